@@ -107,6 +107,23 @@ def damped():
     )
 
 
+def followed():
+    """Loads that turn with their sections, two at one place, beside one that does not."""
+    left = ub.Beam((0, 0), (0, 3), SECTION, cells=4)
+    roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4)
+    return ub.Scene(
+        [left, roof],
+        joints=[ub.Rigid(left.end, roof.start)],
+        supports=[ub.Clamped(left.start)],
+        loads=[
+            ub.FollowerLoad(roof.end, force=(-3.0, 1.0), time=lambda t: np.sin(3.0 * t)),
+            ub.FollowerLoad(roof.end, force=(0.0, -2.0), moment=1.0, time=ub.ramp(0.3)),
+            ub.FollowerLoad(roof.at(0.5), moment=-2.0),
+            ub.PointLoad(left.end, force=(4.0, -1.0), time=ub.ramp(0.4)),
+        ],
+    )
+
+
 def slipping():
     """Cells with cracks, and between them hinges that slip; in a step several open in turn."""
     cracks = ub.Fibres(ub.Hardening(9e3, modulus=1e5), softening=ub.Softening(4e3, 200.0), number=6)
@@ -147,7 +164,10 @@ def everything(state):
     yield from (np.array(list(part.values())) for part in state.entries)
 
 
-@pytest.mark.parametrize("make", [elastic, inelastic, connected, jointed, damped, slipping])
+SCENES = [elastic, inelastic, connected, jointed, damped, followed, slipping]
+
+
+@pytest.mark.parametrize("make", SCENES)
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 def test_the_same_as_in_python(make, scheme):
     """To the last digit but for sums in another order; a step that C leaves to Python included."""
@@ -160,7 +180,7 @@ def test_the_same_as_in_python(make, scheme):
         assert np.allclose(one.astype(float), other.astype(float), rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("make", [elastic, damped])
+@pytest.mark.parametrize("make", [elastic, damped, followed])
 @pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.DecayingMidpoint(0.4)], ids=str)
 def test_steps_of_other_lengths_in_turn(make, scheme):
     """Now in C, now in Python: what depends on the last step knows whoever took it."""

@@ -30,11 +30,12 @@ from ufl_beam.terms.connectors import Couplings, couplings
 from ufl_beam.terms.damping import SecondDifferences, damping_forces
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.follower_loads import FollowerLoads
 from ufl_beam.terms.guide_curves import guides
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.inelastic_cells import inelastic_cells
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.loads import FollowerLoads, FrameForces, LoadTerm
+from ufl_beam.terms.loads import FrameForces, LoadTerm
 from ufl_beam.terms.material_points import Points, expect_entries
 from ufl_beam.terms.openings import Openable, Openings, SearchFlags
 from ufl_beam.terms.rigid_plastic import RigidPlasticResponse

@@ -23,6 +23,7 @@ from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.follower_loads import FollowerLoads
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import Openings
@@ -89,7 +90,9 @@ class CompiledSteps:
         self._space, rotations = np.zeros((2, share.size)), share.rotations()
         limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
         self._bytes, self._end = 8 * share.size, np.zeros(1)
-        loads = [term for term in equation.terms if isinstance(term, DeadLoads)]
+        kinds = DeadLoads, FollowerLoads
+        loads = {type(x): x.steps_in_c for x in equation.terms if isinstance(x, kinds)}
+        dead, following = (loads.get(kind, ffi.NULL) for kind in kinds)
         multipliers = share.multipliers().astype(np.int32)
         load_weight, motion_weight, at = whole
         self.c = fill(
@@ -99,7 +102,7 @@ class CompiledSteps:
             largest_turn=largest_turn, rotations=len(limited), rotation=limited,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
-            loads=loads[0].steps_in_c if loads else ffi.NULL,
+            loads=dead, follower_loads=following,
             supports=equation.supports.in_c(times),
             states=len(ledger.state), state=ledger.state.numbers,
         )  # fmt: skip

@@ -32,8 +32,6 @@ class DeadLoads(LoadTerm):
         dofs: Local degrees of freedom that are loaded; other arrays here are at these alone.
     """
 
-    _name = "dead loads"
-
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
         super().__init__(share, scheme, ledger)
         # Loads of one time function are one vector; functions need not be hashable.
@@ -50,7 +48,7 @@ class DeadLoads(LoadTerm):
         self._acts: Array = nothing  # now; also at the end of the step, and at that of the last one
         self._end: Array = nothing
         self._before = nothing
-        self.force = np.broadcast_to(0.0, share.size)  # which takes no room
+        self._force = np.broadcast_to(0.0, share.size)  # which takes no room
         self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs)
         self._factors: list[float] = []
 
@@ -72,7 +70,7 @@ class DeadLoads(LoadTerm):
             self._end = self._before + change
             self._acts = self._end if step.at == 1 else self._before + step.at * change
             self._factors = []
-        self.force = self._whole(self._acts)
+        self._force = self._whole(self._acts)
         self._in_c.values = doubles(self._acts)
 
     def loops(self) -> tuple[Loop, Loop | None]:
@@ -141,7 +139,7 @@ class DeadLoads(LoadTerm):
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces at the end of the last step."""
-        self._before = memory.added(self._name, self._whole(self._before))[self.dofs]
+        self._before = memory.added("dead loads", self._whole(self._before))[self.dofs]
         self._acts = self._end = self._before
         self._factors = []
 

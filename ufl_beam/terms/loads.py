@@ -1,10 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Loads, and centrifugal and Coriolis forces: their tangents and works."""
+"""Loads: what all kinds have in common, and centrifugal and Coriolis forces."""
 
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
 
 import numpy as np
 import ufl
@@ -17,117 +16,28 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
-from ufl_beam.model.loads import FollowerLoad, RotatingFrame
-from ufl_beam.model.time_functions import value_at
+from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 
 
 class LoadTerm(Term):
-    """Forces that time or the configuration gives.
-
-    Attributes:
-        force: The forces in the latest residual.
-    """
+    """Forces that time or the configuration gives."""
 
     kind = "loads"
-    _name: str  # in files
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger) -> None:
         self._acting, self._ledger = scheme.acting, ledger
-        self.force: Array = np.zeros(share.size)
-        self._before: Array = self.force
+        self._force: Array = np.zeros(share.size)
+
+    @property
+    def force(self) -> Array:
+        """The forces in the latest residual; a new array where they have changed."""
+        return self._force
 
     @abstractmethod
     def carry_on(self, t: float, q: Array) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the work of the loads."""
-        self._ledger.supplied["loads"] += float(self._acting(self._before, self.force) @ s)
-        self._before = self.force
-
-    def remember(self, memory: Memory, q: Array) -> None:
-        """The forces in the equation of the last step."""
-        self.force = self._before = memory.added(self._name, self._before)
-
-
-class FollowerLoads(LoadTerm):
-    """Forces that turn with the cross-section they act on."""
-
-    _name = "follower loads"
-
-    def __init__(
-        self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
-    ) -> None:
-        super().__init__(share, scheme, ledger)
-        here = [i for i, load in enumerate(loads) if share.computes(load.place)]
-        self._numbers, self._loads = np.array(here, dtype=np.int64), [loads[i] for i in here]
-        dofs = [share.local(share.at(load.place)) for load in self._loads]
-        self._dofs = np.array(dofs, dtype=np.int64).reshape(-1, 3)
-        self._forces = np.array([[*load.force, load.moment] for load in self._loads]).reshape(-1, 3)
-        x, y, turn = self._dofs.T
-        self._entries = np.array([A.positions(x, turn), A.positions(y, turn)])
-        self._A = A
-        self._weight = scheme.load_weight
-        self._sizes_before: Array = np.zeros_like(self._forces)
-
-    def begin(self, step: Step) -> None:
-        """The size of the loads in the step."""
-        before, target = self._sizes_before, self._sizes_at(step.load_time)
-        self._sizes_at_end = before + step.fraction * (target - before)
-        self._sizes = before + step.at * (self._sizes_at_end - before)
-        self._ψ0 = step.q0[self._dofs[:, 2]]
-
-    def carry_on(self, t: float, q: Array) -> Array:
-        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
-        self._sizes_before = self._sizes = self._sizes_at(t)
-        self._ψ0 = q[self._dofs[:, 2]]
-        self.force = self._before = self._in_plane(q)
-        return self.force
-
-    def _sizes_at(self, t: float) -> Array:
-        factors = np.array([value_at(load.time, t, load) for load in self._loads])
-        return np.asarray(self._forces * factors.reshape(-1, 1))
-
-    def _in_plane(self, q: Array) -> Array:
-        """Nodal forces at ``q``."""
-        force = np.zeros_like(q)
-        x, y = self._turned(q)
-        np.add.at(force, self._dofs, np.column_stack([x, y, self._sizes[:, 2]]))
-        return force
-
-    def _turned(self, q1: Array) -> tuple[Array, Array]:
-        """The forces in the plane, each (number of loads,)."""
-        ψ = self._ψ0 + self._weight * (q1[self._dofs[:, 2]] - self._ψ0)
-        cos, sin = np.cos(ψ), np.sin(ψ)
-        x, y = self._sizes[:, 0], self._sizes[:, 1]
-        return cos * x - sin * y, sin * x + cos * y
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract the loads from the residual."""
-        self.force = self._in_plane(q1)
-        r -= self.force
-
-    def add_tangent(self, q1: Array) -> None:
-        """Subtract the derivative by the rotation."""
-        x, y = self._turned(q1)
-        np.add.at(self._A.data, self._entries[0], self._weight * y)
-        np.add.at(self._A.data, self._entries[1], -self._weight * x)
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the work of the loads, and take their sizes."""
-        super().accept(q1, s)
-        self._sizes_before = self._sizes_at_end
-
-    def remember(self, memory: Memory, q: Array) -> None:
-        """The forces in the equation of the last step, and their sizes."""
-        super().remember(memory, q)
-        sizes = memory.rows(self._name, self._numbers, self._sizes_before)
-        self._sizes = self._sizes_before = sizes
-
-
-# -- rotating frames -----------------------------------------------------------------------------
 
 
 @stated
@@ -155,13 +65,12 @@ class FrameForces(LoadTerm):
     Rotary inertia keeps its spin in steady rotation, so no moments come of it.
     """
 
-    _name = "rotating frame"
-
     def __init__(
         self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
         share = fields.share
         super().__init__(share, scheme, ledger)
+        self._before = self._force
         S, G = mass_matrix(fields), turned_mass_matrix(fields)
         S.data[np.isin(S.rows(), share.rotations())] = 0.0
         S.data *= frame.rate**2
@@ -179,14 +88,14 @@ class FrameForces(LoadTerm):
     def carry_on(self, t: float, q: Array) -> Array:
         """The forces at ``q``; take that state as one that is in equilibrium with them."""
         self._grown = 1.0
-        self.force = self._before = self._pull(self._from_centre + q)
-        return self.force
+        self._force = self._before = self._pull(self._from_centre + q)
+        return self._force
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract centrifugal and Coriolis forces from the residual."""
         q: Array = self._q0 + self._share_of_end * (q1 - self._q0)
-        self.force = self._growth * self._pull(self._from_centre + q)
-        r -= self.force
+        self._force = self._growth * self._pull(self._from_centre + q)
+        r -= self._force
         r += self._turn(q1 - self._q0) / self._dt
 
     def add_tangent(self, q1: Array) -> None:
@@ -196,12 +105,12 @@ class FrameForces(LoadTerm):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the work of the centrifugal forces, and take how much of them acts."""
-        super().accept(q1, s)
-        self._grown = self._growth_at_end
+        self._ledger.supplied["loads"] += float(self._acting(self._before, self._force) @ s)
+        self._before, self._grown = self._force, self._growth_at_end
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step, and how much of them acts."""
-        super().remember(memory, q)
+        self._force = self._before = memory.added("rotating frame", self._before)
         self._grown = memory.number("growth of the rotating frame", self._grown)
 
 

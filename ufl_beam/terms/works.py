@@ -255,12 +255,12 @@ class Works(LoadTerm):
 
     def carry_on(self, t: float, q: Array) -> Array:
         """The forces at rest at ``q``; take that state as one that is in equilibrium with them."""
-        self._t, self._grown, self.force = t, 1.0, np.zeros_like(self.force)
+        self._t, self._grown, self._force = t, 1.0, np.zeros_like(self._force)
         for one in self._parts:
             one.begin(q, Clock(t, AT_REST, 1.0))
             one.take(force := one.force(q))
-            self.force = self.force + force
-        return self.force
+            self._force = self._force + force
+        return self._force
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the forces from the residual."""
@@ -274,11 +274,11 @@ class Works(LoadTerm):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what the works did in the step."""
-        self.force = np.zeros_like(q1)
+        self._force = np.zeros_like(q1)
         for one in self._parts:
             force = one.force(q1)
             one.accept(q1, s, force, (self._t, self._end[0]))
-            self.force += force
+            self._force += force
         self._t, self._grown = self._end
 
     def add_state(self, q: Array) -> None:
@@ -290,7 +290,7 @@ class Works(LoadTerm):
         """The time and growth of the works, and their forces in the equation of the last step."""
         self._t = memory.number("time of works", self._t)
         self._grown = memory.number("growth of works", self._grown)
-        self.force = memory.added("works", self.force)
+        self._force = memory.added("works", self._force)
         for one in self._parts:
             one.remember(memory)
 

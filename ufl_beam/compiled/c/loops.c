@@ -132,6 +132,37 @@ void subtract_vector(void *self, const double *q, double *b)
   for (int i = 0; i < a->size; ++i) b[a->dof[i]] -= a->values[i];
 }
 
+/* Follower load k in the plane at q. */
+static void turn_load(const follower_loads *f, int k, const double *q, double *x, double *y)
+{
+  const double turn = f->turn0[k] + f->part * (q[f->turning[k]] - f->turn0[k]);
+  const double *size = f->now + 3 * k, c = cos(turn), s = sin(turn);
+  *x = c * size[0] - s * size[1], *y = s * size[0] + c * size[1];
+}
+
+void subtract_follower_loads(void *self, const double *q, double *r)
+{
+  const follower_loads *f = self;
+  memset(f->force, 0, f->size * sizeof *f->force);
+  for (int k = 0; k < f->number; ++k) {
+    double x, y;
+    turn_load(f, k, q, &x, &y);
+    const int32_t *at = f->at + 3 * k;
+    f->force[at[0]] += x, f->force[at[1]] += y, f->force[at[2]] += f->now[3 * k + 2];
+  }
+  for (int i = 0; i < f->size; ++i) r[f->dof[i]] -= f->force[i];
+}
+
+void add_tangent_of_follower_loads(void *self, const double *q, double *tangent)
+{
+  const follower_loads *f = self;
+  for (int k = 0; k < f->number; ++k) {
+    double x, y;
+    turn_load(f, k, q, &x, &y);
+    tangent[f->x[k]] += f->part * y, tangent[f->y[k]] -= f->part * x;
+  }
+}
+
 /* Where a matrix holds an entry, -1 if nowhere; columns are in order. */
 static inline int32_t find_entry(int rows, const int32_t *indptr, const int32_t *indices, int32_t row,
                                  int32_t column)

@@ -108,6 +108,8 @@ void combine(int size, double a, const double *x, double b, const double *y, dou
 void predict_strains(predicted_strains *p, const double *q);
 void add_static_tangent(void *self, const double *q, double *tangent);
 void subtract_vector(void *self, const double *q, double *b);
+void subtract_follower_loads(void *self, const double *q, double *r);
+void add_tangent_of_follower_loads(void *self, const double *q, double *tangent);
 void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
@@ -498,6 +500,21 @@ typedef struct {
   double *entry, held;
 } form_value;
 
+/* Loads that turn with cross-sections, see FollowerLoads; three numbers of each. */
+typedef struct {
+  int number, size;
+  const int32_t *dof;      /* that are loaded; size */
+  const int32_t *at;       /* places among these */
+  const int32_t *turning;  /* rotations that the loads follow; number */
+  double *turn0, part;     /* these at the beginning of the step; part of its turn at which loads act */
+  const double *given;     /* forces along and across, and moments, times functions of time: */
+  const time_function *factor;
+  double *now, *end, *before; /* in the equation, at the end of the step, at that of the last one */
+  const int32_t *x, *y;    /* entries of the tangent, of forces in the plane by the rotations */
+  double *force, *force_before; /* in the plane: in the latest residual, in that of the last step; size */
+  double weight_of_before, *work;
+} follower_loads;
+
 /* Vectors times functions of time at some degrees of freedom, see DeadLoads. */
 typedef struct {
   int size, vectors, changed; /* changed: since norm was computed */
@@ -615,6 +632,7 @@ typedef struct {
   rates *rates;       /* in dynamics */
   static_path *path;  /* in statics */
   dead_loads *loads;  /* or none */
+  const follower_loads *follower_loads; /* or none */
   moving_supports *supports;
   int32_t *search;    /* flags of points that may open; or none */
   int places;         /* that may open, and their largest excess, see points */
@@ -638,6 +656,8 @@ void begin_static_tangent(void *self, const time_step *step, const double *q1, c
 void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s);
 void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
+void begin_follower_loads(void *self, const time_step *step, const double *q1, const double *s);
+void accept_follower_loads(void *self, const time_step *step, const double *q1, const double *s);
 void begin_viscous_forms(void *self, const time_step *step, const double *q1, const double *s);
 void begin_second_differences(void *self, const time_step *step, const double *q1, const double *s);
 void accept_second_differences(void *self, const time_step *step, const double *q1, const double *s);

@@ -141,6 +141,31 @@ void accept_dead_loads(void *self, const time_step *step, const double *q1, cons
   memcpy(l->before, l->end, l->size * sizeof *l->end);
 }
 
+void begin_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const follower_loads *f = self;
+  for (int k = 0; k < f->number; ++k) {
+    const double factor = value_at(f->factor + k, step->load_time);
+    for (int i = 3 * k; i < 3 * k + 3; ++i) {
+      f->end[i] = f->before[i] + step->fraction * (f->given[i] * factor - f->before[i]);
+      f->now[i] = f->before[i] + step->at * (f->end[i] - f->before[i]);
+    }
+    f->turn0[k] = step->q0[f->turning[k]];
+  }
+}
+
+void accept_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const follower_loads *f = self;
+  const double a = f->weight_of_before;
+  double work = 0;
+  for (int i = 0; i < f->size; ++i)
+    work += (a * f->force_before[i] + (1 - a) * f->force[i]) * s[f->dof[i]];
+  *f->work += work;
+  memcpy(f->force_before, f->force, f->size * sizeof *f->force);
+  memcpy(f->before, f->end, 3 * (size_t)f->number * sizeof *f->end);
+}
+
 /* out = sum of numbers times rates, from the one with number `first` on */
 static void combine_rates(const rates *r, const double *numbers, int first, double *out)
 {
@@ -407,6 +432,8 @@ static int solve(march *m)
     m->loads->changed = 0;
   }
   e->loads = m->loads ? m->loads->norm : 0;
+  const follower_loads *f = m->follower_loads;
+  if (f) e->loads += norm_of_some(f->size, f->dof, e->weight, f->force);
   if (!m->search) return iterate(m);
   memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
   m->search[HOLD] = 1;

@@ -1,0 +1,117 @@
+# SPDX-License-Identifier: MIT
+"""Follower loads: forces that turn with the cross-section they act on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.model.loads import FollowerLoad
+from ufl_beam.model.time_functions import value_at
+from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.loads import LoadTerm
+from ufl_beam.terms.phases import Phases, TimeFunctions, weight_of_before
+
+
+class FollowerLoads(LoadTerm):
+    """Forces that turn with the cross-section they act on.
+
+    Attributes:
+        steps_in_c: ``follower_loads`` of loops.h.
+    """
+
+    def __init__(
+        self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
+    ) -> None:
+        super().__init__(share, scheme, ledger)
+        here = [i for i, load in enumerate(loads) if share.computes(load.place)]
+        self._numbers, self._loads = np.array(here, dtype=np.int64), [loads[i] for i in here]
+        places = [share.local(share.at(load.place)) for load in self._loads]
+        dofs = np.array(places, dtype=np.int32).reshape(-1, 3)
+        x, y, self._turning = np.ascontiguousarray(dofs.T)
+        loaded: Array = np.zeros(share.size)
+        loaded[dofs] = 1.0
+        # A process may own degrees of freedom that others load.
+        self._dofs = np.flatnonzero(share.added(loaded)).astype(np.int32)
+        given = [[*load.force, load.moment] for load in self._loads]
+        self._given = np.array(given, dtype=np.float64).reshape(-1, 3)
+        # In the equation, at the end of the step, and at that of the last one.
+        self._sizes = np.zeros((3, *self._given.shape))
+        self._turns, self._size, self._A = np.zeros(len(here)), share.size, A
+        # In the latest residual, and in that of the last step.
+        self._forces = np.zeros((2, len(self._dofs)))
+        self.steps_in_c = struct(
+            "follower_loads", number=len(here), size=len(self._dofs), dof=self._dofs,
+            at=np.searchsorted(self._dofs, dofs).astype(np.int32), given=self._given,
+            turning=self._turning, turn0=self._turns, part=scheme.load_weight,
+            now=self._sizes[0], end=self._sizes[1], before=self._sizes[2],
+            x=A.positions(x, self._turning), y=A.positions(y, self._turning),
+            force=self._forces[0], force_before=self._forces[1],
+            weight_of_before=weight_of_before(scheme.acting),
+            work=ledger.supplied.pointer("loads"),
+        )  # fmt: skip
+
+    @property
+    def force(self) -> Array:
+        """The forces in the latest residual; a new array."""
+        return self._whole(self._forces[0])
+
+    def begin(self, step: Step) -> None:
+        """The sizes of the loads in the step."""
+        now, end, before = self._sizes
+        end[:] = before + step.fraction * (self._sizes_at(step.load_time) - before)
+        now[:] = before + step.at * (end - before)
+        self._turns[:] = step.q0[self._turning]
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """C loops of the forces in the plane, and of their derivatives by the rotation."""
+        c = self.steps_in_c
+        return loop("subtract_follower_loads", c), loop("add_tangent_of_follower_loads", c)
+
+    def phases(self, times: TimeFunctions) -> Phases | None:
+        """Loops over the loads."""
+        c = fill(self.steps_in_c, factor=times.in_c([(load.time, load) for load in self._loads]))
+        begin, accept = (loop(f"{name}_follower_loads", c) for name in ("begin", "accept"))
+        return Phases([begin], [accept])
+
+    def carry_on(self, t: float, q: Array) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
+        self._sizes[:] = self._sizes_at(t)
+        self._turns[:] = q[self._turning]
+        self.add_residual(q, np.zeros(self._size))
+        self._forces[1] = self._forces[0]
+        return self.force
+
+    def _sizes_at(self, t: float) -> Array:
+        factors = np.array([value_at(load.time, t, load) for load in self._loads])
+        return np.asarray(self._given * factors.reshape(-1, 1))
+
+    def _whole(self, forces: Array) -> Array:
+        """Forces at all local degrees of freedom, from those that are loaded."""
+        whole: Array = np.zeros(self._size)
+        whole[self._dofs] = forces
+        return whole
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Subtract the loads from the residual."""
+        lib.subtract_follower_loads(self.steps_in_c, doubles(q1), doubles(r))
+
+    def add_tangent(self, q1: Array) -> None:
+        """Subtract the derivative by the rotation."""
+        lib.add_tangent_of_follower_loads(self.steps_in_c, doubles(q1), doubles(self._A.data))
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Enter the work of the loads, and take their sizes."""
+        lib.accept_follower_loads(self.steps_in_c, ffi.NULL, doubles(q1), doubles(s))
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces in the equation of the last step, and their sizes."""
+        self._forces[:] = memory.added("follower loads", self._whole(self._forces[1]))[self._dofs]
+        self._sizes[:] = memory.rows("follower loads", self._numbers, self._sizes[2])
