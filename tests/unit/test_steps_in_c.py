@@ -182,9 +182,11 @@ def test_the_same_as_in_python(make, scheme):
 
 @pytest.mark.parametrize("make", [elastic, damped, followed])
 @pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.DecayingMidpoint(0.4)], ids=str)
-def test_steps_of_other_lengths_in_turn(make, scheme):
+@pytest.mark.parametrize("degree", [1, 3])
+def test_steps_of_other_lengths_in_turn(make, scheme, degree):
     """Now in C, now in Python: what depends on the last step knows whoever took it."""
-    both, in_python = ub.Simulation(make(), scheme), InPython(make(), scheme)
+    mesh = ub.Mesh(degree=degree)
+    both, in_python = (kind(make(), scheme, mesh=mesh) for kind in (ub.Simulation, InPython))
     for n, t in enumerate(np.cumsum([4, 4, 6, 2, 4, 8, 2, 4, 1]) / 256):
         if n % 3 == 1:
             both.take_back()

@@ -72,8 +72,10 @@ class KelvinVoigtForces(OfForms):
     def phases(self, times: TimeFunctions) -> Phases | None:
         """Loops over the cells; the step is a number of the forms."""
         begin, accept = self._loops_of_step()
-        forms = knowing(self._of_step, self._rate)
-        c = struct("viscous_forms", **forms, time=self._time, dt=self._dt)
+        c = struct(
+            "viscous_forms", **knowing(self._of_step, self._rate), of_cell=len(self._rate.x.array),
+            time=self._time, dt=self._dt,
+        )  # fmt: skip
         return Phases([*begin, loop("begin_viscous_forms", c)], accept)
 
     def begin(self, step: Step) -> None:

@@ -476,9 +476,9 @@ typedef struct {
   int at;
 } form_of_step;
 
-/* Forms that know a time over that of the step, which they have from `at` on. */
+/* Forms that know a time over that of the step, in each point of a cell, which they have from `at` on. */
 typedef struct {
-  int forms;
+  int forms, of_cell;
   const form_of_step *form;
   double time, *dt; /* dt: of the latest step */
 } viscous_forms;

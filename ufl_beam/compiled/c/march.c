@@ -62,7 +62,7 @@ void begin_viscous_forms(void *self, const time_step *step, const double *q1, co
   *v->dt = step->dt;
   for (int k = 0; k < v->forms; ++k)
     for (int c = 0; c < v->form[k].form->number; ++c)
-      put_in_cell(v->form[k].form, c, v->form[k].at, 1, &rate);
+      for (int i = 0; i < v->of_cell; ++i) put_in_cell(v->form[k].form, c, v->form[k].at + i, 1, &rate);
 }
 
 void begin_second_differences(void *self, const time_step *step, const double *q1, const double *s)
