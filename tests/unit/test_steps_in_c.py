@@ -124,6 +124,25 @@ def followed():
     )
 
 
+def driven():
+    """Dampers, a motor and an actuator."""
+    left = ub.Beam((0, 0), (0, 3), SECTION, cells=4)
+    roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4)
+    return ub.Scene(
+        [left, roof],
+        connectors=[
+            ub.Turn(left.end, roof.start, ub.Motor(lambda t: 0.3 * np.sin(t))),
+            ub.Turn(ub.ground(0, 0), left.start, ub.Damper(20.0)),
+            ub.Turn(ub.ground(4, 3), roof.end, ub.Damper(5.0)),
+            ub.Stretch(ub.ground(2, 0), roof.at(0.5), ub.Actuator(ub.ramp(0.3))),
+            ub.Stretch(ub.ground(4, 0), left.at(0.5), ub.Actuator(lambda t: -3.0 * t)),
+        ],
+        joints=[ub.Revolute(left.end, roof.start)],
+        supports=[ub.Pinned(left.start), ub.Roller(roof.end)],
+        loads=[ub.PointLoad(left.end, force=(4.0, -1.0), time=ub.ramp(0.4))],
+    )
+
+
 def slipping():
     """Cells with cracks, and between them hinges that slip; in a step several open in turn."""
     cracks = ub.Fibres(ub.Hardening(9e3, modulus=1e5), softening=ub.Softening(4e3, 200.0), number=6)
@@ -164,7 +183,7 @@ def everything(state):
     yield from (np.array(list(part.values())) for part in state.entries)
 
 
-SCENES = [elastic, inelastic, connected, jointed, damped, followed, slipping]
+SCENES = [elastic, inelastic, connected, jointed, damped, followed, driven, slipping]
 
 
 @pytest.mark.parametrize("make", SCENES)
@@ -180,7 +199,7 @@ def test_the_same_as_in_python(make, scheme):
         assert np.allclose(one.astype(float), other.astype(float), rtol=1e-9, atol=1e-9)
 
 
-@pytest.mark.parametrize("make", [elastic, damped, followed])
+@pytest.mark.parametrize("make", [elastic, damped, followed, driven])
 @pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.DecayingMidpoint(0.4)], ids=str)
 @pytest.mark.parametrize("degree", [1, 3])
 def test_steps_of_other_lengths_in_turn(make, scheme, degree):
@@ -267,7 +286,7 @@ def test_no_leap_beyond_a_limit_load(kind):
     assert 1.5 * caught.value.solution.times[-1] == pytest.approx(1.0, rel=1e-3)
 
 
-@pytest.mark.parametrize("make", [elastic, inelastic, connected, jointed])
+@pytest.mark.parametrize("make", [elastic, inelastic, connected, jointed, damped, followed, driven])
 @pytest.mark.parametrize(
     "scheme", [ub.Midpoint(0.1, 0.05), ub.GeneralizedAlpha(), ub.Static()], ids=str
 )

@@ -24,6 +24,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.connector_responses import Response, Rows, Setting, respond
+from ufl_beam.terms.phases import TimeFunctions
 
 CREEP = 1e-12
 """Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
@@ -37,7 +38,7 @@ class _Held(Response):
 
     steady = True
 
-    def in_steps(self) -> dict[str, Any] | None:
+    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
         return {}
 
     def rows(self, e1: Array, λ: Array) -> Rows:
@@ -49,6 +50,11 @@ class _Driven(Response):
 
     steady = True
     _part, _entry, _sign = "supplied", "motors", -1.0
+
+    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+        motors = zip(self._laws, self._links, strict=True)
+        wanted = times.in_c([(law.motion, link) for law, link in motors])
+        return {"wanted_motion": wanted, **self._entry_in_steps()}
 
     def begin(self, e0: Array, step: Step) -> None:
         super().begin(e0, step)
@@ -73,8 +79,8 @@ class _Given(Response):
     _part, _sign = "supplied", -1.0
 
     def _prepare(self, law: Any) -> None:
-        self._force: Array = np.zeros(len(self._links))
-        self._reached: Array = self._force
+        # Acting, at the end of the step, and at that of the last one.
+        self._force, self._end, self._reached = np.zeros((3, len(self._links)))
 
     @abstractmethod
     def _wanted(self, law: Any, link: Connector, step: Step) -> float:
@@ -83,22 +89,22 @@ class _Given(Response):
     def begin(self, e0: Array, step: Step) -> None:
         super().begin(e0, step)
         wanted = -np.array([self._wanted(link.law, link, step) for link in self._links])
-        self._end = self._reached + step.fraction * (wanted - self._reached)
-        self._force = self._reached + step.at * (self._end - self._reached)
+        self._end[:] = self._reached + step.fraction * (wanted - self._reached)
+        self._force[:] = self._reached + step.at * (self._end - self._reached)
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         return 0.0, 1.0, self._force
 
     def accept(self, e1: Array, work: float) -> None:
         super().accept(e1, work)
-        self._reached = self._end
+        self._reached[:] = self._end
 
     def state(self) -> Array:
         """The forces at the end of the last step."""
         return self._reached[:, None]
 
     def restore(self, rows: Array) -> None:
-        self._reached = rows[:, 0].copy()
+        self._reached[:] = rows[:, 0]
 
 
 @respond.register(Actuator)
@@ -106,6 +112,12 @@ class _Pushed(_Given):
     """Actuators: the force is a function of time."""
 
     _entry = "loads"
+
+    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+        actuators = zip(self._laws, self._links, strict=True)
+        wanted = times.in_c([(law.force, link) for law, link in actuators])
+        ends = {"end": self._end, "reached": self._reached}
+        return {"wanted_force": wanted, **ends, **self._entry_in_steps()}
 
     def _wanted(self, law: Any, link: Connector, step: Step) -> float:
         return value_at(law.force, step.load_time, link)
@@ -127,6 +139,9 @@ class _Damped(Response):
 
     steady = True
     _entry = "damping"
+
+    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+        return {"viscosity": self._numbers("viscosity"), **self._entry_in_steps()}
 
     def rows(self, e1: Array, λ: Array) -> Rows:
         factor = self._numbers("viscosity") / self._dt

@@ -19,6 +19,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import Openable, SearchFlags
+from ufl_beam.terms.phases import TimeFunctions
 
 Rows = tuple[Any, Any, Any]
 """α, β, γ of some connectors: arrays or numbers."""
@@ -63,12 +64,16 @@ class Response(ABC):
     def _prepare(self, law: Any) -> None:
         """Prepare the response; called once."""
 
-    def in_steps(self) -> dict[str, Any] | None:
+    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
         """Fields of ``coupling_term`` of loops.h for steps without Python; None where they need it.
 
         Names of entries of the ledger are those of ``inelastic_term``.
         """
         return None
+
+    def _entry_in_steps(self) -> dict[str, Any]:
+        """Those of them that say where the work of the forces is entered."""
+        return {"entry": self._entries.pointer(self._entry), "sign": self._sign}
 
     def _numbers(self, name: str) -> Array:
         """A number of the laws."""

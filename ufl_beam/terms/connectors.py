@@ -232,9 +232,9 @@ class CompiledCouplings(Couplings):
         return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
 
     def phases(self, times: TimeFunctions) -> Phases | None:
-        """Loops over what is held, springs and rigid-plastic connectors."""
+        """Loops over what is held, driven, pushed or damped, springs and rigid-plastic ones."""
         response = self.response
-        if (of_law := response.in_steps()) is None:
+        if (of_law := response.in_steps(times)) is None:
             return None
         fields = {name for name, _ in ffi.typeof("coupling_term").fields}
         mine = {name: x for name, x in of_law.items() if name in fields}
@@ -245,7 +245,7 @@ class CompiledCouplings(Couplings):
         def enter(q: Array) -> None:
             if q is not self._q:
                 self._q, self._e[:] = q, self.motion(q)
-            if response.steady:
+            if not of_law:  # rows that stay
                 self._put(*response.rows(self._e, self._before))
             c.hardened = response.stored
 

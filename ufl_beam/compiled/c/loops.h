@@ -577,9 +577,15 @@ typedef struct {
   double *plastic, *hinges, *numerical, *released, *stored, *hardening;
 } inelastic_term;
 
-/* Connectors of one motion: springs, rigid-plastic ones, or such as are held; entries or none. */
+/* Connectors of one motion: springs, rigid-plastic ones, or such as are held, damped, driven or pushed;
+ * entries or none. */
 typedef struct {
   couplings *links;
+  const double *viscosity;            /* of dampers */
+  const time_function *wanted_motion; /* of motors */
+  const time_function *wanted_force;  /* of actuators; */
+  double *end, *reached;              /* theirs at the end of the step, and of the last one */
+  double *entry, sign;                /* of the work in the ledger */
   int dt_of_law;       /* where a rigid-plastic law has the step */
   int32_t *way_before; /* of rigid-plastic ones, after the last step */
   double hardened, loss; /* stored by rigid-plastic ones; part of what backward Euler loses */

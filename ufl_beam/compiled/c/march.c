@@ -315,11 +315,36 @@ void add_energy_of_points(void *self, const time_step *step, const double *q1, c
   enter_stored(t, t->cells->points->sum);
 }
 
+/* Rows of what damps, drives or pushes, which stay the same during a step. */
+static void put_rows_of_step(const coupling_term *t, const time_step *step)
+{
+  const couplings *c = t->links;
+  for (int k = 0; k < c->number; ++k) {
+    const int i = c->link[k];
+    double a = 0, b = 1, y;
+    if (t->viscosity) {
+      a = -t->viscosity[i] / step->dt;
+      y = a * c->e0[i];
+    } else if (t->wanted_motion) {
+      const double wanted = value_at(t->wanted_motion + i, step->motion_time);
+      a = 1, b = 0;
+      y = c->e0[i] + step->fraction * (wanted - c->e0[i]);
+    } else {
+      const double wanted = -value_at(t->wanted_force + i, step->load_time);
+      t->end[i] = t->reached[i] + step->fraction * (wanted - t->reached[i]);
+      y = t->reached[i] + step->at * (t->end[i] - t->reached[i]);
+    }
+    const double row[3] = {a, b, y};
+    put_row(c, k, row);
+  }
+}
+
 void begin_couplings(void *self, const time_step *step, const double *q1, const double *s)
 {
   const coupling_term *t = self;
   const couplings *c = t->links;
   const rigid_plastic *p = c->rigid_plastic;
+  if (t->entry) put_rows_of_step(t, step);
   if (c->points) begin_points(c->points, t->points->dt, step->dt);
   for (int i = 0; p && i < p->number; ++i) {
     p->w[i * p->width + t->dt_of_law] = step->dt;
@@ -331,7 +356,9 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
 {
   coupling_term *t = self;
   const couplings *c = t->links;
-  commit_couplings(c, q1, step->dt);
+  const double taken = commit_couplings(c, q1, step->dt);
+  if (t->entry) *t->entry += t->sign * taken;
+  if (t->reached) memcpy(t->reached, t->end, c->number * sizeof *t->end);
   if (c->points) {
     respond_springs(c);
     commit(c->points);
