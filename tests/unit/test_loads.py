@@ -150,3 +150,18 @@ def test_loads_at_joints_between_processes(joint, load):
     # Whatever the joints do, the momentum is the impulse: (6, 2 + ... + 7) N for 1 s
     if load is ub.PointLoad:
         assert all_of_us.momentum()[-1, :2] == pytest.approx([6, 27], rel=1e-9)
+
+
+def test_work_of_follower_loads_among_many_entries():
+    """The ledger needs more room after the loads have been made."""
+    beam = ub.Beam((0, 0), (4, 0), SECTION, cells=4)
+    load = ub.FollowerLoad(beam.end, force=(0.0, -2.0), time=ub.ramp(0.3))
+
+    def lift(w):
+        return 0.01 * w[1]
+
+    works = [ub.VirtualWork(f"wind {k}", lift) for k in range(20)]
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], works=works)
+    run = ub.simulate(scene, ub.Midpoint(), t=(0.0, 0.5), dt=0.02, progress=False)
+    assert run.energy.supplied["loads"][-1] > 0.001
+    assert run.energy.worst < 1e-9

@@ -55,7 +55,6 @@ class FollowerLoads(LoadTerm):
             x=A.positions(x, self._turning), y=A.positions(y, self._turning),
             force=self._forces[0], force_before=self._forces[1],
             weight_of_before=weight_of_before(scheme.acting),
-            work=ledger.supplied.pointer("loads"),
         )  # fmt: skip
 
     @property
@@ -78,6 +77,7 @@ class FollowerLoads(LoadTerm):
     def phases(self, times: TimeFunctions) -> Phases | None:
         """Loops over the loads."""
         c = fill(self.steps_in_c, factor=times.in_c([(load.time, load) for load in self._loads]))
+        c.work = self._ledger.supplied.pointer("loads")
         begin, accept = (loop(f"{name}_follower_loads", c) for name in ("begin", "accept"))
         return Phases([begin], [accept])
 
@@ -109,6 +109,8 @@ class FollowerLoads(LoadTerm):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the work of the loads, and take their sizes."""
+        # Entries may have moved since the last step: each name that comes may need more room.
+        self.steps_in_c.work = self._ledger.supplied.pointer("loads")
         lib.accept_follower_loads(self.steps_in_c, ffi.NULL, doubles(q1), doubles(s))
 
     def remember(self, memory: Memory, q: Array) -> None:
