@@ -19,10 +19,11 @@ from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
 from ufl_beam.output import output_files
+from ufl_beam.output.archive import read
 from ufl_beam.output.output_files import OutputFile
 from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import PAGE, XdmfWriter
-from ufl_beam.simulation.checkpoint_file import read
+from ufl_beam.simulation.checkpoint import FORMAT
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
 
@@ -127,7 +128,7 @@ def test_xdmf_and_a_checkpoint_of_one_stem(shared_path, on_first_rank):
             checkpoint=ub.Checkpoint(shared_path / "run.h5", every=2),
         )
     found = on_first_rank(lambda: read_xdmf(shared_path / "run.xdmf"))
-    kept = on_first_rank(lambda: read(shared_path / "run.h5"))
+    kept = on_first_rank(lambda: read(shared_path / "run.h5", FORMAT))
     assert len(found.times) == len(kept["history/q"]) == len(solution.times) == 11
 
 
@@ -258,7 +259,7 @@ def test_a_file_that_was_removed_before_a_checkpoint(kind, shared_path, on_first
     with pytest.raises(FileNotFoundError, match=message) as error:
         run(recorder(shared_path / name), Remove(shared_path / gone, 3), checkpoint=checkpoint)
     assert len(error.value.solution.times) == 5
-    kept = on_first_rank(lambda: read(shared_path / "a.checkpoint"))
+    kept = on_first_rank(lambda: read(shared_path / "a.checkpoint", FORMAT))
     assert len(kept["history/q"]) == 3
     with pytest.raises(ub.SceneError, match=r"it is not (the file|what) (that )?was written"):
         run(recorder(shared_path / name), Remove(shared_path / gone, 3), checkpoint=checkpoint)

@@ -164,7 +164,7 @@ class OutputFile:
             )
 
 
-def put_in_place(path: Path, data: bytes) -> None:
+def put_in_place(path: Path, data: bytes | memoryview) -> None:
     """Write a whole file; the one before stays until the new one is on the disk."""
     part = path.parent / f"{path.name}.part"
     try:
