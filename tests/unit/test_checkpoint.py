@@ -20,7 +20,6 @@ from ufl_beam.simulation.checkpoint import FORMAT
 from ufl_beam.simulation.fingerprint import Description, difference
 
 
-
 def read(path):
     return archive.read(path, FORMAT)
 
@@ -309,7 +308,7 @@ def test_a_history_that_is_gone(path, on_first_rank):
     table = path.with_suffix(".csv")
     run(path, record=ub.History(table))
     on_first_rank(lambda: table.write_text("t\n0\n"))
-    with pytest.raises(ub.SceneError, match="it is not the file that was written up to"):
+    with pytest.raises(ub.SceneError, match="it is not what was written up to the checkpoint"):
         run(path, record=ub.History(table))
 
 

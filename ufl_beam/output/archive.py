@@ -36,10 +36,13 @@ ADVICE = {
 }
 """What to do about a file that cannot be used."""
 
+NPY: Any = np.lib.format
+"""NumPy's reader and writer of arrays; it has no types."""
+
 DIGEST = 64
 """Bytes of the checksum at the end of a file."""
 
-END = re.compile(rb"(?s).*?(\w+ of ufl_beam, \d+); written by ufl_beam ([!-~]+); sha256 [0-9a-f]{64}")
+END = re.compile(rb"(?s).*?(\w+ of ufl_beam, \d+); written by ufl_beam ([!-~]+); sha256 \w{64}")
 """The end of a file: format, and version of the package."""
 
 
@@ -75,7 +78,7 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
                 member.write(json.dumps(text, default=_plain).encode())
             for name, values in arrays.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                    np.lib.format.write_array(member, values, allow_pickle=False)
+                    NPY.write_array(member, values, allow_pickle=False)
     except (TypeError, ValueError) as error:
         raise SceneError(
             f"{what} {path}{at} cannot be written: a state() has something else than numbers, "
@@ -123,7 +126,8 @@ def read(path: Path, format: str) -> Content:
         raise SceneError("there is no such file") from None
     except OSError as error:
         raise SceneError(f"the file cannot be read: {error.strerror}") from None
-    found, by, content = "", "an earlier version", {}
+    content: Content = {}
+    found, by = "", "an earlier version"
     if data.startswith(b"\x89HDF\r\n\x1a\n"):
         found, content = _without_checksum(data)
     elif data.startswith(b"checkpoint of ufl_beam, 2;"):
@@ -155,7 +159,7 @@ def read(path: Path, format: str) -> Content:
             name, _, ending = member.rpartition(".")
             if ending == "npy":
                 stored = io.BytesIO(archive.read(member))
-                content[name] = np.lib.format.read_array(stored, allow_pickle=False)
+                content[name] = NPY.read_array(stored, allow_pickle=False)
     return content
 
 

@@ -20,7 +20,7 @@ from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_locks import Lock
 from ufl_beam.output.archive import Content, above, decoding, read, write
-from ufl_beam.output.output_files import require_path
+from ufl_beam.output.output_files import part_of, require_path
 from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state
 from ufl_beam.simulation.solution import Solution
 
@@ -79,7 +79,7 @@ class Checkpoint:
     def files(self) -> tuple[Path, ...]:
         """The file, and the one that takes its place; no other output may write them."""
         path = Path(self.path)
-        return path, path.parent / f"{path.name}.part"
+        return path, part_of(path)
 
 
 class Keeper:

@@ -147,7 +147,7 @@ class KeptStates:
         """
         require_arrays(arrays, {"times": (-1,)})
         n, grid = len(arrays["times"]), self._grid
-        shapes = {
+        shapes: dict[str, tuple[int, ...]] = {
             "reactions": (n, len(grid.scene.supports), 3), "material": (n, -1, 7),
             "connections": (n, len(grid.scene.links), 5),
         }  # fmt: skip
