@@ -15,6 +15,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.arrays import State as State
 from ufl_beam.discretization.partition import Share
+from ufl_beam.errors import SceneError
 
 NOWHERE: Array = np.empty(0)
 """In the place of a configuration: of what is remembered, strains and stored energies are not that
@@ -105,18 +106,27 @@ class Restoring(Memory):
         self._state = state
 
     def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
-        return np.asarray(self._state[name][where])
+        return np.asarray(self._found(name, (size,))[where])
 
     def _summed(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
-        here = self._state[name][where]
+        here = self._found(name, (size,))[where]
         here[owned:] = 0.0  # the owner has all of it
         return np.asarray(here)
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
         """Return the saved rows of these numbers."""
-        table = self._state.get(f"{name}, {rows.shape[1]}")
-        if table is None:
+        columns = rows.shape[1]
+        if f"{name}, {columns}" not in self._state:
             return rows
+        table = self._found(f"{name}, {columns}", (-1, columns + 1))
         found = np.minimum(np.searchsorted(table[:, 0], numbers), len(table) - 1)
         known = table[found, 0] == numbers
         return np.where(known[:, None], table[found, 1:], rows)
+
+    def _found(self, name: str, shape: tuple[int, ...]) -> Array:
+        """Return an array of the state; :class:`SceneError` if it has not the shape; -1 is any."""
+        values = self._state.get(name)
+        if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
+            found = "missing" if values is None else f"of shape {values.shape}"
+            raise SceneError(f"the array {name!r} of the state is {found}, and must be {shape}")
+        return values

@@ -23,12 +23,12 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import above, below
+from ufl_beam.output.archive import above, below, decoding
 from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, say
 from ufl_beam.progress_bar import progress_bar
-from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
+from ufl_beam.simulation.checkpoint import FORMAT, Checkpoint, Keeper, end_of
 from ufl_beam.simulation.diagnosis import open_ledger
 from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
@@ -130,11 +130,13 @@ def simulate(
 
         def go_on(keeper: Keeper) -> None:
             found = keeper.found
-            simulation.resume(below("state/", found))
-            solution.resume(below("history/", found))
+            with decoding(keeper.path, FORMAT):
+                simulation.resume(below("state/", found))
+                solution.resume(below("history/", found))
+                pace.restore(found["pace"])
+                solution.seconds = float(found["seconds"])
             solution.parts, solution.iterations = simulation.parts, simulation.iterations
-            pace.restore(found["pace"])
-            solution.seconds, solution.time_error = found["seconds"], pace.error
+            solution.time_error = pace.error
             keeper.resume(pace.steps)
             for i, recorder in enumerate(recorders):
                 recorder.resume(simulation, below(f"recorder {i}/", found))
