@@ -112,11 +112,23 @@ class Assembly:
         memory = Saving(self.equation.share)
         for one in self.remembering:
             one.remember(memory, q)
-        if self.supports.work or any(isinstance(link.law, Coulomb) for link in self.asked):
+        slips = any(isinstance(link.law, Coulomb) for link in self.asked)
+        if self.inertia is None or self.supports.work or slips:
             self.supports.carry_on(memory, q)
         if self.inertia is not None:
             self.inertia.carry_on(memory, len(self.inertia.more))
+        for load in self.loads:
+            load.pass_on(memory)
         return memory.state()
+
+    def carry_on(self, t: float, q: Array, internal: State | None) -> list[Array]:
+        """Return the loads at the initial state, which is in equilibrium with them.
+
+        ``internal`` are the :meth:`internal_variables` of a run of the same scene that ended there.
+        """
+        v = None if self.inertia is None else self.inertia.v
+        past = None if internal is None else Restoring(self.equation.share, internal)
+        return [load.carry_on(t, q, v, past) for load in self.loads]
 
     def take_over(self, q: Array, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
@@ -133,20 +145,24 @@ class Assembly:
             self.inertia.carry_on(memory, known)
 
     def static_path(
-        self, scheme: Scheme, q: Array, t0: float, loads: list[Array], together: Agreement
-    ) -> StaticPath | None:
+        self, scheme: Scheme, q: Array, t0: float, loads: list[Array], together: Agreement,
+        *, goes_on: bool,
+    ) -> StaticPath | None:  # fmt: skip
         """Begin a static path, and set the reactions to those of its state; None in dynamics.
 
-        The state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.
+        The state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.  A
+        path that ``goes_on`` from a static run of the same scene has the reactions of that already,
+        with the forces of what is viscous.
         """
         if self.inertia is not None:
             return None
         share, state = self.equation.share, (self.ledger, q, t0)
         path = together(StaticPath, share, scheme, self.beams, self.couplings, *state)
-        r = np.asarray(path.force - sum(loads))
-        self.supports.enter(r)
-        self.supports.hold(share.added(r))
-        self.supports.take()
+        if not goes_on:
+            r = np.asarray(path.force - sum(loads))
+            self.supports.enter(r)
+            self.supports.hold(share.added(r))
+            self.supports.take()
         return path
 
 
