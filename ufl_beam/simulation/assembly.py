@@ -177,7 +177,8 @@ def assemble(
     A = fields.matrix()
     setting = (scheme, A, ledger)
 
-    # Each kind makes its entries of the ledger: their order is that of the columns of tables.
+    # Each kind makes its entries of the ledger: their order is that of the columns of tables.  It
+    # follows from the scene alone, also where a process lacks cells or connectors of a kind.
     groups = inelastic_cells(share)
     inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
     for layout, cells in groups:
@@ -188,12 +189,15 @@ def assemble(
             of = (layout, *setting, search, by.points)
             inelastic.append(by.inelastic(fields.part(part), *of))
     beams: list[Cells] = [*inelastic]
+    decays = isinstance(scheme, DecayingMidpoint)
+    if (scheme.alpha or decays) and sum(len(cells) for _, cells in groups) < len(share.grid.cells):
+        ledger.lost["numerical"] += 0.0
     numerical: list[Term] = []
     if elastic.any():
         part = np.flatnonzero(elastic)
         on_part = fields if elastic.all() else fields.part(part)
         beams.append(ElasticBeams(on_part, *setting))
-        if isinstance(scheme, DecayingMidpoint):
+        if decays:
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
@@ -217,6 +221,8 @@ def assemble(
     supports = Supports(share, scheme, ledger, A)
     if inertia:
         supports.stop(inertia.v)
+    if scene.beams:
+        ledger.state["stored"] += 0.0
     parts = share, A, beams, coupled, loads, others, supports, search
     equation = StepEquation(*parts, in_motion=inertia is not None)
     if by.in_c:
