@@ -105,6 +105,10 @@ class Restoring(Memory):
         super().__init__(share)
         self._state = state
 
+    def has(self, name: str) -> bool:
+        """Return true if the state has numbers of this name."""
+        return name in self._state
+
     def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
         return np.asarray(self._found(name, (size,))[where])
 

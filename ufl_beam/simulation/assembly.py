@@ -112,11 +112,23 @@ class Assembly:
         memory = Saving(self.equation.share)
         for one in self.remembering:
             one.remember(memory, q)
-        if self.supports.work or any(isinstance(link.law, Coulomb) for link in self.asked):
+        slips = any(isinstance(link.law, Coulomb) for link in self.asked)
+        if self.inertia is None or self.supports.work or slips:
             self.supports.carry_on(memory, q)
         if self.inertia is not None:
             self.inertia.carry_on(memory, len(self.inertia.more))
+        for load in self.loads:
+            load.pass_on(memory)
         return memory.state()
+
+    def carry_on(self, t: float, q: Array, internal: State | None) -> list[Array]:
+        """Return the loads at the initial state, which is in equilibrium with them.
+
+        ``internal`` are the :meth:`internal_variables` of a run of the same scene that ended there.
+        """
+        v = None if self.inertia is None else self.inertia.v
+        past = None if internal is None else Restoring(self.equation.share, internal)
+        return [load.carry_on(t, q, v, past) for load in self.loads]
 
     def take_over(self, q: Array, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
@@ -133,20 +145,24 @@ class Assembly:
             self.inertia.carry_on(memory, known)
 
     def static_path(
-        self, scheme: Scheme, q: Array, t0: float, loads: list[Array], together: Agreement
-    ) -> StaticPath | None:
+        self, scheme: Scheme, q: Array, t0: float, loads: list[Array], together: Agreement,
+        *, goes_on: bool,
+    ) -> StaticPath | None:  # fmt: skip
         """Begin a static path, and set the reactions to those of its state; None in dynamics.
 
-        The state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.
+        The state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.  A
+        path that ``goes_on`` from a static run of the same scene has the reactions of that already,
+        with the forces of what is viscous.
         """
         if self.inertia is not None:
             return None
         share, state = self.equation.share, (self.ledger, q, t0)
         path = together(StaticPath, share, scheme, self.beams, self.couplings, *state)
-        r = np.asarray(path.force - sum(loads))
-        self.supports.enter(r)
-        self.supports.hold(share.added(r))
-        self.supports.take()
+        if not goes_on:
+            r = np.asarray(path.force - sum(loads))
+            self.supports.enter(r)
+            self.supports.hold(share.added(r))
+            self.supports.take()
         return path
 
 
@@ -161,7 +177,8 @@ def assemble(
     A = fields.matrix()
     setting = (scheme, A, ledger)
 
-    # Each kind makes its entries of the ledger: their order is that of the columns of tables.
+    # Each kind makes its entries of the ledger: their order is that of the columns of tables.  It
+    # follows from the scene alone, also where a process lacks cells or connectors of a kind.
     groups = inelastic_cells(share)
     inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
     for layout, cells in groups:
@@ -172,12 +189,15 @@ def assemble(
             of = (layout, *setting, search, by.points)
             inelastic.append(by.inelastic(fields.part(part), *of))
     beams: list[Cells] = [*inelastic]
+    decays = isinstance(scheme, DecayingMidpoint)
+    if (scheme.alpha or decays) and sum(len(cells) for _, cells in groups) < len(share.grid.cells):
+        ledger.lost["numerical"] += 0.0
     numerical: list[Term] = []
     if elastic.any():
         part = np.flatnonzero(elastic)
         on_part = fields if elastic.all() else fields.part(part)
         beams.append(ElasticBeams(on_part, *setting))
-        if isinstance(scheme, DecayingMidpoint):
+        if decays:
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
@@ -201,6 +221,8 @@ def assemble(
     supports = Supports(share, scheme, ledger, A)
     if inertia:
         supports.stop(inertia.v)
+    if scene.beams:
+        ledger.state["stored"] += 0.0
     parts = share, A, beams, coupled, loads, others, supports, search
     equation = StepEquation(*parts, in_motion=inertia is not None)
     if by.in_c:

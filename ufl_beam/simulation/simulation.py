@@ -121,11 +121,10 @@ class Simulation(StateView):
         self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
         self._continues = start is not None
         loaded: list[Array] = []
+        same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
         if self._continues or (has_inertia(scheme) and scheme.kept):
-            # The initial state is taken as one in equilibrium with the loads.
-            loaded = together(lambda: [load.carry_on(t0, self.q) for load in self.loads])
+            loaded = together(parts.carry_on, t0, self.q, internal if same else None)
         if start is not None:
-            same = start.scene is scene and start.times[-1] == t0
             parts.take_over(self.q, internal, same=same)
         for term in self.terms:
             term.add_state(self.q)
@@ -133,7 +132,8 @@ class Simulation(StateView):
             self.inertia = parts.inertia
             if scene.links or scene.supports:
                 together(warn_of_jumps, grid, t0, q, self.connections()[:, 0])
-        self._branch = parts.static_path(scheme, self.q, t0, loaded, together)
+        goes_on = same and "reactions" in internal and not len(start.v)
+        self._branch = parts.static_path(scheme, self.q, t0, loaded, together, goes_on=goes_on)
         self.reactions_known = self._branch is not None
 
         factors = by.factors(share, self.equation.A)

@@ -334,17 +334,20 @@ class ReferenceCouplings(Couplings):
 
 
 def couplings(share: Share, setting: Setting, A: Csr, kind: type[Couplings]) -> list[Links]:
-    """Make the connectors of a process but for guides, those that are alike together."""
+    """Make the connectors of a process but for guides, those that are alike together.
+
+    Each process makes the entries of the ledger in the order of the scene, also those that only
+    others write.
+    """
     links = share.grid.scene.links
     groups: dict[tuple[str, object], list[int]] = {}
     keys = [(link.motion, _kind(link.law)) for link in links]
     for i, number in enumerate(share.links):
         groups.setdefault(keys[number], []).append(i)
+    made: list[Links] = []
     for key, link in dict(zip(keys, links, strict=True)).items():
-        if key not in groups and link.motion in MOTIONS:
-            respond(link.law, (), setting)  # makes the entries of the ledger that others write
-    return [
-        kind(share, np.array(here), setting, A)
-        for (motion, _), here in groups.items()
-        if motion in MOTIONS
-    ]
+        if link.motion in MOTIONS and key in groups:
+            made.append(kind(share, np.array(groups[key]), setting, A))
+        elif link.motion in MOTIONS:
+            respond(link.law, (), setting)
+    return made

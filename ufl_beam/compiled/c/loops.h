@@ -392,8 +392,9 @@ typedef struct {
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands;
   const demand *demand; /* of connectors */
-  double last, best;
+  double last, best, last_scale;
   int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
+  int anew;                           /* no tangent is kept from step to step */
   double rate;                        /* of a modified Newton's method, by which residuals fall */
   int iterations, reason;             /* of snes_newton, the latest */
 } equation;

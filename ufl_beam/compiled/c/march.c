@@ -435,7 +435,7 @@ static void guess(march *m)
 static int iterate(march *m)
 {
   equation *e = m->equation;
-  begin_newton(e, 2, as_last(m->prediction, m->step.dt));
+  begin_newton(e, 2, m->rates && as_last(m->prediction, m->step.dt));
   const int error = petsc.SNESSolve(m->snes, 0, e->x);
   m->tried += e->iterations;
   return !error && e->reason > 0;
