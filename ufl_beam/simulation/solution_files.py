@@ -27,7 +27,7 @@ T = TypeVar("T")
 FORMAT = "solution of ufl_beam, 1"
 """The number grows whenever the meaning of files changes."""
 
-NAMED = ("seconds", "time_error", "open_ledger")
+NAMED = ("seconds", "time_error", "open_ledger", "warnings")
 """Attributes that are saved as they are."""
 
 TIME_FUNCTIONS = ("time", "held", "motion", "force", "numbers")
