@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from itertools import chain
 from typing import Any
 
 from mpi4py import MPI
@@ -198,14 +199,19 @@ def simulate(
 def check_ledger(simulation: Simulation) -> None:
     """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
 
+    All processes know all warnings then.
+
     All processes call it together, at the end of a run.
 
     Warns:
         ModelWarning: It is open, perhaps by round-off.
     """
-    solution = simulation.solution
+    solution, share = simulation.solution, simulation.share
+    if not share.alone:  # forces are watched by the process that has the connector
+        everyone = share.comm.allgather(solution.warnings.splitlines(keepends=True))
+        solution.warnings = "".join(dict.fromkeys(chain.from_iterable(everyone)))
     if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
-        solution.open_ledger = open_ledger(solution, simulation.share, simulation.solver)
+        solution.open_ledger = open_ledger(solution, share, simulation.solver)
     if solution.open_ledger and simulation.comm.rank == 0:
         warn(solution.open_ledger)
 

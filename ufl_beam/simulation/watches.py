@@ -29,7 +29,7 @@ from ufl_beam.terms.phases import weight_of_before
 STATES = 100
 """Kept states that are judged together."""
 
-TURNOVER = 10.0
+TURNOVER = 5.0
 """Numerical loss in so many steps, over the largest energy in the scene meanwhile, that is wrong.
 
 A motion that steps resolve loses a small part of its energy in each.
