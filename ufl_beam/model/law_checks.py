@@ -122,10 +122,9 @@ def has_quadratic_energies(law: MaterialLaw) -> bool:
     tried = law.of(law.as_argument(C), {n: 1.0 if hasattr(v, "draw") else v for n, v in numbers})
 
     def energies(factor: float) -> list[float]:
-        points = (factor * np.random.default_rng(0).uniform(-1.0, 1.0, (8, 1))).tolist()
-        strain = law.as_argument(tuple(np.array(points[-1 - i]) for i, _ in enumerate(C)))
-        at = [np.array(points[i % 5]) for i, _ in enumerate(law.variables)]
-        state = State(dict(zip(law.variables, at, strict=True)))
+        draw = np.random.default_rng(0).uniform
+        strain = law.as_argument(tuple(factor * draw(-1.0, 1.0, 1) for _ in C))
+        state = State({name: factor * draw(-1.0, 1.0, 1) for name in law.variables})
         with np.errstate(all="ignore"):
             found = tried.elastic_energy(strain, state), tried.hardening_energy(state)
         return [float(np.sum(x)) for x in found]

@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 
-from ufl_beam.arrays import Array
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.model.connector_laws import Controller, Coulomb, Running
@@ -39,13 +38,13 @@ class Controllers:
 
     def ask(self, now: Running) -> None:
         """Evaluate what is due at the time ``now.t``; all processes call it together."""
-        values = {link: link.law.ask(now, link) for link in self._each_step}  # type: ignore[union-attr]
+        values = {link: link.law.ask(now, link) for link in self._each_step}
         self.values.update(values)
         self.fresh.update(values)
         for i, link in enumerate(self._sampled):
             first, number = self._due(i, now.t)
             if number != self._samples[i, 1]:
-                self.values[link] = link.law.ask(now, link)  # type: ignore[union-attr]
+                self.values[link] = link.law.ask(now, link)
                 self.fresh.add(link)
                 self._samples[i] = first, number
 
@@ -73,14 +72,12 @@ class Controllers:
         """
         if not self._sampled:
             return
-        held = [(self.values[link], *samples, t) for link, samples in self._rows()]
-        rows = memory.known_rows("samples", self._numbers, np.array(held))
-        for (link, samples), (force, *others, at) in zip(self._rows(), rows.tolist(), strict=True):
-            if at == t:
-                self.values[link], samples[:] = force, others
-
-    def _rows(self) -> zip[tuple[Connector, Array]]:
-        return zip(self._sampled, self._samples, strict=True)
+        forces = [self.values[link] for link in self._sampled]
+        held = np.column_stack([forces, self._samples, np.full(len(forces), t)])
+        rows = memory.known_rows("samples", self._numbers, held)
+        for i, link in enumerate(self._sampled):
+            if rows[i, 3] == t:
+                self.values[link], self._samples[i] = float(rows[i, 0]), rows[i, 1:3]
 
 
 def _sample(link: Connector) -> float:

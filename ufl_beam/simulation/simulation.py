@@ -113,6 +113,7 @@ class Simulation(StateView):
         by = REFERENCE if newton.reference else COMPILED
         self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], by, together)
         self.fields, self.ledger, self.controllers = parts.fields, parts.ledger, parts.controllers
+        self.asked = parts.controllers.values
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
         self.equation, self.terms = parts.equation, parts.equation.terms
@@ -145,7 +146,7 @@ class Simulation(StateView):
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
-        in_python = self._copies or self.controllers.values or not share.alone
+        in_python = self._copies or self.asked or not share.alone
         self._in_c = None if in_python else self._steps_in_c(parts)
 
     # -- stepping ------------------------------------------------------------------------------
@@ -267,7 +268,7 @@ class Simulation(StateView):
 
     def ask(self) -> None:
         """Ask controllers and friction for forces and limits in the next step, on all processes."""
-        if self.controllers.values:
+        if self.asked:
             self._assembly.ask(self, self.q)
 
     def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:

@@ -180,8 +180,7 @@ class ForceWatch:
         values, fresh = self._controllers.values, self._controllers.fresh
         of_laws = np.concatenate([one.force(q) for one in self._couplings])
         moved = np.abs(np.concatenate([one.rate for one in self._couplings])) * dt
-        pairs = zip(self._links, of_laws.tolist(), strict=True)
-        force = np.array([values.get(link, -λ) for link, λ in pairs])
+        force = np.array([values.get(x, λ) for x, λ in zip(self._links, of_laws, strict=True)])
         new = np.array([link in fresh or link not in values for link in self._links])
         fresh.clear()
         change = np.where(new, force - self._force, self._change)
