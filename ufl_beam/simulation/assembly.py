@@ -16,12 +16,13 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_laws import Controller, Coulomb, Running
+from ufl_beam.model.connector_laws import Coulomb, Running
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
+from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
@@ -78,7 +79,7 @@ class Assembly:
 
     fields: Fields  # on the cells of this process
     ledger: Ledger
-    asked: dict[Connector, float]  # forces of controllers, limits of friction in the step; N or N m
+    controllers: Controllers  # with their forces, and the limits of friction, in the step
     rates: dict[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
     beams: list[Cells]  # those with material points first
     inelastic: list[InelasticBeams]  # those with material points
@@ -95,24 +96,21 @@ class Assembly:
         """Terms with internal variables."""
         return [*self.inelastic, *self.couplings]
 
-    def ask(self, simulation: Running, q: Array) -> None:
+    def ask(self, now: Running, q: Array) -> None:
         """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        forces = {
-            link: link.law.ask(simulation, link)
-            for link in self.asked if isinstance(link.law, Controller | Coulomb)
-        }  # fmt: skip
-        self.asked.update(forces)
+        self.controllers.ask(now)
         if self.inertia is not None:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):
                     self.rates.update(zip(one.links, one.rates(q, self.inertia.v), strict=True))
 
-    def internal_variables(self, q: Array) -> State:
+    def internal_variables(self, q: Array, t: float) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""
         memory = Saving(self.equation.share)
+        self.controllers.remember(memory, t)
         for one in self.remembering:
             one.remember(memory, q)
-        slips = any(isinstance(link.law, Coulomb) for link in self.asked)
+        slips = any(isinstance(link.law, Coulomb) for link in self.controllers.values)
         if self.inertia is None or self.supports.work or slips:
             self.supports.carry_on(memory, q)
         if self.inertia is not None:
@@ -130,12 +128,13 @@ class Assembly:
         past = None if internal is None else Restoring(self.equation.share, internal)
         return [load.carry_on(t, q, v, past) for load in self.loads]
 
-    def take_over(self, q: Array, internal: State, *, same: bool) -> None:
+    def take_over(self, q: Array, t: float, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
         ``same`` says that no force has changed since, so that accelerations are what they were.
         """
         memory = Restoring(self.equation.share, internal)
+        self.controllers.remember(memory, t)
         for one in self.remembering:
             one.remember(memory, NOWHERE)
         if "reactions" in internal:
@@ -200,10 +199,10 @@ def assemble(
         if decays:
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
-    asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
-    rates = dict(asked)
+    controllers = Controllers(share)
+    rates = dict(controllers.values)
     connectors = Setting(
-        asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search, by.points,
+        controllers.values, rates, scene.size, scheme, ledger, friction_repeats(scene), search, by.points,
         by.slips,
     )  # fmt: skip
     of_links = share, connectors, A
@@ -228,7 +227,7 @@ def assemble(
     if by.in_c:
         equation.leave_to_c()
     return Assembly(
-        fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
+        fields, ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, openings, equation,
     )  # fmt: skip
 

@@ -69,6 +69,16 @@ class KeptStates:
             self._blocks.append(states)
             self._ends.append(len(self) + len(states.t))
 
+    def part(self, first: int, last: int) -> KeptStates:
+        """Views of the states from the first number to before the last one."""
+        part, k = KeptStates(self._grid), bisect_right(self._ends, first)
+        while first < last:
+            block, end = self._blocks[k], self._ends[k]
+            begin, k = end - len(block.t), k + 1
+            part.append(block.view(slice(first - begin, last - begin)))
+            first = end
+        return part
+
     def thin(self) -> None:
         """Forget every other state; the first one stays."""
         first = [end - len(block.t) for end, block in zip(self._ends, self._blocks, strict=True)]

@@ -58,6 +58,7 @@ class Solution(Rich):
         every: Steps from one that was kept to the next.
         parameter: Words for :attr:`times`, which are load factors in a path.
         open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
+        warnings: What the run has warned of, a line each; see docs/warnings.md.
         internal: Internal variables of cells and connectors at the end of the run.
 
     Example:
@@ -75,7 +76,7 @@ class Solution(Rich):
         self.scene, self.grid = scene, grid
         self.parts = self.iterations = 0
         self.time_error, self.seconds, self.building = math.nan, 0.0, 0.0
-        self.every, self.open_ledger = 1, ""
+        self.every, self.open_ledger, self.warnings = 1, "", ""
         self.internal: State = {}
         self._kept = KeptStates(grid)
         self._along = ForcesAlongCells(grid, self._kept.forces_in_points)
@@ -142,6 +143,10 @@ class Solution(Rich):
     def __len__(self) -> int:
         """Number of kept states."""
         return len(self._kept)
+
+    def part(self, first: int, last: int) -> KeptStates:
+        """Views of kept states, from the first number to before the last one."""
+        return self._kept.part(first, last)
 
     def thin(self) -> None:
         """Forget every other kept state; the first one stays."""
@@ -341,7 +346,8 @@ class Solution(Rich):
         ]
 
     def __str__(self) -> str:
-        return "\n".join([*self.summary(), str(self.energy), self.open_ledger]).rstrip()
+        said = *self.summary(), str(self.energy), self.open_ledger, self.warnings
+        return "\n".join(filter(None, said))
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {'; '.join(self.summary()[:2])}>"

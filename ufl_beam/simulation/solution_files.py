@@ -22,7 +22,7 @@ from ufl_beam.version import version
 FORMAT = "solution of ufl_beam, 2"
 """The number grows whenever the meaning of files changes."""
 
-NAMED = {"seconds": float, "time_error": float, "open_ledger": str}
+NAMED = {"seconds": float, "time_error": float, "open_ledger": str, "warnings": str}
 """Attributes that are saved as they are, and their types."""
 
 TIME_FUNCTIONS = ("time", "held", "motion", "force", "numbers")
