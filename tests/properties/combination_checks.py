@@ -1,0 +1,372 @@
+# SPDX-License-Identifier: MIT
+"""Checks of combinations that compare runs: each states when it applies, and its tolerance.
+
+A check takes a :class:`Case`.  It raises :class:`NotApplicable` where the combination is none for
+it, and AssertionError where results differ: a flag.
+"""
+
+import warnings
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+
+from mpi4py import MPI
+
+import numpy as np
+from combinations import Combination
+from own_parts import LargestCurvature
+
+import ufl_beam as ub
+from ufl_beam.simulation import replicas
+
+DIGITS = 1e-12
+"""Tolerance of Newton's method in runs whose results are compared as numbers."""
+
+SAME = 1e-7
+"""Difference of two runs to :data:`DIGITS`, as a part of the largest value.
+
+Each of some 20 steps leaves 1e-12 of the forces; stiffnesses of the combinations differ by factors
+of up to 1e3, and displacements are up to 1e-2 of what these forces would make.
+"""
+
+
+class NotApplicable(Exception):
+    """Why a check says nothing about a combination."""
+
+
+def only(condition, reason):
+    if not condition:
+        raise NotApplicable(reason)
+
+
+class StopAt(ub.Recorder):
+    """Interrupts a run after so many steps."""
+
+    def __init__(self, steps):
+        self.steps = steps
+
+    def open(self, simulation):
+        pass
+
+    def write(self, simulation):
+        self.steps -= 1
+        if self.steps == 0:
+            raise KeyboardInterrupt
+
+    def state(self):
+        return {}
+
+    def resume(self, simulation, state):
+        pass
+
+
+@dataclass
+class Run:
+    """Names of a script, and the solution of its scene; `failure` if a step failed."""
+
+    names: dict
+    solution: ub.Solution
+    failure: str = ""
+
+
+@dataclass
+class Case:
+    """A combination, its run, and a folder for files."""
+
+    combination: Combination
+    folder: Path
+    comm: MPI.Intracomm = field(default_factory=lambda: MPI.COMM_SELF)
+
+    def run(self, source=None, *, names=None, call=ub.simulate, **changes):
+        """Run the script, with other arguments; a failed step leaves what came before it."""
+        names = self.combination.make(source) if names is None else names
+        arguments = {key: names[key] for key in ("t", "dt", "mesh", "newton")}
+        arguments |= {"progress": False, "comm": self.comm, **changes}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", ub.ModelWarning)
+            try:
+                return Run(names, call(names["scene"], names["scheme"], **arguments))
+            except ub.ConvergenceError as error:
+                return Run(names, error.solution, str(error))
+
+    @cached_property
+    def whole(self):
+        """The run as the script states it."""
+        return self.run()
+
+    @cached_property
+    def exact(self):
+        """The same to more digits."""
+        return self.run(newton=ub.Newton(rtol=DIGITS))
+
+    @property
+    def steps(self):
+        return len(self.whole.solution) - 1
+
+    @property
+    def equal_steps(self):
+        return not self.combination.has("ub.Adaptive")
+
+
+CHECKS = {}
+
+
+def check(function):
+    """Add a function to the checks."""
+    CHECKS[function.__name__] = function
+    return function
+
+
+def arrays_of(solution):
+    """All that a solution kept, and what it counted, by name."""
+    counts = {"parts": np.array(solution.parts), "iterations": np.array(solution.iterations)}
+    return {**solution.history(), **counts, **{f"end {n}": x for n, x in solution.internal.items()}}
+
+
+def assert_same_bits(one, other):
+    first, second = (arrays_of(x) if isinstance(x, ub.Solution) else x for x in (one, other))
+    assert sorted(first) == sorted(second)
+    for name, values in first.items():
+        assert np.asarray(values).tobytes() == np.asarray(second[name]).tobytes(), name
+
+
+def difference(one, other, size=None):
+    """Largest difference, as a part of the largest size; NaN stands where it stands in both."""
+    one, other = np.asarray(one), np.asarray(other)
+    assert one.shape == other.shape
+    assert (np.isnan(one) == np.isnan(other)).all()
+    size = np.nanmax(np.abs(other), initial=0.0) if size is None else size
+    return float(np.nanmax(np.abs(one - other), initial=0.0)) / (size or 1.0)
+
+
+def results(names, solution, rows=slice(None)):
+    """Results of a solution by name: motions as parts of the scene, forces, energies."""
+    scene = names["scene"]
+    found = {}
+    lengths = scene.size * np.array([1.0, 1.0, 0.0]) + np.array([0.0, 0.0, 1.0])
+    moved = [one.at(s) for one in scene.beams for s in (0.0, 0.5, 1.0)]
+    moved += [one.middle for one in scene.bodies]
+    found["motions"] = np.array([solution.displacement(p)[rows] / lengths for p in moved]), 1.0
+    forces = [solution.section_forces_at(p)[rows] for p in moved if isinstance(p, ub.Place)]
+    forces += [solution.reaction(support)[rows] for support in scene.supports]
+    links = [solution.connector(one) for one in scene.connectors]
+    found["forces"] = np.array(forces), None
+    found["of connectors"] = np.array([link.force[rows] for link in links]), None
+    return found
+
+
+def differences(one, other, rows=slice(None), begin=None):
+    """Largest differences of two runs by kind; of the second those of some rows.
+
+    Energies that were supplied and lost count from the first of the rows on.
+    """
+    a, b = results(one.names, one.solution), results(other.names, other.solution, rows)
+    forces = max((np.nanmax(np.abs(x), initial=0.0) for x, _ in b.values()), default=1.0)
+    found = {}
+    for name, (values, size) in a.items():
+        values, others = (x[:, 1:] if x.ndim > 1 else x for x in (values, b[name][0]))
+        found[name] = difference(values, others, size or forces)
+    through = other.solution.energy.throughput or 1.0
+    for kind in ("state", "supplied", "lost"):
+        mine, others = getattr(one.solution.energy, kind), getattr(other.solution.energy, kind)
+        assert set(mine) == set(others)
+        for name in mine:
+            expected = others[name][rows] - (0.0 if kind == "state" else others[name][rows][0])
+            found[f"{kind}: {name}"] = difference(mine[name], expected, through)
+    return found
+
+
+def assert_near(found, tolerance=SAME):
+    assert max(found.values()) <= tolerance, {k: v for k, v in found.items() if v > tolerance}
+
+
+# -- runs --------------------------------------------------------------------------------------
+
+
+@check
+def failed_step(case):
+    """A step that fails also fails in runs of a quarter of the step, near the same time."""
+    only(case.whole.failure, "all steps converged")
+    only(case.equal_steps, "adaptive steps are as short as they need be")
+    small = case.run(dt=case.whole.names["dt"] / 4, newton=ub.Newton())
+    assert small.failure, f"small steps converge; {case.whole.failure}"
+    apart = abs(small.solution.times[-1] - case.whole.solution.times[-1])
+    assert apart <= 2 * case.whole.names["dt"], case.whole.failure
+
+
+@check
+def ledger(case):
+    """It closes as the scheme claims; what was lost never comes back, to digits of the whole."""
+    solution = case.whole.solution
+    assert solution.open_ledger == ""
+    energy = solution.energy
+    for name in ("plastic", "hinges", "friction", "numerical"):
+        if name in energy.lost and case.combination.has_exact_ledger:
+            assert np.diff(energy.lost[name]).min(initial=0.0) >= -1e-9 * energy.throughput, name
+
+
+@check
+def ledger_of_small_steps(case):
+    """A ledger by trapezes, of second order where nothing yields, closes with smaller steps.
+
+    A quarter of the step leaves a sixteenth of the imbalance; of yielding, sliding and contact
+    within a step a quarter.  A half is let go for what is not yet small.
+    """
+    only(not case.combination.has_exact_ledger, "the scheme closes its ledger")
+    only(case.equal_steps and not case.whole.failure, "steps are not equal")
+    before = case.whole.solution.energy
+    small = case.run(dt=case.whole.names["dt"] / 4)
+    after = small.solution.energy
+    assert after.worst <= max(0.5 * before.worst, 1e-9), (before.worst, after.worst)
+
+
+@check
+def split(case):
+    """A run in two parts by `start=` is the run."""
+    only(case.equal_steps, "steps depend on those before")
+    only(not case.exact.failure, "a step fails")
+    names, n = case.combination.make(), len(case.exact.solution) - 1
+    (t0, t1), k = names["t"], n // 2
+    at = t0 + (t1 - t0) * k / n
+    equal = {"dt": (t1 - t0) / n * (1 + 1e-10), "newton": ub.Newton(rtol=DIGITS), "names": names}
+    first = case.run(t=(t0, at), **equal)
+    second = case.run(t=(at, t1), start=first.solution, **equal)
+    assert_near(differences(first, case.exact, slice(0, k + 1)))
+    assert_near(differences(second, case.exact, slice(k, None)))
+
+
+@check
+def resumed(case):
+    """A run that is interrupted and resumed is the run, to the last bit."""
+    only(not case.whole.failure, "a step fails")
+    only(case.steps >= 4, "too few steps")
+    checkpoint = ub.Checkpoint(case.folder / "run.checkpoint", every=3)
+    recorders = recorders_of(case, "resumed")
+    try:
+        case.run(checkpoint=checkpoint, record=[*recorders(), StopAt(case.steps // 2 + 1)])
+    except KeyboardInterrupt:
+        pass
+    again = recorders()
+    resumed = case.run(checkpoint=checkpoint, record=[*again, StopAt(10**9)])
+    whole = recorders_of(case, "whole")()
+    case.run(record=[*whole, StopAt(10**9)])
+    assert_same_bits(resumed.solution, case.whole.solution)
+    assert_same_records(again, whole, case.folder)
+
+
+@check
+def saved(case):
+    """A saved and loaded solution has the same results and texts."""
+    before, scene = case.whole.solution, case.whole.names["scene"]
+    before.save(case.folder / "solution.h5")
+    after = ub.load(case.folder / "solution.h5")
+    assert_same_bits(before, after)
+    assert str(before) == str(after)
+    for one, other in zip(scene.beams, after.scene.beams, strict=True):
+        assert_same_bits(before.diagram(one)._asdict(), after.diagram(other)._asdict())
+        assert (before.section_forces(one) == after.section_forces(other)).all()
+        places = one.at(0.37), other.at(0.37)
+        assert (before.position(places[0]) == after.position(places[1])).all()
+    for one, other in zip(scene.connectors, after.scene.connectors, strict=True):
+        assert_same_bits(before.connector(one)._asdict(), after.connector(other)._asdict())
+    for one, other in zip(scene.supports, after.scene.supports, strict=True):
+        assert before.reaction(one).tobytes() == after.reaction(other).tobytes()
+    for one, other in zip(scene.joints, after.scene.joints, strict=True):
+        if one.holders and {one.holders[0].a, one.holders[0].b} == set(one.places[:2]):
+            assert_same_bits(before.joint(one)._asdict(), after.joint(other)._asdict())
+
+
+@check
+def recorders(case):
+    """Recorders change nothing, and what they record is in the solution."""
+    written = recorders_of(case, "recorders")()
+    run = case.run(record=written)
+    assert_same_bits(run.solution, case.whole.solution)
+    history, extremes = written[0], written[1]
+    rows = np.loadtxt(history.files[0], delimiter=",", skiprows=1)
+    end = run.solution.displacement(run.names["b0"].end)
+    if len(rows) == len(end):  # parts of a failed step are not kept
+        assert (rows[:, 1:4] == end).all()
+    for beam in run.names["scene"].beams:
+        moved = extremes.displacement(beam)
+        nodes = run.solution.q[:, run.solution.grid.nodes_of(beam)[1]]
+        assert (moved.high == nodes.max(axis=0)).all() or run.failure
+        assert (moved.low == nodes.min(axis=0)).all() or run.failure
+
+
+def recorders_of(case, name):
+    """A function that makes all recorders of files in a folder, and those of numbers."""
+    names = case.whole.names
+
+    def make():
+        folder = case.folder / name
+        folder.mkdir(exist_ok=True)
+        beam = names["b0"]
+        spot = ub.HotSpot.fibre(beam.at(0.3), y=0.05, E=1.2e8)
+        curve = [ub.SNCurve.eurocode(71e6), ub.SNCurve(range=1e6, cycles=1e6, slope=3.0)][0]
+        return [
+            ub.History(folder / "run.csv", [by_name(case, "b0").end]),
+            ub.Extremes(), ub.Events(), ub.Fatigue(spot, curve), LargestCurvature(),
+            ub.XDMF(folder / "run.xdmf"), ub.VTKHDF(folder / "run.vtkhdf", every=2),
+        ]  # fmt: skip
+
+    return make
+
+
+@check
+def loops(case):
+    """Loops of `step_to` and `steps_to` take the steps of the run, to the last bit."""
+    only(case.equal_steps, "the run chooses its steps")
+    only(not case.whole.failure, "a step fails")
+    ends = case.whole.solution.times[1:]
+    for many in (False, True):
+        names = case.combination.make()
+        simulation = ub.Simulation(
+            names["scene"], names["scheme"], mesh=names["mesh"], newton=names["newton"],
+            comm=case.comm,
+        )  # fmt: skip
+        simulation.keep()
+        left = ends
+        while len(left):
+            if many:
+                left = left[simulation.steps_to(left, keep=True) :]
+            else:
+                simulation.step_to(left[0])
+                simulation.keep()
+                left = left[1:]
+        simulation.end()
+        simulation.close()
+        assert_same_bits(simulation.solution, case.whole.solution)
+
+
+@check
+def reference(case):
+    """Both paths find the same motions, forces and energies."""
+    only(not case.exact.failure, "a step fails")
+    found = case.run(newton=ub.Newton(rtol=DIGITS, reference=True))
+    assert not found.failure, found.failure
+    assert_near(differences(found, case.exact))
+
+
+@check
+def newton_options(case):
+    """Options of Newton's method change nothing but what it leaves."""
+    only(case.combination.has("newton = ub.Mesh(), ub.Newton(m", "Newton(p", "Newton(m"), "none")
+    only(case.equal_steps, "steps depend on last digits")
+    only(not case.exact.failure, "a step fails")
+    assert not case.whole.failure, case.whole.failure
+    assert_near(differences(case.whole, case.exact), 100 * SAME)
+
+
+@check
+def processes(case):
+    """Shared by all processes of MPI the run is the one of a single process."""
+    only(MPI.COMM_WORLD.size > 1, "one process")
+    only(not case.exact.failure, "a step fails")
+    smallest, replicas.SMALLEST_SHARE = replicas.SMALLEST_SHARE, 1
+    try:
+        shared = case.run(newton=ub.Newton(rtol=DIGITS), comm=MPI.COMM_WORLD)
+    finally:
+        replicas.SMALLEST_SHARE = smallest
+    assert not shared.failure, shared.failure
+    assert_near(differences(shared, case.exact))
