@@ -5,7 +5,11 @@ A check takes a :class:`Case`.  It raises :class:`NotApplicable` where the combi
 it, and AssertionError where results differ: a flag.
 """
 
+import contextlib
+import tempfile
+import time
 import warnings
+from collections import Counter
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -13,7 +17,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 import numpy as np
-from combinations import Combination
+from combinations import Combination, draw
 from own_parts import LargestCurvature
 
 import ufl_beam as ub
@@ -126,8 +130,9 @@ def arrays_of(solution):
 def assert_same_bits(one, other):
     first, second = (arrays_of(x) if isinstance(x, ub.Solution) else x for x in (one, other))
     assert sorted(first) == sorted(second)
-    for name, values in first.items():
-        assert np.asarray(values).tobytes() == np.asarray(second[name]).tobytes(), name
+    for name, values in first.items():  # all bits but the signs of zeros
+        numbers = not isinstance(values, str)
+        assert np.array_equal(values, second[name], equal_nan=numbers), name
 
 
 def difference(one, other, size=None):
@@ -196,13 +201,18 @@ def failed_step(case):
 
 @check
 def ledger(case):
-    """It closes as the scheme claims; what was lost never comes back, to digits of the whole."""
+    """It closes as the scheme claims; what was lost never comes back, to digits of the whole.
+
+    `DecayingMidpoint` may give back a part of its own loss, but no more than that.
+    """
     solution = case.whole.solution
     assert solution.open_ledger == ""
     energy = solution.energy
     for name in ("plastic", "hinges", "friction", "numerical"):
         if name in energy.lost and case.combination.has_exact_ledger:
-            assert np.diff(energy.lost[name]).min(initial=0.0) >= -1e-9 * energy.throughput, name
+            gives_back = name == "numerical" and case.combination.has("DecayingMidpoint")
+            least = energy.lost[name] if gives_back else np.diff(energy.lost[name])
+            assert least.min(initial=0.0) >= -1e-9 * energy.throughput, name
 
 
 @check
@@ -210,14 +220,25 @@ def ledger_of_small_steps(case):
     """A ledger by trapezes, of second order where nothing yields, closes with smaller steps.
 
     A quarter of the step leaves a sixteenth of the imbalance; of yielding, sliding and contact
-    within a step a quarter.  A half is let go for what is not yet small.
+    within a step a quarter.  Steps must resolve the periods of the mesh for that, some 1e-3 s.
     """
     only(not case.combination.has_exact_ledger, "the scheme closes its ledger")
     only(case.equal_steps and not case.whole.failure, "steps are not equal")
-    before = case.whole.solution.energy
-    small = case.run(dt=case.whole.names["dt"] / 4)
-    after = small.solution.energy
-    assert after.worst <= max(0.5 * before.worst, 1e-9), (before.worst, after.worst)
+    found = [imbalance(case.whole)]
+    for parts in (4, 32, 256):
+        found.append(imbalance(case.run(dt=case.whole.names["dt"] / parts)))
+        if found[-1] <= max(0.5 * found[0], 1e-9):
+            return
+    raise AssertionError(f"imbalance {found} with 1, 1/4, 1/32 and 1/256 of the step")
+
+
+def imbalance(run):
+    """Largest imbalance, as a part of the energy that went through.
+
+    In statics the first trapeze, from rest to loads that are there from the start, does not count.
+    """
+    energy, first = run.solution.energy, 0 if len(run.solution.v) else 1
+    return np.ptp(energy.imbalance[first:]) / (energy.throughput or 1.0)
 
 
 @check
@@ -241,22 +262,27 @@ def resumed(case):
     only(not case.whole.failure, "a step fails")
     only(case.steps >= 4, "too few steps")
     checkpoint = ub.Checkpoint(case.folder / "run.checkpoint", every=3)
-    recorders = recorders_of(case, "resumed")
-    try:
-        case.run(checkpoint=checkpoint, record=[*recorders(), StopAt(case.steps // 2 + 1)])
-    except KeyboardInterrupt:
-        pass
-    again = recorders()
-    resumed = case.run(checkpoint=checkpoint, record=[*again, StopAt(10**9)])
-    whole = recorders_of(case, "whole")()
-    case.run(record=[*whole, StopAt(10**9)])
+
+    def go(folder, stop, **more):
+        names = case.combination.make()
+        written = recorders_of(case, names, folder)
+        return case.run(names=names, record=[*written, StopAt(stop)], **more), written
+
+    with contextlib.suppress(KeyboardInterrupt):
+        go("resumed", case.steps // 2 + 1, checkpoint=checkpoint)
+    resumed, again = go("resumed", 10**9, checkpoint=checkpoint)
+    _, whole = go("whole", 10**9)
     assert_same_bits(resumed.solution, case.whole.solution)
-    assert_same_records(again, whole, case.folder)
+    assert_same_records(again, whole)
 
 
 @check
 def saved(case):
-    """A saved and loaded solution has the same results and texts."""
+    """A saved and loaded solution has the same results and texts.
+
+    Guide curves are saved as points, so that the directions of their forces have fewer digits.
+    """
+    only(not case.combination.has("Dashpot", "PowerLaw"), "own laws cannot be saved")
     before, scene = case.whole.solution, case.whole.names["scene"]
     before.save(case.folder / "solution.h5")
     after = ub.load(case.folder / "solution.h5")
@@ -273,14 +299,19 @@ def saved(case):
         assert before.reaction(one).tobytes() == after.reaction(other).tobytes()
     for one, other in zip(scene.joints, after.scene.joints, strict=True):
         if one.holders and {one.holders[0].a, one.holders[0].b} == set(one.places[:2]):
-            assert_same_bits(before.joint(one)._asdict(), after.joint(other)._asdict())
+            histories = before.joint(one), after.joint(other)
+            if one.kind == "Guided":
+                assert difference(histories[0].force, histories[1].force) < 1e-5
+            else:
+                assert_same_bits(*(history._asdict() for history in histories))
 
 
 @check
 def recorders(case):
     """Recorders change nothing, and what they record is in the solution."""
-    written = recorders_of(case, "recorders")()
-    run = case.run(record=written)
+    names = case.combination.make()
+    written = recorders_of(case, names, "recorders")
+    run = case.run(names=names, record=written)
     assert_same_bits(run.solution, case.whole.solution)
     history, extremes = written[0], written[1]
     rows = np.loadtxt(history.files[0], delimiter=",", skiprows=1)
@@ -294,23 +325,27 @@ def recorders(case):
         assert (moved.low == nodes.min(axis=0)).all() or run.failure
 
 
-def recorders_of(case, name):
-    """A function that makes all recorders of files in a folder, and those of numbers."""
-    names = case.whole.names
+def recorders_of(case, names, folder):
+    """New recorders of all kinds, which write to a folder of the case."""
+    path, seed = case.folder / folder, case.combination.seed
+    path.mkdir(exist_ok=True)
+    mean = (ub.Goodman(4e8), ub.Gerber(4e8))[seed % 2]
+    curve = ub.SNCurve(range=1e6, mean=mean) if seed % 3 else ub.SNCurve.eurocode(71e6)
+    spot = ub.HotSpot.fibre(names["b0"].at(0.3), y=0.05, E=1.2e8)
+    series = ub.XDMF(path / "run.xdmf") if seed % 2 else ub.VTKHDF(path / "run.vtkhdf", every=2)
+    history = ub.History(path / "run.csv", [names["b0"].end], names["scene"].connectors)
+    return [
+        history, ub.Extremes(), ub.Events(), ub.Fatigue(spot, curve), LargestCurvature(), series
+    ]  # fmt: skip
 
-    def make():
-        folder = case.folder / name
-        folder.mkdir(exist_ok=True)
-        beam = names["b0"]
-        spot = ub.HotSpot.fibre(beam.at(0.3), y=0.05, E=1.2e8)
-        curve = [ub.SNCurve.eurocode(71e6), ub.SNCurve(range=1e6, cycles=1e6, slope=3.0)][0]
-        return [
-            ub.History(folder / "run.csv", [by_name(case, "b0").end]),
-            ub.Extremes(), ub.Events(), ub.Fatigue(spot, curve), LargestCurvature(),
-            ub.XDMF(folder / "run.xdmf"), ub.VTKHDF(folder / "run.vtkhdf", every=2),
-        ]  # fmt: skip
 
-    return make
+def assert_same_records(some, others):
+    """Recorders of two runs have the same rows, extremes, events, cycles and numbers."""
+    for one, other in zip(some, others, strict=True):
+        assert_same_bits(one.state(), other.state())
+        for path, another in zip(one.files, other.files, strict=True):
+            if path.suffix in (".csv", ".xdmf"):
+                assert path.read_bytes() == another.read_bytes(), path.name
 
 
 @check
@@ -351,7 +386,7 @@ def reference(case):
 @check
 def newton_options(case):
     """Options of Newton's method change nothing but what it leaves."""
-    only(case.combination.has("newton = ub.Mesh(), ub.Newton(m", "Newton(p", "Newton(m"), "none")
+    only(case.combination.has("Newton(p", "Newton(m"), "none")
     only(case.equal_steps, "steps depend on last digits")
     only(not case.exact.failure, "a step fails")
     assert not case.whole.failure, case.whole.failure
@@ -370,3 +405,55 @@ def processes(case):
         replicas.SMALLEST_SHARE = smallest
     assert not shared.failure, shared.failure
     assert_near(differences(shared, case.exact))
+
+
+# -- many combinations -------------------------------------------------------------------------
+
+REFUSED = (
+    "hinges are for resultants",
+)  # fmt: skip
+"""What a refusal of a combination may say: features that the documentation excludes together."""
+
+
+SECONDS: Counter = Counter()
+"""Time that each check has taken in this process; s."""
+
+
+def outcome_of(seed, folder, names=tuple(CHECKS)):
+    """What became of each check: "passed", "not applicable", "refused", or words of a flag."""
+    case, found = Case(draw(seed), folder), {}
+    try:
+        assert case.whole.solution is not None
+    except ub.SceneError as error:
+        known = any(words in str(error) for words in REFUSED)
+        return {"run": "refused" if known else f"refused: {error}"}
+    for name in names:
+        begin = time.perf_counter()
+        try:
+            CHECKS[name](case)
+            found[name] = "passed"
+        except NotApplicable:
+            found[name] = "not applicable"
+        except Exception as error:
+            found[name] = f"{type(error).__name__}: {error}"
+        SECONDS[name] += time.perf_counter() - begin
+    return found
+
+
+def table_of(seeds, names):
+    """Run many; print flags as they come, and return the table of checks."""
+    counts = {name: Counter() for name in ("run", *names)}
+    for seed in seeds:
+        with tempfile.TemporaryDirectory() as folder:
+            found = outcome_of(seed, Path(folder), names)
+        for name, words in {"run": "passed", **found}.items():
+            known = words in ("passed", "not applicable", "refused")
+            counts[name][words if known else "flags"] += 1
+            if not known:
+                print(f"{name}: {words[:600]}\n    {draw(seed).title}", flush=True)
+    kinds = ("passed", "flags", "refused", "not applicable")
+    rows = [f"{'check':24s}" + "".join(f"{kind:>16s}" for kind in kinds) + "       s each"]
+    for name, count in counts.items():
+        each = SECONDS[name] / max(1, sum(count.values()))
+        rows.append(f"{name:24s}" + "".join(f"{count[k]:16d}" for k in kinds) + f"{each:13.3f}")
+    return "\n".join(rows)

@@ -7,6 +7,7 @@ As a script: ``python3 combinations.py --from 0 --number 2000`` runs all checks 
 ``--show SEED`` prints the script of one.
 """
 
+import argparse
 import math
 import re
 from dataclasses import dataclass, field
@@ -295,3 +296,24 @@ def _build(d, base):
         d.beam((1.0, 0.2), (1.8, -0.3), d.one([2, 3]))
     x, y = d.some(-25, 25), d.some(-25, 25)
     d.loads.append(f"ub.PointLoad({d.last}.end, force=({x:.3f}, {y:.3f}), time={d.time()})")
+
+
+def main(arguments=None):
+    """Run the checks of many seeds, and print how often each applied, passed and flagged."""
+    import combination_checks  # it imports this module
+
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--from", type=int, default=0, dest="first")
+    parser.add_argument("--number", type=int, default=100)
+    parser.add_argument("--checks", nargs="*", default=list(combination_checks.CHECKS))
+    parser.add_argument("--show", type=int, help="print the script of this seed, and nothing else")
+    options = parser.parse_args(arguments)
+    if options.show is not None:
+        print(draw(options.show).source)
+        return
+    seeds = range(options.first, options.first + options.number)
+    print(combination_checks.table_of(seeds, options.checks))
+
+
+if __name__ == "__main__":
+    main()

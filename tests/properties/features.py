@@ -238,6 +238,8 @@ def propped(d):
 def moved_tip(d):
     component, size = d.one([("u", 0.05), ("v", 0.1), ("psi", 0.3)])
     way = f"ub.Table([0.0, {d.end / 2:.4g}, {d.end:.4g}], [0.0, {size}, {-size / 2}])"
+    if not d.static:  # kinks of motions are blows, of which the energy does not converge
+        way = f"lambda t: {size} * (1.0 - math.cos({d.some(2, 6) / d.end:.4g} * t))"
     d.supports.append(f"ub.Prescribed({d.last}.end, {component}={way})")
 
 
