@@ -301,6 +301,7 @@ def _build(d, base):
 def main(arguments=None):
     """Run the checks of many seeds, and print how often each applied, passed and flagged."""
     import combination_checks  # it imports this module
+    import mechanics_checks  # noqa: F401 - adds its checks
 
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--from", type=int, default=0, dest="first")

@@ -1,0 +1,386 @@
+# SPDX-License-Identifier: MIT
+"""Checks of combinations against mechanics: equilibrium, momentum, vibrations, paths, buckling."""
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from combination_checks import CHECKS, DIGITS, SAME, check, difference, only
+
+import ufl_beam as ub
+from ufl_beam.model.bodies import GROUND, node
+
+GAUSS = np.polynomial.legendre.leggauss(5)
+
+FORCES = 1e-8
+"""Part of the largest force that may be missing: Newton's method leaves 1e-12 of the forces, which
+differences of positions magnify; V follows from moments of cells of a quarter of a metre."""
+
+
+# -- statics: nodes and cells ------------------------------------------------------------------
+
+
+class Balance:
+    """Forces and moments on the parts of a scene in the last state of a static run.
+
+    Vectors of the plane are (3,): force, and moment about the origin; N, N m.
+    """
+
+    def __init__(self, names, solution):
+        self.scene, self.solution, self.t = names["scene"], solution, solution.times[-1]
+        self._group, self.size = {}, 0.0
+        for joint in self.scene.joints:
+            self._join(*joint.places)
+        for one in self.scene.connectors:
+            self._join(one.a, one.b)
+
+    def _of(self, anchor):
+        """Part of a place: a body, the ground, or a vertex of a beam."""
+        key = node(anchor)
+        key = key if not isinstance(key, ub.Place) else (key.beam, round(key.s, 9))
+        while key in self._group:
+            key = self._group[key]
+        return key
+
+    def _join(self, a, *others):
+        """Parts that forces of joints and connectors keep together; those of the ground act."""
+        for b in others:
+            one, other = self._of(a), self._of(b)
+            if one != other and GROUND not in (one, other):
+                self._group[one] = other
+
+    def at(self, place, force, moment=0.0):
+        """A force at a place, about the origin."""
+        x, y = self.solution.position(place)[-1]
+        return np.array([*force, x * force[1] - y * force[0] + moment])
+
+    def factor(self, time):
+        return time(self.t)
+
+    def turn(self, place):
+        return self.solution.displacement(place)[-1, 2]
+
+    def on_places(self):
+        """Forces of loads, supports, weights, and of what is joined to the ground, with places."""
+        solution, last = self.solution, -1
+        for load in self.scene.loads:
+            if isinstance(load, ub.PointLoad | ub.FollowerLoad):
+                c = s = 0.0
+                if isinstance(load, ub.FollowerLoad):
+                    s = self.turn(load.place)
+                c, s = math.cos(s), math.sin(s)
+                x, y = load.force
+                force = self.factor(load.time) * np.array([c * x - s * y, s * x + c * y])
+                yield load.place, self.at(load.place, force, self.factor(load.time) * load.moment)
+        for support in self.scene.supports:
+            *force, moment = solution.reaction(support)[last]
+            yield support.place, self.at(support.place, force, moment)
+        heavy = [(one.place, one.mass) for one in self.scene.masses]
+        heavy += [(one.middle, one.mass) for one in self.scene.bodies]
+        for place, mass in heavy:
+            yield place, self.at(place, mass * self.field(solution.position(place)[last]))
+        for one in self.scene.connectors:
+            if node(one.a) is GROUND:
+                yield one.b, self._of_connector(one, solution.connector(one).force[last])
+        for joint in self.scene.joints:
+            if node(joint.places[0]) is GROUND:
+                history = solution.joint(joint)
+                moment = np.nan_to_num(history.moment[last])
+                yield joint.places[1], self.at(joint.places[1], history.force[last], moment)
+
+    def _of_connector(self, one, force):
+        if one.turns:
+            return np.array([0.0, 0.0, -force])
+        away = self.solution.position(one.b)[-1] - np.array(one.a.point)
+        axis = away / np.hypot(*away) if one.stretches else np.array(one.axis)
+        return self.at(one.b, -force * axis)
+
+    def field(self, x):
+        """Acceleration of weight and of rotating frames at a point; m/s²."""
+        g = np.zeros(2)
+        for load in self.scene.loads:
+            if isinstance(load, ub.Gravity):
+                g += self.factor(load.time) * np.array(load.acceleration)
+            if isinstance(load, ub.RotatingFrame):
+                g += load.rate**2 * np.subtract(x, load.about)
+        return g
+
+    def on_cell(self, beam, k, s0, s1):
+        """Distributed loads and works on the k-th cell, from s0 to s1."""
+        total = np.zeros(3)
+        length = math.dist(*self.solution.grid.points[self._nodes(beam, k)])
+        for ξ, w in zip(*GAUSS, strict=True):
+            place = beam.at((s0 + s1) / 2 + ξ * (s1 - s0) / 2)
+            x = self.solution.position(place)[-1]
+            force, moment = beam.section.rhoA * self.field(x), 0.0
+            for load in self.scene.loads:
+                if isinstance(load, ub.LineLoad) and load.beam is beam:
+                    force = force + self.factor(load.time) * np.array(load.force)
+                    moment += self.factor(load.time) * load.moment
+            of_works = self._of_works(beam, place, (s0, s1), length)
+            total += w / 2 * length * self.at(place, force + of_works[:2], moment + of_works[2])
+        return total
+
+    def _nodes(self, beam, k):
+        """Vertices of the k-th cell of a beam."""
+        return self.solution.grid.cells[self.solution.grid.cells_of(beam)][k]
+
+    def _of_works(self, beam, place, ends, length):
+        """Force and moment per length of the works of own_parts.py."""
+        total = np.zeros(3)
+        u = self.solution.displacement(place)[-1]
+        for work in self.scene.works:
+            number = {n: x(self.t) if callable(x) else x for n, x in work.numbers.items()}
+            if beam not in work.on(self.scene.beams):
+                continue
+            if work.name == "dead":
+                total[:2] += number["x"], number["y"]
+            elif work.name == "soil":
+                total[1] -= number["k"] * u[1]
+            elif work.name == "field":
+                total[2] += number["size"] * math.cos(u[2])
+            elif work.name == "current":
+                a, b = (self.solution.position(beam.at(s))[-1] for s in ends)
+                x, y = (b - a) / length
+                total[:2] += number["p"] * np.array([-y, x])
+        return total
+
+    def cuts(self, beam):
+        """Forces on the cells of a straight beam at their ends, from the diagram; pairs of (3,)."""
+        diagram = self.solution.diagram(beam, points=2)
+        x, y = np.subtract(beam.b, beam.a) / math.dist(beam.a, beam.b)
+        for k in range(0, len(diagram.s), 2):
+            ends = []
+            turns = self.solution.q[-1, self.solution.grid.dofs[self._nodes(beam, k // 2), 2]]
+            for i, sign, turn in ((k, -1.0, turns[0]), (k + 1, 1.0, turns[1])):
+                place = beam.at(diagram.s[i])
+                c, s = math.cos(turn), math.sin(turn)
+                t = np.array([c * x - s * y, s * x + c * y])
+                n = np.array([-t[1], t[0]])
+                force = sign * (diagram.N[i] * t + diagram.V[i] * n)
+                ends.append(self.at(place, force, sign * diagram.M[i]))
+                self.size = max(self.size, np.abs(ends[-1]).max())
+            yield k // 2, (diagram.s[k], diagram.s[k + 1]), ends
+
+
+def straight(names):
+    return all(type(beam) is ub.Beam and not beam.corners for beam in names["scene"].beams)
+
+
+@check
+def equilibrium(case):
+    """In statics N, V, M at both ends of each cell bear its loads, and jump by what acts at nodes.
+
+    Loads of a cell are integrated anew; a support, connector or joint bears what the nodes of the
+    parts that it holds miss.  Quadratures of works and fields of forces are those of the cells, of
+    degree 2, which are exact for all but the field of magnets.
+    """
+    words = case.combination
+    only(words.has("scheme = ub.Static("), "forces of a step act at its end in Static only")
+    only(not words.has("Beam.", "lumped", "field", "KelvinVoigt"), "not integrated here")
+    only(not case.exact.failure, "a step fails")
+    balance = Balance(case.exact.names, case.exact.solution)
+    missing, nodes = {}, {}
+    for beam in balance.scene.beams:
+        for k, (s0, s1), (start, end) in balance.cuts(beam):
+            missing[f"cell {k} of {beam.name}"] = start + end + balance.on_cell(beam, k, s0, s1)
+            for s, force in ((s0, start), (s1, end)):
+                part = balance._of(beam.at(s))
+                nodes[part] = nodes.get(part, np.zeros(3)) - force
+    for place, force in balance.on_places():
+        part = balance._of(place)
+        nodes[part] = nodes.get(part, np.zeros(3)) + force
+        balance.size = max(balance.size, np.abs(force).max())
+    nodes.pop(GROUND, None)
+    missing |= {f"node {part}": force for part, force in nodes.items()}
+    wrong = {k: v / balance.size for k, v in missing.items()}
+    wrong = {k: v for k, v in wrong.items() if not np.abs(v).max() < FORCES}
+    assert not wrong, wrong
+
+
+# -- dynamics ----------------------------------------------------------------------------------
+
+
+@check
+def momentum(case):
+    """In midpoint rules linear momentum grows by the impulses of loads, supports and the ground.
+
+    Tolerance: 1e-12 of the forces in each step, which are up to 1e3 times those of loads.
+    """
+    words = case.combination
+    only(words.has("ub.Midpoint", "ub.DecayingMidpoint", "Weighted"), "other means of forces")
+    only(not words.has("VirtualWork", "Potential", "RotatingFrame", "Rayleigh", "Guided"), "field")
+    only(not case.exact.failure, "a step fails")
+    solution, scene = case.exact.solution, case.exact.names["scene"]
+    only(solution.parts == len(solution) - 1, "a step was cut")
+    t, dt = solution.times, np.diff(solution.times)
+    middle = (t[1:] + t[:-1]) / 2
+    force, size = np.zeros((len(dt), 2)), 0.0
+
+    def add(values):
+        nonlocal force, size
+        force, size = force + values, max(size, np.abs(values).max(initial=0.0))
+
+    for load in scene.loads:
+        factor = np.array([load.time(x) for x in middle])[:, None]
+        if isinstance(load, ub.Gravity):
+            mass = sum(_length(solution, beam) * beam.section.rhoA for beam in scene.beams)
+            mass += sum(one.mass for one in (*scene.masses, *scene.bodies))
+            add(factor * mass * np.array(load.acceleration))
+        elif isinstance(load, ub.LineLoad):
+            add(factor * _length(solution, load.beam) * np.array(load.force))
+        else:
+            turn = solution.displacement(load.place)[:, 2]
+            mean = (turn[1:] + turn[:-1]) / 2 * isinstance(load, ub.FollowerLoad)
+            add(factor * (_turned(mean) @ np.array(load.force)))
+    for support in scene.supports:
+        add(solution.reaction(support)[1:, :2])
+    joints = [joint.holders[0] for joint in scene.joints if node(joint.places[0]) is GROUND]
+    for one in (*scene.connectors, *joints):
+        if node(one.a) is GROUND and not one.turns:
+            away = solution.position(one.b) - np.array(one.a.point)
+            sums, lengths = away[1:] + away[:-1], np.hypot(*away.T)
+            axis = sums / (lengths[1:] + lengths[:-1])[:, None] if one.stretches else one.axis
+            add(-solution.connector(one).force[1:, None] * np.broadcast_to(axis, force.shape))
+    change = np.diff(solution.momentum()[:, :2], axis=0)
+    missing = np.abs(change - dt[:, None] * force).max() / (size * dt.max())
+    assert missing < FORCES, missing
+
+
+def _length(solution, beam):
+    return np.hypot(*np.diff(solution.grid.points[solution.grid.vertices_of(beam)], axis=0).T).sum()
+
+
+def _turned(angles):
+    cos, sin = np.cos(angles), np.sin(angles)
+    return np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
+
+
+@check
+def modes(case):
+    """Modes about a static state are those of the motion after a small step of a load.
+
+    With s dt = 2 (z - 1)/(z + 1) in the midpoint rule, all states lie in the span of zⁿ of all
+    modes.  Ten are taken: the first left out has about 1/100 of the first amplitude, squared
+    frequencies growing as n⁴ in beams and as n² in bars.
+    """
+    words = case.combination
+    only(words.static and words.elastic and not case.whole.failure, "not elastic, or in motion")
+    only(not words.has("Prescribed", "Motor", "Actuator", "VirtualWork", "'field'"), "driven")
+    names, state = case.whole.names, case.whole.solution
+    scene, t0 = names["scene"], state.times[-1]
+    held = [
+        load if isinstance(load, ub.RotatingFrame)
+        else replace(load, time=lambda t, load=load: load.time(t0))
+        for load in scene.loads
+    ]  # fmt: skip
+    still = replace(scene, loads=held)
+    shapes = ub.modes(still, 10, at=state)
+    period = 2 * math.pi / shapes.omega[0]
+    place = max((b.at(s) for b in scene.beams for s in (0.5, 1.0)), key=lambda p: _way(shapes, p))
+    push = ub.PointLoad(place, force=1e-5 * 100 * np.array([0.6, 0.8]), time=lambda t: 1.0)
+    arguments = {"t": (t0, t0 + 4 * period), "dt": period / 40, "mesh": names["mesh"]}
+    run = ub.simulate(
+        replace(still, loads=[*held, push]), ub.Midpoint(), start=state, progress=False,
+        comm=case.comm, newton=ub.Newton(rtol=DIGITS), **arguments,
+    )  # fmt: skip
+    moved = run.displacement(place)[:, :2]
+    sdt = shapes.exponents * period / 40
+    z = (1 + sdt / 2) / (1 - sdt / 2)
+    powers = z[None, :] ** np.arange(len(moved))[:, None]
+    basis = np.column_stack([np.ones(len(moved)), powers.real, powers.imag])
+    left = moved - basis @ np.linalg.lstsq(basis, moved, rcond=1e-10)[0]
+    missing = np.abs(left).max() / np.ptp(moved, axis=0).max()
+    assert missing < 1e-2, missing
+
+
+def _way(shapes, place):
+    return float(np.abs(shapes.shape(0, place)[:2]).max())
+
+
+# -- paths -------------------------------------------------------------------------------------
+
+IN_TIME = ("Controller", "state=", "Perzyna", "DuvautLions", "Dashpot", "KelvinVoigt")
+"""What depends on time, or on rates, and is no part of a path."""
+
+
+@check
+def path(case):
+    """`follow` with equal steps of the load factor passes the states of `Static`."""
+    words = case.combination
+    only(words.has("scheme = ub.Static(") and not words.has(*IN_TIME), "in time")
+    only(words.base != "column" and not case.exact.failure, "no equilibrium")
+    names, expected = case.combination.make(), case.exact.solution
+    step, end = expected.times[1], expected.times[-1]
+    only(expected.parts == len(expected) - 1, "a step was cut")
+    try:
+        found = ub.follow(
+            names["scene"], ub.LoadControl(step), steps=len(expected) - 1, mesh=names["mesh"],
+            until=lambda now: now.t > end - step / 2, newton=ub.Newton(rtol=DIGITS),
+            progress=False, comm=case.comm,
+        )  # fmt: skip
+    except ub.ConvergenceError as error:
+        only("nothing moves with the load factor" not in str(error), "loads stay as they are")
+        raise
+    both = [
+        (i, int(np.argmin(np.abs(found.factor - t)))) for i, t in enumerate(expected.times) if i
+    ]
+    rows, others = (np.array(k) for k in zip(*both, strict=True))
+    assert difference(found.factor[others], expected.times[rows]) < SAME
+    nodes = np.unique(np.vstack([expected.grid.dofs, expected.grid.dofs_of_bodies]))
+    assert difference(found.q[others][:, nodes], expected.q[rows][:, nodes], 1.0) < SAME
+    for one, other in zip(names["scene"].supports, case.exact.names["scene"].supports, strict=True):
+        forces = expected.reaction(other)[rows]
+        size = max(np.abs(forces).max(), 1.0)
+        assert difference(found.reaction(one)[others], forces, size) < 10 * SAME
+
+
+@check
+def buckles(case):
+    """The first critical point of a straight column is a bifurcation at its factor of `buckling`.
+
+    They differ by the strain before buckling, up to its double in shear.
+    """
+    only(case.combination.base == "column", "no straight column")
+    names = case.combination.make()
+    scene, mesh = names["scene"], names["mesh"]
+    factor = ub.buckling(scene, 1, mesh=mesh).factors[0]
+    path = ub.follow(
+        scene, ub.LoadControl(factor / 8.3), steps=11, mesh=mesh, comm=case.comm, progress=False,
+        until=lambda now: now.t > 1.1 * factor,
+    )  # fmt: skip
+    assert path.critical, f"none up to {path.factor[-1]:.6g}; buckling at {factor:.6g}"
+    first = path.critical[0]
+    strain = factor / names["b0"].section.EA + factor / names["b0"].section.GA
+    assert first.kind == "bifurcation", (first, factor)
+    assert abs(first.factor / factor - 1) < 4 * strain + 1e-6, (first.factor, factor)
+
+
+# -- pictures ----------------------------------------------------------------------------------
+
+
+def pictures_of(case):
+    """Pictures by name; each draws what the scene has."""
+    names, solution, beam = case.whole.names, case.whole.solution, case.whole.names["b0"]
+    drawn = {
+        "model": lambda: ub.plot(names["scene"]), "M": lambda: ub.plot(solution, "M"),
+        "N": lambda: ub.plot(solution, "N"), "V": lambda: ub.plot(solution, "V"),
+        "shapes": lambda: ub.plot_shapes(solution), "energy": lambda: ub.plot_energy(solution),
+        "history": lambda: ub.plot_history(solution, [beam.end]),
+    }  # fmt: skip
+    if case.combination.has("bending=", "axial=", "fibres=", "hinge=", "interaction="):
+        drawn["dissipation"] = lambda: ub.plot_dissipation(solution)
+        drawn["curvature"] = lambda: ub.plot_moment_curvature(solution, beam.at(0.3))
+    return drawn
+
+
+@check
+def pictures(case):
+    """Two of the pictures, other ones for each seed, are drawn without an error."""
+    only(len(case.whole.solution) > 1, "no step")
+    drawn, seed = pictures_of(case), case.combination.seed
+    for k in (0, 1):
+        list(drawn.values())[(2 * seed + k) % len(drawn)]().draw_without_rendering()
+
+
+__all__ = ["CHECKS"]
