@@ -16,8 +16,6 @@ from functools import cached_property
 import numpy as np
 from features import FEATURES, PLAIN, Feature
 
-import ufl_beam as ub
-
 STATICS = ("Static()", "ExactStatic()", "Static()", "ExactStatic(0.7)")
 DYNAMICS = (
     "Midpoint()", "Midpoint(0.05, 0.1)", "DecayingMidpoint()", "PrintedMidpoint()", "Newmark()",
@@ -38,7 +36,7 @@ BASES = ("cantilever", "chain", "portal")
 COLUMN = (
     "shape", "pinned", "degree", "refined", "potential", "newton", "propped", "side_spring",
 )  # fmt: skip
-"""Features that leave a straight column straight under a load along it, which every 16th seed is."""
+"""Features that leave a straight column straight under a load along it; every 16th seed is one."""
 
 STIFF = "EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=0.01"
 
@@ -149,7 +147,9 @@ class Draft:
             text = self.root.format(place="b0.start", rest=rest[moves[1]] if moves else "")
             lines.append(f"root = {text}")
             supports.insert(0, "root")
-        moving = ", ".join([*(f"b{i}" for i in range(len(self.beams))), *["body"] * len(self.bodies)])
+        moving = ", ".join(
+            [*(f"b{i}" for i in range(len(self.beams))), *["body"] * len(self.bodies)]
+        )
         parts = {
             "beams": [f"b{i}" for i in range(len(self.beams))], "joints": joints,
             "supports": supports, "loads": self.loads, "masses": self.masses,
@@ -240,7 +240,7 @@ class Combination:
 
 
 def draw(seed):
-    """The combination of a seed: the first feature and the scheme come in turn, others at random."""
+    """The combination of a seed: its first feature and its scheme come in turn, others at random."""
     random = np.random.default_rng([2026, seed])
     first = FEATURES[seed % len(FEATURES)]
     base = BASES[int(random.integers(len(BASES)))]

@@ -61,7 +61,10 @@ def _bulk(d, limit, stiffness):
 
 @feature("any section")
 def shape(d):
-    E, rho = 1.2e10 if d.column else 1.2e8, 1.2e4  # EI and mass as the plain section has them, in order of size
+    E, rho = (
+        1.2e10 if d.column else 1.2e8,
+        1.2e4,
+    )  # EI and mass as the plain section has them, in order of size
     d.section(0, d.one([
         f"ub.Section.rectangle(0.01, 0.1, E={E}, nu=0.3, rho={rho / 12:.6g})",
         f"ub.Section.circle(0.05, E={3 * E}, nu=0.3, rho={rho / 24:.6g})",
@@ -178,7 +181,9 @@ def prismatic(d):
     d.need_beams(2)
     d.joint = f"ub.Prismatic({{a}}, {{b}}, axis=({d.some(-1, 1):.3f}, 1.0))"
     axis = d.joint.split("axis=")[1][:-1]
-    d.connectors.append(f"ub.Slide(b0.end, b1.start, ub.Spring({d.some(100, 900):.4g}), axis={axis})")
+    d.connectors.append(
+        f"ub.Slide(b0.end, b1.start, ub.Spring({d.some(100, 900):.4g}), axis={axis})"
+    )
 
 
 @feature("joint")
@@ -304,9 +309,7 @@ def spring(d):
 def side_spring(d):
     x, y = d.tip
     law = f"ub.Spring({d.some(50, 300):.4g})"
-    d.connectors.append(
-        f"ub.Slide(ub.ground({x!r}, {y!r}), {d.last}.end, {law}, axis=(0.0, 1.0))"
-    )
+    d.connectors.append(f"ub.Slide(ub.ground({x!r}, {y!r}), {d.last}.end, {law}, axis=(0.0, 1.0))")
 
 
 @feature(elastic=False)
@@ -359,7 +362,9 @@ def actuator(d):
 
 @feature(elastic=False)
 def controller(d):
-    _connect(d, f"ub.Controller(lambda now: {d.some(1, 5):.3f} * math.sin({9 / d.end:.4g} * now.t))")
+    _connect(
+        d, f"ub.Controller(lambda now: {d.some(1, 5):.3f} * math.sin({9 / d.end:.4g} * now.t))"
+    )
 
 
 @feature(elastic=False)
@@ -376,7 +381,9 @@ def force_law(d):
 
 @feature(statics=False, elastic=False)
 def force_law_with_history(d):
-    _connect(d, f"ub.ForceLaw(Maxwell({d.some(50, 200):.4g}, {d.some(0.02, 0.1):.4g}), state=[0.0])")
+    _connect(
+        d, f"ub.ForceLaw(Maxwell({d.some(50, 200):.4g}, {d.some(0.02, 0.1):.4g}), state=[0.0])"
+    )
 
 
 @feature(at_end=False, elastic=False)

@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from combination_checks import CHECKS, DIGITS, SAME, check, difference, only
@@ -306,7 +307,10 @@ IN_TIME = ("Controller", "state=", "Perzyna", "DuvautLions", "Dashpot", "KelvinV
 
 @check
 def path(case):
-    """`follow` with equal steps of the load factor passes the states of `Static`."""
+    """`follow` with equal steps of the load factor passes the states of `Static`.
+
+    Where a step was cut, or loads stay as they are, there are no common factors any more.
+    """
     words = case.combination
     only(words.has("scheme = ub.Static(") and not words.has(*IN_TIME), "in time")
     only(words.base != "column" and not case.exact.failure, "no equilibrium")
@@ -322,11 +326,10 @@ def path(case):
     except ub.ConvergenceError as error:
         only("nothing moves with the load factor" not in str(error), "loads stay as they are")
         raise
-    both = [
-        (i, int(np.argmin(np.abs(found.factor - t)))) for i, t in enumerate(expected.times) if i
-    ]
-    rows, others = (np.array(k) for k in zip(*both, strict=True))
-    assert difference(found.factor[others], expected.times[rows]) < SAME
+    near = np.abs(found.factor[:, None] - expected.times[None, 1:]) < 1e-9 * end
+    others, rows = np.nonzero(near)
+    assert len(rows) > 2, found.factor
+    rows = rows + 1
     nodes = np.unique(np.vstack([expected.grid.dofs, expected.grid.dofs_of_bodies]))
     assert difference(found.q[others][:, nodes], expected.q[rows][:, nodes], 1.0) < SAME
     for one, other in zip(names["scene"].supports, case.exact.names["scene"].supports, strict=True):
@@ -363,24 +366,21 @@ def pictures_of(case):
     """Pictures by name; each draws what the scene has."""
     names, solution, beam = case.whole.names, case.whole.solution, case.whole.names["b0"]
     drawn = {
-        "model": lambda: ub.plot(names["scene"]), "M": lambda: ub.plot(solution, "M"),
-        "N": lambda: ub.plot(solution, "N"), "V": lambda: ub.plot(solution, "V"),
-        "shapes": lambda: ub.plot_shapes(solution), "energy": lambda: ub.plot_energy(solution),
+        "model": lambda: ub.plot(names["scene"]), "shapes": lambda: ub.plot_shapes(solution),
+        "energy": lambda: ub.plot_energy(solution),
         "history": lambda: ub.plot_history(solution, [beam.end]),
     }  # fmt: skip
     if case.combination.has("bending=", "axial=", "fibres=", "hinge=", "interaction="):
         drawn["dissipation"] = lambda: ub.plot_dissipation(solution)
         drawn["curvature"] = lambda: ub.plot_moment_curvature(solution, beam.at(0.3))
+    if case.combination.seed % 12 == 5:  # these take seconds
+        drawn = {force: partial(ub.plot, solution, force) for force in "NVM"}
     return drawn
 
 
 @check
 def pictures(case):
-    """Two of the pictures, other ones for each seed, are drawn without an error."""
+    """One of the pictures, another one for each seed, is drawn without an error."""
     only(len(case.whole.solution) > 1, "no step")
-    drawn, seed = pictures_of(case), case.combination.seed
-    for k in (0, 1):
-        list(drawn.values())[(2 * seed + k) % len(drawn)]().draw_without_rendering()
-
-
-__all__ = ["CHECKS"]
+    drawn = list(pictures_of(case).values())
+    drawn[case.combination.seed % len(drawn)]().draw_without_rendering()

@@ -5,6 +5,7 @@ They are the same objects in all scenes, with other numbers each, so that each i
 """
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import ufl
@@ -62,7 +63,7 @@ class Dashpot(ub.MaterialLaw):
     """Maxwell's body, in closed form."""
 
     eta: float
-    variables = {"creep": 0.0}
+    variables: ClassVar = {"creep": 0.0}
 
     def stress(self, strain, state):
         return self.C * (strain - state.creep)
@@ -81,7 +82,7 @@ class PowerLaw(ub.MaterialLaw):
     M0: float
     k0: float
     n: float
-    variables = {"plastic": 0.0, "largest": 0.0}
+    variables: ClassVar = {"plastic": 0.0, "largest": 0.0}
 
     def stress(self, strain, state):
         return self.C * (strain - state.plastic)
