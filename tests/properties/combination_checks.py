@@ -1,191 +1,26 @@
 # SPDX-License-Identifier: MIT
-"""Checks of combinations that compare runs: each states when it applies, and its tolerance.
-
-A check takes a :class:`Case`.  It raises :class:`NotApplicable` where the combination is none for
-it, and AssertionError where results differ: a flag.
-"""
+"""Checks of combinations that compare runs: each states when it applies, and its tolerance."""
 
 import contextlib
-import tempfile
-import time
-import warnings
-from collections import Counter
-from dataclasses import dataclass, field
-from functools import cached_property
-from pathlib import Path
 
 from mpi4py import MPI
 
 import numpy as np
-from combinations import Combination, draw
+from combination_case import (
+    DIGITS,
+    SAME,
+    StopAt,
+    assert_near,
+    assert_same_bits,
+    check,
+    difference,
+    differences,
+    only,
+)  # fmt: skip
 from own_parts import LargestCurvature
 
 import ufl_beam as ub
 from ufl_beam.simulation import replicas
-
-DIGITS = 1e-12
-"""Tolerance of Newton's method in runs whose results are compared as numbers."""
-
-SAME = 1e-7
-"""Difference of two runs to :data:`DIGITS`, as a part of the largest value.
-
-Each of some 20 steps leaves 1e-12 of the forces; stiffnesses of the combinations differ by factors
-of up to 1e3, and displacements are up to 1e-2 of what these forces would make.
-"""
-
-
-class NotApplicable(Exception):
-    """Why a check says nothing about a combination."""
-
-
-def only(condition, reason):
-    if not condition:
-        raise NotApplicable(reason)
-
-
-class StopAt(ub.Recorder):
-    """Interrupts a run after so many steps."""
-
-    def __init__(self, steps):
-        self.steps = steps
-
-    def open(self, simulation):
-        pass
-
-    def write(self, simulation):
-        self.steps -= 1
-        if self.steps == 0:
-            raise KeyboardInterrupt
-
-    def state(self):
-        return {}
-
-    def resume(self, simulation, state):
-        pass
-
-
-@dataclass
-class Run:
-    """Names of a script, and the solution of its scene; `failure` if a step failed."""
-
-    names: dict
-    solution: ub.Solution
-    failure: str = ""
-
-
-@dataclass
-class Case:
-    """A combination, its run, and a folder for files."""
-
-    combination: Combination
-    folder: Path
-    comm: MPI.Intracomm = field(default_factory=lambda: MPI.COMM_SELF)
-
-    def run(self, source=None, *, names=None, call=ub.simulate, **changes):
-        """Run the script, with other arguments; a failed step leaves what came before it."""
-        names = self.combination.make(source) if names is None else names
-        arguments = {key: names[key] for key in ("t", "dt", "mesh", "newton")}
-        arguments |= {"progress": False, "comm": self.comm, **changes}
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ub.ModelWarning)
-            try:
-                return Run(names, call(names["scene"], names["scheme"], **arguments))
-            except ub.ConvergenceError as error:
-                return Run(names, error.solution, str(error))
-
-    @cached_property
-    def whole(self):
-        """The run as the script states it."""
-        return self.run()
-
-    @cached_property
-    def exact(self):
-        """The same to more digits."""
-        return self.run(newton=ub.Newton(rtol=DIGITS))
-
-    @property
-    def steps(self):
-        return len(self.whole.solution) - 1
-
-    @property
-    def equal_steps(self):
-        return not self.combination.has("ub.Adaptive")
-
-
-CHECKS = {}
-
-
-def check(function):
-    """Add a function to the checks."""
-    CHECKS[function.__name__] = function
-    return function
-
-
-def arrays_of(solution):
-    """All that a solution kept, and what it counted, by name."""
-    counts = {"parts": np.array(solution.parts), "iterations": np.array(solution.iterations)}
-    return {**solution.history(), **counts, **{f"end {n}": x for n, x in solution.internal.items()}}
-
-
-def assert_same_bits(one, other):
-    first, second = (arrays_of(x) if isinstance(x, ub.Solution) else x for x in (one, other))
-    assert sorted(first) == sorted(second)
-    for name, values in first.items():  # all bits but the signs of zeros
-        numbers = not isinstance(values, str)
-        assert np.array_equal(values, second[name], equal_nan=numbers), name
-
-
-def difference(one, other, size=None):
-    """Largest difference, as a part of the largest size; NaN stands where it stands in both."""
-    one, other = np.asarray(one), np.asarray(other)
-    assert one.shape == other.shape
-    assert (np.isnan(one) == np.isnan(other)).all()
-    size = np.nanmax(np.abs(other), initial=0.0) if size is None else size
-    return float(np.nanmax(np.abs(one - other), initial=0.0)) / (size or 1.0)
-
-
-def results(names, solution, rows=slice(None)):
-    """Results of a solution by name: motions as parts of the scene, forces, energies."""
-    scene = names["scene"]
-    found = {}
-    lengths = scene.size * np.array([1.0, 1.0, 0.0]) + np.array([0.0, 0.0, 1.0])
-    moved = [one.at(s) for one in scene.beams for s in (0.0, 0.5, 1.0)]
-    moved += [one.middle for one in scene.bodies]
-    found["motions"] = np.array([solution.displacement(p)[rows] / lengths for p in moved]), 1.0
-    forces = [solution.section_forces_at(p)[rows] for p in moved if isinstance(p, ub.Place)]
-    forces += [solution.reaction(support)[rows] for support in scene.supports]
-    links = [solution.connector(one) for one in scene.connectors]
-    found["forces"] = np.array(forces), None
-    found["of connectors"] = np.array([link.force[rows] for link in links]), None
-    return found
-
-
-def differences(one, other, rows=slice(None), begin=None):
-    """Largest differences of two runs by kind; of the second those of some rows.
-
-    Energies that were supplied and lost count from the first of the rows on.
-    """
-    a, b = results(one.names, one.solution), results(other.names, other.solution, rows)
-    forces = max((np.nanmax(np.abs(x), initial=0.0) for x, _ in b.values()), default=1.0)
-    found = {}
-    for name, (values, size) in a.items():
-        values, others = (x[:, 1:] if x.ndim > 1 else x for x in (values, b[name][0]))
-        found[name] = difference(values, others, size or forces)
-    through = other.solution.energy.throughput or 1.0
-    for kind in ("state", "supplied", "lost"):
-        mine, others = getattr(one.solution.energy, kind), getattr(other.solution.energy, kind)
-        assert set(mine) == set(others)
-        for name in mine:
-            expected = others[name][rows] - (0.0 if kind == "state" else others[name][rows][0])
-            found[f"{kind}: {name}"] = difference(mine[name], expected, through)
-    return found
-
-
-def assert_near(found, tolerance=SAME):
-    assert max(found.values()) <= tolerance, {k: v for k, v in found.items() if v > tolerance}
-
-
-# -- runs --------------------------------------------------------------------------------------
 
 
 @check
@@ -409,55 +244,3 @@ def processes(case):
         replicas.SMALLEST_SHARE = smallest
     assert not shared.failure, shared.failure
     assert_near(differences(shared, case.exact))
-
-
-# -- many combinations -------------------------------------------------------------------------
-
-REFUSED = (
-    "hinges are for resultants",
-)  # fmt: skip
-"""What a refusal of a combination may say: features that the documentation excludes together."""
-
-
-SECONDS: Counter = Counter()
-"""Time that each check has taken in this process; s."""
-
-
-def outcome_of(combination, folder, names):
-    """What became of each check: "passed", "not applicable", "refused", or words of a flag."""
-    case, found = Case(combination, folder), {}
-    try:
-        assert case.whole.solution is not None
-    except ub.SceneError as error:
-        known = any(words in str(error) for words in REFUSED)
-        return {"run": "refused" if known else f"refused: {error}"}
-    for name in names:
-        begin = time.perf_counter()
-        try:
-            CHECKS[name](case)
-            found[name] = "passed"
-        except NotApplicable:
-            found[name] = "not applicable"
-        except Exception as error:
-            found[name] = f"{type(error).__name__}: {error}"
-        SECONDS[name] += time.perf_counter() - begin
-    return found
-
-
-def table_of(seeds, names):
-    """Run many; print flags as they come, and return the table of checks."""
-    counts = {name: Counter() for name in ("run", *names)}
-    for seed in seeds:
-        with tempfile.TemporaryDirectory() as folder:
-            found = outcome_of(draw(seed), Path(folder), names)
-        for name, words in {"run": "passed", **found}.items():
-            known = words in ("passed", "not applicable", "refused")
-            counts[name][words if known else "flags"] += 1
-            if not known:
-                print(f"{name}: {words[:600]}\n    {draw(seed).title}", flush=True)
-    kinds = ("passed", "flags", "refused", "not applicable")
-    rows = [f"{'check':24s}" + "".join(f"{kind:>16s}" for kind in kinds) + "       s each"]
-    for name, count in counts.items():
-        each = SECONDS[name] / max(1, sum(count.values()))
-        rows.append(f"{name:24s}" + "".join(f"{count[k]:16d}" for k in kinds) + f"{each:13.3f}")
-    return "\n".join(rows)

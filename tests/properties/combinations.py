@@ -3,7 +3,7 @@
 
 `draw(seed)` draws a model of one to three beams and its features from those of :mod:`features`.
 As a script: ``python3 combinations.py --from 0 --number 2000`` runs all checks of
-:mod:`combination_checks` on each and prints how often each applied, passed and flagged;
+:mod:`combination_table` on each and prints how often each applied, passed and flagged;
 ``--show SEED`` prints the script of one.
 """
 
@@ -13,6 +13,7 @@ import re
 from dataclasses import dataclass, field
 from functools import cached_property
 
+import features_of_forces  # noqa: F401 - adds its features
 import numpy as np
 from features import FEATURES, PLAIN, Feature
 
@@ -240,7 +241,7 @@ class Combination:
 
 
 def draw(seed):
-    """The combination of a seed: its first feature and its scheme come in turn, others at random."""
+    """The combination of a seed: first feature and scheme come in turn, others at random."""
     random = np.random.default_rng([2026, seed])
     first = FEATURES[seed % len(FEATURES)]
     base = BASES[int(random.integers(len(BASES)))]
@@ -300,20 +301,19 @@ def _build(d, base):
 
 def main(arguments=None):
     """Run the checks of many seeds, and print how often each applied, passed and flagged."""
-    import combination_checks  # it imports this module
-    import mechanics_checks  # noqa: F401 - adds its checks
+    import combination_table  # it imports this module
 
     parser = argparse.ArgumentParser(description=main.__doc__)
     parser.add_argument("--from", type=int, default=0, dest="first")
     parser.add_argument("--number", type=int, default=100)
-    parser.add_argument("--checks", nargs="*", default=list(combination_checks.CHECKS))
+    parser.add_argument("--checks", nargs="*", default=list(combination_table.CHECKS))
     parser.add_argument("--show", type=int, help="print the script of this seed, and nothing else")
     options = parser.parse_args(arguments)
     if options.show is not None:
         print(draw(options.show).source)
         return
     seeds = range(options.first, options.first + options.number)
-    print(combination_checks.table_of(seeds, options.checks))
+    print(combination_table.table_of(seeds, options.checks))
 
 
 if __name__ == "__main__":

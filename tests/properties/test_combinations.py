@@ -8,10 +8,9 @@ table, ``--show SEED`` prints the script of one.
 from mpi4py import MPI
 
 import pytest
-from combination_checks import outcome_of
+from combination_table import CHECKS, outcome_of
 from combinations import DYNAMICS, STATICS, draw
 from features import FEATURES
-from mechanics_checks import CHECKS
 
 import ufl_beam as ub
 
