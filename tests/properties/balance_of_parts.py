@@ -1,0 +1,154 @@
+# SPDX-License-Identifier: MIT
+"""Forces on the cells and nodes of a scene in a static state, stated anew from the records."""
+
+import math
+
+import numpy as np
+
+import ufl_beam as ub
+from ufl_beam.model.bodies import GROUND, node
+
+GAUSS = np.polynomial.legendre.leggauss(5)
+
+
+class Balance:
+    """Forces and moments on the parts of a scene in the last state of a static run.
+
+    Vectors of the plane are (3,): force, and moment about the origin; N, N m.
+    """
+
+    def __init__(self, names, solution):
+        self.scene, self.solution, self.t = names["scene"], solution, solution.times[-1]
+        self._group, self.size = {}, 0.0
+        for joint in self.scene.joints:
+            self._join(*joint.places)
+        for one in self.scene.connectors:
+            self._join(one.a, one.b)
+
+    def _of(self, anchor):
+        """Part of a place: a body, the ground, or a vertex of a beam."""
+        key = node(anchor)
+        key = key if not isinstance(key, ub.Place) else (key.beam, round(key.s, 9))
+        while key in self._group:
+            key = self._group[key]
+        return key
+
+    def _join(self, a, *others):
+        """Parts that forces of joints and connectors keep together; those of the ground act."""
+        for b in others:
+            one, other = self._of(a), self._of(b)
+            if one != other and GROUND not in (one, other):
+                self._group[one] = other
+
+    def at(self, place, force, moment=0.0):
+        """A force at a place, about the origin."""
+        x, y = self.solution.position(place)[-1]
+        return np.array([*force, x * force[1] - y * force[0] + moment])
+
+    def factor(self, time):
+        return time(self.t)
+
+    def turn(self, place):
+        return self.solution.displacement(place)[-1, 2]
+
+    def on_places(self):
+        """Forces of loads, supports, weights, and of what is joined to the ground, with places."""
+        solution, last = self.solution, -1
+        for load in self.scene.loads:
+            if isinstance(load, ub.PointLoad | ub.FollowerLoad):
+                c = s = 0.0
+                if isinstance(load, ub.FollowerLoad):
+                    s = self.turn(load.place)
+                c, s = math.cos(s), math.sin(s)
+                x, y = load.force
+                force = self.factor(load.time) * np.array([c * x - s * y, s * x + c * y])
+                yield load.place, self.at(load.place, force, self.factor(load.time) * load.moment)
+        for support in self.scene.supports:
+            *force, moment = solution.reaction(support)[last]
+            yield support.place, self.at(support.place, force, moment)
+        heavy = [(one.place, one.mass) for one in self.scene.masses]
+        heavy += [(one.middle, one.mass) for one in self.scene.bodies]
+        for place, mass in heavy:
+            yield place, self.at(place, mass * self.field(solution.position(place)[last]))
+        for one in self.scene.connectors:
+            if node(one.a) is GROUND:
+                yield one.b, self._of_connector(one, solution.connector(one).force[last])
+        for joint in self.scene.joints:
+            if node(joint.places[0]) is GROUND:
+                history = solution.joint(joint)
+                moment = np.nan_to_num(history.moment[last])
+                yield joint.places[1], self.at(joint.places[1], history.force[last], moment)
+
+    def _of_connector(self, one, force):
+        if one.turns:
+            return np.array([0.0, 0.0, -force])
+        away = self.solution.position(one.b)[-1] - np.array(one.a.point)
+        axis = away / np.hypot(*away) if one.stretches else np.array(one.axis)
+        return self.at(one.b, -force * axis)
+
+    def field(self, x):
+        """Acceleration of weight and of rotating frames at a point; m/s²."""
+        g = np.zeros(2)
+        for load in self.scene.loads:
+            if isinstance(load, ub.Gravity):
+                g += self.factor(load.time) * np.array(load.acceleration)
+            if isinstance(load, ub.RotatingFrame):
+                g += load.rate**2 * np.subtract(x, load.about)
+        return g
+
+    def on_cell(self, beam, k, s0, s1):
+        """Distributed loads and works on the k-th cell, from s0 to s1."""
+        total = np.zeros(3)
+        length = math.dist(*self.solution.grid.points[self._nodes(beam, k)])
+        for ξ, w in zip(*GAUSS, strict=True):
+            place = beam.at((s0 + s1) / 2 + ξ * (s1 - s0) / 2)
+            x = self.solution.position(place)[-1]
+            force, moment = beam.section.rhoA * self.field(x), 0.0
+            for load in self.scene.loads:
+                if isinstance(load, ub.LineLoad) and load.beam is beam:
+                    force = force + self.factor(load.time) * np.array(load.force)
+                    moment += self.factor(load.time) * load.moment
+            of_works = self._of_works(beam, place, (s0, s1), length)
+            total += w / 2 * length * self.at(place, force + of_works[:2], moment + of_works[2])
+        return total
+
+    def _nodes(self, beam, k):
+        """Vertices of the k-th cell of a beam."""
+        return self.solution.grid.cells[self.solution.grid.cells_of(beam)][k]
+
+    def _of_works(self, beam, place, ends, length):
+        """Force and moment per length of the works of own_parts.py."""
+        total = np.zeros(3)
+        u = self.solution.displacement(place)[-1]
+        for work in self.scene.works:
+            number = {n: x(self.t) if callable(x) else x for n, x in work.numbers.items()}
+            if beam not in work.on(self.scene.beams):
+                continue
+            if work.name == "dead":
+                total[:2] += number["x"], number["y"]
+            elif work.name == "soil":
+                total[1] -= number["k"] * u[1]
+            elif work.name == "field":
+                total[2] += number["size"] * math.cos(u[2])
+            elif work.name == "current":
+                a, b = (self.solution.position(beam.at(s))[-1] for s in ends)
+                x, y = (b - a) / length
+                total[:2] += number["p"] * np.array([-y, x])
+        return total
+
+    def cuts(self, beam):
+        """Forces on the cells of a straight beam at their ends, from the diagram; pairs of (3,)."""
+        diagram = self.solution.diagram(beam, points=2)
+        x, y = np.subtract(beam.b, beam.a) / math.dist(beam.a, beam.b)
+        for k in range(0, len(diagram.s), 2):
+            ends = []
+            turns = self.solution.q[-1, self.solution.grid.dofs[self._nodes(beam, k // 2), 2]]
+            for i, sign, turn in ((k, -1.0, turns[0]), (k + 1, 1.0, turns[1])):
+                place = beam.at(diagram.s[i])
+                c, s = math.cos(turn), math.sin(turn)
+                t = np.array([c * x - s * y, s * x + c * y])
+                n = np.array([-t[1], t[0]])
+                force = sign * (diagram.N[i] * t + diagram.V[i] * n)
+                ends.append(self.at(place, force, sign * diagram.M[i]))
+                self.size = max(self.size, np.abs(ends[-1]).max())
+            yield k // 2, (diagram.s[k], diagram.s[k + 1]), ends

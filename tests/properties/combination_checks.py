@@ -1,0 +1,246 @@
+# SPDX-License-Identifier: MIT
+"""Checks of combinations that compare runs: each states when it applies, and its tolerance."""
+
+import contextlib
+
+from mpi4py import MPI
+
+import numpy as np
+from combination_case import (
+    DIGITS,
+    SAME,
+    StopAt,
+    assert_near,
+    assert_same_bits,
+    check,
+    difference,
+    differences,
+    only,
+)  # fmt: skip
+from own_parts import LargestCurvature
+
+import ufl_beam as ub
+from ufl_beam.simulation import replicas
+
+
+@check
+def failed_step(case):
+    """A step that fails also fails in runs of a quarter of the step, near the same time."""
+    only(case.whole.failure, "all steps converged")
+    only(case.equal_steps, "adaptive steps are as short as they need be")
+    small = case.run(dt=case.whole.names["dt"] / 4, newton=ub.Newton())
+    assert small.failure, f"small steps converge; {case.whole.failure}"
+    apart = abs(small.solution.times[-1] - case.whole.solution.times[-1])
+    assert apart <= 2 * case.whole.names["dt"], case.whole.failure
+
+
+@check
+def ledger(case):
+    """It closes as the scheme claims; what was lost never comes back, to digits of the whole.
+
+    `DecayingMidpoint` may give back a part of its own loss, but no more than that.
+    """
+    solution = case.whole.solution
+    assert solution.open_ledger == ""
+    energy = solution.energy
+    for name in ("plastic", "hinges", "friction", "numerical"):
+        if name in energy.lost and case.combination.has_exact_ledger:
+            gives_back = name == "numerical" and case.combination.has("DecayingMidpoint")
+            least = energy.lost[name] if gives_back else np.diff(energy.lost[name])
+            assert least.min(initial=0.0) >= -1e-9 * energy.throughput, name
+
+
+@check
+def ledger_of_small_steps(case):
+    """A ledger by trapezes, of second order where nothing yields, closes with smaller steps.
+
+    A quarter of the step leaves a sixteenth of the imbalance; of yielding, sliding and contact
+    within a step a quarter.  Steps must resolve the periods of the mesh for that, some 1e-3 s.
+    """
+    only(not case.combination.has_exact_ledger, "the scheme closes its ledger")
+    only(case.equal_steps and not case.whole.failure, "steps are not equal")
+    found = [imbalance(case.whole)]
+    for parts in (4, 32, 256):
+        found.append(imbalance(case.run(dt=case.whole.names["dt"] / parts)))
+        if found[-1] <= max(0.5 * found[0], 1e-9):
+            return
+    raise AssertionError(f"imbalance {found} with 1, 1/4, 1/32 and 1/256 of the step")
+
+
+def imbalance(run):
+    """Largest imbalance, as a part of the energy that went through.
+
+    In statics the first trapeze, from rest to loads that are there from the start, does not count.
+    """
+    energy, first = run.solution.energy, 0 if len(run.solution.v) else 1
+    return np.ptp(energy.imbalance[first:]) / (energy.throughput or 1.0)
+
+
+@check
+def split(case):
+    """A run in two parts by `start=` is the run.
+
+    docs/schemes.md excepts `DecayingMidpoint`, whose first step has no step before it.
+    """
+    only(not case.combination.has("DecayingMidpoint"), "the step before is not known")
+    only(case.equal_steps, "steps depend on those before")
+    only(not case.exact.failure, "a step fails")
+    names, n = case.combination.make(), len(case.exact.solution) - 1
+    (t0, t1), k = names["t"], n // 2
+    at = t0 + (t1 - t0) * k / n
+    equal = {"dt": (t1 - t0) / n * (1 + 1e-10), "newton": ub.Newton(rtol=DIGITS), "names": names}
+    first = case.run(t=(t0, at), **equal)
+    second = case.run(t=(at, t1), start=first.solution, **equal)
+    assert_near(differences(first, case.exact, slice(0, k + 1)))
+    assert_near(differences(second, case.exact, slice(k, None)))
+
+
+@check
+def resumed(case):
+    """A run that is interrupted and resumed is the run, to the last bit."""
+    only(not case.whole.failure, "a step fails")
+    only(case.steps >= 4, "too few steps")
+    checkpoint = ub.Checkpoint(case.folder / "run.checkpoint", every=3)
+
+    def go(folder, stop, **more):
+        names = case.combination.make()
+        written = recorders_of(case, names, folder)
+        return case.run(names=names, record=[*written, StopAt(stop)], **more), written
+
+    with contextlib.suppress(KeyboardInterrupt):
+        go("resumed", case.steps // 2 + 1, checkpoint=checkpoint)
+    resumed, again = go("resumed", 10**9, checkpoint=checkpoint)
+    _, whole = go("whole", 10**9)
+    assert_same_bits(resumed.solution, case.whole.solution)
+    assert_same_records(again, whole)
+
+
+@check
+def saved(case):
+    """A saved and loaded solution has the same results and texts.
+
+    Guide curves are saved as points, so that the directions of their forces have fewer digits.
+    """
+    only(not case.combination.has("Dashpot", "PowerLaw"), "own laws cannot be saved")
+    before, scene = case.whole.solution, case.whole.names["scene"]
+    before.save(case.folder / "solution.h5")
+    after = ub.load(case.folder / "solution.h5")
+    assert_same_bits(before, after)
+    assert str(before) == str(after)
+    for one, other in zip(scene.beams, after.scene.beams, strict=True):
+        assert_same_bits(before.diagram(one)._asdict(), after.diagram(other)._asdict())
+        assert (before.section_forces(one) == after.section_forces(other)).all()
+        places = one.at(0.37), other.at(0.37)
+        assert (before.position(places[0]) == after.position(places[1])).all()
+    for one, other in zip(scene.connectors, after.scene.connectors, strict=True):
+        assert_same_bits(before.connector(one)._asdict(), after.connector(other)._asdict())
+    for one, other in zip(scene.supports, after.scene.supports, strict=True):
+        assert before.reaction(one).tobytes() == after.reaction(other).tobytes()
+    for one, other in zip(scene.joints, after.scene.joints, strict=True):
+        if one.holders and {one.holders[0].a, one.holders[0].b} == set(one.places[:2]):
+            histories = before.joint(one), after.joint(other)
+            if one.kind == "Guided":
+                assert difference(histories[0].force, histories[1].force) < 1e-5
+            else:
+                assert_same_bits(*(history._asdict() for history in histories))
+
+
+@check
+def recorders(case):
+    """Recorders change nothing, and what they record is in the solution."""
+    names = case.combination.make()
+    written = recorders_of(case, names, "recorders")
+    run = case.run(names=names, record=written)
+    assert_same_bits(run.solution, case.whole.solution)
+    history, extremes = written[0], written[1]
+    rows = np.loadtxt(history.files[0], delimiter=",", skiprows=1)
+    end = run.solution.displacement(run.names["b0"].end)
+    if len(rows) == len(end):  # parts of a failed step are not kept
+        assert (rows[:, 1:4] == end).all()
+    for beam in run.names["scene"].beams:
+        moved = extremes.displacement(beam)
+        nodes = run.solution.q[:, run.solution.grid.nodes_of(beam)[1]]
+        assert (moved.high == nodes.max(axis=0)).all() or run.failure
+        assert (moved.low == nodes.min(axis=0)).all() or run.failure
+
+
+def recorders_of(case, names, folder):
+    """New recorders of all kinds, which write to a folder of the case."""
+    path, seed = case.folder / folder, case.combination.seed
+    path.mkdir(exist_ok=True)
+    mean = (ub.Goodman(4e8), ub.Gerber(4e8))[seed % 2]
+    curve = ub.SNCurve(range=1e6, mean=mean) if seed % 3 else ub.SNCurve.eurocode(71e6)
+    spot = ub.HotSpot.fibre(names["b0"].at(0.3), y=0.05, E=1.2e8)
+    series = ub.XDMF(path / "run.xdmf") if seed % 2 else ub.VTKHDF(path / "run.vtkhdf", every=2)
+    history = ub.History(path / "run.csv", [names["b0"].end], names["scene"].connectors)
+    return [
+        history, ub.Extremes(), ub.Events(), ub.Fatigue(spot, curve), LargestCurvature(), series
+    ]  # fmt: skip
+
+
+def assert_same_records(some, others):
+    """Recorders of two runs have the same rows, extremes, events, cycles and numbers."""
+    for one, other in zip(some, others, strict=True):
+        assert_same_bits(one.state(), other.state())
+        for path, another in zip(one.files, other.files, strict=True):
+            if path.suffix in (".csv", ".xdmf"):
+                assert path.read_bytes() == another.read_bytes(), path.name
+
+
+@check
+def loops(case):
+    """Loops of `step_to` and `steps_to` take the steps of the run, to the last bit."""
+    only(case.equal_steps, "the run chooses its steps")
+    only(not case.whole.failure, "a step fails")
+    ends = case.whole.solution.times[1:]
+    for many in (False, True):
+        names = case.combination.make()
+        simulation = ub.Simulation(
+            names["scene"], names["scheme"], mesh=names["mesh"], newton=names["newton"],
+            comm=case.comm,
+        )  # fmt: skip
+        simulation.keep()
+        left = ends
+        while len(left):
+            if many:
+                left = left[simulation.steps_to(left, keep=True) :]
+            else:
+                simulation.step_to(left[0])
+                simulation.keep()
+                left = left[1:]
+        simulation.end()
+        simulation.close()
+        assert_same_bits(simulation.solution, case.whole.solution)
+
+
+@check
+def reference(case):
+    """Both paths find the same motions, forces and energies."""
+    only(not case.exact.failure, "a step fails")
+    found = case.run(newton=ub.Newton(rtol=DIGITS, reference=True))
+    assert not found.failure, found.failure
+    assert_near(differences(found, case.exact))
+
+
+@check
+def newton_options(case):
+    """Options of Newton's method change nothing but what it leaves."""
+    only(case.combination.has("Newton(p", "Newton(m"), "none")
+    only(case.equal_steps, "steps depend on last digits")
+    only(not case.exact.failure, "a step fails")
+    assert not case.whole.failure, case.whole.failure
+    assert_near(differences(case.whole, case.exact), 100 * SAME)
+
+
+@check
+def processes(case):
+    """Shared by all processes of MPI the run is the one of a single process."""
+    only(MPI.COMM_WORLD.size > 1, "one process")
+    only(not case.exact.failure, "a step fails")
+    smallest, replicas.SMALLEST_SHARE = replicas.SMALLEST_SHARE, 1
+    try:
+        shared = case.run(newton=ub.Newton(rtol=DIGITS), comm=MPI.COMM_WORLD)
+    finally:
+        replicas.SMALLEST_SHARE = smallest
+    assert not shared.failure, shared.failure
+    assert_near(differences(shared, case.exact))

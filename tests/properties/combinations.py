@@ -1,0 +1,320 @@
+# SPDX-License-Identifier: MIT
+"""Combinations of 2 to 5 features in small models, each a script that anybody can run.
+
+`draw(seed)` draws a model of one to three beams and its features from those of :mod:`features`.
+As a script: ``python3 combinations.py --from 0 --number 2000`` runs all checks of
+:mod:`combination_table` on each and prints how often each applied, passed and flagged;
+``--show SEED`` prints the script of one.
+"""
+
+import argparse
+import math
+import re
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import features_of_forces  # noqa: F401 - adds its features
+import numpy as np
+from features import FEATURES, PLAIN, Feature
+
+STATICS = ("Static()", "ExactStatic()", "Static()", "ExactStatic(0.7)")
+DYNAMICS = (
+    "Midpoint()", "Midpoint(0.05, 0.1)", "DecayingMidpoint()", "PrintedMidpoint()", "Newmark()",
+    "Newmark(0.6, 0.36)", "GeneralizedAlpha(0.8)", "Weighted(0.55)", "Midpoint()",
+)  # fmt: skip
+SCHEMES = (*STATICS, *DYNAMICS)
+
+EXACT = ("ub.ExactStatic", "ub.Midpoint", "ub.DecayingMidpoint", "Weighted")
+
+HOLDING = (
+    "Link", "Prismatic", "measured=", "Guided", "Motor", "Release", "Coulomb", "RigidPlastic",
+    "hinges=", "Prescribed", "Roller", "Body",
+)  # fmt: skip
+"""Constraints, at which accelerations of undamped Newmark oscillate."""
+
+BASES = ("cantilever", "chain", "portal")
+
+COLUMN = (
+    "shape", "pinned", "degree", "refined", "potential", "newton", "propped", "side_spring",
+)  # fmt: skip
+"""Features that leave a straight column straight under a load along it; every 16th seed is one."""
+
+STIFF = "EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=0.01"
+
+HEAD = """import math
+import ufl_beam as ub
+from own_parts import *
+"""
+
+
+@dataclass
+class Draft:
+    """A model while features write into it.
+
+    Attributes:
+        beams: Numbers of each: ends a and b, cells, section, kind of axis, hinges.
+        last: Name of the beam whose end is the `tip`.
+        end: Time of the run; s.
+    """
+
+    random: np.random.Generator
+    static: bool
+    column: bool = False
+    beams: list = field(default_factory=list)
+    sections: dict = field(default_factory=dict)
+    last: str = "b0"
+    joint: str = "ub.Rigid({a}, {b})"
+    root: str | None = "ub.Clamped({place})"
+    step: str = ""
+    mesh: str = "ub.Mesh()"
+    newton: str = "ub.Newton()"
+    gap: bool = False
+    end: float = 0.15
+    lines: list = field(default_factory=list)
+    joints: list = field(default_factory=list)
+    supports: list = field(default_factory=list)
+    loads: list = field(default_factory=list)
+    masses: list = field(default_factory=list)
+    initial: list = field(default_factory=list)
+    damping: list = field(default_factory=list)
+    bodies: list = field(default_factory=list)
+    connectors: list = field(default_factory=list)
+    works: list = field(default_factory=list)
+
+    def some(self, low, high):
+        return float(self.random.uniform(low, high))
+
+    def one(self, choices):
+        return choices[int(self.random.integers(len(choices)))]
+
+    def time(self):
+        """A function of time, at most about one large."""
+        t = self.end
+        kinds = [
+            f"ub.ramp({t * self.some(0.2, 1):.4g})",
+            f"ub.Table([0.0, {t / 3:.4g}, {t:.4g}], [0.0, {self.some(-1, 1):.3f}, 1.0])",
+            f"lambda t: math.sin({self.some(2, 6) / t:.4g} * t)",
+        ]
+        if not self.static:
+            kinds.append("lambda t: 1.0")
+        return self.one(kinds)
+
+    @property
+    def tip(self):
+        """End of the last beam; m."""
+        return self.beams[int(self.last[1:])]["b"]
+
+    def beam(self, a, b, cells):
+        self.beams.append({"a": a, "b": b, "cells": cells, "kind": "", "hinges": ""})
+        self.last = f"b{len(self.beams) - 1}"
+
+    def need_beams(self, number, apart=False):
+        self.gap = apart
+        while len(self.beams) < number:
+            x, y = self.beams[-1]["b"]
+            self.beam((x, y), (x + 0.8, y - 0.5), 2)
+
+    def section(self, i, text):
+        self.sections[i] = text
+
+    def yields(self, i, law):
+        self.sections[i] = f"ub.Section({PLAIN}, {law})"
+
+    # -- the script ----------------------------------------------------------------------------
+
+    def _beams(self):
+        for i, beam in enumerate(self.beams):
+            a, b = beam["a"], beam["b"]
+            if i == 1 and self.gap:
+                a = (a[0] + 0.1, a[1] + 0.05)
+            yield f"section{i} = {self.sections.get(i, f'ub.Section({PLAIN})')}"
+            yield f"b{i} = ub.Beam{_axis(beam['kind'], a, b)}, section{i}, " + (
+                f"cells={beam['cells']}, name='b{i}'"
+                + (f", hinges={beam['hinges']})" if beam["hinges"] else ")")
+            )
+
+    def source(self, scheme, title):
+        """The script."""
+        lines = [f"# {title}", HEAD, *self._beams(), *self.bodies, *self.lines]
+        joints = list(self.joints)
+        if len(self.beams) > 1:
+            lines.append(f"joint = {self.joint.format(a='b0.end', b='b1.start')}")
+            joints.append("joint")
+            joints += [f"ub.Rigid(b{i}.end, b{i + 1}.start)" for i in range(1, len(self.beams) - 1)]
+        supports = list(self.supports)
+        if self.root is not None:
+            rest = {"u": "v=0, psi=0", "v": "u=0, psi=0", "psi": "u=0, v=0"}
+            moves = re.search(r"\}, (u|v|psi)=", self.root)
+            text = self.root.format(place="b0.start", rest=rest[moves[1]] if moves else "")
+            lines.append(f"root = {text}")
+            supports.insert(0, "root")
+        moving = ", ".join(
+            [*(f"b{i}" for i in range(len(self.beams))), *["body"] * len(self.bodies)]
+        )
+        parts = {
+            "beams": [f"b{i}" for i in range(len(self.beams))], "joints": joints,
+            "supports": supports, "loads": self.loads, "masses": self.masses,
+            "initial": [text.format(moving=moving) for text in self.initial],
+            "damping": self.damping, "bodies": ["body"] * len(self.bodies),
+            "connectors": self.connectors, "works": self.works,
+        }  # fmt: skip
+        lines.append("scene = ub.Scene(")
+        for name, records in parts.items():
+            if records:
+                lines += [f"    {name}=[", *(f"        {record}," for record in records), "    ],"]
+        ours = "" if scheme.startswith("Weighted") else "ub."
+        text = "\n".join(lines)
+        if scheme == "Newmark()" and any(word in text for word in HOLDING):
+            scheme = "Newmark(0.6, 0.36)"
+        return text + (
+            f"\n)\nscheme = {ours}{scheme}\nt, dt = (0.0, {self.end}), {self.step}\n"
+            f"mesh, newton = {self.mesh}, {self.newton}\n"
+        )
+
+
+def _axis(kind, a, b):
+    """Beginning of a call that makes a beam from a to b."""
+    (ax, ay), (bx, by) = a, b
+    mx, my = (ax + bx) / 2, (ay + by) / 2
+    if kind == "polyline":
+        return f".polyline([{a}, ({mx - 0.1:.4g}, {my + 0.2:.4g}), {b}]"
+    if kind == "along":
+        curve = f"({ax} + s * {bx - ax:.6g}, {ay} + s * {by - ay:.6g} + 0.8 * s * (1 - s))"
+        return f".along(lambda s: {curve}"
+    if kind == "arc":  # about a centre at a distance of the chord from its middle
+        cx, cy = mx + (by - ay), my - (bx - ax)
+        first, last = math.atan2(ay - cy, ax - cx), math.atan2(by - cy, bx - cx)
+        last += 2 * math.pi * round((first - last) / (2 * math.pi))
+        return f".arc(({cx}, {cy}), {math.dist((cx, cy), a)}, ({first}, {last})"
+    return f"({a}, {b}"
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A drawn model.
+
+    Attributes:
+        source: Script that makes `scene`, `scheme`, `t`, `dt`, `mesh` and `newton`.
+    """
+
+    seed: int
+    base: str
+    features: tuple[Feature, ...]
+    source: str
+
+    @property
+    def title(self):
+        return self.source.splitlines()[0][2:]
+
+    def make(self, source=None):
+        """The names that the script defines, each time new ones: some remember what they saw."""
+        names = {}
+        exec(compile(source or self.source, f"combination {self.seed}", "exec"), names)
+        return names
+
+    @cached_property
+    def elastic(self):
+        """Whether nothing but elasticity, inertia and viscosity acts."""
+        return all(feature.elastic for feature in self.features)
+
+    def has(self, *words):
+        """Whether one of the words is in the script."""
+        return any(word in self.source for word in words)
+
+    @property
+    def static(self):
+        return self.has("scheme = ub.Static(", "scheme = ub.ExactStatic(")
+
+    @property
+    def has_exact_ledger(self):
+        """Whether works of the scheme are increments of energy, however long its steps are."""
+        return self.has(*(f"scheme = {one}" for one in EXACT))
+
+    @property
+    def names(self):
+        """Public names that the script uses."""
+        found = set(re.findall(r"ub\.(\w+)", self.source))
+        found |= {"ground"} if self.has("ub.ground") else set()
+        found |= {"law_functions", "MaterialLaw"} if self.has("Dashpot", "PowerLaw") else set()
+        own = {"ExactStep", "Midway", "Scheme", "DynamicScheme", "Step"}
+        return found | (own if self.has("Weighted") else set())
+
+
+def draw(seed):
+    """The combination of a seed: first feature and scheme come in turn, others at random."""
+    random = np.random.default_rng([2026, seed])
+    first = FEATURES[seed % len(FEATURES)]
+    base = BASES[int(random.integers(len(BASES)))]
+    if seed % 16 == 7:
+        base = "column"
+        first = FEATURES[[one.name for one in FEATURES].index(COLUMN[seed // 16 % len(COLUMN)])]
+    if {"tip", "free"} & set(first.slots):
+        base = "chain" if base == "portal" else base
+    scheme = SCHEMES[(seed + seed // len(FEATURES)) % len(SCHEMES)]
+    if not _allows(first, scheme, base):
+        scheme = str(random.choice([s for s in SCHEMES if _allows(first, s, base)]))
+    draft = Draft(random, static=scheme in STATICS, column=base == "column")
+    taken = {"tip", "free"} if base == "portal" else set()
+    _build(draft, base)
+    number, chosen = int(random.integers(2, 6)), []
+    for one in (first, *(FEATURES[i] for i in random.permutation(len(FEATURES)))):
+        free = one not in chosen and not taken & set(one.slots)
+        if len(chosen) < number and free and _allows(one, scheme, base):
+            chosen.append(one)
+            taken |= set(one.slots)
+    for one in chosen:
+        one.write(draft)
+    steps = int(random.integers(8, 25))
+    draft.step = draft.step or f"{draft.end / steps:.6g}"
+    words = ", ".join(one.name for one in chosen)
+    title = f"combination {seed}: {base} with {words}; {scheme}"
+    return Combination(seed, base, tuple(chosen), draft.source(scheme, title))
+
+
+def _allows(one, scheme, base):
+    if base == "column":
+        return one.name in COLUMN and scheme in STATICS
+    static, at_end = scheme in STATICS, scheme.startswith(("Newmark", "Generalized"))
+    return one.statics if static else (one.dynamics and (one.at_end or not at_end))
+
+
+def _build(d, base):
+    """Beams and the first load."""
+    if base == "column":
+        d.beam((0.0, 0.0), (1.0, 0.0), 6)
+        d.loads.append("ub.PointLoad(b0.end, force=(-1.0, 0.0), time=lambda t: t)")
+        d.section(0, f"ub.Section({STIFF})")
+        return
+    if base == "portal":
+        d.beam((0.0, 0.0), (0.1, 1.0), 4)
+        d.beam((0.1, 1.0), (1.0, 1.1), 2)
+        d.beam((1.0, 1.1), (1.1, 0.0), 3)
+        d.supports.append("ub.Pinned(b2.end)")
+        d.last = "b1"
+    else:
+        d.beam((0.0, 0.0), (1.0, 0.2), d.one([2, 4]))
+    if base == "chain":
+        d.beam((1.0, 0.2), (1.8, -0.3), d.one([2, 3]))
+    x, y = d.some(-25, 25), d.some(-25, 25)
+    d.loads.append(f"ub.PointLoad({d.last}.end, force=({x:.3f}, {y:.3f}), time={d.time()})")
+
+
+def main(arguments=None):
+    """Run the checks of many seeds, and print how often each applied, passed and flagged."""
+    import combination_table  # it imports this module
+
+    parser = argparse.ArgumentParser(description=main.__doc__)
+    parser.add_argument("--from", type=int, default=0, dest="first")
+    parser.add_argument("--number", type=int, default=100)
+    parser.add_argument("--checks", nargs="*", default=list(combination_table.CHECKS))
+    parser.add_argument("--show", type=int, help="print the script of this seed, and nothing else")
+    options = parser.parse_args(arguments)
+    if options.show is not None:
+        print(draw(options.show).source)
+        return
+    seeds = range(options.first, options.first + options.number)
+    print(combination_table.table_of(seeds, options.checks))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,284 @@
+# SPDX-License-Identifier: MIT
+"""Features of models that combinations draw, each a function that writes into a draft.
+
+A feature takes the slots that it names, which no other feature of a combination may take.  Sizes
+are of beams of about 1 m with EA = 1e4 N, GA = 4e3 N, EI = 100 N m2 and 1 kg/m, under forces of
+some tens of N, so that yielding moments are some N m and the lowest periods some 0.1 s.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+EA, GA, EI = 1e4, 4e3, 100.0
+PLAIN = "EA=1e4, GA=4e3, EI=100.0, rhoA=1.0, rhoI=0.01"
+
+SECTION = ("section",)
+"""Slot of a section that yields or breaks; degrees above 1 exclude it."""
+
+
+@dataclass(frozen=True)
+class Feature:
+    """A feature; `statics`, `at_end`: whether static schemes, and those at ends of steps, allow it.
+
+    Attributes:
+        elastic: Whether motions are those of an elastic scene without friction and controls.
+    """
+
+    name: str
+    write: Callable
+    slots: tuple = ()
+    statics: bool = True
+    dynamics: bool = True
+    at_end: bool = True
+    elastic: bool = True
+
+
+FEATURES: list[Feature] = []
+
+
+def feature(*slots, **options):
+    """Add a function to the features."""
+
+    def add(function):
+        FEATURES.append(Feature(function.__name__, function, slots, **options))
+        return function
+
+    return add
+
+
+def bulk_law(d, limit, stiffness):
+    """A law that yields at about a limit."""
+    k = stiffness * d.some(0.02, 0.2)
+    return d.one([
+        f"ub.Hardening({limit:.4g}, modulus={k:.4g})",
+        f"ub.Hardening({limit:.4g}, kinematic={k:.4g})",
+        f"ub.Hardening({limit:.4g}, modulus={k:.4g}, kinematic={k:.4g})",
+    ])  # fmt: skip
+
+
+# -- sections ----------------------------------------------------------------------------------
+
+
+@feature("any section")
+def shape(d):
+    E, rho = (
+        1.2e10 if d.column else 1.2e8,
+        1.2e4,
+    )  # EI and mass as the plain section has them, in order of size
+    d.section(0, d.one([
+        f"ub.Section.rectangle(0.01, 0.1, E={E}, nu=0.3, rho={rho / 12:.6g})",
+        f"ub.Section.circle(0.05, E={3 * E}, nu=0.3, rho={rho / 24:.6g})",
+        f"ub.Section.tube(0.08, 0.005, E={E / 2}, nu=0.3, rho={rho / 15:.6g})",
+        f"ub.Section.i_shape(0.08, 0.05, 0.004, 0.006, E={E / 4}, nu=0.3, rho={rho / 12:.6g})",
+    ]))  # fmt: skip
+
+
+@feature("section", "any section", elastic=False)
+def hardening(d):
+    d.yields(0, f"bending={bulk_law(d, d.some(3, 10), EI)}")
+
+
+@feature("section", "any section", elastic=False)
+def axial_and_shear(d):
+    d.yields(0, f"axial={bulk_law(d, d.some(8, 30), EA)}, shear={bulk_law(d, d.some(8, 30), GA)}")
+
+
+@feature("section", "any section", elastic=False)
+def perzyna(d):
+    law = f"{d.some(3, 8):.4g}, kinematic=5.0, viscosity=ub.Perzyna({d.some(0.5, 5):.4g})"
+    d.yields(0, f"bending=ub.Hardening({law})")
+
+
+@feature("section", "any section", elastic=False)
+def duvaut_lions(d):
+    law = f"{d.some(3, 8):.4g}, modulus=5.0, viscosity=ub.DuvautLions({d.some(0.01, 0.1):.4g})"
+    d.yields(0, f"bending=ub.Hardening({law})")
+
+
+@feature("section", "any section", elastic=False)
+def hysteresis(d):
+    M = d.some(4, 10)
+    d.yields(0, "bending=" + d.one([
+        f"ub.RambergOsgood({M:.4g}, {d.some(0.02, 0.1):.4g}, {d.some(2, 6):.3g})",
+        f"ub.ArmstrongFrederick({M:.4g}, {d.some(5, 20):.4g}, {d.some(0.5, 4):.4g})",
+        f"ub.BoucWen({M:.4g}, {d.some(0.02, 0.3):.3g}, {d.some(1, 4):.3g})",
+    ]))  # fmt: skip
+
+
+@feature("section", "any section", elastic=False)
+def own_law(d):
+    d.yields(0, "bending=" + d.one([
+        f"Dashpot({d.some(5, 50):.4g})",
+        f"PowerLaw({d.some(4, 10):.4g}, 0.05, {d.some(2, 5):.3g})",
+    ]))  # fmt: skip
+
+
+@feature("section", "any section", elastic=False)
+def interaction(d):
+    d.yields(0, f"interaction=ub.AxialBending({d.some(15, 60):.4g}, {d.some(4, 10):.4g})")
+
+
+@feature("section", "any section", elastic=False)
+def hinge_in_cells(d):
+    kind = d.one(["Softening", "LinearSoftening"])
+    more = d.one(["", "", f", bending={bulk_law(d, d.some(3, 6), EI)}"])
+    d.yields(0, f"hinge=ub.{kind}({d.some(5, 9):.4g}, {d.some(2, 9):.4g}){more}")
+
+
+@feature("section", "any section", elastic=False)
+def fibres(d):
+    mean = d.some(4e4, 1e5)
+    limit = d.one([
+        f"{mean:.5g}", f"ub.Normal({mean:.5g}, {mean / 8:.5g}, seed=1)",
+        f"ub.TruncatedNormal({mean:.5g}, {mean / 5:.5g}, seed=2)",
+        f"ub.Lognormal({mean:.5g}, {mean / 5:.5g}, seed=3)",
+        f"ub.Weibull({mean:.5g}, 6.0, seed=4)",
+    ])  # fmt: skip
+    crack = d.one(["", f", softening=ub.Softening({1.5 * mean:.5g}, {mean / 500:.5g})"])
+    law = f"ub.Fibres(ub.Hardening({limit}, modulus=6e6), number=4{crack})"
+    shapes = [
+        f"ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3, fibres={law})",
+        f"ub.Section.of_fibres([-0.05, 0.0, 0.03, 0.06], [2e-4, 3e-4, 3e-4, 2e-4], E=8e7, "
+        f"nu=0.3, rho=1e3, fibres={law.replace(', number=4', '')})",
+    ]
+    d.section(0, d.one(shapes))
+
+
+@feature("hinges", elastic=False)
+def hinges(d):
+    M, place = d.some(3, 9), d.one([0.0, 0.0, 0.5])
+    d.beams[0]["hinges"] = f"{{{place}: " + d.one([
+        f"ub.Softening({M:.4g}, {d.some(1, 8):.4g})",
+        f"ub.LinearSoftening({M:.4g}, {d.some(2, 9):.4g})",
+        f"ub.Hardening({M:.4g}, modulus={d.some(5, 30):.4g})",
+    ]) + "}"  # fmt: skip
+
+
+# -- axes, joints, supports --------------------------------------------------------------------
+
+
+@feature("axis", "hinges")
+def curved(d):
+    d.beams[0]["kind"] = d.one(["arc", "polyline", "along"])
+
+
+@feature("joint")
+def revolute(d):
+    d.need_beams(2)
+    measured = d.one(["", ", measured=True"])
+    d.joint = f"ub.Revolute({{a}}, {{b}}{measured})"
+    d.connectors.append(f"ub.Turn(b0.end, b1.start, ub.Spring({d.some(20, 100):.4g}))")
+
+
+@feature("joint")
+def measured(d):
+    d.need_beams(2)
+    d.joint = "ub.Rigid({a}, {b}, measured=True)"
+
+
+@feature("joint")
+def prismatic(d):
+    d.need_beams(2)
+    d.joint = f"ub.Prismatic({{a}}, {{b}}, axis=({d.some(-1, 1):.3f}, 1.0))"
+    axis = d.joint.split("axis=")[1][:-1]
+    d.connectors.append(
+        f"ub.Slide(b0.end, b1.start, ub.Spring({d.some(100, 900):.4g}), axis={axis})"
+    )
+
+
+@feature("joint")
+def slot(d):
+    d.need_beams(2)
+    d.joint = "ub.Prismatic({a}, {b}, axis=(0.3, 1.0), turning=True)"
+    d.connectors.append("ub.Slide(b0.end, b1.start, ub.Spring(400.0), axis=(0.3, 1.0))")
+    d.connectors.append(f"ub.Turn(b0.end, b1.start, ub.Spring({d.some(20, 100):.4g}))")
+
+
+@feature("joint")
+def rigid_link(d):
+    d.need_beams(2, apart=True)
+    d.joint = "ub.RigidLink({a}, {b})"
+
+
+@feature("joint")
+def release(d):
+    d.need_beams(2)
+    free = d.one(["N", "V", "M"])
+    d.joint = f"ub.Release({{a}}, {{b}}, free='{free}'{d.one(['', ', measured=True'])})"
+    k = d.some(50, 300)
+    if free == "M":
+        d.connectors.append(f"ub.Turn(b0.end, b1.start, ub.Spring({k:.4g}))")
+    else:
+        axis = "b0.end.direction" if free == "N" else "(-b0.end.direction[1], b0.end.direction[0])"
+        d.connectors.append(f"ub.Slide(b0.end, b1.start, ub.Spring({k:.4g}), axis={axis})")
+
+
+@feature("tip")
+def link(d):
+    x, y = d.tip
+    d.joints.append(f"ub.Link(ub.ground({x - 0.4:.3f}, {y - 0.9:.3f}), {d.last}.end)")
+
+
+@feature("tip")
+def guided(d):
+    x, y = d.tip
+    bend = d.some(-0.5, 0.5)
+    d.joints.append(
+        f"ub.Guided({d.last}.end, lambda s: ({x!r} + 0.4 * s, {y!r} + s + {bend:.3f} * s**2))"
+    )
+
+
+@feature("tip")
+def roller(d):
+    d.supports.append(f"ub.Roller({d.last}.end, along=({d.some(-1, 1):.3f}, 1.0))")
+
+
+@feature("tip")
+def propped(d):
+    along = (1.0, 0.0) if d.column else (1.0, 0.3)
+    d.supports.append(f"ub.Roller({d.last}.end, along={along})")
+
+
+@feature("tip")
+def moved_tip(d):
+    component, size = d.one([("u", 0.05), ("v", 0.1), ("psi", 0.3)])
+    way = f"ub.Table([0.0, {d.end / 2:.4g}, {d.end:.4g}], [0.0, {size}, {-size / 2}])"
+    if not d.static:  # kinks of motions are blows, of which the energy does not converge
+        way = f"lambda t: {size} * (1.0 - math.cos({d.some(2, 6) / d.end:.4g} * t))"
+    d.supports.append(f"ub.Prescribed({d.last}.end, {component}={way})")
+
+
+@feature("root")
+def pinned(d):
+    d.root = "ub.Pinned({place})"
+    d.connectors.append(f"ub.Turn(ub.ground(0, 0), b0.start, ub.Spring({d.some(100, 500):.4g}))")
+
+
+@feature("root")
+def shaken(d):
+    ω = d.some(2, 6) / d.end
+    motion = f"lambda t: 0.03 * (1.0 - math.cos({ω:.4g} * t))"
+    d.root = f"ub.Prescribed({{place}}, {d.one(['u', 'v', 'psi'])}={motion}, {{rest}})"
+
+
+@feature("root", "tip", "free", statics=False)
+def free_flight(d):
+    d.root = None
+    d.initial.append(
+        f"ub.Velocity([{{moving}}], linear=({d.some(-2, 2):.3f}, 1.0), "
+        f"angular={d.some(-4, 4):.3f}, about=(0.0, 0.0))"
+    )
+
+
+@feature("body")
+def body(d):
+    x, y = d.tip
+    cx, cy = x + d.some(0.05, 0.2), y + d.some(-0.1, 0.1)
+    d.bodies.append(f"body = ub.Body(({cx:.4f}, {cy:.4f}), mass=0.7, inertia=0.02, name='body')")
+    spring = f"ub.Turn({d.last}.end, body.middle, ub.Spring({d.some(20, 90):.4g}))"
+    if d.one([True, False]):
+        d.joints.append(f"ub.Rigid({d.last}.end, body.at({x!r}, {y!r}))")
+    else:
+        d.joints.append(f"ub.Revolute({d.last}.end, body.at({x!r}, {y!r}))")
+        d.connectors.append(spring)
+    d.loads.append(f"ub.PointLoad(body.middle, force=(0.0, -5.0), time={d.time()})")

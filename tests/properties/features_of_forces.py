@@ -1,0 +1,218 @@
+# SPDX-License-Identifier: MIT
+"""Features of connectors, loads, works, masses, damping, discretization, solver and steps.
+
+See :mod:`features`, whose list they extend.
+"""
+
+from features import bulk_law, feature
+
+# -- connectors --------------------------------------------------------------------------------
+
+
+def _connect(d, law, kinds="SLT"):
+    """A connector of a law between the ground and a place, or of two places."""
+    x, y = d.tip
+    kind = d.one(kinds)
+    place = d.one([f"{d.last}.at(0.5)", "b0.end"])
+    if kind == "T":
+        d.connectors.append(f"ub.Turn(ub.ground(0, 0), {place}, {law})")
+    elif kind == "S":
+        d.connectors.append(f"ub.Stretch(ub.ground({x + 0.5:.3f}, {y + 0.8:.3f}), {place}, {law})")
+    else:
+        d.connectors.append(f"ub.Slide(ub.ground(0.2, 0.7), {place}, {law}, axis=(0.3, 1.0))")
+
+
+@feature()
+def spring(d):
+    _connect(d, f"ub.Spring({d.some(50, 300):.4g})")
+
+
+@feature()
+def side_spring(d):
+    x, y = d.tip
+    law = f"ub.Spring({d.some(50, 300):.4g})"
+    d.connectors.append(f"ub.Slide(ub.ground({x!r}, {y!r}), {d.last}.end, {law}, axis=(0.0, 1.0))")
+
+
+@feature(elastic=False)
+def spring_yields(d):
+    _connect(d, f"ub.Spring(200.0, law={bulk_law(d, d.some(0.5, 4), 200.0)})")
+
+
+@feature(elastic=False)
+def spring_breaks(d):
+    kind = d.one(["Softening", "LinearSoftening"])
+    _connect(d, f"ub.Spring(200.0, softening=ub.{kind}({d.some(1, 5):.4g}, {d.some(0.5, 2):.4g}))")
+
+
+@feature(statics=False)
+def damper(d):
+    _connect(d, f"ub.Damper({d.some(0.2, 3):.4g})")
+
+
+@feature(elastic=False)
+def stop(d):
+    _connect(d, f"ub.Stop({d.some(200, 900):.4g}, low=-0.01, high={d.some(0.005, 0.02):.4g})")
+
+
+@feature("rubs", statics=False, at_end=False, elastic=False)
+def coulomb(d):
+    _connect(d, f"ub.Coulomb({d.some(0.2, 2):.4g})")
+
+
+@feature("rubs", "joint", statics=False, at_end=False, elastic=False)
+def rubbing_pin(d):
+    d.need_beams(2)
+    d.joint = "ub.Revolute({a}, {b}, measured=True)"
+    law = f"ub.Coulomb({d.some(0.05, 0.3):.4g}, coefficient=0.02, joint=joint)"
+    d.connectors.append(f"ub.Turn(b0.end, b1.start, {law})")
+
+
+@feature("joint")
+def motor(d):
+    d.need_beams(2)
+    d.joint = "ub.Revolute({a}, {b})"
+    ω = d.some(2, 6) / d.end
+    law = f"ub.Motor(lambda t: {d.some(0.05, 0.4):.3f} * (1.0 - math.cos({ω:.4g} * t)))"
+    d.connectors.append(f"ub.Turn(b0.end, b1.start, {law})")
+
+
+@feature()
+def actuator(d):
+    _connect(d, f"ub.Actuator(lambda t: {d.some(2, 9):.3f} * math.sin({9 / d.end:.4g} * t))")
+
+
+@feature(elastic=False)
+def controller(d):
+    _connect(
+        d, f"ub.Controller(lambda now: {d.some(1, 5):.3f} * math.sin({9 / d.end:.4g} * now.t))"
+    )
+
+
+@feature(elastic=False)
+def integral_controller(d):
+    law = f"ub.Controller(Integral(b0.end, {d.some(0.5, 2):.3f}))"
+    d.connectors.append(f"ub.Turn(ub.ground(0, 0), b0.end, {law})")
+
+
+@feature()
+def force_law(d):
+    d.lines.append(f"cubic = Cubic({d.some(50, 200):.4g}, {d.some(500, 3000):.4g})")
+    _connect(d, d.one(["ub.ForceLaw(cubic)", "ub.ForceLaw(cubic, stored=cubic.energy)"]))
+
+
+@feature(statics=False, elastic=False)
+def force_law_with_history(d):
+    _connect(
+        d, f"ub.ForceLaw(Maxwell({d.some(50, 200):.4g}, {d.some(0.02, 0.1):.4g}), state=[0.0])"
+    )
+
+
+@feature(at_end=False, elastic=False)
+def rigid_plastic(d):
+    law = f"ub.RigidPlastic(ub.Hardening({d.some(1, 4):.4g}, modulus={d.some(50, 200):.4g}))"
+    d.connectors.append(f"ub.Slide(ub.ground(0.2, 0.7), {d.last}.at(0.5), {law}, axis=(0.3, 1.0))")
+
+
+# -- loads, works, masses, damping -------------------------------------------------------------
+
+
+@feature()
+def follower(d):
+    d.loads.append(
+        f"ub.FollowerLoad({d.last}.end, force=({d.some(-15, 15):.3f}, {d.some(-15, 15):.3f}), "
+        f"moment={d.some(-2, 2):.3f}, time={d.time()})"
+    )
+
+
+@feature()
+def moment(d):
+    d.loads.append(f"ub.PointLoad({d.last}.at(0.5), moment={d.some(-6, 6):.3f}, time={d.time()})")
+
+
+@feature()
+def line_load(d):
+    more = d.one(["", f", moment={d.some(-2, 2):.3f}"])
+    d.loads.append(
+        f"ub.LineLoad(b0, force=({d.some(-20, 20):.3f}, {d.some(-20, 20):.3f}){more}, "
+        f"time={d.time()})"
+    )
+
+
+@feature()
+def gravity(d):
+    d.loads.append(f"ub.Gravity(({d.some(-5, 5):.3f}, -9.81), time={d.time()})")
+
+
+@feature("frame", at_end=False)
+def rotating_frame(d):
+    d.loads.append(f"ub.RotatingFrame({d.some(1, 5):.3f}, about=(-0.2, 0.1))")
+
+
+@feature("work")
+def virtual_work(d):
+    kinds = [
+        f"'current', current, numbers={{'p': {d.some(-15, 15):.3f}}}",
+        f"'dead', dead, numbers={{'x': {d.some(-15, 15):.3f}, 'y': {d.time()}}}",
+    ]
+    if not d.static:
+        kinds += [
+            f"'drag', drag, numbers={{'c': {d.some(0.2, 3):.3f}}}",
+            f"'wind', wind, numbers={{'c': {d.some(0.2, 2):.3f}, 'speed': {1 / d.end:.4g}}}",
+        ]
+    beams = d.one(["", ", beams=[b0]"])
+    d.works.append(f"ub.VirtualWork({d.one(kinds)}{beams})")
+
+
+@feature("potential")
+def potential(d):
+    kinds = [
+        f"'soil', soil, numbers={{'k': {d.some(50, 500):.3f}}}",
+        f"'field', field, numbers={{'size': ub.ramp({d.end / 2:.4g})}}",
+        f"'warming', warming, numbers={{'M': {d.some(-5, 5):.3f}}}",
+    ]
+    kind = kinds[0] if d.column else d.one(kinds)
+    d.works.append(f"ub.Potential({kind}, beams=[b0])")
+
+
+@feature()
+def point_mass(d):
+    inertia = d.one(["", ", 0.02"])
+    d.masses.append(f"ub.PointMass({d.last}.{d.one(['end', 'at(0.5)'])}, 0.8{inertia})")
+    d.loads.append(f"ub.Gravity(time={d.time()})")
+
+
+@feature("damping", statics=False)
+def rayleigh(d):
+    d.damping.append(f"ub.Rayleigh(mass={d.some(0.1, 2):.3f}, stiffness={d.some(1e-4, 1e-3):.2e})")
+
+
+@feature("viscous")
+def kelvin_voigt(d):
+    d.damping.append(f"ub.KelvinVoigt({d.some(1e-4, 2e-3):.2e}{d.one(['', ', beams=[b0]'])})")
+
+
+# -- discretization, solver, steps -------------------------------------------------------------
+
+
+@feature("section", "hinges", "mesh")
+def degree(d):
+    d.mesh = f"ub.Mesh(degree={d.one([2, 3])}{d.one(['', ', lumped=True'])})"
+
+
+@feature("mesh")
+def refined(d):
+    d.mesh = f"ub.Mesh(refine={d.one(['2', '3'])}{d.one(['', ', lumped=True'])})"
+
+
+@feature("newton")
+def newton(d):
+    d.newton = d.one([
+        "ub.Newton(modified=True)", "ub.Newton(rtol=1e-11, max_iterations=20)",
+        "ub.Newton(petsc={'snes_linesearch_type': 'bt'})",
+    ])  # fmt: skip
+
+
+@feature("steps", statics=False)
+def adaptive(d):
+    d.step = f"ub.Adaptive({d.some(1e-4, 1e-3):.2e}, stops=[{d.end / 3:.4g}])"

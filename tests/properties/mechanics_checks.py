@@ -1,0 +1,235 @@
+# SPDX-License-Identifier: MIT
+"""Checks of combinations against mechanics: equilibrium, momentum, vibrations, paths, buckling."""
+
+import math
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+from balance_of_parts import Balance
+from combination_case import DIGITS, SAME, check, difference, only
+
+import ufl_beam as ub
+from ufl_beam.model.bodies import GROUND, node
+
+FORCES = 1e-8
+"""Part of the largest force that may be missing: Newton's method leaves 1e-12 of the forces, which
+differences of positions magnify; V follows from moments of cells of a quarter of a metre."""
+
+
+@check
+def equilibrium(case):
+    """In statics N, V, M at both ends of each cell bear its loads, and jump by what acts at nodes.
+
+    Loads of a cell are integrated anew; a support, connector or joint bears what the nodes of the
+    parts that it holds miss.  Quadratures of works and fields of forces are those of the cells, of
+    degree 2, which are exact for all but the field of magnets.
+    """
+    words = case.combination
+    only(words.has("scheme = ub.Static("), "forces of a step act at its end in Static only")
+    only(not words.has("Beam.", "lumped", "field", "KelvinVoigt"), "not integrated here")
+    only(not case.exact.failure, "a step fails")
+    balance = Balance(case.exact.names, case.exact.solution)
+    missing, nodes = {}, {}
+    for beam in balance.scene.beams:
+        for k, (s0, s1), (start, end) in balance.cuts(beam):
+            missing[f"cell {k} of {beam.name}"] = start + end + balance.on_cell(beam, k, s0, s1)
+            for s, force in ((s0, start), (s1, end)):
+                part = balance._of(beam.at(s))
+                nodes[part] = nodes.get(part, np.zeros(3)) - force
+    for place, force in balance.on_places():
+        part = balance._of(place)
+        nodes[part] = nodes.get(part, np.zeros(3)) + force
+        balance.size = max(balance.size, np.abs(force).max())
+    nodes.pop(GROUND, None)
+    missing |= {f"node {part}": force for part, force in nodes.items()}
+    wrong = {k: v / balance.size for k, v in missing.items()}
+    wrong = {k: v for k, v in wrong.items() if not np.abs(v).max() < FORCES}
+    assert not wrong, wrong
+
+
+# -- dynamics ----------------------------------------------------------------------------------
+
+
+@check
+def momentum(case):
+    """In midpoint rules linear momentum grows by the impulses of loads, supports and the ground.
+
+    Tolerance: 1e-12 of the forces in each step, which are up to 1e3 times those of loads.
+    """
+    words = case.combination
+    only(words.has("ub.Midpoint", "ub.DecayingMidpoint", "Weighted"), "other means of forces")
+    only(not words.has("VirtualWork", "Potential", "RotatingFrame", "Rayleigh", "Guided"), "field")
+    only(not case.exact.failure, "a step fails")
+    solution, scene = case.exact.solution, case.exact.names["scene"]
+    only(solution.parts == len(solution) - 1, "a step was cut")
+    t, dt = solution.times, np.diff(solution.times)
+    middle = (t[1:] + t[:-1]) / 2
+    force, size = np.zeros((len(dt), 2)), 0.0
+
+    def add(values):
+        nonlocal force, size
+        force, size = force + values, max(size, np.abs(values).max(initial=0.0))
+
+    for load in scene.loads:
+        factor = np.array([load.time(x) for x in middle])[:, None]
+        if isinstance(load, ub.Gravity):
+            mass = sum(_length(solution, beam) * beam.section.rhoA for beam in scene.beams)
+            mass += sum(one.mass for one in (*scene.masses, *scene.bodies))
+            add(factor * mass * np.array(load.acceleration))
+        elif isinstance(load, ub.LineLoad):
+            add(factor * _length(solution, load.beam) * np.array(load.force))
+        else:
+            turn = solution.displacement(load.place)[:, 2]
+            mean = (turn[1:] + turn[:-1]) / 2 * isinstance(load, ub.FollowerLoad)
+            add(factor * (_turned(mean) @ np.array(load.force)))
+    for support in scene.supports:
+        add(solution.reaction(support)[1:, :2])
+    joints = [joint.holders[0] for joint in scene.joints if node(joint.places[0]) is GROUND]
+    for one in (*scene.connectors, *joints):
+        if node(one.a) is GROUND and not one.turns:
+            away = solution.position(one.b) - np.array(one.a.point)
+            sums, lengths = away[1:] + away[:-1], np.hypot(*away.T)
+            axis = sums / (lengths[1:] + lengths[:-1])[:, None] if one.stretches else one.axis
+            add(-solution.connector(one).force[1:, None] * np.broadcast_to(axis, force.shape))
+    change = np.diff(solution.momentum()[:, :2], axis=0)
+    missing = np.abs(change - dt[:, None] * force).max() / (size * dt.max())
+    assert missing < FORCES, missing
+
+
+def _length(solution, beam):
+    return np.hypot(*np.diff(solution.grid.points[solution.grid.vertices_of(beam)], axis=0).T).sum()
+
+
+def _turned(angles):
+    cos, sin = np.cos(angles), np.sin(angles)
+    return np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=-2)
+
+
+@check
+def modes(case):
+    """Modes about a static state are those of the motion after a small step of a load.
+
+    With s dt = 2 (z - 1)/(z + 1) in the midpoint rule, all states lie in the span of zⁿ of all
+    modes.  Ten are taken: the first left out has about 1/100 of the first amplitude, squared
+    frequencies growing as n⁴ in beams and as n² in bars.
+    """
+    words = case.combination
+    only(words.static and words.elastic and not case.whole.failure, "not elastic, or in motion")
+    only(not words.has("Prescribed", "Motor", "Actuator", "VirtualWork", "'field'"), "driven")
+    names, state = case.whole.names, case.whole.solution
+    scene, t0 = names["scene"], state.times[-1]
+    held = [
+        load if isinstance(load, ub.RotatingFrame)
+        else replace(load, time=lambda t, load=load: load.time(t0))
+        for load in scene.loads
+    ]  # fmt: skip
+    still = replace(scene, loads=held)
+    shapes = ub.modes(still, 10, at=state)
+    period = 2 * math.pi / shapes.omega[0]
+    place = max((b.at(s) for b in scene.beams for s in (0.5, 1.0)), key=lambda p: _way(shapes, p))
+    push = ub.PointLoad(place, force=1e-5 * 100 * np.array([0.6, 0.8]), time=lambda t: 1.0)
+    arguments = {"t": (t0, t0 + 4 * period), "dt": period / 40, "mesh": names["mesh"]}
+    run = ub.simulate(
+        replace(still, loads=[*held, push]), ub.Midpoint(), start=state, progress=False,
+        comm=case.comm, newton=ub.Newton(rtol=DIGITS), **arguments,
+    )  # fmt: skip
+    moved = run.displacement(place)[:, :2]
+    sdt = shapes.exponents * period / 40
+    z = (1 + sdt / 2) / (1 - sdt / 2)
+    powers = z[None, :] ** np.arange(len(moved))[:, None]
+    basis = np.column_stack([np.ones(len(moved)), powers.real, powers.imag])
+    left = moved - basis @ np.linalg.lstsq(basis, moved, rcond=1e-10)[0]
+    missing = np.abs(left).max() / np.ptp(moved, axis=0).max()
+    assert missing < 1e-2, missing
+
+
+def _way(shapes, place):
+    return float(np.abs(shapes.shape(0, place)[:2]).max())
+
+
+# -- paths -------------------------------------------------------------------------------------
+
+IN_TIME = ("Controller", "state=", "Perzyna", "DuvautLions", "Dashpot", "KelvinVoigt")
+"""What depends on time, or on rates, and is no part of a path."""
+
+
+@check
+def path(case):
+    """`follow` with equal steps of the load factor passes the states of `Static`.
+
+    Where a step was cut, or loads stay as they are, there are no common factors any more.
+    """
+    words = case.combination
+    only(words.has("scheme = ub.Static(") and not words.has(*IN_TIME), "in time")
+    only(words.base != "column" and not case.exact.failure, "no equilibrium")
+    names, expected = case.combination.make(), case.exact.solution
+    step, end = expected.times[1], expected.times[-1]
+    only(expected.parts == len(expected) - 1, "a step was cut")
+    try:
+        found = ub.follow(
+            names["scene"], ub.LoadControl(step), steps=len(expected) - 1, mesh=names["mesh"],
+            until=lambda now: now.t > end - step / 2, newton=ub.Newton(rtol=DIGITS),
+            progress=False, comm=case.comm,
+        )  # fmt: skip
+    except ub.ConvergenceError as error:
+        only("nothing moves with the load factor" not in str(error), "loads stay as they are")
+        raise
+    near = np.abs(found.factor[:, None] - expected.times[None, 1:]) < 1e-9 * end
+    others, rows = np.nonzero(near)
+    assert len(rows) > 2, found.factor
+    rows = rows + 1
+    nodes = np.unique(np.vstack([expected.grid.dofs, expected.grid.dofs_of_bodies]))
+    assert difference(found.q[others][:, nodes], expected.q[rows][:, nodes], 1.0) < SAME
+    for one, other in zip(names["scene"].supports, case.exact.names["scene"].supports, strict=True):
+        forces = expected.reaction(other)[rows]
+        size = max(np.abs(forces).max(), 1.0)
+        assert difference(found.reaction(one)[others], forces, size) < 10 * SAME
+
+
+@check
+def buckles(case):
+    """The first critical point of a straight column is a bifurcation at its factor of `buckling`.
+
+    They differ by the strain before buckling, up to its double in shear.
+    """
+    only(case.combination.base == "column", "no straight column")
+    names = case.combination.make()
+    scene, mesh = names["scene"], names["mesh"]
+    factor = ub.buckling(scene, 1, mesh=mesh).factors[0]
+    path = ub.follow(
+        scene, ub.LoadControl(factor / 8.3), steps=11, mesh=mesh, comm=case.comm, progress=False,
+        until=lambda now: now.t > 1.1 * factor,
+    )  # fmt: skip
+    assert path.critical, f"none up to {path.factor[-1]:.6g}; buckling at {factor:.6g}"
+    first = path.critical[0]
+    strain = factor / names["b0"].section.EA + factor / names["b0"].section.GA
+    assert first.kind == "bifurcation", (first, factor)
+    assert abs(first.factor / factor - 1) < 4 * strain + 1e-6, (first.factor, factor)
+
+
+# -- pictures ----------------------------------------------------------------------------------
+
+
+def pictures_of(case):
+    """Pictures by name; each draws what the scene has."""
+    names, solution, beam = case.whole.names, case.whole.solution, case.whole.names["b0"]
+    drawn = {
+        "model": lambda: ub.plot(names["scene"]), "shapes": lambda: ub.plot_shapes(solution),
+        "energy": lambda: ub.plot_energy(solution),
+        "history": lambda: ub.plot_history(solution, [beam.end]),
+    }  # fmt: skip
+    if case.combination.has("bending=", "axial=", "fibres=", "hinge=", "interaction="):
+        drawn["dissipation"] = lambda: ub.plot_dissipation(solution)
+        drawn["curvature"] = lambda: ub.plot_moment_curvature(solution, beam.at(0.3))
+    if case.combination.seed % 12 == 5:  # these take seconds
+        drawn = {force: partial(ub.plot, solution, force) for force in "NVM"}
+    return drawn
+
+
+@check
+def pictures(case):
+    """One of the pictures, another one for each seed, is drawn without an error."""
+    only(len(case.whole.solution) > 1, "no step")
+    drawn = list(pictures_of(case).values())
+    drawn[case.combination.seed % len(drawn)]().draw_without_rendering()

@@ -1,0 +1,189 @@
+# SPDX-License-Identifier: MIT
+"""Functions and classes of a user: works, laws, a scheme and a recorder, as docs/ show them.
+
+They are the same objects in all scenes, with other numbers each, so that each is compiled once.
+"""
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import ufl
+
+import ufl_beam as ub
+
+f = ub.law_functions
+
+
+# -- works, N/m and J/m ------------------------------------------------------------------------
+
+
+def drag(v, w, c):
+    """Resistance in proportion to the velocity."""
+    return -c * (v[0] * w[0] + v[1] * w[1])
+
+
+def wind(v, w, t, c, speed):
+    """Square of the velocity relative to air that moves along x."""
+    x, y = v[0] - speed * t, v[1]
+    return -c * ufl.sqrt(x**2 + y**2 + 1e-6) * (x * w[0] + y * w[1])
+
+
+def current(q, w, axis, p):
+    """Force across the deformed axis."""
+    tangent = axis.t0 + axis.d(ufl.as_vector([q[0], q[1]]))
+    return p * (tangent[0] * w[1] - tangent[1] * w[0])
+
+
+def dead(w, x, y):
+    """Dead force."""
+    return x * w[0] + y * w[1]
+
+
+def soil(q, k):
+    """Winkler's soil below y."""
+    return k * q[1] ** 2 / 2
+
+
+def field(q, size):
+    """Magnets in a field along y."""
+    return -size * ufl.sin(q[2])
+
+
+def warming(q, axis, M):
+    """Curvature of a temperature that differs across the section; M = EI alpha dT/h."""
+    return -M * axis.d(q[2])
+
+
+# -- laws --------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Dashpot(ub.MaterialLaw):
+    """Maxwell's body, in closed form."""
+
+    eta: float
+    variables: ClassVar = {"creep": 0.0}
+
+    def stress(self, strain, state):
+        return self.C * (strain - state.creep)
+
+    def increments(self, strain, state, dt):
+        return {"creep": self.stress(strain, state) / (self.eta / dt + self.C)}
+
+    def elastic_energy(self, strain, state):
+        return self.C * (strain - state.creep) ** 2 / 2
+
+
+@dataclass(frozen=True)
+class PowerLaw(ub.MaterialLaw):
+    """Ramberg and Osgood's law by residuals, as in docs/extending_laws.md."""
+
+    M0: float
+    k0: float
+    n: float
+    variables: ClassVar = {"plastic": 0.0, "largest": 0.0}
+
+    def stress(self, strain, state):
+        return self.C * (strain - state.plastic)
+
+    def residuals(self, strain, old, new, dt):
+        M = self.stress(strain, new)
+        largest = f.larger(old.largest, self.k0 * (f.absolute(M) / self.M0) ** self.n)
+        flows = f.sign(M) * (new.largest - old.largest)
+        return {"largest": new.largest - largest, "plastic": new.plastic - old.plastic - flows}
+
+    def elastic_energy(self, strain, state):
+        return self.C * (strain - state.plastic) ** 2 / 2
+
+
+# -- laws of connectors ------------------------------------------------------------------------
+
+
+class Maxwell:
+    """Spring in series with a damper: force and state after the step."""
+
+    def __init__(self, k, time):
+        self.k, self.time = k, time
+
+    def __call__(self, motion, rate, dt, state):
+        after = (state[0] + self.k * rate * dt) / (1 + dt / self.time)
+        return (state[0] + after) / 2, [after]
+
+
+class Cubic:
+    """Nonlinear spring and its energy."""
+
+    def __init__(self, k, cubic):
+        self.k, self.cubic = k, cubic
+
+    def __call__(self, motion, rate):
+        return self.k * motion + self.cubic * motion**3
+
+    def energy(self, motion):
+        return self.k * motion**2 / 2 + self.cubic * motion**4 / 4
+
+
+class Integral:
+    """Controller that remembers the sum of the rotations of a place."""
+
+    def __init__(self, place, gain):
+        self.place, self.gain, self.sum = place, gain, 0.0
+
+    def __call__(self, now):
+        self.sum += now.displacement(self.place)[2]
+        return -self.gain * self.sum
+
+    def state(self):
+        return self.sum
+
+    def restore(self, state):
+        self.sum = state
+
+
+# -- scheme and recorder -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Weighted(ub.ExactStep, ub.Midway):
+    """Midpoint rule with one weight for resultants and velocities, as in docs/extending.md."""
+
+    weight: float = 0.55
+    slips = True
+
+    @property
+    def alpha(self):
+        return self.weight - 0.5
+
+    def inertia(self, dt, rates):
+        return 1 / (self.weight * dt**2), 1 / (self.weight * dt), rates.v
+
+    def rates(self, dt, s, rates):
+        return ((s / dt - (1 - self.weight) * rates.v) / self.weight,)
+
+    def slip(self, dt, change, rates):
+        return self.alpha * change
+
+    def way_to_rest(self, dt):
+        return (1 - self.weight) * dt
+
+    def error_weights(self):
+        return self.alpha, 1 / 12 + self.alpha
+
+
+class LargestCurvature(ub.Recorder):
+    """Largest size of the curvature in any cell, by DOLFINx."""
+
+    def open(self, simulation):
+        self.largest = 0.0
+
+    def write(self, simulation):
+        curvature = simulation.dolfinx.strains.x.array.reshape(-1, 3)[:, 2]
+        here = np.abs(curvature).max(initial=0.0)
+        self.largest = simulation.share.largest(max(self.largest, here))
+
+    def state(self):
+        return {"largest": np.array([self.largest])}
+
+    def resume(self, simulation, state):
+        (self.largest,) = state["largest"].tolist()

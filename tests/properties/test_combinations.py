@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: MIT
+"""Combinations of features agree with themselves: 30 of them, and 300 in `make verify`.
+
+``python3 tests/properties/combinations.py --from 1000 --number 500`` checks others and prints a
+table, ``--show SEED`` prints the script of one.
+"""
+
+from mpi4py import MPI
+
+import pytest
+from combination_table import CHECKS, outcome_of
+from combinations import DYNAMICS, STATICS, draw
+from features import FEATURES
+
+import ufl_beam as ub
+
+NUMBER = 300
+"""Combinations that draw everything."""
+
+FEW = 30
+"""Those of them that are checked in `make test`."""
+
+RECORDED = {
+    "Events", "Extremes", "Fatigue", "Gerber", "Goodman", "History", "HotSpot", "Recorder",
+    "SNCurve", "VTKHDF", "XDMF",
+}  # fmt: skip
+"""What the checks `recorders` and `resumed` give to runs."""
+
+CALLED = {
+    "Checkpoint", "DolfinxView", "LoadControl", "Simulation", "buckling", "follow", "load",
+    "modes", "plot", "plot_energy", "plot_dissipation", "plot_history", "plot_moment_curvature",
+    "plot_shapes", "simulate",
+}  # fmt: skip
+"""Other names that checks use."""
+
+MADE = {
+    "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Diagram", "Energy", "Event",
+    "Extent", "Joint", "Modes", "Path", "Place", "Solution", "Spot", "Support",
+}  # fmt: skip
+"""What others return; nobody makes them."""
+
+ELSEWHERE = {
+    "analyses of histories": {
+        "Decay", "Envelope", "damping", "damping_ratio", "fit_decay", "logarithmic_decrement",
+        "peaks", "rainflow",
+    },
+    "other controls of paths": {"ArcLength", "DisplacementControl", "DissipationControl"},
+    "many runs": {"Study", "Tradeoff", "TradeoffError", "study", "tradeoff"},
+    "errors and words": {"ConvergenceError", "CopiesDiffer", "ModelWarning", "SceneError", "say"},
+    "pictures of what is not in every combination, or of a second each": {
+        "Camera", "Film", "animate", "picture", "plot_cycles", "plot_damage", "plot_extremes",
+        "plot_hinge", "plot_modes", "plot_tradeoff", "render",
+    },
+}  # fmt: skip
+"""Public names that are no part of a model or its run, and why combinations leave them out."""
+
+
+KNOWN = ("passed", "not applicable", "refused")
+
+
+@pytest.mark.serial
+def test_everything_public_is_drawn():
+    """A new public name is drawn by a feature, used by a check, or named above with a reason."""
+    drawn = set().union(*(draw(seed).names for seed in range(NUMBER)))
+    others = RECORDED | CALLED | MADE
+    others = others.union(*ELSEWHERE.values())
+    assert not others - set(ub.__all__), "no public names any more"
+    assert not set(ub.__all__) - drawn - others, "nobody draws these"
+    models = {
+        name for name in ub.__all__
+        if getattr(getattr(ub, name), "__module__", "").startswith("ufl_beam.model.")
+    }  # fmt: skip
+    assert models - MADE <= drawn, "records of models are not left out"
+
+
+@pytest.mark.serial
+def test_every_feature_and_scheme_is_drawn():
+    combinations = [draw(seed) for seed in range(NUMBER)]
+    assert {one.name for c in combinations for one in c.features} == {f.name for f in FEATURES}
+    for scheme in (*STATICS, *DYNAMICS):
+        assert any(c.has(f".{scheme}\n", f"= {scheme}\n") for c in combinations), scheme
+    assert all(2 <= len(c.features) <= 5 for c in combinations)
+
+
+@pytest.mark.serial
+@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
+@pytest.mark.parametrize(
+    "seed", [pytest.param(n, marks=pytest.mark.slow if n >= FEW else ()) for n in range(NUMBER)]
+)
+def test_combination(seed, tmp_path):
+    combination = draw(seed)
+    found = outcome_of(combination, tmp_path, CHECKS)
+    flags = {name: words for name, words in found.items() if words not in KNOWN}
+    assert not flags, f"{flags}\n{combination.source}"
+
+
+@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
+@pytest.mark.skipif(MPI.COMM_WORLD.size == 1, reason="one process")
+@pytest.mark.parametrize("seed", range(0, NUMBER, 7))
+def test_processes_agree(seed, shared_path):
+    found = outcome_of(draw(seed), shared_path, ["processes"])
+    assert set(found.values()) <= set(KNOWN), (found, draw(seed).source)
+
+
+@pytest.mark.slow
+@pytest.mark.serial
+@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
+def test_few_combinations_are_refused_or_fail(tmp_path):
+    """In statics what breaks or flows has limit loads, beyond which there is no equilibrium."""
+    found = [outcome_of(draw(seed), tmp_path, ["failed_step"]) for seed in range(NUMBER)]
+    refused = sum("run" in one for one in found)
+    failed = sum(one.get("failed_step") == "passed" for one in found)
+    assert refused <= 0.01 * NUMBER
+    assert failed <= 0.03 * NUMBER
