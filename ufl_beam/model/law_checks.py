@@ -110,8 +110,10 @@ def judges_dissipation(law: MaterialLaw) -> bool:
     """Return whether the entry "plastic" of a law is its own dissipation, whatever the step.
 
     So it is if the law states it, and if energies are quadratic.  Else the entry has an error of
-    the rule by which works are integrated, of either sign.
+    the rule by which works are integrated, of either sign.  An active law may give energy.
     """
+    if law.active:
+        return False
     return type(law).dissipation is not MaterialLaw.dissipation or has_quadratic_energies(law)
 
 
