@@ -241,9 +241,14 @@ def require_kind(value: Any, kind: type | tuple[type, ...], what: str) -> None:
 
 
 def require_text(value: Any, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is text."""
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is text that files can have."""
     if not isinstance(value, str):
         raise SceneError(f"{what} = {shorten(value)} must be text")
+    if any(c == "\0" or "\ud800" <= c <= "\udfff" for c in value):
+        raise SceneError(
+            f"{what} = {shorten(value)} has a character that files cannot have, a null or a "
+            "surrogate; leave it out"
+        )
 
 
 def require_switch(value: Any, what: str) -> None:
