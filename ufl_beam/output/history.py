@@ -99,7 +99,12 @@ class History(Recorder):
             turns = simulation.scene.links[link].turns
             units = ("rad", "N m", "J") if turns else ("m", "N", "J")
             names += [f"{c} {name} [{unit}]" for c, unit in zip(CONNECTOR, units, strict=True)]
-        energies = (f"{name} [J]" for group in simulation.entries() for name in group)
+        energies = [f"{name} [J]" for group in simulation.entries() for name in group]
+        for twice in {*names} & {*energies}:
+            raise SceneError(
+                f"History {self._path}: {twice!r} would be a column of a connector and of the "
+                "energy ledger; give the work that is called so another name"
+            )
         self._header = _line([simulation.parameter.column, *names, *energies])
 
     def _begin(self, path: Path, content: bytes) -> None:
