@@ -197,4 +197,9 @@ class Potential(Work):
 
     arguments = ("q", "axis", "t")
 
+    @property
+    def in_time(self) -> str:
+        """Name of the entry of what a change in time supplies."""
+        return f"{self.name} in time"
+
     __repr__ = bracketed

@@ -100,7 +100,12 @@ class History(Recorder):
             turns = simulation.scene.links[link].turns
             units = ("rad", "N m", "J") if turns else ("m", "N", "J")
             names += [f"{c} {name} [{unit}]" for c, unit in zip(CONNECTOR, units, strict=True)]
-        energies = (f"{name} [J]" for group in simulation.entries() for name in group)
+        energies = [f"{name} [J]" for group in simulation.entries() for name in group]
+        for twice in {*names} & {*energies}:
+            raise SceneError(
+                f"History {self._path}: {twice!r} would be a column of a connector and of the "
+                "energy ledger; give the work that is called so another name"
+            )
         columns = [simulation.parameter.column, *names, *energies]
         # Spreadsheets take what begins so for a formula, which may run programs
         self._header = _line([f"'{c}" if c.startswith(FORMULA) else c for c in columns])
