@@ -110,7 +110,8 @@ class Assembly:
         self.controllers.remember(memory, t)
         for one in self.remembering:
             one.remember(memory, q)
-        if self.supports.work or any(isinstance(link.law, Coulomb) for link in self.controllers.values):
+        links = self.controllers.values
+        if self.supports.work or any(isinstance(link.law, Coulomb) for link in links):
             self.supports.carry_on(memory, q)
         if self.inertia is not None:
             self.inertia.carry_on(memory, len(self.inertia.more))
@@ -182,8 +183,8 @@ def assemble(
     controllers = Controllers(share)
     rates = dict(controllers.values)
     connectors = Setting(
-        controllers.values, rates, scene.size, scheme, ledger, friction_repeats(scene), search, by.points,
-        by.slips,
+        controllers.values, rates, scene.size, scheme, ledger, friction_repeats(scene), search,
+        by.points, by.slips,
     )  # fmt: skip
     of_links = share, connectors, A
     coupled = together(lambda: [*couplings(*of_links, by.couplings), *guides(*of_links)])
