@@ -271,7 +271,10 @@ TABLE = {
         state=V([0.0], [None, 1.0, "ab", [NAN], [1j], ["1"], [[1.0]], [HUGE]]),
         stored=V(None, optional(FUNCTION)),
     ),
-    "Controller": call(ub.Controller, force=V(lambda simulation: 1.0, FUNCTION)),
+    "Controller": call(
+        ub.Controller,
+        force=V(lambda simulation: 1.0, FUNCTION), sample=V(None, optional(POSITIVE)),
+    ),
     "Motor": call(ub.Motor, motion=V(lambda t: t, [*TIME, None])),
     "Actuator": call(ub.Actuator, force=V(lambda t: t, [*TIME, None])),
     # loads, supports, masses
