@@ -80,6 +80,10 @@ class Snapshots(NamedTuple):
         """Return the n-th of the states."""
         return Snapshot(*self._each(lambda x: x[n]))
 
+    def view(self, n: slice) -> Snapshots:
+        """Views of some of the states."""
+        return Snapshots(*self._each(lambda x: x[n]))
+
     def some(self, n: slice) -> Snapshots:
         """Copies of some of the states."""
         return Snapshots(*self._each(lambda x: x[n].copy()))

@@ -49,8 +49,9 @@ if all(
     for name in (None, "py.warnings")
     for handler in logging.getLogger(name).handlers
 ):
-    # FFCx sends all warnings of Python to the log, where without a handler nobody sees them. The
-    # log gets a handler that shows nothing if a warning comes before this line, as with -W always.
+    # FFCx 0.9 sends all warnings of Python to the log, where without a handler nobody sees them.
+    # The log gets a handler that shows nothing if a warning comes before this line, as with -W
+    # always.
     logging.captureWarnings(False)
 
 if VERSION > (0, 11) and MPI.COMM_WORLD.rank == 0:
@@ -106,7 +107,10 @@ def pack(form: fem.Form) -> tuple[Array, Array]:
     """Pack the constants of a form and the coefficients of its cells; (n,), (num_cells, m)."""
     coefficients = cpp.fem.pack_coefficients(form._cpp_object)
     (cells,) = coefficients.values()
-    return cpp.fem.pack_constants(form._cpp_object), np.array(cells)
+    topology = form.mesh.topology
+    # Without coefficients DOLFINx returns an array of shape (0, 0).
+    packed = np.array(cells).reshape(topology.index_map(topology.dim).size_local, cells.shape[1])
+    return cpp.fem.pack_constants(form._cpp_object), packed
 
 
 def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:

@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from importlib import metadata
 from pathlib import Path
 
 PROJECT = Path(__file__).resolve().parents[1] / "pyproject.toml"
 
 
+@cache
 def version() -> str:
     """The version of the source tree that is imported, else that of the installed package."""
     if PROJECT.is_file():

@@ -90,3 +90,56 @@ class Stiffening(ub.MaterialLaw):
 
     def elastic_energy(self, strain, state):
         return self.C * strain**2 / 2 + self.cubic * strain**4 / 4
+
+
+@dataclass(frozen=True)
+class TwoRoots(ub.AxialBending):
+    """AxialBending by equations that hold on the far side of the surface, too."""
+
+    def residuals(self, strain, old, new, dt):
+        (N, M), γ = self.stress(strain, new), new.flow - old.flow
+        w, m = self.rounding, M / self.bending
+        by_m = m / f.sqrt(m**2 + w**2) / (f.sqrt(1 + w**2) - w)
+        outside = f.below(-self.excess(*self.stress(strain, old)), 0.0)
+        return {
+            "stretch": new.stretch - old.stretch - γ * 2 * N / self.axial**2,
+            "curvature": new.curvature - old.curvature - γ * by_m / self.bending,
+            "flow": f.where(outside, self.excess(N, M), γ),
+        }
+
+
+@dataclass(frozen=True)
+class GivesEnergy(ub.MaterialLaw):
+    """Plastic strain against the stress, beyond a limit; no material does so."""
+
+    limit: float
+    variables: ClassVar = {"plastic": 0.0}
+
+    def stress(self, strain, state):
+        return self.C * (strain - state.plastic)
+
+    def residuals(self, strain, old, new, dt):
+        over = f.positive(f.absolute(self.C * (strain - old.plastic)) - self.limit)
+        flow = f.sign(strain - old.plastic) * over / self.C / 4
+        return {"plastic": new.plastic - old.plastic + flow}
+
+    def elastic_energy(self, strain, state):
+        return self.C * (strain - state.plastic) ** 2 / 2
+
+
+@dataclass(frozen=True)
+class Swelling(ub.MaterialLaw):
+    """Elastic about a strain that grows in time; it gives energy where it is held in tension."""
+
+    rate: float
+    variables: ClassVar = {"free": 0.0}
+    active: ClassVar = True
+
+    def stress(self, strain, state):
+        return self.C * (strain - state.free)
+
+    def residuals(self, strain, old, new, dt):
+        return {"free": new.free - old.free + self.rate * dt}
+
+    def elastic_energy(self, strain, state):
+        return self.C * (strain - state.free) ** 2 / 2

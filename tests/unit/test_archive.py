@@ -13,7 +13,6 @@ from pathlib import Path
 
 from mpi4py import MPI
 
-import h5py
 import numpy as np
 import pytest
 
@@ -312,8 +311,8 @@ def test_others_can_read_it(shared_path, on_first_rank):
     solution.save(shared_path / "a.h5")
 
     def motion():
-        with h5py.File(shared_path / "a.h5") as file:
-            return file["history/q"][()]
+        with np.load(shared_path / "a.h5") as file:
+            return file["history/q"]
 
     assert same(on_first_rank(motion), solution.q)
     assert on_first_rank(lambda: [path.name for path in shared_path.iterdir()]) == ["a.h5"]
@@ -323,57 +322,6 @@ def test_a_second_file_replaces_the_first(shared_path):
     swing().save(shared_path / "a.h5")
     solution = swing(every=2)
     require_same(saved(solution, shared_path), solution)
-
-
-def spoil(change):
-    def do(path):
-        with h5py.File(path, "r+") as file:
-            change(file)
-
-    return do
-
-
-def renamed(file):
-    text = json.loads(file["text"][()])
-    text["scene"]["records"][-1]["odd"] = 1
-    del file["text"]
-    file["text"] = json.dumps(text)
-
-
-def renumbered(file):
-    text = json.loads(file["text"][()])
-    text["numbering"] += 1
-    del file["text"]
-    file["text"] = json.dumps(text)
-
-
-SPOILT = {
-    "nothing": (lambda path: path.unlink(), "there is no such file"),
-    "text": (lambda path: path.write_text("hello"), "holds no solution of ufl_beam, or is damaged"),
-    "empty": (lambda path: path.write_bytes(b""), "holds no solution of ufl_beam, or is damaged"),
-    "half": (
-        lambda path: path.write_bytes(path.read_bytes()[:5000]),
-        "holds no solution of ufl_beam, or is damaged",
-    ),
-    "HDF5": (lambda path: h5py.File(path, "w").close(), "the file holds no solution of ufl_beam$"),
-    "later": (
-        spoil(lambda file: file.attrs.modify("format", "solution of ufl_beam, 9")),
-        "is a solution of ufl_beam, 9, and this version of ufl_beam reads number 1",
-    ),
-    "array": (spoil(lambda file: file.__delitem__("history/q")), "or is damaged"),
-    "record": (spoil(renamed), "the file is damaged: .*odd"),
-    "numbering": (spoil(renumbered), "which numbers degrees of freedom otherwise than this one"),
-}
-
-
-@pytest.mark.parametrize("kind", SPOILT)
-def test_other_files_are_refused(kind, shared_path, on_first_rank):
-    change, message = SPOILT[kind]
-    swing().save(shared_path / "a.h5")
-    on_first_rank(lambda: change(shared_path / "a.h5"))
-    with pytest.raises(ub.SceneError, match=message) as refused:
-        ub.load(shared_path / "a.h5")
-    assert str(shared_path / "a.h5") in str(refused.value)
 
 
 def test_paths_that_cannot_be_written(shared_path):

@@ -313,6 +313,18 @@ def test_kernels_give_what_dolfinx_assembles():
     assert np.abs(matrix.data - expected.data).max() < 1e-14 * scale
 
 
+def test_a_form_without_coefficients_is_added_in_all_cells():
+    """DOLFINx packs an array of shape (0, 0) for it, whatever the number of cells."""
+    fields = fields_of_a_frame()
+    element = fields.element
+    u, w = ufl.TrialFunction(element.space), ufl.TestFunction(element.space)
+    kernel, matrix = fields.kernel(u[0] * w[0] * element.dx(2), element.q1), fields.matrix()
+    kernel.place(matrix)
+    kernel.add(np.zeros(fields.share.size), matrix.data)
+    # The integral of 1 over both beams; entries of the cells of a partition of unity
+    assert matrix.data.sum() == pytest.approx(2 + math.sqrt(10), rel=1e-14)
+
+
 def test_forms_are_compiled_once_in_a_process(compiled):
     """For scenes with other numbers, on other meshes; hinges of the same kind included."""
     for n, limit in ((3, 1.0), (5, 2.0)):

@@ -11,10 +11,46 @@ from dolfinx import fem, has_adios2
 import ufl_beam as ub
 from ufl_beam.discretization.dolfinx_forms import DolfinxFields
 from ufl_beam.output import dolfinx_view
+from ufl_beam.simulation import replicas
 
 BOTH = pytest.mark.parametrize("reference", [False, True], ids=["compiled", "reference"])
 
 STEEL = {"EA": 1e6, "GA": 4e5, "EI": 800.0, "rhoA": 10.0, "rhoI": 0.01}
+
+
+@pytest.mark.parametrize("least", [1, 6000], ids=["shared", "copies"])
+def test_total_is_that_of_the_scene_on_any_processes(monkeypatch, least):
+    """Length, ∫ x² and stored energy; [round-off] of 12 cells and of Newton's method."""
+    monkeypatch.setattr(replicas, "SMALLEST_SHARE", least)
+    beam = ub.Beam((0, 0), (3, 0), ub.Section(**STEEL), cells=12)
+    load = ub.PointLoad(beam.end, force=(10.0, 30.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    simulation = moved(scene, ub.Midpoint(), comm=MPI.COMM_WORLD)
+    assert simulation.share.comm.size == (MPI.COMM_WORLD.size if least == 1 else 1)
+    view = simulation.dolfinx
+    x, C, e = ufl.SpatialCoordinate(view.mesh), view.stiffness, view.strains
+    stored = sum(C[i] * e[i] ** 2 / 2 for i in range(3)) * view.dx
+    one = fem.Constant(view.mesh, 1.0)
+    assert view.total(one * view.dx) == pytest.approx(3.0, rel=1e-13)
+    assert view.total(x[0] ** 2) == pytest.approx(9.0, rel=1e-13)
+    # Both rules in one form: FFCx alone would take one for both.
+    assert view.total(one * view.dx + x[0] ** 2 * ufl.dx) == pytest.approx(12.0, rel=1e-13)
+    assert view.total(stored) == pytest.approx(simulation.entries()[0]["stored"], rel=1e-10)
+    simulation.close()
+
+
+def test_what_total_refuses():
+    view = moved(frame(), ub.Midpoint()).dolfinx
+    w = ufl.TestFunction(view.function_space)
+    for wrong, message in [
+        (w[0] * view.dx, "without test functions"),
+        (view.configuration, "a scalar expression"),
+        (3.0, "a form of UFL"),
+        (fem.Constant(view.mesh, 1.0) * ufl.ds, "over facets"),
+        (moved(frame(), ub.Midpoint()).dolfinx.configuration[0] * ufl.dx, "another mesh"),
+    ]:
+        with pytest.raises(ub.SceneError, match=message):
+            view.total(wrong)
 
 
 @pytest.fixture(autouse=True)

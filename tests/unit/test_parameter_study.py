@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Studies: the same on any number of ranks, no member fatal, nothing lost, nothing done twice."""
 
+import json
 import math
 import os
 import re
@@ -219,12 +220,12 @@ def test_a_study_is_loaded_as_it_was(shared_path):
     assert [path.name for path in shared_path.iterdir()] == ["a.h5"]
 
 
-def test_the_file_is_plain_hdf5(shared_path, on_first_rank):
+def test_numpy_reads_the_file(shared_path, on_first_rank):
     ub.study(square, numbers(1, 2), path=shared_path / "a.h5")
 
     def read():
-        with h5py.File(shared_path / "a.h5") as file:
-            return list(file["cases"].asstr()), file["results/powers"][()].tolist()
+        with np.load(shared_path / "a.h5") as file:
+            return json.loads(file["text.json"])["cases"], file["results/powers"].tolist()
 
     assert on_first_rank(read) == (['{"x": 1}', '{"x": 2}'], [[1, 1, 1, 1], [1, 2, 4, 8]])
 
@@ -352,7 +353,7 @@ def test_files_that_cannot_be_written(shared_path, on_first_rank, counted):
     with raises("nowhere", "there is no directory", "make it first"):
         ub.study(counted(square), numbers(1), path=shared_path / "nowhere" / "a.h5")
     on_first_rank(lambda: (shared_path / "a.h5.part").mkdir())
-    with raises("a.h5 cannot be written"):
+    with raises("a.h5 cannot be written: Is a directory", kind=OSError):
         ub.study(counted(square), numbers(1), path=shared_path / "a.h5")
     assert counted.calls() == []
 
@@ -373,7 +374,7 @@ def test_files_that_are_no_studies(shared_path, on_first_rank):
     for name in ("a.h5", "b.h5", "c.h5"):
         before = (shared_path / name).read_bytes()
         for anew in (False, True):
-            with raises(name, "the file holds no study, or is damaged"):
+            with raises(name, "the file holds no study of ufl_beam, or is damaged"):
                 ub.study(square, numbers(1), path=shared_path / name, anew=anew)
         assert (shared_path / name).read_bytes() == before
 

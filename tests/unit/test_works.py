@@ -311,6 +311,7 @@ def test_restart(scheme, shared_path):
         same_works(resumed.energy[name], whole.energy[name])
 
 
+@pytest.mark.filterwarnings("ignore:.*takes v:ufl_beam.ModelWarning")  # motion in time is meant
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()])
 def test_restart_in_statics(scheme, shared_path):
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)

@@ -21,7 +21,7 @@ from mpi4py.futures import MPICommExecutor
 from ufl_beam.analysis.study_file import Outcome, Study, numbers_of, text_of
 from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_sequence, require_switch, shorten
-from ufl_beam.output.output_files import require_apart, require_path, take
+from ufl_beam.output.output_files import part_of, require_apart, require_path, take
 from ufl_beam.parallel import alone, communicator, say
 from ufl_beam.progress_bar import progress_bar
 
@@ -85,7 +85,7 @@ def study(
     outputs = []
     if path is not None:
         path = require_path(path, "study")
-        outputs.append(("study", (path, path.with_name(f"{path.name}.part"))))
+        outputs.append(("study", (path, part_of(path))))
     todo: dict[str, Case] = {}
     records: dict[str, tuple[Outcome, float]] = {}
 

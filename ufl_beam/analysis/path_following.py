@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from typing import Any, cast
+from typing import cast
 
 from mpi4py import MPI
 
@@ -14,7 +14,7 @@ import numpy as np
 from ufl_beam.analysis.critical_points import Branch, CriticalPoint
 from ufl_beam.analysis.path_corrector import Control
 from ufl_beam.analysis.path_stepper import PathStepper
-from ufl_beam.arrays import Array, State
+from ufl_beam.arrays import Array
 from ufl_beam.errors import (
     SceneError,
     StepFailed,
@@ -27,7 +27,7 @@ from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.connector_laws import Controller
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import above, below
+from ufl_beam.output.archive import Content, above, below, require_arrays
 from ufl_beam.output.recorders import Recorder, recorders_of
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import FACTOR
@@ -35,6 +35,7 @@ from ufl_beam.progress_bar import progress_bar
 from ufl_beam.simulation.run import running
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.solution_files import NAMED
 from ufl_beam.solvers.newton_options import Newton
 
 MOST_POINTS = 5  # critical points that the text of a path names
@@ -72,21 +73,25 @@ class Path(Solution):
         points = f"{first} and {rest} more" if rest > 0 else first
         return [*super().summary(), *filter(None, [points])]
 
-    def _content(self) -> tuple[dict[str, Any], State]:
-        text, arrays = super()._content()
-        text["critical"] = [{"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical]
+    def _content(self) -> Content:
+        content = super()._content()
+        content["critical"] = [
+            {"kind": c.kind, "factor": c.factor, "n": c.n} for c in self.critical
+        ]
         for k, point in enumerate(self.critical):
-            arrays[f"critical/{k}/mode"] = point.mode
-            arrays |= above(f"critical/{k}/state/", point.state._arrays())
-        return text, arrays
+            content[f"critical/{k}/mode"] = point.mode
+            content |= above(f"critical/{k}/state/", point.state._arrays())
+        return content
 
-    def _take(self, text: dict[str, Any], arrays: State) -> None:
-        super()._take(text, arrays)
+    def _take(self, content: Content) -> None:
+        super()._take(content)
         critical = []
-        for k, one in enumerate(text["critical"]):
-            state, prefix = Solution(self.scene, self.grid), f"critical/{k}/state/"
-            state._take(text, below(prefix, arrays))
-            critical.append(CriticalPoint(**one, state=state, mode=arrays[f"critical/{k}/mode"]))
+        for k, one in enumerate(content["critical"]):
+            state, inside = Solution(self.scene, self.grid), below(f"critical/{k}/", content)
+            require_arrays(inside, {"mode": (self.grid.size,)})
+            state._take({**{n: content[n] for n in NAMED}, **below("state/", inside)})
+            kind, factor, n = str(one["kind"]), float(one["factor"]), range(len(self))[one["n"]]
+            critical.append(CriticalPoint(kind, factor, n, state, inside["mode"]))
         self.critical = critical
 
     @property

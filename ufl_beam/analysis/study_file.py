@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,11 +13,13 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind
+from ufl_beam.output.archive import above, below, decoding, read, require_arrays, write
+from ufl_beam.output.output_files import require_path, require_writable
 from ufl_beam.rich_display import Rich
 
 Outcome = dict[str, Array] | str  # result of a member, or the reason of its failure
 
-FORMAT = "study of ufl_beam, 1"
+FORMAT = "study of ufl_beam, 2"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,28 +85,19 @@ class Study(Rich):
         return "\n".join(lines)
 
     def save(self, path: str | Path) -> None:
-        """Write an HDF5 file; an existing one is replaced once the new one is complete.
+        """Write a file with a checksum; an existing one is replaced once the new one is complete.
 
         Raises:
             SceneError: The file cannot be written.
+            OSError: There is no space for it.
         """
-        import h5py
-
-        path = Path(path)
-        if not path.parent.is_dir():
-            raise SceneError(f"study {path}: there is no directory {path.parent}; make it first")
-        part, text = path.with_name(path.name + ".part"), h5py.string_dtype()
-        errors = [self.failed.get(i, "") for i in range(len(self))]
-        try:
-            with h5py.File(part, "w") as file:
-                file.attrs["format"], file.attrs["member"] = FORMAT, self.member
-                file.create_dataset("cases", data=[*map(text_of, self.cases)], dtype=text)
-                file.create_dataset("errors", data=errors, dtype=text)
-                file["seconds"] = self.seconds
-                file.create_group("results").update(self.results)
-            os.replace(part, path)
-        except OSError as error:
-            raise SceneError(f"study {path} cannot be written: {error}") from None
+        file = require_path(path, "study")
+        require_writable(file)
+        content = {
+            "member": self.member, "cases": [*map(text_of, self.cases)], "seconds": self.seconds,
+            "errors": [self.failed.get(i, "") for i in range(len(self))],
+        }  # fmt: skip
+        write(file, FORMAT, {**content, **above("results/", self.results)})
 
     @classmethod
     def load(cls, path: str | Path) -> Study:
@@ -114,24 +106,18 @@ class Study(Rich):
         Raises:
             SceneError: There is no such file, or it holds no study, or is damaged.
         """
-        import h5py
-
-        if not Path(path).is_file():
-            raise SceneError(f"study {path}: there is no such file")
-        try:
-            with h5py.File(path, "r") as file:
-                if file.attrs["format"] != FORMAT:
-                    raise ValueError(f"its format is {file.attrs['format']!r}")
-                return cls(
-                    file.attrs["member"],
-                    tuple(map(json.loads, file["cases"].asstr()[()])),
-                    {name: values[()] for name, values in file["results"].items()},
-                    {i: error for i, error in enumerate(file["errors"].asstr()[()]) if error},
-                    file["seconds"][()],
-                )
-        except (OSError, KeyError, ValueError) as error:
-            why = f"the file holds no study, or is damaged: {error}"
-            raise SceneError(f"study {path}: {why}") from None
+        file = require_path(path, "study")
+        with decoding(file, FORMAT):
+            content = read(file, FORMAT)
+            cases, results = content["cases"], below("results/", content)
+            failed = {i: str(error) for i, error in enumerate(content["errors"]) if error}
+            require_arrays(content, {"seconds": (len(cases),)})
+            for name, values in results.items():
+                require_arrays(results, {name: (len(cases), *values.shape[1:])})
+            if len(content["errors"]) != len(cases):
+                raise SceneError("the file is damaged: it has not one 'errors' for each case")
+            made = tuple(map(json.loads, cases))
+            return cls(str(content["member"]), made, results, failed, content["seconds"])
 
 
 def text_of(case: dict[str, Any], what: str = "case") -> str:
@@ -154,7 +140,7 @@ def numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
         raise SceneError(f"study: {case} returned {returned!r}; return a dict of numbers or arrays")
     arrays = {}
     for name, value in returned.items():
-        if not isinstance(name, str) or name in {"", "."} or "/" in name:
+        if not isinstance(name, str) or name in {"", "."} or "/" in name or not name.isprintable():
             raise SceneError(f"study: {case} returned {name!r}, which is no name of a result")
         array = np.asarray(None)  # stays so if rows have different lengths
         with suppress(ValueError):

@@ -335,6 +335,11 @@ class Grid:
         beam = next(b for b in self.scene.beams if node in self._nodes_of(b))
         return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
 
+    def describe_cell(self, number: int) -> str:
+        """A cell in words: its beam and its middle."""
+        x, y = self.points[self.cells[number]].mean(axis=0)
+        return f"{self.scene.beams[self.beam_of_cell[number]].name} at ({x:g}, {y:g})"
+
     def worst(self, sizes: Array) -> dict[str, float]:
         """Largest degree of freedom of each beam, body and connector, in words; zeros left out."""
         dofs_of_beams = [self.nodes_of(beam)[1] for beam in self.scene.beams]

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import ffi
@@ -15,12 +16,39 @@ from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.discretization.function_spaces import Element, Fields, derivative
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
+from ufl_beam.dolfinx_compat import mesh as meshes
+from ufl_beam.errors import SceneError, shorten
 
 
 def dofs_of_cells(space: fem.FunctionSpace) -> Index:
     """Degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
     blocks, size = space.dofmap.list, space.dofmap.bs
     return np.asarray(blocks[:, :, None] * size + np.arange(size)).reshape(len(blocks), -1)
+
+
+def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
+    """Integrate a form without arguments, or a scalar expression, over the cells of a mesh.
+
+    Raises:
+        SceneError: It is neither, or it is of another mesh.
+    """
+    if isinstance(integral, Expr) and not integral.ufl_shape:
+        integral = integral * ufl.dx(domain=mesh)
+    if not isinstance(integral, ufl.Form) or integral.arguments():
+        raise SceneError(
+            f"dolfinx.total: {shorten(integral)} must be a form of UFL without test functions, "
+            "such as expression * view.dx, or a scalar expression"
+        )
+    if any(one.integral_type() != "cell" for one in integral.integrals()):
+        raise SceneError(
+            "dolfinx.total: the form has integrals over facets, and the mesh of each process has "
+            "facets of its own where it ends; integrate over cells, with dx"
+        )
+    if any(domain != mesh.ufl_domain() for domain in integral.ufl_domains()):
+        raise SceneError("dolfinx.total: the form is of another mesh; state it on view.mesh")
+    # One by one, as each compiled form has one quadrature rule.
+    forms = (compiled_form(ufl.Form([one]))[0] for one in integral.integrals())
+    return float(sum(fem.assemble_scalar(form) for form in forms))
 
 
 class DolfinxForm:

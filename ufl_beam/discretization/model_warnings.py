@@ -52,6 +52,17 @@ def warn_of_masses(scene: Scene) -> None:
         )
 
 
+def warn_of_rates(scene: Scene) -> None:
+    """Warn of works with velocities in a static run, such as drag left in a preload."""
+    for work in scene.works:
+        if "v" in work.asked:
+            warn(
+                f"{work} takes v, which is (q1 - q0)/dt in a static run, too: it carries a part of "
+                "the loads, as a damper does. Leave it out of the scene of a preload; if slow "
+                "motion in time is meant, filter this warning"
+            )
+
+
 def warn_of_free_hinges(scene: Scene) -> None:
     """Warn of hinges given at free ends where a load is a moment, which acts on the member."""
     there = {place_of(hinge) for hinge in scene.hinges}

@@ -15,6 +15,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.arrays import State as State
 from ufl_beam.discretization.partition import Share
+from ufl_beam.errors import SceneError
 
 NOWHERE: Array = np.empty(0)
 """In the place of a configuration: of what is remembered, strains and stored energies are not that
@@ -50,6 +51,10 @@ class Memory(ABC):
         """Rows of numbered things, each on one process only; of any lengths under one name."""
 
     @abstractmethod
+    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
+        """Rows of numbered things that all processes know."""
+
+    @abstractmethod
     def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
         """Values at some places of ``size``, of which the first ``owned`` are of this process."""
 
@@ -79,6 +84,10 @@ class Saving(Memory):
         self._rows[f"{name}, {rows.shape[1]}"].append(np.column_stack([numbers, rows]))
         return rows
 
+    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
+        """Save numbered rows of a table, once."""
+        return self.rows(name, numbers, rows) if self._share.comm.rank == 0 else rows
+
     def state(self) -> State:
         """Return the state of all processes, on each of them; they call it together."""
         here = self._sums, self._rows
@@ -104,19 +113,36 @@ class Restoring(Memory):
         super().__init__(share)
         self._state = state
 
+    def has(self, name: str) -> bool:
+        """Return true if the state has numbers of this name."""
+        return name in self._state
+
     def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
-        return np.asarray(self._state[name][where])
+        return np.asarray(self._found(name, (size,))[where])
 
     def _summed(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
-        here = self._state[name][where]
+        here = self._found(name, (size,))[where]
         here[owned:] = 0.0  # the owner has all of it
         return np.asarray(here)
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
         """Return the saved rows of these numbers."""
-        table = self._state.get(f"{name}, {rows.shape[1]}")
-        if table is None:
+        columns = rows.shape[1]
+        if f"{name}, {columns}" not in self._state:
             return rows
+        table = self._found(f"{name}, {columns}", (-1, columns + 1))
         found = np.minimum(np.searchsorted(table[:, 0], numbers), len(table) - 1)
         known = table[found, 0] == numbers
         return np.where(known[:, None], table[found, 1:], rows)
+
+    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
+        """Return the saved rows of these numbers."""
+        return self.rows(name, numbers, rows)
+
+    def _found(self, name: str, shape: tuple[int, ...]) -> Array:
+        """Return an array of the state; :class:`SceneError` if it has not the shape; -1 is any."""
+        values = self._state.get(name)
+        if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
+            found = "missing" if values is None else f"of shape {values.shape}"
+            raise SceneError(f"the array {name!r} of the state is {found}, and must be {shape}")
+        return values

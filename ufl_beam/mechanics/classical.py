@@ -107,6 +107,9 @@ class _AtEnd(PlainStep):
 class Static(InParts, _AtEnd):
     """Static equilibrium at the end of each step; time is the load parameter.
 
+    What is viscous acts at the mean rates of the step, in real time: dampers, :class:`KelvinVoigt`,
+    viscosity of materials, works with ``v``.  There is no inertia.
+
     The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the step
     and a measure of it.  A step is cut if its forces do not account for the stored and dissipated
     energy up to a twentieth, since it may have jumped to another branch of equilibria.

@@ -114,7 +114,8 @@ class ExactStatic(InParts, ExactStep):
     step with ``theta=1`` and of second order with ``theta=1/2``, see docs/schemes.md for measured
     errors.  Loads that act from the start are applied in the first step, in parts that turn nodes
     little.  At a jump to another branch of equilibria the run goes on, and the released energy is
-    in the entry "numerical"; :class:`Static` stops there.
+    in the entry "numerical"; :class:`Static` stops there.  Time is real for what is viscous, as in
+    :class:`Static`.
 
     Args:
         theta: Part of the step at which resultants and loads are in equilibrium.  With 1/2 no

@@ -77,11 +77,18 @@ class Running(Protocol):
 
 @dataclass(frozen=True)
 class Controller(Record):
-    """Force by a function of the running simulation, constant during each step.
+    """Force by a function of the running simulation, constant until it is evaluated again.
+
+    The force acts a step, or a sample time, after the state that it is computed from.  A force of
+    ``kd`` times a rate grows without bound, or changes its sign each time, unless
+    ``kd sample < 2 J``; J is the inertia that the force accelerates within that time.  At the end
+    of a beam without a body this is nearly nothing.  :class:`ForceLaw` has no such delay.
 
     Args:
         force: ``force(simulation)``; N or N m; a positive one makes the motion grow.  It may ask
             the simulation for its time, motions, velocities and the forces of joints.
+        sample: Sample time, from the beginning of the run; s.  Steps end at samples.  By default
+            the force is computed at every step.
 
     Example:
         >>> brake = ub.Controller(lambda now: -1e4 * now.velocity(beam.end)[1])
@@ -93,11 +100,12 @@ class Controller(Record):
     """
 
     force: Annotated[Callable[[Any], float], partial(require_function, of="the simulation")]
+    sample: Annotated[float | None, partial(require_number, positive=True)] = None
 
     __repr__ = one_line
 
     def ask(self, simulation: Running, link: object) -> float:
-        """Evaluate the force of ``link`` in the next step; all processes call it together."""
+        """Evaluate the force of ``link`` from now on; all processes call it together."""
         at = f"t = {simulation.t:.9g} s"
         return require_returned(self.force(simulation), f"{link}: the controller", at)
 

@@ -54,13 +54,19 @@ class AxialBending(Record, MaterialLaw):
         return (N / self.axial) ** 2 + (sqrt(m**2 + w**2) - w) / (sqrt(1 + w**2) - w) - 1
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Flow along the normal of the surface up to which the resultants return."""
-        N, M = self.stress(strain, new)
-        w, m, γ = self.rounding, M / self.bending, new.flow - old.flow
+        """Flow along the normal of the surface up to which the resultants return.
+
+        Flow against the normal would lead to the far side of the surface.  So a negative flow moves
+        nothing, and the excess grows with it: the equations have one solution.
+        """
+        (N, M), (EA, EI) = self.stress(strain, new), self.C
+        w, m, flow = self.rounding, M / self.bending, new.flow - old.flow
         by_m = m / sqrt(m**2 + w**2) / (sqrt(1 + w**2) - w)
+        γ = where(below(flow, 0.0), 0.0, flow)
+        back = (flow - γ) * (EA / self.axial**2 + EI / self.bending**2)
         outside = below(-self.excess(*self.stress(strain, old)), 0.0)
         return {
             "stretch": new.stretch - old.stretch - γ * 2 * N / self.axial**2,
             "curvature": new.curvature - old.curvature - γ * by_m / self.bending,
-            "flow": where(outside, self.excess(N, M), γ),
+            "flow": where(outside, self.excess(N, M) - back, flow),
         }

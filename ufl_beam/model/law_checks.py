@@ -104,3 +104,32 @@ def _require_names(found: object, law: MaterialLaw, what: str) -> None:
         wrong = [f"lacks {', '.join(missing)}"] * bool(missing)
         wrong += [f"has {', '.join(unknown)}, which `variables` does not name"] * bool(unknown)
         raise SceneError(f"{what}: what it returns {' and '.join(wrong)}")
+
+
+def judges_dissipation(law: MaterialLaw) -> bool:
+    """Return whether the entry "plastic" of a law is its own dissipation, whatever the step.
+
+    So it is if the law states it, and if energies are quadratic.  Else the entry has an error of
+    the rule by which works are integrated, of either sign.  An active law may give energy.
+    """
+    if law.active:
+        return False
+    return type(law).dissipation is not MaterialLaw.dissipation or has_quadratic_energies(law)
+
+
+def has_quadratic_energies(law: MaterialLaw) -> bool:
+    """Return whether the energies of a law are quadratic in strains and variables."""
+    C = tuple(np.ones(1) for _ in law.resultants or "x")
+    numbers = law.numbers(law.as_argument(C)).items()
+    tried = law.of(law.as_argument(C), {n: 1.0 if hasattr(v, "draw") else v for n, v in numbers})
+
+    def energies(factor: float) -> list[float]:
+        draw = np.random.default_rng(0).uniform
+        strain = law.as_argument(tuple(factor * draw(-1.0, 1.0, 1) for _ in C))
+        state = State({name: factor * draw(-1.0, 1.0, 1) for name in law.variables})
+        with np.errstate(all="ignore"):
+            found = tried.elastic_energy(strain, state), tried.hardening_energy(state)
+        return [float(np.sum(x)) for x in found]
+
+    # Twice the numbers have the same digits.
+    return bool(np.allclose(energies(2.0), 4.0 * np.array(energies(1.0)), rtol=1e-12, atol=0.0))

@@ -40,6 +40,8 @@ class MaterialLaw(ABC):
         resultants: ``"NM"`` or ``"NVM"`` of a law in which these interact; strain, stress and ``C``
             are tuples then.  By default a law is of one strain and one stress.
         C: Elastic stiffness.
+        active: True of a law that may give energy, such as one that swells.  Else steps are refused
+            in which :meth:`residuals` were solved by variables with a negative dissipation.
 
     Example:
         >>> from dataclasses import dataclass
@@ -58,6 +60,7 @@ class MaterialLaw(ABC):
 
     variables: ClassVar[Mapping[str, float]] = {}
     resultants: ClassVar[str] = ""
+    active: ClassVar[bool] = False
     C: Values
 
     @abstractmethod
@@ -125,6 +128,11 @@ class MaterialLaw(ABC):
     def solves(self) -> bool:
         """True if the variables are found by Newton's method from :meth:`residuals`."""
         return type(self).residuals is not MaterialLaw.residuals
+
+    @property
+    def must_dissipate(self) -> bool:
+        """True if solutions of :meth:`residuals` with a negative dissipation are refused."""
+        return self.solves and not self.active
 
     def as_tuple(self, values: Values) -> tuple[Values, ...]:
         """Strains or stresses of a point as a tuple, of one if nothing interacts."""

@@ -103,6 +103,11 @@ class Work:
             )
         return names.asked
 
+    @property
+    def takes_rates(self) -> bool:
+        """True if the function takes ``v`` or ``dt``: only a step in time gives it a value."""
+        return not {"v", "dt"}.isdisjoint(self.asked)
+
     def on(self, beams: Sequence[Member]) -> Sequence[Member]:
         """Those of the beams of a scene on which it acts."""
         return beams if self.beams is None else self.beams
@@ -118,7 +123,7 @@ class VirtualWork(Work):
 
     * ``q0``, ``q1``: configurations (u_x, u_y, ψ) at both ends of the step; m, m, rad,
     * ``q``: that at which the time scheme states forces, their mean in :class:`Midpoint`,
-    * ``v``: mean velocity of the step, zero in statics; m/s, m/s, rad/s,
+    * ``v``: mean velocity of the step, (q1 - q0)/dt, also in static runs; m/s, m/s, rad/s,
     * ``w``: virtual motion (w_x, w_y, w_ψ), in which the work is linear; m, m, rad,
     * ``axis``: undeformed axis, with ``axis.x``, its point (2,), tangent ``axis.t0`` and normal
       ``axis.n0``, derivative along it ``axis.d(f)``, length of the cell ``axis.h``,
@@ -126,7 +131,8 @@ class VirtualWork(Work):
     * the names in ``numbers``.
 
     Its work since the beginning is the entry ``name`` among those supplied in the energy ledger.
-    Effects that store energy are a :class:`Potential`.
+    Effects that store energy are a :class:`Potential`.  A static run has real time: works with
+    ``v`` act in it as dampers do, with a warning.
 
     Args:
         name: Entry in the ledger.

@@ -8,9 +8,10 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dolfinx_forms import DolfinxFields, dofs_of_cells
+from ufl_beam.discretization.dolfinx_forms import DolfinxFields, dofs_of_cells, integrated
 from ufl_beam.discretization.function_spaces import Strains, derivative, mass_form
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import fem
@@ -66,7 +67,8 @@ class DolfinxView:
     A function is made when it is asked for first.  It is the same object ever after, and has the
     values of the accepted state when it was asked for last.  All are copies: nothing that is done
     to them changes the run.  With several processes that share a scene each has a mesh of its own
-    cells; all of them ask together.
+    cells; all of them ask together.  The communicator of the mesh is that of one process, so sums
+    over ``view.mesh.comm`` are parts: :meth:`total` integrates over the whole scene.
 
     Beams have vertices of their own, also where joints connect them: a function of the mesh may
     jump there, and :attr:`dofs` leads from it to the unknowns of the scene, which joints share.
@@ -78,13 +80,14 @@ class DolfinxView:
         >>> view = simulation.dolfinx
         >>> C, e = view.stiffness, view.strains  # (EA, GA, EI), (Σ, Γ, K)
         >>> energy = sum(C[i] * e[i] ** 2 / 2 for i in range(3)) * view.dx
-        >>> stored = fem.assemble_scalar(fem.form(energy))
+        >>> stored = view.total(energy)
         >>> bool(np.isclose(stored, simulation.entries()[0]["stored"], rtol=1e-12))
         True
     """
 
     def __init__(self, of: Viewed) -> None:
         self._of = of
+        self._functions: dict[str, fem.Function] = {}
 
     def __repr__(self) -> str:
         return f"<DolfinxView of {self._of!r}>"
@@ -122,7 +125,7 @@ class DolfinxView:
         Example:
             >>> import ufl
             >>> dx = ufl.Measure("dx", domain=view.mesh, subdomain_data=view.cell_tags)
-            >>> print(round(fem.assemble_scalar(fem.form(fem.Constant(view.mesh, 1.0) * dx(0))), 9))
+            >>> print(round(view.total(fem.Constant(view.mesh, 1.0) * dx(0)), 9))
             2.0
         """
         beams = self._of.share.grid.beam_of_cell[self.cells]
@@ -169,6 +172,24 @@ class DolfinxView:
         """
         return self._fields.element.dx(1)
 
+    def total(self, integral: ufl.Form | Expr) -> float:
+        """Integrate over all beams of the scene, on whatever processes; all call it together.
+
+        Args:
+            integral: Form over cells without arguments, or a scalar expression, which is integrated
+                with the degree that UFL estimates.
+
+        Raises:
+            SceneError: It is neither, or it is of another mesh.
+
+        Example:
+            >>> length = view.total(1.0 * view.dx)
+            >>> _, u_y, _ = ufl.split(view.configuration)
+            >>> print(round(length, 9), bool(view.total(u_y) < 0))
+            2.0 True
+        """
+        return self._of.share.total(integrated(integral, self.mesh))
+
     # -- functions -------------------------------------------------------------------------------
 
     @property
@@ -179,7 +200,7 @@ class DolfinxView:
             >>> bool(view.stiffness.x.array[2] == section.EI)
             True
         """
-        return self._put(self._stiffness, self._fields.of_sections(self._fields.element.stiffness))
+        return self._put(self._named("stiffness"), self._fields.of_sections(self._fields.element.stiffness))
 
     @property
     def configuration(self) -> fem.Function:
@@ -190,7 +211,7 @@ class DolfinxView:
             >>> bool(np.isclose(ψ.x.array.min(), simulation.displacement(beam.end)[2]))
             True
         """
-        return self._fill(self._configuration, self._of.q)
+        return self._fill(self._named("configuration"), self._of.q)
 
     @property
     def velocity(self) -> fem.Function:
@@ -206,7 +227,7 @@ class DolfinxView:
         """
         if not has_inertia(self._of.scheme):
             raise SceneError("dolfinx.velocity: a static scheme has no velocities; run dynamics")
-        return self._fill(self._velocity, self._of.velocities()[0])
+        return self._fill(self._named("velocity"), self._of.velocities()[0])
 
     @property
     def strains(self) -> fem.Function:
@@ -218,7 +239,7 @@ class DolfinxView:
             >>> view.strains.x.array.reshape(-1, 3).shape
             (4, 3)
         """
-        return self._put(self._strains, self._mean_strains.mean(self._of.q))
+        return self._put(self._named("strains"), self._mean_strains.mean(self._of.q))
 
     @property
     def forces(self) -> fem.Function:
@@ -229,7 +250,7 @@ class DolfinxView:
             >>> bool(np.allclose(M, simulation.section_forces()[view.cells, 2]))
             True
         """
-        return self._put(self._forces, self._of.section_forces()[self.cells])
+        return self._put(self._named("forces"), self._of.section_forces()[self.cells])
 
     @property
     def jump(self) -> fem.Function:
@@ -256,35 +277,20 @@ class DolfinxView:
         return self._put(self._jump, self._of.damage()[0][self.cells])
 
     @cached_property
-    def _configuration(self) -> fem.Function:
-        return self._named("configuration", self.function_space)
-
-    @cached_property
-    def _velocity(self) -> fem.Function:
-        return self._named("velocity", self.function_space)
-
-    @cached_property
-    def _stiffness(self) -> fem.Function:
-        return self._named("stiffness", self._fields.element.stiffness.function_space)
-
-    @cached_property
-    def _strains(self) -> fem.Function:
-        return self._named("strains", self._stiffness.function_space)
-
-    @cached_property
     def _mean_strains(self) -> Strains:
         return Strains(self._fields)
 
     @cached_property
-    def _forces(self) -> fem.Function:
-        return self._named("forces", self._stiffness.function_space)
-
-    @cached_property
     def _jump(self) -> fem.Function:
-        return self._named("jump", fem.functionspace(self.mesh, ("DG", 0)))
+        return fem.Function(fem.functionspace(self.mesh, ("DG", 0)), name="jump")
 
-    def _named(self, name: str, space: fem.FunctionSpace) -> fem.Function:
-        return fem.Function(space, name=name)
+    def _named(self, name: str) -> fem.Function:
+        """A function of the configurations, or one with three values in each cell."""
+        if name not in self._functions:
+            element, of_nodes = self._fields.element, name in ("configuration", "velocity")
+            space = element.space if of_nodes else element.stiffness.function_space
+            self._functions[name] = fem.Function(space, name=name)
+        return self._functions[name]
 
     def _fill(self, function: fem.Function, values: Array) -> fem.Function:
         """Give a function values at the degrees of freedom of the scene."""

@@ -13,13 +13,13 @@ import numpy as np
 
 from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
-from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
+from ufl_beam.errors import require_count, require_kind, require_sequence
 from ufl_beam.model.bodies import Anchor, require_anchors
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import links_of, motion_of
-from ufl_beam.output.output_files import OutputFile, require_path
+from ufl_beam.output.output_files import OutputFile, changed, part_of, require_path
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
 
@@ -66,7 +66,7 @@ class History(Recorder):
         require_count(most, f"History {path}: most")
         self._first_every, self._most = every, most
         self._path = require_path(path, "History")
-        self._part = self._path.with_name(self._path.name + ".part")
+        self._part = part_of(self._path)
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")
         for i, place in enumerate(self._places):
@@ -138,42 +138,46 @@ class History(Recorder):
         return _line([repr(float(x)) for x in numbers])
 
     def state(self) -> State:
-        """Return the length of the file, and the whole of it where rows may go again."""
-        on_first(self._comm, self._sync)
+        """Return the length of the file and its checksum; all of it where rows may go again."""
         rows = self._steps // self._every
-        counts, content = np.array([self._every, self._steps, rows, 0], dtype=float), b""
-        for file in self._files:
-            counts[3] = self._length
-            if self._most < sys.maxsize:
-                content = file.read(0, self._length)
-        return {"counts": counts, "content": np.frombuffer(content, dtype=np.uint8)}
+        counts = np.array([self._every, self._steps, rows, 0], dtype=float)
+        content = digest = b""
 
-    def _sync(self) -> None:
-        for file in self._files:
-            file.sync()
+        def sync() -> None:
+            nonlocal content, digest
+            for file in self._files:
+                file.sync()
+                counts[3] = self._length
+                if self._most < sys.maxsize:
+                    content = file.read(0, self._length)
+                else:
+                    digest = file.digest(self._length)
+
+        on_first(self._comm, sync)
+        texts = {"content": content, "digest": digest}
+        return {"counts": counts, **{n: np.frombuffer(x, dtype=np.uint8) for n, x in texts.items()}}
 
     def resume(self, simulation: StateView, state: State) -> None:
         """Cut off what was written after the state, and append."""
         self._prepare(simulation)
         self._every, self._steps, _, length = map(int, state["counts"])
-        on_first(simulation.comm, lambda: self._take_back(state["content"].tobytes(), length))
+        content, digest = (state[name].tobytes() for name in ("content", "digest"))
+        on_first(simulation.comm, lambda: self._take_back(content, digest, length))
 
-    def _take_back(self, content: bytes, length: int) -> None:
+    def _take_back(self, content: bytes, digest: bytes, length: int) -> None:
         if content:
             self._path.write_bytes(content)
         try:
-            with self._path.open("rb") as file:
-                same = file.read(len(self._header)) == self._header
-            same = same and self._path.stat().st_size >= length
+            file = OutputFile(self._path, new=False)
         except FileNotFoundError:
-            same = False
-        if not same:
-            raise SceneError(
-                f"History {self._path}: it is not the file that was written up to the checkpoint; "
-                "bring it back, or delete the checkpoint to begin anew"
-            )
-        self._files, self._length = [OutputFile(self._path, new=False)], length
-        self._files[0].cut(length)
+            raise changed(f"History {self._path}") from None
+        if file.read(0, len(self._header)) != self._header or (
+            not content and file.digest(length) != digest
+        ):
+            file.close()
+            raise changed(f"History {self._path}")
+        self._files, self._length = [file], length
+        file.cut(length)
 
     def close(self) -> None:
         """Close the file, without what an interrupt has left behind the last complete row."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import errno
+import hashlib
 import os
 import shutil
 import stat
@@ -16,6 +17,8 @@ from ufl_beam.file_locks import is_at
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
 _in_use: list[Output] = []  # outputs of the runs that go on in this process, the outer ones first
+
+BLOCK = 1 << 20  # bytes that are read at once for a checksum
 
 
 def require_path(path: str | Path, what: str) -> Path:
@@ -83,6 +86,11 @@ def take(outputs: Iterable[Output]) -> Callable[[], None]:
     return release
 
 
+def part_of(path: Path) -> Path:
+    """Return the path of the file that takes the place of another one once it is complete."""
+    return path.with_name(f"{path.name}.part")
+
+
 class OutputFile:
     """File that is written at given positions, emptied or made if new; errors name it."""
 
@@ -94,6 +102,7 @@ class OutputFile:
         except OSError as error:
             raise failure(error, path) from None
         self._regular = stat.S_ISREG(os.fstat(self._file).st_mode)
+        self._digest, self._hashed = hashlib.sha256(), 0
 
     @property
     def size(self) -> int:
@@ -115,6 +124,19 @@ class OutputFile:
     def read(self, at: int, count: int) -> bytes:
         """Read some bytes, fewer at the end of the file."""
         return os.pread(self._file, count, at)
+
+    def digest(self, length: int) -> bytes:
+        """Return the SHA-256 of the first bytes, which do not change any more; each is read once.
+
+        Later calls ask for at least as many.  A file that is too short has another digest.
+        """
+        while self._regular and self._hashed < length:
+            block = self.read(self._hashed, min(length - self._hashed, BLOCK))
+            if not block:
+                break
+            self._digest.update(block)
+            self._hashed += len(block)
+        return self._digest.digest()
 
     def cut(self, length: int) -> None:
         """Cut the file off at a length."""
@@ -164,9 +186,9 @@ class OutputFile:
             )
 
 
-def put_in_place(path: Path, data: bytes) -> None:
+def put_in_place(path: Path, data: bytes | memoryview) -> None:
     """Write a whole file; the one before stays until the new one is on the disk."""
-    part = path.parent / f"{path.name}.part"
+    part = part_of(path)
     try:
         with part.open("wb") as file:
             file.write(data)
@@ -192,4 +214,12 @@ def failure(error: OSError, path: Path) -> OSError:
         error.errno or errno.EIO,
         f"output {path} cannot be written: {error.strerror or error}{space}; what was written "
         "before is complete",
+    )
+
+
+def changed(what: str) -> SceneError:
+    """Return the error of an output that is not as the checkpoint knows it."""
+    return SceneError(
+        f"{what}: it is not what was written up to the checkpoint: it is missing, or was changed "
+        "while the run was down; bring it back, or delete the checkpoint to begin anew"
     )

@@ -17,7 +17,7 @@ from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count
 from ufl_beam.model.bodies import arm
 from ufl_beam.output.joint_histories import turned
-from ufl_beam.output.output_files import require_path
+from ufl_beam.output.output_files import changed, part_of, require_path
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.scene_lines import rods_of
 from ufl_beam.output.state_view import StateView
@@ -111,7 +111,9 @@ class TimeSeries(Recorder):
         self._writers[0].write(t, fields)
 
     @abstractmethod
-    def _writer(self, fields: LineFields, complete: Sequence[int] | None = None) -> Any:
+    def _writer(
+        self, fields: LineFields, complete: Sequence[int] | None = None, digest: bytes = b""
+    ) -> Any:
         """Make the writer of a file, or of one that is complete up to some sizes."""
 
     def write(self, simulation: StateView) -> None:
@@ -122,25 +124,26 @@ class TimeSeries(Recorder):
             on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
 
     def state(self) -> State:
-        """Return the number of steps and the sizes of the complete parts, which are on the disk."""
-        on_first(self._comm, lambda: [writer.sync() for writer in self._writers])
+        """Return the number of steps, and sizes and checksum of what is complete, on the disk."""
+        digests: list[bytes] = []
+        on_first(self._comm, lambda: digests.extend(writer.sync() for writer in self._writers))
         sizes = [n for writer in self._writers for n in writer.complete]
-        return {"sizes": np.array([self._count, *sizes], dtype=float)}
+        return {
+            "sizes": np.array([self._count, *sizes], dtype=float),
+            "digest": np.frombuffer(b"".join(digests), dtype=np.uint8),
+        }
 
     def resume(self, simulation: StateView, state: State) -> None:
         """Cut off what was written after the state, and go on."""
         self._count, *sizes = (int(n) for n in state["sizes"])
-        fields = self._prepare(simulation)
-        on_first(simulation.comm, lambda: self._take_back(fields, sizes))
+        fields, digest = self._prepare(simulation), state["digest"].tobytes()
+        on_first(simulation.comm, lambda: self._take_back(fields, sizes, digest))
 
-    def _take_back(self, fields: LineFields, sizes: list[int]) -> None:
+    def _take_back(self, fields: LineFields, sizes: list[int], digest: bytes) -> None:
         try:
-            self._writers = [self._writer(fields, sizes)]
+            self._writers = [self._writer(fields, sizes, digest)]
         except (FileNotFoundError, ValueError):
-            raise SceneError(
-                f"{type(self).__name__} {self._path}: it is not what was written up to the "
-                "checkpoint; bring it back, or delete the checkpoint to begin anew"
-            ) from None
+            raise changed(f"{type(self).__name__} {self._path}") from None
 
     def close(self) -> None:
         """Close the files of the time series."""
@@ -193,9 +196,11 @@ class XDMF(TimeSeries):
             )
         super().require_writable()
 
-    def _writer(self, fields: LineFields, complete: Sequence[int] | None = None) -> XdmfWriter:
+    def _writer(
+        self, fields: LineFields, complete: Sequence[int] | None = None, digest: bytes = b""
+    ) -> XdmfWriter:
         lines, sizes = self._lines, None if complete is None else Complete(*complete)
-        return XdmfWriter(self._path, lines.points, lines.cells, lines.parts, sizes)
+        return XdmfWriter(self._path, lines.points, lines.cells, lines.parts, sizes, digest)
 
 
 class VTKHDF(TimeSeries):
@@ -216,17 +221,19 @@ class VTKHDF(TimeSeries):
         >>> film = ub.VTKHDF("beam.vtkhdf", every=5)
         >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=film)
         >>> [path.name for path in film.files]
-        ['beam.vtkhdf']
+        ['beam.vtkhdf', 'beam.vtkhdf.part']
     """
 
     ending = ".vtkhdf"
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """Path of the file."""
-        return (self._path,)
+        """Path of the file, and of the one that takes its place when a run is restarted."""
+        return self._path, part_of(self._path)
 
-    def _writer(self, fields: LineFields, complete: Sequence[int] | None = None) -> VtkhdfWriter:
+    def _writer(
+        self, fields: LineFields, complete: Sequence[int] | None = None, digest: bytes = b""
+    ) -> VtkhdfWriter:
         lines, steps = self._lines, None if complete is None else complete[0]
         mesh = lines.points, lines.cells, lines.parts
-        return VtkhdfWriter(self._path, *mesh, fields, steps)
+        return VtkhdfWriter(self._path, *mesh, fields, steps, digest)

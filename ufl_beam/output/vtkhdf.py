@@ -9,6 +9,7 @@ crashes when a disk is full, so the space that a step may need is allocated befo
 
 from __future__ import annotations
 
+import hashlib
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.output.output_files import OutputFile
+from ufl_beam.output.output_files import OutputFile, part_of
 
 Fields = tuple[Mapping[str, Array], ...]  # at points and in cells, by name
 LAYOUT = (2, 0)  # of the format; VTK 9.3 warns of later ones
@@ -37,7 +38,7 @@ class VtkhdfWriter:
     """Writer of one time series, or of the rest of one with as many complete ``steps``.
 
     Of the ``fields`` only names and shapes count.  It raises :class:`ValueError` if the file is not
-    the one that was written up to there.
+    the one that was written up to there; ``digest`` is that of :meth:`sync`.
     """
 
     def __init__(
@@ -48,6 +49,7 @@ class VtkhdfWriter:
         parts: Array,
         fields: Fields,
         steps: int | None = None,
+        digest: bytes = b"",
     ) -> None:
         import h5py
 
@@ -62,46 +64,54 @@ class VtkhdfWriter:
             "Types": np.full(len(cells), LINE, dtype=np.uint8),
             "CellData/part": parts,
         }
-        self._output = OutputFile(path, new=steps is None)
-        if steps is None:
-            self._output.put(0, _empty_file(mesh, fields))
-        try:
-            # Without a lock others may look at the file while the run goes on.
-            self._file = h5py.File(path, "r+", locking=False)
-        except OSError:
-            self._output.close()
-            raise ValueError("the file is damaged") from None
-        rows = _rows(0, fields)
-        if not self._is_same(mesh, rows):
-            self._file.close()
-            self._output.close()
-            raise ValueError("not the file that was written up to there")
-        root = self._file["VTKHDF"]
+        self._output = OutputFile(path if steps is None else part_of(path))
+        self._output.put(0, _empty_file(mesh, fields))
+        # Without a lock others may look at the file while the run goes on.
+        self._file = h5py.File(self._output.path, "r+", locking=False)
+        root, rows = self._file["VTKHDF"], _rows(0, fields)
         self._attributes, self._times = root["Steps"].attrs, root["Steps/Values"].id
         self._growing = [(root[name].id, values.shape) for name, values in rows.items()]
         self._room = INDEX + sum(
             8 * math.prod(dataset.get_create_plist().get_chunk())
             for dataset in (self._times, *(dataset for dataset, _ in self._growing))
         )
-        self._cut()
+        lengths = {"Steps/Values": 1, **{name: len(values) for name, values in rows.items()}}
+        self._hashes = {name: (length, hashlib.sha256()) for name, length in lengths.items()}
+        self._hashed = 0  # steps that the checksums have
+        if steps is not None:
+            self._take_over(path, digest)
+
+    def _take_over(self, path: Path, digest: bytes) -> None:
+        """Copy the complete steps of a file, and put this one in its place if they are the same.
+
+        So the run does not append to HDF5 that may be damaged, of which HDF5 may crash.
+        """
+        import h5py
+
+        try:
+            self._output.allocate(path.stat().st_size + 2 * self._room)
+            try:
+                with h5py.File(path, "r", locking=False) as file:
+                    for name, (rows, _) in self._hashes.items():
+                        old, new = file["VTKHDF"][name], self._file["VTKHDF"][name]
+                        new.resize(self.steps * rows, axis=0)
+                        for first in range(0, len(new), BLOCK):
+                            new[first : first + BLOCK] = old[first : min(first + BLOCK, len(new))]
+            except Exception:  # of HDF5, which has many for what is damaged
+                raise ValueError("the file is damaged") from None
+            self._cut()
+            if self.sync() != digest:
+                raise ValueError("not the file that was written up to there")
+        except BaseException:
+            self.close()
+            self._output.path.unlink()
+            raise
+        self._output.rename(path)
 
     @property
     def complete(self) -> tuple[int]:
         """Number of complete steps, for a checkpoint."""
         return (self.steps,)
-
-    def _is_same(self, mesh: Mapping[str, Array], rows: Mapping[str, Array]) -> bool:
-        """Return whether the file has this mesh, data sets for these rows, and enough steps."""
-        try:
-            root = self._file["VTKHDF"]
-            same = [np.array_equal(root[name][()], values) for name, values in mesh.items()]
-            for name, values in rows.items():
-                length, *shape = root[name].shape
-                same.append(tuple(shape) == values.shape[1:])
-                same.append(length >= self.steps * len(values))
-            return all(same) and int(root["Steps"].attrs["NSteps"]) >= self.steps
-        except KeyError:
-            return False
 
     def write(self, t: float, fields: Fields) -> None:
         """Append a step with its fields."""
@@ -136,10 +146,22 @@ class VtkhdfWriter:
             dataset.set_extent((self.steps * rows, *components))
         self._file.flush()
 
-    def sync(self) -> None:
-        """Bring everything to the disk; raises if the file was removed."""
+    def sync(self) -> bytes:
+        """Bring everything to the disk; return the SHA-256 of all numbers; each is read once.
+
+        Raises:
+            OSError: The file was removed.
+        """
         self._file.flush()
         self._output.sync()
+        root, whole = self._file["VTKHDF"], hashlib.sha256()
+        for name, (rows, hashed) in self._hashes.items():
+            end = self.steps * rows
+            for first in range(self._hashed * rows, end, BLOCK):
+                hashed.update(root[name][first : min(first + BLOCK, end)])
+            whole.update(hashed.digest())
+        self._hashed = self.steps
+        return whole.digest()
 
     def close(self) -> None:
         """Close the file, without what an interrupt has left behind the last complete step."""

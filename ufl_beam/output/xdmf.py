@@ -46,11 +46,17 @@ class XdmfWriter:
     """Writer of one time series; ``complete`` are its sizes after the last complete step.
 
     Given, it goes on from there, and raises :class:`ValueError` if the files are not those that
-    were written up to there.
+    were written up to there; ``digest`` is that of :meth:`sync`.
     """
 
     def __init__(
-        self, path: Path, points: Array, cells: Index, parts: Array, complete: Complete | None
+        self,
+        path: Path,
+        points: Array,
+        cells: Index,
+        parts: Array,
+        complete: Complete | None = None,
+        digest: bytes = b"",
     ) -> None:
         self._name, self._mesh_data = escape(data_path(path).name), b""
         items = []
@@ -71,18 +77,12 @@ class XdmfWriter:
             self._data.put(0, self._mesh_data)
             self._xml.put(0, (HEAD + TAIL).ljust(ROOM) + CLOSING)
         else:
-            self._require_same()
+            short = self._xml.size < self.complete.room + len(CLOSING)
+            if short or self._digest() != digest:
+                self._xml.close()
+                self._data.close()
+                raise ValueError("not the files that were written up to there")
             self._cut()
-
-    def _require_same(self) -> None:
-        """Raise unless both files are long enough and begin as these do."""
-        if (
-            self._xml.size < self.complete.room + len(CLOSING)
-            or self._data.size < self.complete.data
-            or self._xml.read(0, len(HEAD)) != HEAD
-            or self._data.read(0, len(self._mesh_data)) != self._mesh_data
-        ):
-            raise ValueError("not the files that were written up to there")
 
     def write(self, t: float, fields: tuple[Mapping[str, Array], ...]) -> None:
         """Append a step with its fields."""
@@ -131,10 +131,15 @@ class XdmfWriter:
         self._data.cut(length)
         self._writing = False
 
-    def sync(self) -> None:
-        """Bring everything to the disk; raises if a file was removed."""
+    def sync(self) -> bytes:
+        """Bring everything to the disk; return its checksum; raises if a file was removed."""
         self._data.sync()
         self._xml.sync()
+        return self._digest()
+
+    def _digest(self) -> bytes:
+        """SHA-256 of the document up to its tail, and of the numbers."""
+        return self._xml.digest(self.complete.tail) + self._data.digest(self.complete.data)
 
     def close(self) -> None:
         """Close the text file and the file of numbers."""

@@ -16,12 +16,13 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_laws import Controller, Coulomb, Running
+from ufl_beam.model.connector_laws import Coulomb, Running
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
+from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import ElasticBeams, Inertia
@@ -78,7 +79,7 @@ class Assembly:
 
     fields: Fields  # on the cells of this process
     ledger: Ledger
-    asked: dict[Connector, float]  # forces of controllers, limits of friction in the step; N or N m
+    controllers: Controllers  # with their forces, and the limits of friction, in the step
     rates: dict[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
     beams: list[Cells]  # those with material points first
     inelastic: list[InelasticBeams]  # those with material points
@@ -95,35 +96,45 @@ class Assembly:
         """Terms with internal variables."""
         return [*self.inelastic, *self.couplings]
 
-    def ask(self, simulation: Running, q: Array) -> None:
+    def ask(self, now: Running, q: Array) -> None:
         """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        forces = {
-            link: link.law.ask(simulation, link)
-            for link in self.asked if isinstance(link.law, Controller | Coulomb)
-        }  # fmt: skip
-        self.asked.update(forces)
+        self.controllers.ask(now)
         if self.inertia is not None:
             for one in self.couplings:
                 if isinstance(one.links[0].law, Coulomb):
                     self.rates.update(zip(one.links, one.rates(q, self.inertia.v), strict=True))
 
-    def internal_variables(self, q: Array) -> State:
+    def internal_variables(self, q: Array, t: float) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""
         memory = Saving(self.equation.share)
+        self.controllers.remember(memory, t)
         for one in self.remembering:
             one.remember(memory, q)
-        if self.supports.work or any(isinstance(link.law, Coulomb) for link in self.asked):
+        slips = any(isinstance(link.law, Coulomb) for link in self.controllers.values)
+        if self.inertia is None or self.supports.work or slips:
             self.supports.carry_on(memory, q)
         if self.inertia is not None:
             self.inertia.carry_on(memory, len(self.inertia.more))
+        for load in self.loads:
+            load.pass_on(memory)
         return memory.state()
 
-    def take_over(self, q: Array, internal: State, *, same: bool) -> None:
+    def carry_on(self, t: float, q: Array, internal: State | None) -> list[Array]:
+        """Return the loads at the initial state, which is in equilibrium with them.
+
+        ``internal`` are the :meth:`internal_variables` of a run of the same scene that ended there.
+        """
+        v = None if self.inertia is None else self.inertia.v
+        past = None if internal is None else Restoring(self.equation.share, internal)
+        return [load.carry_on(t, q, v, past) for load in self.loads]
+
+    def take_over(self, q: Array, t: float, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
         ``same`` says that no force has changed since, so that accelerations are what they were.
         """
         memory = Restoring(self.equation.share, internal)
+        self.controllers.remember(memory, t)
         for one in self.remembering:
             one.remember(memory, NOWHERE)
         if "reactions" in internal:
@@ -133,20 +144,24 @@ class Assembly:
             self.inertia.carry_on(memory, known)
 
     def static_path(
-        self, scheme: Scheme, q: Array, t0: float, loads: list[Array], together: Agreement
-    ) -> StaticPath | None:
+        self, scheme: Scheme, q: Array, t0: float, loads: list[Array], together: Agreement,
+        *, goes_on: bool,
+    ) -> StaticPath | None:  # fmt: skip
         """Begin a static path, and set the reactions to those of its state; None in dynamics.
 
-        The state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.
+        The state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.  A
+        path that ``goes_on`` from a static run of the same scene has the reactions of that already,
+        with the forces of what is viscous.
         """
         if self.inertia is not None:
             return None
         share, state = self.equation.share, (self.ledger, q, t0)
         path = together(StaticPath, share, scheme, self.beams, self.couplings, *state)
-        r = np.asarray(path.force - sum(loads))
-        self.supports.enter(r)
-        self.supports.hold(share.added(r))
-        self.supports.take()
+        if not goes_on:
+            r = np.asarray(path.force - sum(loads))
+            self.supports.enter(r)
+            self.supports.hold(share.added(r))
+            self.supports.take()
         return path
 
 
@@ -161,7 +176,8 @@ def assemble(
     A = fields.matrix()
     setting = (scheme, A, ledger)
 
-    # Each kind makes its entries of the ledger: their order is that of the columns of tables.
+    # Each kind makes its entries of the ledger: their order is that of the columns of tables.  It
+    # follows from the scene alone, also where a process lacks cells or connectors of a kind.
     groups = inelastic_cells(share)
     inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
     for layout, cells in groups:
@@ -172,18 +188,21 @@ def assemble(
             of = (layout, *setting, search, by.points)
             inelastic.append(by.inelastic(fields.part(part), *of))
     beams: list[Cells] = [*inelastic]
+    decays = isinstance(scheme, DecayingMidpoint)
+    if (scheme.alpha or decays) and sum(len(cells) for _, cells in groups) < len(share.grid.cells):
+        ledger.lost["numerical"] += 0.0
     numerical: list[Term] = []
     if elastic.any():
         part = np.flatnonzero(elastic)
         on_part = fields if elastic.all() else fields.part(part)
         beams.append(ElasticBeams(on_part, *setting))
-        if isinstance(scheme, DecayingMidpoint):
+        if decays:
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
-    asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
-    rates = dict(asked)
+    controllers = Controllers(share)
+    rates = dict(controllers.values)
     connectors = Setting(
-        asked, rates, scene.size, scheme, ledger, friction_repeats(scene), search, by.points,
+        controllers.values, rates, scene.size, scheme, ledger, friction_repeats(scene), search, by.points,
         by.slips,
     )  # fmt: skip
     of_links = share, connectors, A
@@ -201,12 +220,14 @@ def assemble(
     supports = Supports(share, scheme, ledger, A)
     if inertia:
         supports.stop(inertia.v)
+    if scene.beams:
+        ledger.state["stored"] += 0.0
     parts = share, A, beams, coupled, loads, others, supports, search
     equation = StepEquation(*parts, in_motion=inertia is not None)
     if by.in_c:
         equation.leave_to_c()
     return Assembly(
-        fields, ledger, asked, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
+        fields, ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, openings, equation,
     )  # fmt: skip
 

@@ -19,11 +19,13 @@ import numpy as np
 from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_locks import Lock
-from ufl_beam.output.archive import above
-from ufl_beam.output.output_files import require_path
-from ufl_beam.simulation.checkpoint_file import Content, read, write
+from ufl_beam.output.archive import Content, above, decoding, read, write
+from ufl_beam.output.output_files import part_of, require_path
 from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state
 from ufl_beam.simulation.solution import Solution
+
+FORMAT = "checkpoint of ufl_beam, 3"
+"""The number grows whenever the meaning of files changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,7 @@ class Checkpoint:
     run the same script again.
 
     Args:
-        path: File; HDF5.
+        path: File.
         every: Write every so many steps.
         minutes: Write after so many minutes of wall time.
         also: Further objects with a state, besides those that functions in the scene use: random
@@ -77,7 +79,7 @@ class Checkpoint:
     def files(self) -> tuple[Path, ...]:
         """The file, and the one that takes its place; no other output may write them."""
         path = Path(self.path)
-        return path, path.parent / f"{path.name}.part"
+        return path, part_of(path)
 
 
 class Keeper:
@@ -132,8 +134,9 @@ class Keeper:
                 "it, or name another file"
             )
         if exists:
-            self.found = read(self.path)
-            self._require_same(self.found)
+            with decoding(self.path, FORMAT):
+                self.found = read(self.path, FORMAT)
+                self._require_same(self.found)
 
     def _require_same(self, found: Content) -> None:
         now, then = self._described.texts, found["call"]
@@ -151,15 +154,10 @@ class Keeper:
         if not differs and [*self._stateful] != [*found["stateful"]]:
             differs = "other objects have a state"
         if differs:
-            raise SceneError(
-                f"checkpoint {self.path} is of another run: {differs}. Delete the file to begin "
-                "anew, or name another"
-            )
+            raise SceneError(f"it is of another run: {differs}")
         t, t1 = float(found["state/t"][0]), self._t1
         if t > t1 and t - t1 > 1e-9 * (step or 0.0):
-            raise SceneError(
-                f"checkpoint {self.path} is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s"
-            )
+            raise SceneError(f"it is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s")
 
     def close(self) -> None:
         """Let other runs have the file."""
@@ -197,8 +195,8 @@ class Keeper:
 
         def put() -> None:
             history = above("history/", solution.history())
-            at = f"of t = {content['state/t'][0]:.9g} s"
-            write(self.path, {**mine, **content, **history}, at)
+            at = f" of t = {content['state/t'][0]:.9g} s"
+            write(self.path, FORMAT, {**mine, **content, **history}, at)
 
         on_first(self._comm, put)
         self._last_time, self._last_step = time.perf_counter(), steps

@@ -118,6 +118,9 @@ class CompiledSteps:
             )  # fmt: skip
         if inertia is not None and inertia.in_c is not None:
             fill(self.c, rates=inertia.in_c.c)
+        admits = [one.admits for one in phases if one.admits is not None]
+        if admits:
+            fill(self.c, admissions=len(admits), admission=ffi.new("admission_call[]", admits))
         if path is not None:
             changes = [one.change for one in phases if one.change is not None]
             fill(self.c, path=path.in_c(changes))

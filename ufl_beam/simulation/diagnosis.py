@@ -197,7 +197,8 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
             "limit load or a bifurcation"
         )
     said = f"{_list(parts)} {'is' if len(parts) == 1 else 'are'} held by nothing"
-    ways = [str(grid.scene.links[i]) for i in links.soft] + [_cell(grid, i) for i in cells.soft]
+    ways = [str(grid.scene.links[i]) for i in links.soft]
+    ways += [grid.describe_cell(i) for i in cells.soft]
     if ways:
         give = "gives way" if len(ways) == 1 else "give way together"
         said += f"; {_list(ways)} {give} at no further force"
@@ -228,13 +229,6 @@ def _component(words: str) -> str:
     """A degree of freedom as :meth:`Grid.describe` says it, with a noun."""
     component, _, place = words.partition(" of ")
     return f"the {'rotation' if component == 'psi' else f'displacement {component}'} of {place}"
-
-
-def _cell(grid: Grid, number: int) -> str:
-    """A cell in words: its beam and its middle."""
-    beam = grid.scene.beams[grid.beam_of_cell[number]]
-    x, y = grid.points[grid.cells[number]].mean(axis=0)
-    return f"{beam.name} at ({x:g}, {y:g})"
 
 
 def _list(names: list[str]) -> str:

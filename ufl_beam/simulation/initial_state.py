@@ -14,6 +14,7 @@ from ufl_beam.discretization.model_warnings import (
     warn_of_free_hinges,
     warn_of_masses,
     warn_of_origin,
+    warn_of_rates,
     warn_of_touching,
 )
 from ufl_beam.discretization.state_io import State
@@ -51,6 +52,7 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
         require_rates(scene, scheme)
     else:
         require_no_mechanism(scene)
+        warn_of_rates(scene)
     require_works(scene, scheme, mesh)
     require_independent(scene)
     warn_of_far_points(scene)

@@ -28,7 +28,7 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
 from ufl_beam.one_line import one_line
-from ufl_beam.output.archive import above, below
+from ufl_beam.output.archive import above, below, require_arrays
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
@@ -68,6 +68,16 @@ class KeptStates:
         if len(states.t):
             self._blocks.append(states)
             self._ends.append(len(self) + len(states.t))
+
+    def part(self, first: int, last: int) -> KeptStates:
+        """Views of the states from the first number to before the last one."""
+        part, k = KeptStates(self._grid), bisect_right(self._ends, first)
+        while first < last:
+            block, end = self._blocks[k], self._ends[k]
+            begin, k = end - len(block.t), k + 1
+            part.append(block.view(slice(first - begin, last - begin)))
+            first = end
+        return part
 
     def thin(self) -> None:
         """Forget every other state; the first one stays."""
@@ -140,16 +150,31 @@ class KeptStates:
         return arrays
 
     def take(self, arrays: State) -> None:
-        """Go on after :meth:`arrays`; what they lack, or have no rows of, is not in the scene."""
-        n = len(arrays["times"])
-        nothing: dict[str, Array] = {
-            "reactions": np.zeros((n, 0, 3)), "connections": np.zeros((n, 0, 5)),
-            "material": np.zeros((n, 0, 7)),
+        """Go on after :meth:`arrays`; what they lack, or have no rows of, is not in the scene.
+
+        Raises:
+            SceneError: They have other shapes than those that the scene implies.
+        """
+        require_arrays(arrays, {"times": (-1,)})
+        n, grid = len(arrays["times"]), self._grid
+        shapes: dict[str, tuple[int, ...]] = {
+            "reactions": (n, len(grid.scene.supports), 3), "material": (n, -1, 7),
+            "connections": (n, len(grid.scene.links), 5),
         }  # fmt: skip
+        nothing: dict[str, Array] = {
+            name: np.zeros([max(length, 0) for length in shape]) for name, shape in shapes.items()
+        }
         found = {**nothing, **{name: values for name, values in arrays.items() if len(values)}}
         ledger = tuple(below(f"{kind}: ", found) for kind in LEDGER)
         self._blocks, self._ends, self._latest = [], [], None
         if n:
+            shapes |= {"q": (n, grid.size)} | ({"v": (n, grid.size)} if "v" in found else {})
+            require_arrays(found, shapes)
+            for entries in ledger:
+                require_arrays(entries, dict.fromkeys(entries, (n,)))
+            cells = found["material"][:, :, 0]
+            if not np.isin(cells, np.arange(len(grid.cells))).all():
+                raise SceneError("the array 'material' has numbers of cells that there are not")
             self.append(
                 Snapshots(
                     found["times"], found["q"], found.get("v"), found["reactions"], ledger,

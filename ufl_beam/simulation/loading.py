@@ -5,9 +5,10 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from ufl_beam.output.archive import decoding, read
 from ufl_beam.output.output_files import require_path
 from ufl_beam.simulation.solution import Solution, restored
-from ufl_beam.simulation.solution_files import made_of_file
+from ufl_beam.simulation.solution_files import FORMAT
 
 
 def load(path: str | Path) -> Solution:
@@ -25,4 +26,6 @@ def load(path: str | Path) -> Solution:
         >>> bool((loaded.q == solution.q).all())
         True
     """
-    return made_of_file(require_path(path, "load"), restored)
+    file = require_path(path, "load")
+    with decoding(file, FORMAT):
+        return restored(read(file, FORMAT))

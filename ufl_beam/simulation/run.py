@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
+from itertools import chain
 from typing import Any
 
 from mpi4py import MPI
@@ -23,19 +24,20 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import above, below
+from ufl_beam.output.archive import above, below, decoding
 from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, say
 from ufl_beam.progress_bar import progress_bar
-from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
-from ufl_beam.simulation.diagnosis import open_ledger
+from ufl_beam.simulation.checkpoint import FORMAT, Checkpoint, Keeper, end_of
+from ufl_beam.simulation.diagnosis import ROOM, open_ledger
 from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive, number_of_steps, steps_of
 from ufl_beam.simulation.step_solver import MOST_PARTS
+from ufl_beam.simulation.watches import LedgerWatch
 from ufl_beam.solvers.newton_options import Newton
 
 BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
@@ -124,17 +126,22 @@ def simulate(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
         )
         solution = simulation.solution
+        if keeper is not None:
+            simulation.solver.begin_steps_anew()
         solution.every, solution.building = every, time.perf_counter() - begin
         stack.enter_context(running(simulation, recorders, outputs, begin))
         pace = steps_of(simulation, t1, dt)
+        watch = LedgerWatch(simulation.grid, scheme, ROOM * simulation.solver.convergence.c.rtol)
 
         def go_on(keeper: Keeper) -> None:
             found = keeper.found
-            simulation.resume(below("state/", found))
-            solution.resume(below("history/", found))
+            with decoding(keeper.path, FORMAT):
+                simulation.resume(below("state/", found))
+                solution.resume(below("history/", found))
+                pace.restore(found["pace"])
+                solution.seconds = float(found["seconds"])
             solution.parts, solution.iterations = simulation.parts, simulation.iterations
-            pace.restore(found["pace"])
-            solution.seconds, solution.time_error = found["seconds"], pace.error
+            solution.time_error = pace.error
             keeper.resume(pace.steps)
             for i, recorder in enumerate(recorders):
                 recorder.resume(simulation, below(f"recorder {i}/", found))
@@ -155,9 +162,12 @@ def simulate(
                 simulation.settle()  # before anything is written
             if pace.steps % solution.every == 0 or pace.finished:
                 simulation.keep()
-                if len(solution) > most + 1 and not pace.finished:
+                thins = len(solution) > most + 1 and not pace.finished
+                simulation.warn(watch.judge(solution, last=thins))
+                if thins:
                     solution.thin()
                     solution.every *= 2
+                    watch.thinned(solution)
             for recorder in recorders:
                 recorder.write(simulation)
             if keeper is not None and (keeper.due(pace.steps) or pace.finished):
@@ -176,12 +186,14 @@ def simulate(
                 if quiet and solution.every == 1 and most == sys.maxsize:
                     pace.advance(sys.maxsize, keep=True)
                     solution.time_error = pace.error
+                    simulation.together(simulation.warn, watch.judge(solution))
                 else:
                     left = solution.every - pace.steps % solution.every
                     pace.advance(left if quiet else 1)
                     simulation.together(after_step)
                 bar.update(pace.progress - bar.n)
         simulation.end()
+        simulation.together(simulation.warn, watch.judge(solution, last=True))
         check_ledger(simulation)
     if comm.rank == 0:
         solution.opened.warn(scheme, solution.times)
@@ -191,14 +203,19 @@ def simulate(
 def check_ledger(simulation: Simulation) -> None:
     """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
 
+    All processes know all warnings then.
+
     All processes call it together, at the end of a run.
 
     Warns:
         ModelWarning: It is open, perhaps by round-off.
     """
-    solution = simulation.solution
+    solution, share = simulation.solution, simulation.share
+    if not share.alone:  # forces are watched by the process that has the connector
+        everyone = share.comm.allgather(solution.warnings.splitlines(keepends=True))
+        solution.warnings = "".join(dict.fromkeys(chain.from_iterable(everyone)))
     if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
-        solution.open_ledger = open_ledger(solution, simulation.share, simulation.solver)
+        solution.open_ledger = open_ledger(solution, share, simulation.solver)
     if solution.open_ledger and simulation.comm.rank == 0:
         warn(solution.open_ledger)
 

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property, partial
 from typing import NoReturn
 
@@ -15,7 +16,7 @@ from ufl_beam.collective_errors import Agreement
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
-from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten
+from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten, warn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -39,6 +40,7 @@ from ufl_beam.simulation.step_solver import (
     begins_loaded,
     go_in_parts,
 )
+from ufl_beam.simulation.watches import ForceWatch
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.solvers.petsc_options import checked_newton
@@ -110,7 +112,8 @@ class Simulation(StateView):
         q, v, internal = initial_state(grid, start)
         by = REFERENCE if newton.reference else COMPILED
         self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], by, together)
-        self.fields, self.ledger, self.asked = parts.fields, parts.ledger, parts.asked
+        self.fields, self.ledger, self.controllers = parts.fields, parts.ledger, parts.controllers
+        self.asked = parts.controllers.values
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
         self.equation, self.terms = parts.equation, parts.equation.terms
@@ -121,19 +124,19 @@ class Simulation(StateView):
         self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
         self._continues = start is not None
         loaded: list[Array] = []
+        same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
         if self._continues or (has_inertia(scheme) and scheme.kept):
-            # The initial state is taken as one in equilibrium with the loads.
-            loaded = together(lambda: [load.carry_on(t0, self.q) for load in self.loads])
+            loaded = together(parts.carry_on, t0, self.q, internal if same else None)
         if start is not None:
-            same = start.scene is scene and start.times[-1] == t0
-            parts.take_over(self.q, internal, same=same)
+            parts.take_over(self.q, t0, internal, same=same)
         for term in self.terms:
             term.add_state(self.q)
         if parts.inertia is not None:
             self.inertia = parts.inertia
             if scene.links or scene.supports:
                 together(warn_of_jumps, grid, t0, q, self.connections()[:, 0])
-        self._branch = parts.static_path(scheme, self.q, t0, loaded, together)
+        goes_on = same and "reactions" in internal and not len(start.v)
+        self._branch = parts.static_path(scheme, self.q, t0, loaded, together, goes_on=goes_on)
         self.reactions_known = self._branch is not None
 
         factors = by.factors(share, self.equation.A)
@@ -142,6 +145,7 @@ class Simulation(StateView):
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
+        self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
         in_python = self._copies or self.asked or not share.alone
         self._in_c = None if in_python else self._steps_in_c(parts)
 
@@ -165,7 +169,9 @@ class Simulation(StateView):
             begin, end = self.t, self.t + APPLYING * (t1 - self.t)
             attempt = partial(self._steps.attempt_loads, self, begin=begin, end=end)
             go_in_parts(begin, end, attempt, self.accept, self.give_up)
-        go_in_parts(self.t, t1, partial(self.attempt, end=t1), self.accept, self.give_up)
+        while self.t != t1:
+            end = self.controllers.next_sample(self.t, t1)
+            go_in_parts(self.t, end, partial(self.attempt, end=end), self.accept, self.give_up)
 
     def steps_to(self, ends: Array, *, keep: bool = False) -> int:
         """Go to the first of these times, and on to others as far as that needs no Python.
@@ -250,6 +256,15 @@ class Simulation(StateView):
         self.ledger.begin()
         for term in self.terms:
             term.add_state(q1)
+        if self._watch:
+            self.warn(self._watch.judge(q1, step.t1, step.dt), here=not self.share.alone)
+
+    def warn(self, found: Iterable[str], *, here: bool = False) -> None:
+        """Warn, and note in the solution, by the first process or ``here``."""
+        for said in found:
+            self.solution.warnings += f"{said}\n"
+            if here or self.comm.rank == 0:
+                warn(said)
 
     def ask(self) -> None:
         """Ask controllers and friction for forces and limits in the next step, on all processes."""
@@ -306,7 +321,7 @@ class Simulation(StateView):
         if self.t not in self.solution.times[-1:]:
             self.keep()
         self.take_back()
-        self.solution.internal = self._assembly.internal_variables(self.q)
+        self.solution.internal = self._assembly.internal_variables(self.q, self.t)
 
     def snapshot(self) -> Solution:
         """The state now, as a solution that other runs may start with; all processes call it."""
@@ -314,7 +329,7 @@ class Simulation(StateView):
         now = Solution(self.scene, self.grid)
         now.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
         self.take_back()
-        now.internal = self._assembly.internal_variables(self.q)
+        now.internal = self._assembly.internal_variables(self.q, self.t)
         return now
 
     def state(self) -> State:
@@ -338,6 +353,7 @@ class Simulation(StateView):
         self.left = [int(memory.number(*one)) for one in left]
         self.solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
+        self.controllers.remember(memory, self.t)
         self.prediction.remember(memory)
         self.ledger.remember(memory)
         for term in self.terms:

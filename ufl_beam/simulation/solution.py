@@ -19,7 +19,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.output.archive import above, below, write
+from ufl_beam.output.archive import Content, above, below, require_arrays, write
 from ufl_beam.output.joint_histories import (
     Connection,
     JointHistory,
@@ -29,7 +29,7 @@ from ufl_beam.output.joint_histories import (
     position_of,
     velocity_of,
 )
-from ufl_beam.output.output_files import require_path
+from ufl_beam.output.output_files import require_path, require_writable
 from ufl_beam.parallel import active_comm
 from ufl_beam.parameter import TIME
 from ufl_beam.rich_display import Rich
@@ -58,6 +58,7 @@ class Solution(Rich):
         every: Steps from one that was kept to the next.
         parameter: Words for :attr:`times`, which are load factors in a path.
         open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
+        warnings: What the run has warned of, a line each; see docs/warnings.md.
         internal: Internal variables of cells and connectors at the end of the run.
 
     Example:
@@ -75,7 +76,7 @@ class Solution(Rich):
         self.scene, self.grid = scene, grid
         self.parts = self.iterations = 0
         self.time_error, self.seconds, self.building = math.nan, 0.0, 0.0
-        self.every, self.open_ledger = 1, ""
+        self.every, self.open_ledger, self.warnings = 1, "", ""
         self.internal: State = {}
         self._kept = KeptStates(grid)
         self._along = ForcesAlongCells(grid, self._kept.forces_in_points)
@@ -97,7 +98,7 @@ class Solution(Rich):
     # -- files ---------------------------------------------------------------------------------
 
     def save(self, path: str | Path) -> None:
-        """Write an HDF5 file, which :func:`load` reads; all processes call it together.
+        """Write a file with a checksum, which :func:`load` reads; all processes call it together.
 
         It has all results and the scene with all its numbers.  Functions of a user cannot be
         saved: those of time have their values at the kept times, curves those at many points,
@@ -111,31 +112,41 @@ class Solution(Rich):
             OSError: There is no space for it.
         """
         file = require_path(path, "save")
-        on_first(active_comm(), lambda: write(file, FORMAT, *self._content()))
 
-    def _content(self) -> tuple[dict[str, Any], State]:
+        def put() -> None:
+            require_writable(file)
+            write(file, FORMAT, self._content())
+
+        on_first(active_comm(), put)
+
+    def _content(self) -> Content:
         """Text and arrays that are saved."""
         text = {"kind": type(self).__name__, **text_of(self.grid, self.times, self.position)}
-        return {**text, **{name: getattr(self, name) for name in NAMED}}, self._arrays()
+        return {**text, **{name: getattr(self, name) for name in NAMED}, **self._arrays()}
 
     def _arrays(self) -> State:
         counts = {"counts": np.array([self.parts, self.iterations])}
         return {**counts, **above("history/", self.history()), **above("internal/", self.internal)}
 
-    def _take(self, text: dict[str, Any], arrays: State) -> None:
+    def _take(self, content: Content) -> None:
         """Take over what :meth:`_content` gave."""
-        self.resume(below("history/", arrays))
-        self.internal = below("internal/", arrays)
-        self.parts, self.iterations = (int(n) for n in arrays["counts"])
-        for name in NAMED:
-            setattr(self, name, text[name])
+        require_arrays(content, {"counts": (2,), "history/every": (1,)})
+        self.resume(below("history/", content))
+        self.internal = below("internal/", content)
+        self.parts, self.iterations = map(int, content["counts"])
+        for name, kind in NAMED.items():
+            setattr(self, name, kind(content[name]))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return restored, self._content()
+        return restored, (self._content(),)
 
     def __len__(self) -> int:
         """Number of kept states."""
         return len(self._kept)
+
+    def part(self, first: int, last: int) -> KeptStates:
+        """Views of kept states, from the first number to before the last one."""
+        return self._kept.part(first, last)
 
     def thin(self) -> None:
         """Forget every other kept state; the first one stays."""
@@ -335,16 +346,17 @@ class Solution(Rich):
         ]
 
     def __str__(self) -> str:
-        return "\n".join([*self.summary(), str(self.energy), self.open_ledger]).rstrip()
+        said = *self.summary(), str(self.energy), self.open_ledger, self.warnings
+        return "\n".join(filter(None, said))
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {'; '.join(self.summary()[:2])}>"
 
 
-def restored(text: dict[str, Any], arrays: State) -> Solution:
+def restored(content: Content) -> Solution:
     """Make a solution from what was saved of it."""
-    grid = grid_of(text)
+    grid = grid_of(content)
     kinds = {kind.__name__: kind for kind in (Solution, *Solution.__subclasses__())}
-    solution = kinds[text["kind"]](grid.scene, grid)
-    solution._take(text, arrays)
+    solution = kinds[content["kind"]](grid.scene, grid)
+    solution._take(content)
     return solution

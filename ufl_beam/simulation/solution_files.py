@@ -4,45 +4,29 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Anchor, Member
 from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import read
 from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data
 from ufl_beam.version import version
 
-T = TypeVar("T")
-
-FORMAT = "solution of ufl_beam, 1"
+FORMAT = "solution of ufl_beam, 2"
 """The number grows whenever the meaning of files changes."""
 
-NAMED = ("seconds", "time_error", "open_ledger")
-"""Attributes that are saved as they are."""
+NAMED = {"seconds": float, "time_error": float, "open_ledger": str, "warnings": str}
+"""Attributes that are saved as they are, and their types."""
 
 TIME_FUNCTIONS = ("time", "held", "motion", "force", "numbers")
 """Fields that are functions of time, but for the forces of controllers and functions."""
-
-
-def made_of_file(file: Path, make: Callable[[dict[str, Any], State], T]) -> T:
-    """Read a file and make a solution of it; :class:`SceneError` if that cannot be."""
-    text, arrays = read(file, FORMAT)
-    try:
-        return make(text, arrays)
-    except SceneError as error:
-        raise SceneError(f"solution {file}: {error}") from None
-    except (KeyError, TypeError, ValueError, IndexError) as error:
-        raise SceneError(f"solution {file}: the file is damaged: {error!r}") from None
 
 
 def text_of(grid: Grid, times: Array, position: Callable[[Anchor], Array]) -> dict[str, Any]:

@@ -151,6 +151,7 @@ class AdaptiveSteps:
         """Take one step that is accurate, after rejected ones; and keep it."""
         simulation = self._simulation
         stop = next(t for t in self._stops if t > simulation.t)
+        stop = simulation.controllers.next_sample(simulation.t, stop)
         while True:
             try:
                 trial, error = self._attempt(stop)

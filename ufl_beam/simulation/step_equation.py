@@ -48,9 +48,9 @@ class StepEquation(Equation):
         super().__init__(A, share.weights(), force, supports.dofs)
         self.share, self.supports, self._search = share, supports, search
         self._beams, self._couplings, self._loads = beams, couplings, loads
-        self._inner: list[InternalForces] = [*beams, *couplings]
+        self.inner: list[InternalForces] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
-        self.terms: list[Term] = [*self._inner, *self.others]
+        self.terms: list[Term] = [*self.inner, *self.others]
         predicted = share.largest(float(any(one.demand() is not None for one in beams)))
         self._tangent_in_c = False  # in C
         if not share.grid.scene.links and predicted == 0.0:  # in any process
@@ -69,7 +69,7 @@ class StepEquation(Equation):
         """Write the local part of the residual at ``x`` into ``r``."""
         q1 = self.supports.in_plane(x)
         r.fill(0.0)
-        for inner in self._inner:
+        for inner in self.inner:
             inner.add_residual(q1, r)
         lib.note_inner_forces(self.c, doubles(r))
         for term in self.others:
@@ -119,7 +119,7 @@ class StepEquation(Equation):
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
-        for inner in self._inner:
+        for inner in self.inner:
             inner.restart(tangents)
 
     def stiffen(self, stiff: bool) -> bool:
@@ -170,7 +170,7 @@ class StepEquation(Equation):
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
-            inner=len(self._inner), forces=len(loops),
+            inner=len(self.inner), forces=len(loops),
             force=ffi.new("call[]", [force for force, _ in loops]),
             stiffnesses=len(stiffnesses), stiffness=ffi.new("call[]", stiffnesses),
             product=product, cells=cells, indptr=self.A.indptr,
@@ -211,7 +211,7 @@ class StepEquation(Equation):
     def tangent_change(self, q: Array, u: Array) -> Array:
         """Derivative along ``u`` of the latest tangent of :meth:`linearise`, at ``q``; entries."""
         self.A.data.fill(0.0)
-        for one in (*self._inner, *self._loads):
+        for one in (*self.inner, *self._loads):
             one.add_tangent_change(q, u)
         return self.A.data.copy()
 

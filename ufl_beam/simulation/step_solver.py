@@ -111,6 +111,8 @@ class StepSolver:
         least = LEAST_IN_MOTION if has_inertia(scheme) else LEAST_AT_REST
         self.newton = Solver(share, equation, factors, newton, least, together)
         self._rotations, self._multipliers = share.rotations(), as_slice(share.multipliers())
+        self._judged = [one for one in equation.inner if one.must_dissipate]
+        self._judges = share.largest(float(len(self._judged))) > 0.0  # on some process
         self._coupled, self._dynamic = len(share.grid.multipliers) > 0, has_inertia(scheme)
 
     def attempt(self, now: Present, t1: float, end: float) -> Trial:
@@ -185,6 +187,11 @@ class StepSolver:
             raise
         return self._trial(step, q1)
 
+    def _require_dissipation(self, q1: Array) -> None:
+        """Raise :class:`StepFailed` if a law of this process gives energy."""
+        for one in self._judged:
+            one.require_dissipation(q1)
+
     def _require_numbers(self, step: Step) -> None:
         """Raise :class:`StepFailed` if a time function is no finite number in a step."""
         scene = self._equation.share.grid.scene
@@ -202,6 +209,8 @@ class StepSolver:
             raise StepFailed(
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
             )
+        if self._judges:
+            self._together(self._require_dissipation, q1)
         if self._branch is not None:
             self._branch.require(q1, s, self._equation.force, self.newton.convergence.least_work(s))
         return Trial(step, q1, s)

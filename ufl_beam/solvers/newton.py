@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Any
 
@@ -277,8 +278,13 @@ class Solver:
         """Return the latest configuration, converged or not; local values, ghosts included."""
         return self._q.copy()
 
+    def begin_steps_anew(self) -> None:
+        """Keep no tangent from step to step: a run that goes on from a checkpoint has none."""
+        self._equation.c.anew = 1
+
     def remember(self, memory: Memory) -> None:
         """Pass on the number of iterations, and motions found to be idle."""
+        self._equation.c.rate = math.inf  # the next tangent is a new one, here and there
         self.iterations = int(memory.number("iterations", self.iterations))
         if memory.number("idle motions are known", float(self._callbacks.idle is not None)):
             self._idle.remember(memory)

@@ -27,7 +27,8 @@ class Newton:
         rtol: Tolerance of the residual, as a part of the forces in the scene.
         max_iterations: Iterations before a step is cut.
         modified: Keep the tangent, also from step to step, while residuals decrease fast enough.
-            This saves more with more cells; final residuals are closer to ``rtol``.
+            This saves more with more cells; final residuals are closer to ``rtol``.  In statics,
+            and with a checkpoint, each step begins with a new one.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option PETSc's Newton method
             is used, otherwise an equivalent one in C, which is faster for few cells.  A

@@ -64,6 +64,12 @@ class Term(ABC):
 class InternalForces(Term):
     """Forces inside a scene: those of its cells and connectors."""
 
+    must_dissipate = False
+    """True if :meth:`require_dissipation` has to be called before a step is accepted."""
+
+    def require_dissipation(self, q1: Array) -> None:
+        """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
+
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
 

@@ -45,6 +45,7 @@ class PointForms:
             residuals and their derivatives, then stresses and theirs, see solve_law in C.
         resistance: That of the discontinuity, and its derivative by the growth.
         end: ``point_output`` of loops.h, stresses, and changes of the variables.
+        own: What a law that must dissipate does by itself, and the size of that; or null.
     """
 
     def __init__(
@@ -71,6 +72,11 @@ class PointForms:
                     *self._derivatives(stress, unknown),
                 ]
             *numbers, stress, changes = equations.end(at)
+            self.own = ffi.NULL
+            if law.must_dissipate:
+                stored = ufl.as_ufl(equations.stored(at))
+                slopes = tuple(self._derivatives((stored,), unknown))
+                self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
         except Exception as error:
             raise SceneError(
                 f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
@@ -121,7 +127,7 @@ class CompiledPoints(Points):
             components=self._components, variables=len(law.variables),
             strain=inputs(layout).index(rows(law, "strain")[0]),
             e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.kept, sum=self.sums,
-            over=self.over, unlike=np.zeros(3), search=self._search.flags,
+            own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search.flags,
         )  # fmt: skip
 
     @property
@@ -151,6 +157,10 @@ class CompiledPoints(Points):
     def release(self, least: float) -> None:
         """Let held points open from now on whose excess was so large in the latest response."""
         lib.release(self.points, least)
+
+    def gives_energy(self) -> int:
+        """Number of the point that gives most energy in the latest response, or -1."""
+        return int(lib.gives_energy(self.points))
 
     def accept(self) -> None:
         """Take the strains of the latest response as the new state."""

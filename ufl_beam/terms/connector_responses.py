@@ -48,6 +48,7 @@ class Response(ABC):
 
     steady = False  # True if the rows stay the same during a step
     in_c: Mapping[str, Any] = {}  # data of laws evaluated in C, by names in ``couplings``, loops.h
+    must_dissipate = False  # True if require_dissipation has to be called before a step is accepted
     stored = 0.0  # by rigid-plastic connectors; J
     openable: Openable | None = None  # connectors that open beyond a limit, if there are any
     _part, _entry, _sign = "lost", "", 1.0
@@ -132,6 +133,9 @@ class Response(ABC):
     def flows(self) -> bool:
         """Return whether one slips plastically in the latest iterate."""
         return False
+
+    def require_dissipation(self, e1: Array) -> None:
+        """Raise :class:`StepFailed` if a law gives energy in a step to the motions ``e1``."""
 
     def dissipated(self) -> Sequence[Array]:
         """Energies whose sum each connector has dissipated plastically; (num_links,) each; J.

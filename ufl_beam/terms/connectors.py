@@ -238,8 +238,7 @@ class CompiledCouplings(Couplings):
             return None
         fields = {name for name, _ in ffi.typeof("coupling_term").fields}
         mine = {name: x for name, x in of_law.items() if name in fields}
-        of_points = {name: x for name, x in of_law.items() if name not in fields}
-        points = struct("inelastic_term", **of_points)
+        points = struct("inelastic_term", **{k: x for k, x in of_law.items() if k not in fields})
         c = struct("coupling_term", links=self._in_c, points=points, **mine)
 
         def enter(q: Array) -> None:
@@ -256,8 +255,9 @@ class CompiledCouplings(Couplings):
         phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")
         first, accept, state = ([loop(name, c)] for name in phases)
         over = None if response.openable is None else response.openable.over
+        admits = loop("springs_dissipate", c) if response.must_dissipate else None
         change = loop("change_of_couplings", c)
-        return Phases([*begin, *first], accept, state, change, enter, leave, over)
+        return Phases([*begin, *first], accept, state, change, enter, leave, over, admits)
 
     def demand(self) -> Loop:
         """The loop of :meth:`excess`."""
@@ -334,17 +334,20 @@ class ReferenceCouplings(Couplings):
 
 
 def couplings(share: Share, setting: Setting, A: Csr, kind: type[Couplings]) -> list[Links]:
-    """Make the connectors of a process but for guides, those that are alike together."""
+    """Make the connectors of a process but for guides, those that are alike together.
+
+    Each process makes the entries of the ledger in the order of the scene, also those that only
+    others write.
+    """
     links = share.grid.scene.links
     groups: dict[tuple[str, object], list[int]] = {}
     keys = [(link.motion, _kind(link.law)) for link in links]
     for i, number in enumerate(share.links):
         groups.setdefault(keys[number], []).append(i)
+    made: list[Links] = []
     for key, link in dict(zip(keys, links, strict=True)).items():
-        if key not in groups and link.motion in MOTIONS:
-            respond(link.law, (), setting)  # makes the entries of the ledger that others write
-    return [
-        kind(share, np.array(here), setting, A)
-        for (motion, _), here in groups.items()
-        if motion in MOTIONS
-    ]
+        if link.motion in MOTIONS and key in groups:
+            made.append(kind(share, np.array(groups[key]), setting, A))
+        elif link.motion in MOTIONS:
+            respond(link.law, (), setting)
+    return made

@@ -134,7 +134,10 @@ def damping_forces(
     ledger.lost["damping"] += 0.0
     if isinstance(of, Rayleigh):
         if inertia is None:
-            raise SceneError("Rayleigh: it damps velocities, and statics has none; use KelvinVoigt")
+            raise SceneError(
+                "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
+                "use KelvinVoigt, which acts in the time of a static run"
+            )
         return [RayleighForces(of, fields, A, ledger, inertia)]
     grid = fields.share.grid
     beams = grid.scene.beams if of.beams is None else of.beams

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Memory, Restoring
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import carries
@@ -104,7 +104,7 @@ class DeadLoads(LoadTerm):
         begin, accept = [loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)]
         return Phases(begin, accept, enter=enter, leave=leave)
 
-    def carry_on(self, t: float, q: Array) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         self._before = self._times(self._factors_at(t))
         return self._whole(self._before)

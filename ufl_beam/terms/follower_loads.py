@@ -11,7 +11,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Memory, Restoring
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.loads import FollowerLoad
 from ufl_beam.model.time_functions import value_at
@@ -81,7 +81,7 @@ class FollowerLoads(LoadTerm):
         begin, accept = (loop(f"{name}_follower_loads", c) for name in ("begin", "accept"))
         return Phases([begin], [accept])
 
-    def carry_on(self, t: float, q: Array) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         self._sizes[:] = self._sizes_at(t)
         self._turns[:] = q[self._turning]

@@ -93,6 +93,7 @@ class InelasticBeams(Cells, ABC):
         )
         self._tangent.place(A)
         self._q: Array = np.empty(0)
+        self.must_dissipate = layout.kind.law.must_dissipate
         self._prepare(forms)
 
     # -- the step ------------------------------------------------------------------------------
@@ -133,6 +134,12 @@ class InelasticBeams(Cells, ABC):
     @abstractmethod
     def _forget(self) -> None:
         """Forget the latest response: the points would answer otherwise now."""
+
+    def require_dissipation(self, q1: Array) -> None:
+        """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
+        self._respond(q1)
+        grid = self._fields.share.grid
+        self.points.require_dissipation(lambda cell: grid.describe_cell(self._cells[cell]))
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
@@ -289,7 +296,9 @@ class CompiledInelasticBeams(InelasticBeams):
 
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
         over = self.over if self.points.softens else None
-        return Phases(begin, *ends, loop("change_of_points", c), self._start_at, leave, over)
+        change = loop("change_of_points", c)
+        admits = loop("points_dissipate", c) if self.must_dissipate else None
+        return Phases(begin, *ends, change, self._start_at, leave, over, admits)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the internal forces."""

@@ -42,6 +42,7 @@ class Links(InternalForces):
         self._forces_at = self._dofs[:, 6]
         self._A = A
         self.response = respond(self.links[0].law, self.links, setting)
+        self.must_dissipate = self.response.must_dissipate
         self._before, self.work, self.rate = np.zeros((3, len(self.links)))
 
     def force(self, q: Array) -> Array:
@@ -98,6 +99,10 @@ class Links(InternalForces):
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return 0.0
+
+    def require_dissipation(self, q1: Array) -> None:
+        """Raise :class:`StepFailed` if a law gives energy in the step to ``q1``."""
+        self.response.require_dissipation(self.motion(q1))
 
     def dissipation(self, q1: Array) -> float:
         """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""

@@ -13,7 +13,7 @@ from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Memory, Restoring, Saving
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.loads import RotatingFrame
@@ -36,8 +36,14 @@ class LoadTerm(Term):
         return self._force
 
     @abstractmethod
-    def carry_on(self, t: float, q: Array) -> Array:
-        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them.
+
+        ``v`` are the velocities, None in statics; ``past`` is the end of a run of the same scene.
+        """
+
+    def pass_on(self, memory: Saving) -> None:
+        """Save the forces of the last step that :meth:`carry_on` could not find again."""
 
 
 @stated
@@ -85,7 +91,7 @@ class FrameForces(LoadTerm):
         growth = step.fraction * (1.0 - self._grown)
         self._growth, self._growth_at_end = self._grown + step.at * growth, self._grown + growth
 
-    def carry_on(self, t: float, q: Array) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The forces at ``q``; take that state as one that is in equilibrium with them."""
         self._grown = 1.0
         self._force = self._before = self._pull(self._from_centre + q)

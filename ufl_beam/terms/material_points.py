@@ -7,12 +7,14 @@ The return map has two forms, one in C (compiled_points.py) and one in NumPy (re
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_law import MaterialLaw
@@ -195,6 +197,25 @@ class Points(ABC):
             elastic += (theta * self[name] * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
+
+    @abstractmethod
+    def gives_energy(self) -> int:
+        """Number of the point that gives most energy in the latest response, or -1.
+
+        That is a law whose dissipation is negative: its equations have several solutions, and one
+        was found that no material comes to.  Points of all cells are counted through.
+        """
+
+    def require_dissipation(self, describe: Callable[[int], str]) -> None:
+        """Raise :class:`StepFailed` if a point gives energy; ``describe`` names its cell."""
+        if (worst := self.gives_energy()) >= 0:
+            law = type(self._layout.kind.law).__name__
+            raise StepFailed(
+                f"{law} of {describe(worst // self._storage.shape[1])} has a negative dissipation "
+                "in the step: its equations have several solutions, or it stores energy that it "
+                "does not state. A law that is to give energy has active = True, see "
+                "docs/extending_laws.md"
+            )
 
     @abstractmethod
     def accept(self) -> None:

@@ -13,7 +13,7 @@ from typing import NamedTuple
 from ufl_beam.compiled.c_library import names
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.fibres import Kind, Layout
-from ufl_beam.model.law_functions import Values, positive
+from ufl_beam.model.law_functions import Values, absolute, positive
 from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.material_laws import SofteningLaw
 
@@ -107,6 +107,30 @@ class PointEquations:
         new, dt = self.state(at, "new"), at["theta"] * at["dt"]
         found = self.law(at).residuals(self.strain(at), self.state(at), new, dt)
         return tuple(found[name] for name in self._names)
+
+    def stored(self, at: At) -> Values:
+        """Energy that a law which solves for its variables stores at t_n+θ."""
+        law, new = self.law(at), self.state(at, "new")
+        return law.elastic_energy(self.strain(at), new) + law.hardening_energy(new)
+
+    def own_dissipation(self, at: At, slopes: tuple[Values, ...]) -> tuple[Values, Values]:
+        """Dissipation by the changes of such variables, as the law holds; size of its terms.
+
+        It is that which the law states, or -∂ψ/∂z Δz: no error of the time scheme is part of it.
+        ``slopes`` are the derivatives ∂ψ/∂z of :meth:`stored`.
+        """
+        law, old, new = self.law(at), self.state(at), self.state(at, "new")
+        changes = State({n: (getattr(new, n) - getattr(old, n)) / at["theta"] for n in self._names})
+        strain, size = self.strain(at), absolute(self.stored(at))
+        for name, e in zip(rows(law, "stiffness"), law.as_tuple(strain), strict=True):
+            size = size + at[name] * e**2
+        by_variables = 0 * size
+        for slope, name in zip(slopes, self._names, strict=True):
+            z0, z1 = getattr(old, name), getattr(new, name)
+            by_variables = by_variables - slope * (z1 - z0)
+            size = size + absolute(slope) * (absolute(z0) + absolute(z1))
+        dissipated = law.dissipation(strain, new, changes, at["dt"])
+        return by_variables if dissipated is None else dissipated + 0 * size, size
 
     def stress(self, at: At) -> tuple[Values, ...]:
         """Stresses of the bulk at t_n+θ, where the law holds."""

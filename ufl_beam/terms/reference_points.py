@@ -183,6 +183,22 @@ class ReferencePoints(Points):
         """Let the variables of the bulk stay as they are from now on."""
         self._frozen = True
 
+    def gives_energy(self) -> int:
+        """Number of the point that gives most energy in the latest response, or -1."""
+        law = self._layout.kind.law
+        if not law.must_dissipate:
+            return -1
+
+        def stored(at: At) -> Array:
+            return np.array([self._equations.stored(at) + 0 * at["length"]])
+
+        with np.errstate(all="ignore"):
+            _, slopes = jacobian(stored, self._at, prefixed("new", law.variables))
+            own, size = self._equations.own_dissipation(self._at, tuple(slopes[0]))
+            part = np.nan_to_num(own / size).ravel()
+        worst = int(np.argmin(part))
+        return worst if part[worst] < -lib.NO_ENERGY else -1
+
     # -- the end of a step -----------------------------------------------------------------------
 
     def accept(self) -> None:

@@ -40,6 +40,7 @@ class _Sprung(Response):
         self.points: Points = setting.points(*of)
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
+        self.must_dissipate = layout.kind.law.must_dissipate
         self.in_c = self.points.in_c
         self.openable = self.points if self.points.softens else None
 
@@ -72,6 +73,10 @@ class _Sprung(Response):
     def dissipation(self, e1: Array, λ: Array) -> float:
         self.points.respond(self._at(e1))
         return self.points.dissipation()
+
+    def require_dissipation(self, e1: Array) -> None:
+        self.points.respond(self._at(e1))
+        self.points.require_dissipation(lambda number: str(self._links[number]))
 
     def dissipated(self) -> Sequence[Array]:
         return self.points.kept[:, 4], self.points.kept[:, 5]

@@ -18,7 +18,7 @@ from ufl_beam.compiled.c_library import Loop, ffi, loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import CellForm
 from ufl_beam.discretization.function_spaces import Fields, element_of
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Memory, Restoring, Saving
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, Step
@@ -26,6 +26,7 @@ from ufl_beam.model.time_functions import value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.loads import LoadTerm
+from ufl_beam.terms.phases import weight_of_before
 from ufl_beam.terms.work_forms import GROWTH, Statement, statement
 
 AT_REST = 1e300
@@ -91,8 +92,12 @@ class Acting(ABC):
         self.residual.add(q1, r)
         return -r
 
-    def take(self, force: Array) -> None:
-        """Take forces as those before the next step."""
+    def take(self, force: Array, past: Restoring | None) -> Array:
+        """Return the forces before the next step: those given, or those that ``past`` knows."""
+        return force
+
+    def pass_on(self, memory: Saving) -> None:
+        """Save the forces of the last step if a scheme that needs them cannot find them again."""
 
     @abstractmethod
     def accept(self, q1: Array, s: Array, force: Array, times: tuple[float, float]) -> None:
@@ -138,9 +143,17 @@ class Working(Acting):
         """Make its entry among the works supplied."""
         ledger.supplied[work.name] += 0.0
 
-    def take(self, force: Array) -> None:
-        """Take forces as those before the next step."""
+    def take(self, force: Array, past: Restoring | None) -> Array:
+        """Take forces as those before the next step, or those that ``past`` knows; return them."""
         self._before = force
+        if past is not None and past.has(self._saved_as):
+            self.remember(past)
+        return self._before
+
+    def pass_on(self, memory: Saving) -> None:
+        """Save forces that depend on the motion of the last step, if their work is counted on."""
+        if self._work.takes_rates and weight_of_before(self._acting):
+            self.remember(memory)
 
     def accept(self, q1: Array, s: Array, force: Array, times: tuple[float, float]) -> None:
         """Enter the work of the step."""
@@ -149,7 +162,11 @@ class Working(Acting):
 
     def remember(self, memory: Memory) -> None:
         """The forces in the equation of the last step."""
-        self._before = memory.added(f"work of {self._name}", self._before)
+        self._before = memory.added(self._saved_as, self._before)
+
+    @property
+    def _saved_as(self) -> str:
+        return f"work of {self._name}"
 
 
 class Storing(Acting):
@@ -253,14 +270,20 @@ class Works(LoadTerm):
         for one in self._parts:
             one.begin(step.q0, clock)
 
-    def carry_on(self, t: float, q: Array) -> Array:
-        """The forces at rest at ``q``; take that state as one that is in equilibrium with them."""
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
+        """The forces at ``q``; take that state as one that is in equilibrium with them."""
         self._t, self._grown, self._force = t, 1.0, np.zeros_like(self._force)
+        # As at the end of a second in which the velocities stayed.
+        before, dt = (q, AT_REST) if v is None else (q - v, 1.0)
         for one in self._parts:
-            one.begin(q, Clock(t, AT_REST, 1.0))
-            one.take(force := one.force(q))
-            self._force = self._force + force
+            one.begin(before, Clock(t, dt, 1.0))
+            self._force = self._force + one.take(one.force(q), past)
         return self._force
+
+    def pass_on(self, memory: Saving) -> None:
+        """Save the forces of works that depend on the motion of the last step."""
+        for one in self._parts:
+            one.pass_on(memory)
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the forces from the residual."""

@@ -153,6 +153,8 @@ enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */
 
 enum { POINT_KEPT = 6, POINT_SUMS = 7 }; /* numbers of a cell, and of all: `kept` and `sum` of points */
 
+extern const double NO_ENERGY; /* dissipation that is none, as a part of its size */
+
 enum { LINE = 3 }; /* strain, stress and slope: what a tangent knows of a point */
 
 /* Flags that all points of a scene share in a step; see SearchFlags in material_points.py. */
@@ -164,6 +166,7 @@ typedef struct {
   /* Of the law: stresses and their derivatives by strains; or, if it solves, residuals and these, see
    * solve_law. Of a discontinuity: resistance and its derivative by the growth. */
   kernel *law, *resistance, *end;
+  kernel *own; /* what a law that must dissipate does by itself, and the size of that; or none */
   int solves, components, variables, strain;
   int cells, of_cell, width;
   const double *B, *weight, *rest, *length;
@@ -243,6 +246,7 @@ void respond_at(const inelastic *m, const double *q);
 void add_inelastic_force(void *self, const double *q, double *r);
 void add_inelastic_tangent(void *self, const double *q, double *tangent);
 double missed_by_points(void *self, const double *q, const double *r, double scale, double moved);
+int gives_energy(const points *p);
 void commit(points *p);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
@@ -392,8 +396,9 @@ typedef struct {
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands;
   const demand *demand; /* of connectors */
-  double last, best;
+  double last, best, last_scale;
   int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
+  int anew;                           /* no tangent is kept from step to step */
   double rate;                        /* of a modified Newton's method, by which residuals fall */
   int iterations, reason;             /* of snes_newton, the latest */
 } equation;
@@ -604,6 +609,13 @@ typedef struct {
   void *self;
 } change_call;
 
+/* Whether a step to q1 may be accepted. */
+typedef int (admission)(void *self, const double *q1);
+typedef struct {
+  admission *of;
+  void *self;
+} admission_call;
+
 /* Checks of static steps, see StaticPath. */
 typedef struct {
   double slack, far, kink;
@@ -636,6 +648,8 @@ typedef struct {
   const int32_t *rotation, *half_tangent, *multiplier;
   double largest_turn; /* of a step; or infinite */
   rates *rates;       /* in dynamics */
+  int admissions;     /* checks of laws */
+  const admission_call *admission;
   static_path *path;  /* in statics */
   dead_loads *loads;  /* or none */
   const follower_loads *follower_loads; /* or none */
@@ -678,6 +692,8 @@ void add_energy_of_points(void *self, const time_step *step, const double *q1, c
 void begin_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s);
+int points_dissipate(void *self, const double *q1);
+int springs_dissipate(void *self, const double *q1);
 void change_of_form(void *self, const double *q1, energy_change *sum);
 void change_of_points(void *self, const double *q1, energy_change *sum);
 void change_of_couplings(void *self, const double *q1, energy_change *sum);

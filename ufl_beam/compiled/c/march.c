@@ -418,6 +418,21 @@ void change_of_couplings(void *self, const double *q1, energy_change *sum)
   sum->in_connectors += taken;
 }
 
+int points_dissipate(void *self, const double *q1)
+{
+  const inelastic_term *t = self;
+  respond_at(t->cells, q1);
+  return gives_energy(t->cells->points) < 0;
+}
+
+int springs_dissipate(void *self, const double *q1)
+{
+  const coupling_term *t = self;
+  find_motions(t->links, q1);
+  respond_springs(t->links);
+  return gives_energy(t->links->points) < 0;
+}
+
 /* -- the step ------------------------------------------------------------------------------------ */
 
 /* A guess of the end of the step: as the last ones went on, and what supports give. */
@@ -435,7 +450,7 @@ static void guess(march *m)
 static int iterate(march *m)
 {
   equation *e = m->equation;
-  begin_newton(e, 2, as_last(m->prediction, m->step.dt));
+  begin_newton(e, 2, m->rates && as_last(m->prediction, m->step.dt));
   const int error = petsc.SNESSolve(m->snes, 0, e->x);
   m->tried += e->iterations;
   return !error && e->reason > 0;
@@ -534,6 +549,8 @@ static int take_step(march *m, double t1)
   run(&m->begin, &m->step, 0, 0);
   guess(m);
   if (!solve(m) || !measure(m)) return 0;
+  for (int k = 0; k < m->admissions; ++k)
+    if (!m->admission[k].of(m->admission[k].self, m->x)) return 0;
   if (m->path) {
     if (!followed(m)) return 0;
     memcpy(m->path->force, m->equation->inner_force, m->size * sizeof *m->path->force);

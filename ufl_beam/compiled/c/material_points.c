@@ -54,8 +54,8 @@ static double part_of(int m, const double *residuals, const double *sizes)
   return largest;
 }
 
-/* Improve the m variables of a law of d strains until its residuals vanish, by Newton's method; zero
- * if it fails. s gets the stresses and their derivatives by the implicit function theorem.
+/* Improve the m variables of a law of d strains until its residuals vanish, by Newton's method. Returns
+ * one and the number of corrections; zero if it fails. s gets the stresses and their derivatives by the implicit function theorem.
  *
  * The law answers with residuals R, their derivatives J by the variables and E by the strains; with
  * stresses, and their derivatives by strains and by variables. A correction is halved until the largest
@@ -104,7 +104,7 @@ static inline int improve_sized(int m, int d, const points *p, double *w, double
         }
       }
       for (int j = 0; j < m; ++j) z[j] -= B[(1 + d) * j];
-      return 1;
+      return 1 + corrections;
     }
     const double before = part_of(m, a, sizes);
     memcpy(x, z, m * sizeof *x);
@@ -125,16 +125,44 @@ static int improve(const points *p, double *w, double *s)
   return improve_sized(m, d, p, w, s);
 }
 
+/* Variables are found to so small a part of them; the square of the last correction is none. */
+const double NO_ENERGY = 1e-9;
+
+/* What a law dissipates by itself in the step, as a part of its size; zero if that is no number. */
+static double own_dissipation(const points *p, const double *w)
+{
+  double s[2];
+  ask(p->own, w, 2, s);
+  const double part = s[0] / s[1];
+  return isfinite(part) ? part : 0;
+}
+
+/* Number of the point that gives most energy in the latest response, or -1; see Points. */
+int gives_energy(const points *p)
+{
+  double least = -NO_ENERGY;
+  int worst = -1;
+  for (int i = 0; p->own && i < p->cells * p->of_cell; ++i) {
+    const double part = own_dissipation(p, p->w + i * p->width);
+    if (part < least) least = part, worst = i;
+  }
+  return worst;
+}
+
+/* Corrections after which a solution is near the one of the last iterate, and like it. */
+enum { NEARBY = 2 };
+
 /* Stresses and derivatives of a law that solves for its variables, or no numbers.
  *
- * It starts from the variables of the last iterate of the step; if there is none, or if that fails,
- * from those before the step.
+ * It starts from the variables of the last iterate of the step; if there is none, if that fails, or if
+ * it leads to a solution that gives energy, from those before the step.
  */
 static void solve_law(const points *p, double *w, double *s)
 {
   const int m = p->variables, d = p->components;
   double *z = w + p->strain + 3 * d + m;
-  if (p->tried && improve(p, w, s)) return;
+  const int found = p->tried ? improve(p, w, s) : 0, near = found <= 1 + NEARBY || !p->own;
+  if (found && (near || own_dissipation(p, w) >= -NO_ENERGY)) return;
   memcpy(z, z - m, m * sizeof *z);
   if (improve(p, w, s)) return;
   for (int i = 0; i < d + d * d; ++i) s[i] = NAN;

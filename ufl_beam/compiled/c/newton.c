@@ -122,8 +122,10 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
     e->near = !kept && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
   }
   if (e->modified) {
-    /* The residual goes on to fall as it did, if the tangent is kept; from step to step too. */
-    if (iteration > 0) e->rate = residual / e->last;
+    /* The residual goes on to fall as it did, if the tangent is kept; from step to step too. Where forces
+     * fade with it, as when all loads go, it is no nearer to a part of them. */
+    if (iteration > 0) e->rate = residual / e->last * fmax(1, e->last_scale / scale);
+    e->last_scale = scale;
     e->near |= residual * pow(e->rate, MORE) <= wanted;
   }
   e->slow += 1;
@@ -149,13 +151,14 @@ void find_round_off(const equation *e, const double *q, double *forces)
   }
 }
 
-/* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. */
+/* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. A
+ * checkpoint does not have that: runs with one begin each step anew, so that they go on bit for bit. */
 void begin_newton(equation *e, int patience, int like_last)
 {
   e->last = e->best = INFINITY;
   e->near = e->slow = 0;
   e->patience = patience;
-  if (!like_last) e->rate = INFINITY;
+  if (!like_last || e->anew) e->rate = INFINITY;
 }
 
 petsc_functions petsc;

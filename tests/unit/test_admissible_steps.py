@@ -1,0 +1,161 @@
+# SPDX-License-Identifier: MIT
+"""Laws by residuals whose equations have several solutions: no step takes one that gives energy."""
+
+import numpy as np
+import pytest
+from bars import Bars
+from laws_of_ones_own import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, TwoRoots
+
+import ufl_beam as ub
+from ufl_beam.model.fibres import Layout
+from ufl_beam.terms.compiled_points import CompiledPoints
+from ufl_beam.terms.point_equations import inputs
+from ufl_beam.terms.reference_points import ReferencePoints
+
+EA, EI, NP, MP = 2e3, 1.0, 4.0, 0.4
+
+
+def section(**more):
+    return ub.Section(EA=EA, GA=8e2, EI=EI, rhoA=1.0, rhoI=5e-4, **more)
+
+
+def shaken(law):
+    """A cantilever, thrown up to many times its elastic range."""
+    beam = ub.Beam((0, 0), (1, 0), section(interaction=law), cells=2)
+    load = ub.PointLoad(beam.end, (3.0, 3.0), time=lambda t: np.sin(9 * t))
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+
+
+@pytest.mark.parametrize("law", [ub.AxialBending(NP, MP), TwoRoots(NP, MP)], ids=repr)
+@pytest.mark.parametrize(
+    ("scheme", "dt"),
+    [(ub.Midpoint(), 0.02), (ub.DecayingMidpoint(), 0.02), (ub.GeneralizedAlpha(), 0.05)],
+    ids=repr,
+)
+def test_dissipation_never_falls(law, scheme, dt):
+    """And is that of the reference path, whose return map begins with the state before the step."""
+    plastic = []
+    for reference in (False, True):
+        newton = ub.Newton(reference=reference)
+        run = ub.simulate(shaken(law), scheme, t=(0, 1), dt=dt, newton=newton, progress=False)
+        plastic.append(run.energy["plastic"])
+        assert np.diff(plastic[-1]).min() >= -1e-12 * plastic[-1][-1]  # round-off of the sums
+    assert plastic[0][-1] > 1.0
+    assert plastic[0] == pytest.approx(plastic[1], rel=1e-6)  # tolerances of two solvers
+
+
+LAWS = {
+    "RambergOsgood": ub.RambergOsgood(3.0, 0.01, 5.0),
+    "sharp": ub.RambergOsgood(3.0, 0.002, 15.0),
+    "ArmstrongFrederick": ub.ArmstrongFrederick(3.0, 100.0, 300.0),
+    "BoucWen": ub.BoucWen(3.0, 0.05, 2.0, 0.5, 0.01),
+    "BoucWen, other shape": ub.BoucWen(3.0, 0.0, 1.0, 0.7),
+    "Hardening": ub.Hardening(3.0, 20.0, 10.0),
+    "Perzyna": ub.Hardening(3.0, 20.0, viscosity=ub.Perzyna(0.5)),
+    "power law": PowerLaw(3.0, 0.01, 5.0),
+    "by residuals": SameHardening(2.0, 20.0, 10.0, 0.5),
+    "dashpot": Dashpot(20.0),
+    "axial force and moment": ub.AxialBending(NP, MP),
+    "two roots": TwoRoots(NP, MP),
+}
+
+
+class Cells:
+    """Cells of the section whose strains are given."""
+
+    def __init__(self, n, law, scheme, by):
+        layout = section(interaction=law).layout(None)
+        assert isinstance(layout, Layout)
+        storage = np.zeros((n, 1, len(inputs(layout))))
+        self.points = by(layout, [(0, k) for k in range(n)], np.full(n, 0.5), scheme, storage)
+        self.scale = np.array([NP / EA, 0.01, MP / EI])
+
+
+def points_of(law, n, scheme, by):
+    """Points of a law in n cells, and the strain at which they yield."""
+    if law.resultants:
+        cells = Cells(n, law, scheme, by)
+        return cells.points, cells.scale
+    return Bars(n, law, None, scheme, by=by).points, np.array([0.015, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("scheme", [ub.ExactStatic(0.5), ub.Static()], ids=str)
+@pytest.mark.parametrize("size", [0.5, 5.0, 50.0])
+def test_iterates_far_apart(law, scheme, size):
+    """Random iterates up to many elastic ranges apart: the last one answers as in the first."""
+    n, random = 300, np.random.default_rng(0)
+    both = [points_of(LAWS[law], n, scheme, by) for by in (CompiledPoints, ReferencePoints)]
+    (points, scale), (reference, _) = both
+    strain, stiffness = np.zeros((n, 3)), 200.0 if not LAWS[law].resultants else EA
+    for _ in range(6):
+        for one, _ in both:
+            one.start(strain)
+            one.begin(0.1)
+        far = size * 10 ** random.uniform(-2, 0, (3, n, 1))
+        for new in strain + random.uniform(-1, 1, (3, n, 3)) * scale * far:
+            r, _ = points.respond(new)
+        reference.respond(new)
+        assert np.isfinite(r).all()
+        largest = stiffness * np.abs(new).max()
+        assert np.abs(r - reference.r).max() < 1e-11 * largest  # of strains that cancel
+        for one, _ in both:
+            before = one.kept[:, 4].copy()
+            assert one.gives_energy() == -1
+            one.accept()
+            # J, of round-off in the energies of the strains
+            assert (one.kept[:, 4] - before).min() >= -1e-14 * largest * np.abs(new).max()
+        strain = new
+
+
+def held(law):
+    """A bar that is pulled by its end, of a law for its axial force."""
+    beam = ub.Beam((0, 0), (1, 0), section(axial=law), cells=2, name="bar")
+    pull = ub.Prescribed(beam.end, u=lambda t: 0.01 * t)
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
+
+
+def sprung(law):
+    """A stiff beam on a spring of the law."""
+    beam = ub.Beam((0, 0), (1, 0), section(), cells=2)
+    spring = ub.Stretch(ub.ground(-1, 0), beam.start, ub.Spring(EA, law=law))
+    pull = ub.Prescribed(beam.end, u=lambda t: 0.01 * t, v=0.0, psi=0.0)
+    return ub.Scene([beam], supports=[pull], connectors=[spring])
+
+
+def controlled(scene):
+    """The same scene with a controller, so that its steps are in Python."""
+    (beam,) = scene.beams
+    push = ub.Slide(ub.ground(1, 0), beam.end, ub.Controller(lambda now: 0.0), axis=(0, 1))
+    return ub.Scene([beam], [], scene.supports, connectors=[*scene.connectors, push])
+
+
+@pytest.mark.parametrize("reference", [False, True])
+@pytest.mark.parametrize("in_python", [False, True])
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(), ub.GeneralizedAlpha()], ids=repr)
+@pytest.mark.parametrize(
+    ("make", "place"),
+    [(held, r"bar at \(0\.\d+, 0\)"), (sprung, r"Stretch\(.*\)")],
+    ids=["bar", "spring"],
+)
+def test_no_step_is_accepted_that_gives_energy(make, place, scheme, in_python, reference):
+    """The run ends with the names of law and place; what was accepted has dissipated nothing."""
+    scene = make(GivesEnergy(2.0))  # N, at a stretch of 1e-3
+    scene = controlled(scene) if in_python else scene
+    newton = ub.Newton(reference=reference)
+    with pytest.raises(ub.ConvergenceError, match=f"GivesEnergy of {place} has a neg") as found:
+        ub.simulate(scene, scheme, t=(0, 1), dt=0.04, newton=newton, progress=False)
+    run = found.value.solution
+    assert 0.04 < run.times[-1] < 0.5
+    assert run.energy["plastic"].min() >= -1e-12 * run.energy.throughput  # round-off
+
+
+@pytest.mark.parametrize("reference", [False, True])
+def test_an_active_law_may_give_energy(reference):
+    """[closed] A held bar that shrinks by e has the force EA e, and has given EA e²/2."""
+    beam = ub.Beam((0, 0), (1, 0), section(axial=Swelling(1e-3)), cells=2)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Clamped(beam.end)])
+    newton = ub.Newton(reference=reference)
+    run = ub.simulate(scene, ub.ExactStatic(0.5), t=(0, 1), dt=0.25, newton=newton, progress=False)
+    assert run.section_forces_at(beam.start)[-1, 0] == pytest.approx(EA * 1e-3, rel=1e-9)
+    assert run.energy["plastic"][-1] == pytest.approx(-EA * 1e-6 / 2, rel=1e-9)

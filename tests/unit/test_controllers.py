@@ -1,0 +1,255 @@
+# SPDX-License-Identifier: MIT
+"""Controllers: sample times, independent of steps; what goes on after a restart; stability."""
+
+import math
+import warnings
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+M, GAIN, RATE = 0.5, 30.0, 4.0  # kg, N/m, N s/m
+
+
+def slider(sample=None, log=None, gain=GAIN, rate=RATE):
+    """A rigid body that a controller moves by 0.2 m, and its connector."""
+    body = ub.Body((0, 0), mass=M, inertia=1.0, name="slider")
+
+    def control(now):
+        if log is not None:
+            log.append(now.t)
+        return gain * (0.2 - now.displacement(body.middle)[0]) - rate * now.velocity(body.middle)[0]
+
+    law = ub.Controller(control, sample=sample)
+    drive = ub.Slide(ub.ground(0, 0), body.middle, law, axis=(1, 0))
+    way = ub.Prismatic(ub.ground(0, 0), body.middle, axis=(1, 0))
+    return ub.Scene([], [way], connectors=[drive], bodies=[body]), body, drive
+
+
+def run(scene, t=(0.0, 0.5), dt=1e-3, **more):
+    return ub.simulate(scene, ub.Midpoint(), t=t, dt=dt, progress=False, **more)
+
+
+def by_hand(sample, samples):
+    """Way after so many samples: under a constant force in each it is a parabola of time."""
+    way = speed = 0.0
+    for _ in range(samples):
+        acceleration = (GAIN * (0.2 - way) - RATE * speed) / M
+        way += speed * sample + acceleration * sample**2 / 2
+        speed += acceleration * sample
+    return way
+
+
+@pytest.mark.parametrize("dt", [0.05, 0.02, 0.01, 0.003, 0.0007, ub.Adaptive(1e-4)], ids=str)
+def test_a_sample_time_is_independent_of_the_step(dt):
+    """The parabolas are exact at any step; 1e-9 is the tolerance of the solver over 50 samples."""
+    log = []
+    scene, body, _ = slider(0.01, log)
+    solution = run(scene, dt=dt)
+    np.testing.assert_allclose(log, 0.01 * np.arange(len(log)), rtol=0, atol=1e-12)
+    assert len(log) == 50
+    way = solution.displacement(body.middle)[-1, 0]
+    assert way == pytest.approx(by_hand(0.01, 50), rel=1e-9)
+    assert solution.energy.worst < 1e-9
+
+
+def test_samples_are_counted_from_the_beginning_of_the_run():
+    log = []
+    run(slider(0.03, log)[0], t=(0.1, 0.2), dt=0.01)
+    np.testing.assert_allclose(log, [0.1, 0.13, 0.16, 0.19], rtol=0, atol=1e-12)
+
+
+def test_without_a_sample_time_each_step_asks():
+    log = []
+    run(slider(None, log)[0], t=(0.0, 0.1), dt=0.01)
+    np.testing.assert_allclose(log, 0.01 * np.arange(10), rtol=0, atol=1e-12)
+
+
+def test_parts_of_a_step_that_is_cut_hold_the_sample(monkeypatch):
+    """Half of the steps fail at first; the controller is not asked more often."""
+    attempt, tried = ub.Simulation.attempt, set()
+
+    def fails_once(self, t1, end=None):
+        if end == t1 and t1 not in tried:
+            tried.add(t1)
+            raise ub.errors.StepFailed("once")
+        return attempt(self, t1, end)
+
+    monkeypatch.setattr(ub.Simulation, "attempt", fails_once)
+    log = []
+    scene, body, _ = slider(0.01, log)
+    solution = run(scene, t=(0.0, 0.1), dt=0.02)
+    assert solution.parts > 10
+    np.testing.assert_allclose(log, 0.01 * np.arange(10), rtol=0, atol=1e-12)
+    # the same as above
+    assert solution.displacement(body.middle)[-1, 0] == pytest.approx(by_hand(0.01, 10), rel=1e-9)
+
+
+class Stopped(Exception):
+    pass
+
+
+class Stop(ub.Recorder):
+    """Raise after some time."""
+
+    def __init__(self, t):
+        self.t = t
+
+    def open(self, simulation):
+        """Nothing is written."""
+
+    def write(self, simulation):
+        if simulation.t >= self.t:
+            raise Stopped
+
+    def state(self):
+        return {}
+
+    def resume(self, simulation, state):
+        self.t = math.inf
+
+
+def test_a_run_goes_on_from_a_checkpoint_within_a_sample(shared_path):
+    """Bit for bit, and the held force is that of the sample before."""
+    backup = ub.Checkpoint(shared_path / "run.checkpoint", every=1)
+    scene, _, drive = slider(0.017)
+    whole = run(scene, dt=0.005, record=Stop(math.inf))
+    with pytest.raises(Stopped):
+        run(scene, dt=0.005, record=Stop(0.23), checkpoint=backup)
+    resumed = run(scene, dt=0.005, record=Stop(0.23), checkpoint=backup)
+    for one, other in ((whole.q, resumed.q), (whole.v, resumed.v)):
+        np.testing.assert_array_equal(one, other)
+    of_drive = [one.connector(drive).force for one in (whole, resumed)]
+    np.testing.assert_array_equal(*of_drive)
+
+
+def test_a_run_goes_on_within_a_sample_by_start():
+    """The first sample of the second run is the next one of the first run."""
+    log = []
+    scene, body, _ = slider(0.04, log)
+    whole = run(scene, t=(0.0, 0.2), dt=0.01)
+    del log[:]
+    first = run(scene, t=(0.0, 0.1), dt=0.01)
+    second = run(scene, t=(0.1, 0.2), dt=0.01, start=first)
+    np.testing.assert_allclose(log, [0.0, 0.04, 0.08, 0.12, 0.16], rtol=0, atol=1e-12)
+    ways = [one.displacement(body.middle)[-1, 0] for one in (whole, second)]
+    assert ways[0] == pytest.approx(ways[1], rel=1e-9)  # tolerance of the solver
+    del log[:]
+    run(scene, t=(0.0, 0.1), dt=0.01, start=first)  # another clock: anew
+    np.testing.assert_allclose(log, [0.0, 0.04, 0.08], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("sample", [0.0, -1.0, math.nan, "often"])
+def test_bad_sample_times(sample):
+    with pytest.raises(ub.SceneError, match="Controller: sample"):
+        ub.Controller(lambda now: 0.0, sample=sample)
+
+
+# -- stability -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("sample", [None, 0.01])
+@pytest.mark.parametrize(("ratio", "stable"), [(1.9, True), (2.1, False)])
+def test_the_criterion_of_the_pages(sample, ratio, stable):
+    """kd sample < 2 M: each sample multiplies the speed by 1 - kd sample / M."""
+    scene, body, _ = slider(sample, gain=0.5, rate=ratio * M / 0.01)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        solution = run(scene, dt=0.01 if sample is None else 0.002, comm=MPI.COMM_SELF)
+    assert (abs(solution.velocity(body.middle)[-1, 0]) < 0.1) == stable
+    said = [str(one.message) for one in caught]
+    assert len(said) == (not stable)
+    for one in said:
+        what = "steps" if sample is None else "samples"
+        assert "Slide(ground (0, 0), slider (0, 0)): the force changed its direction" in one
+        assert f"each of the 20 {what}" in one
+        assert "kd dt < 2 J" in one and "ForceLaw" in one
+        assert one in str(solution)
+
+
+def arm(law, inertia=0.0):
+    """An elastic arm whose first node has no inertia of its own, turned by a drive."""
+    section = ub.Section.rectangle(b=0.04, h=0.02, E=70e9, nu=0.33, rho=2700.0)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4, name="arm")
+    rotor = [ub.PointMass(beam.start, 0.0, inertia=inertia)] if inertia else []
+    drive = ub.Turn(ub.ground(0, 0), beam.start, law(beam))
+    parts = {"supports": [ub.Pinned(beam.start)], "connectors": [drive], "masses": rotor}
+    return ub.Scene([beam], **parts), beam
+
+
+def limited(angle, rate):
+    return float(np.clip(600 * (0.2 - angle) - 40 * rate, -60, 60))
+
+
+def controlled(beam):
+    return ub.Controller(
+        lambda now: limited(now.displacement(beam.start)[2], now.velocity(beam.start)[2])
+    )
+
+
+DAMPED = ub.Midpoint(alpha=0.02, beta=0.02)
+
+
+@pytest.mark.parametrize("dt", [1e-3, 1e-4])
+def test_bang_bang_at_the_end_of_a_beam_warns(dt):
+    """Of the force, and of the work that the scheme takes; shorter steps do not help."""
+    scene, beam = arm(controlled)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        solution = ub.simulate(scene, DAMPED, t=(0, 150 * dt), dt=dt, comm=MPI.COMM_SELF)
+    said = [str(one.message) for one in caught]
+    assert len(said) == 2  # each once
+    assert "Turn(ground (0, 0), arm.start (0, 0)): the force changed" in said[0]
+    assert "the entry 'numerical'" in said[1]
+    assert all(one in str(solution) for one in said)
+
+
+@pytest.mark.parametrize(
+    ("law", "inertia"),
+    [(lambda beam: ub.ForceLaw(lambda x, rate: -limited(x, rate)), 0.0), (controlled, 0.03)],
+    ids=["force law", "inertia of the drive"],
+)
+def test_the_remedies_that_the_warning_names(law, inertia):
+    """0.03 kg m² is more than kd dt / 2 = 0.02; the angle is the wanted one to 1e-5."""
+    scene, beam = arm(law, inertia)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        solution = ub.simulate(scene, DAMPED, t=(0, 0.5), dt=1e-3)
+    assert solution.displacement(beam.start)[-1, 2] == pytest.approx(0.2, rel=1e-5)
+    assert not solution.warnings
+
+
+def test_a_relay_that_holds_for_some_steps_does_not_warn():
+    """Of all changes of direction none follows another at once."""
+    body = ub.Body((0, 0), mass=1.0, inertia=1.0, name="rotor")
+    relay = ub.Controller(lambda now: 5.0 * (-1) ** int(now.t / 0.0201))
+    drive = ub.Turn(ub.ground(0, 0), body.middle, relay)
+    scene = ub.Scene(
+        [], [ub.Revolute(ub.ground(0, 0), body.middle)], connectors=[drive], bodies=[body]
+    )
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        run(scene, t=(0.0, 2.0), dt=0.01)
+
+
+@pytest.mark.parametrize("dt", [0.01, 0.004])
+def test_samples_with_shared_scenes(dt):
+    """All processes ask at the same times: the lists agree; with one process nothing is shared."""
+    log = []
+    scene, _, _ = slider(0.01, log)
+    run(scene, t=(0.0, 0.1), dt=dt, comm=MPI.COMM_WORLD)
+    assert MPI.COMM_WORLD.allgather(log) == [log] * MPI.COMM_WORLD.size
+    assert len(log) == 10
+
+
+def test_one_process_warns_and_all_solutions_say_it():
+    scene, _ = arm(controlled)
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        solution = ub.simulate(scene, DAMPED, t=(0, 0.05), dt=1e-3, comm=MPI.COMM_WORLD)
+    here = sum("changed its direction" in str(one.message) for one in caught)
+    assert MPI.COMM_WORLD.allreduce(here) == 1
+    assert solution.warnings.count("changed its direction") == 1

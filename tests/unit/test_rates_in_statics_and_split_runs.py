@@ -1,0 +1,127 @@
+# SPDX-License-Identifier: MIT
+"""Viscous forces in static runs, and the ledger of a run that another one goes on from."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+SECTION = ub.Section(EA=1e3, GA=1e3, EI=1.0, rhoA=1.0, rhoI=1e-3)
+QUIET = {"progress": False}
+SLOW_MOTION = pytest.mark.filterwarnings("ignore:.*takes v:ufl_beam.ModelWarning")
+
+
+def drag(c):
+    return ub.VirtualWork("wind", lambda v, w, c: -c * v[1] * w[1], numbers={"c": c})
+
+
+def pushed(**more):
+    """A cantilever whose end is pushed to and fro."""
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
+    more.setdefault("supports", [ub.Clamped(beam.start)])
+    load = ub.PointLoad(beam.end, (0, -1), time=lambda t: math.sin(4 * t))
+    return ub.Scene([beam], loads=[load], **more)
+
+
+@SLOW_MOTION
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()])
+def test_a_work_with_velocities_acts_in_statics_as_dampers_do(scheme):
+    """A rigid bar on springs k in drag c: backward Euler of c u' + k u = F; [exact] to 1e-9 of u.
+
+    Strains of the bar are 1e-9 of the motion over its length.  ``ExactStatic`` applies the load of
+    the beginning in an eighth of the first step.
+    """
+    k, c, force, dt = 50.0, 20.0, 3.0, 0.1
+    rigid = ub.Section(EA=1e10, GA=1e10, EI=1e10)
+
+    def run(**more):
+        bar = ub.Beam((0, 0), (1, 0), rigid, cells=1)
+        ends = [(ub.ground(*end.point), end) for end in (bar.start, bar.end)]
+        springs = [ub.Slide(*end, ub.Spring(k / 2), axis=(0, 1)) for end in ends]
+        if "c" in more:
+            springs += [ub.Slide(*end, ub.Damper(more["c"] / 2), axis=(0, 1)) for end in ends]
+        guides = [ub.Roller(end, along=(0, 1)) for end in (bar.start, bar.end)]
+        load = ub.PointLoad(bar.at(0.5), (0, force), time=lambda t: 1 + t)
+        held, acting = {"supports": guides[:1], "connectors": springs}, more.get("works", [])
+        scene = ub.Scene([bar], loads=[load], works=acting, **held)
+        return ub.simulate(scene, scheme, t=(0, 1), dt=dt, **QUIET).displacement(bar.end)[:, 1]
+
+    u, begin = [0.0], 0.0
+    if scheme != ub.Static():
+        begin = dt / 8
+        u = [force / (c / begin + k)]
+    for end in np.arange(1, 11) * dt:
+        viscous = c / (end - begin)
+        u.append((viscous * u[-1] + force * (1 + end)) / (viscous + k))
+        begin = end
+    u[0] = 0.0
+    np.testing.assert_allclose(run(works=[drag(c)]), u, rtol=1e-8, atol=1e-12)
+    np.testing.assert_allclose(run(c=c), u, rtol=1e-8, atol=1e-12)
+    assert run()[-1] > 1.2 * u[-1]
+
+
+def test_a_static_run_warns_of_a_work_with_velocities():
+    scene = pushed(works=[drag(1.0)])
+    with pytest.warns(ub.ModelWarning, match=r"VirtualWork 'wind' takes v, which is \(q1 - q0\)/dt"):
+        ub.simulate(scene, ub.Static(), t=(0, 0.1), dt=0.1, **QUIET)
+    ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1, **QUIET)  # warnings are errors here
+    push = ub.VirtualWork("push", lambda q, w: (1 + q[1]) * w[1])
+    ub.simulate(pushed(works=[push]), ub.Static(), t=(0, 0.1), dt=0.1, **QUIET)
+
+
+def test_whether_a_work_takes_rates():
+    assert drag(1.0).takes_rates
+    assert ub.VirtualWork("flow", lambda q0, q1, w, dt: (q0 - q1)[1] / dt * w[1]).takes_rates
+    assert not ub.VirtualWork("push", lambda q, w, t: t * w[1]).takes_rates
+    assert not ub.Potential("soil", lambda q: q[1] ** 2).takes_rates
+
+
+def split(scene, scheme):
+    """The works and losses of a run, and their sums in two runs of which one goes on."""
+    whole = ub.simulate(scene, scheme, t=(0, 1), dt=0.05, **QUIET)
+    one = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.05, **QUIET)
+    two = ub.simulate(scene, scheme, t=(0.5, 1), dt=0.05, start=one, **QUIET)
+    names = [*whole.energy.supplied, *whole.energy.lost]
+    entries = {n: (whole.energy[n][-1], one.energy[n][-1] + two.energy[n][-1]) for n in names}
+    if not scheme.dynamic:  # else reactions of a first state are not known
+        first, last = (x.reaction(scene.supports[0]) for x in (two, one))
+        np.testing.assert_allclose(first[0], last[-1], rtol=1e-12)
+    return entries, whole.energy.throughput
+
+
+@SLOW_MOTION
+@pytest.mark.parametrize(
+    "scheme",
+    [ub.GeneralizedAlpha(0.6), ub.Newmark(0.6, 0.3025), ub.Static(), ub.ExactStatic()],
+)
+def test_the_work_of_drag_in_two_runs_is_that_of_one(scheme):
+    """[round-off] Newton's tolerance leaves 1e-10 of the energy that went through."""
+    entries, throughput = split(pushed(works=[drag(0.5)]), scheme)
+    assert abs(entries["wind"][0]) > 0.01 * throughput
+    for whole, sum_of_parts in entries.values():
+        assert sum_of_parts == pytest.approx(whole, abs=1e-10 * throughput)
+
+
+@pytest.mark.parametrize("scheme", [ub.Newmark(0.6, 0.3025), ub.Static()])
+def test_the_work_of_a_support_in_two_damped_runs_is_that_of_one(scheme):
+    """As above; forces of damping are a part of its reaction."""
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
+    moving = ub.Prescribed(beam.end, v=lambda t: -0.05 * math.sin(t) ** 2)
+    scene = ub.Scene(
+        [beam], supports=[ub.Clamped(beam.start), moving], damping=[ub.KelvinVoigt(0.5)]
+    )
+    entries, throughput = split(scene, scheme)
+    assert entries["damping"][0] > 0.1 * throughput
+    for whole, sum_of_parts in entries.values():
+        assert sum_of_parts == pytest.approx(whole, abs=1e-10 * throughput)
+
+
+def test_the_work_of_drag_in_the_first_step_of_a_moving_scene():
+    """A stiff bar at 2 m/s in drag of 0.1 N s/m²: 0.4 W, less c/m dt/2 = 5e-4 of it."""
+    bar = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
+    flying = ub.Velocity((bar,), linear=(0.0, 2.0))
+    scene = ub.Scene([bar], initial=[flying], works=[drag(0.1)])
+    run = ub.simulate(scene, ub.Newmark(), t=(0, 0.02), dt=0.01, **QUIET)
+    assert np.diff(run.energy["wind"]) == pytest.approx(-0.1 * 2.0**2 * 0.01, rel=5e-3)

@@ -1,0 +1,198 @@
+# SPDX-License-Identifier: MIT
+"""The ledger watches its own signs: dissipation, stored energy, losses to the scheme."""
+
+import warnings
+from dataclasses import dataclass
+from typing import ClassVar
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from tests.unit.laws_of_ones_own import Dashpot, PowerLaw
+from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
+from ufl_beam.terms import connector_laws
+
+STEEL = {"EA": 4e8, "GA": 1e8, "EI": 1.4e6, "rhoA": 40.0}
+
+
+@dataclass(frozen=True)
+class Wrong(ub.Hardening):
+    """Plasticity that gives back what it has dissipated, by a sign."""
+
+    sign: float = 1.0
+
+    def dissipation(self, strain, state, changes, dt):
+        return self.sign * super().dissipation(strain, state, changes, dt)
+
+
+@dataclass(frozen=True)
+class Elastic(ub.MaterialLaw):
+    """Elastic with a cubic term, a stress at no strain, and a sign of the energy."""
+
+    cubic: float = 0.0
+    initial: float = 0.0
+    sign: float = 1.0
+    variables: ClassVar = {}
+
+    def stress(self, strain, state):
+        return self.C * (strain - self.initial) + self.cubic * strain**3
+
+    def elastic_energy(self, strain, state):
+        quadratic = self.C * (strain**2 / 2 - self.initial * strain)
+        return self.sign * (quadratic + self.cubic * strain**4 / 4)
+
+
+def bent(law=None, spring=None, **more):
+    """A cantilever, or one on a spring in the place of the clamp, that a load bends to and fro."""
+    beam = ub.Beam((0, 0), (2, 0), ub.Section(**STEEL, bending=law), cells=2, name="girder")
+    load = ub.PointLoad(beam.end, (0, -1e4), time=ub.Table((0, 1, 2), (0, 1, -1)))
+    parts = {"supports": [ub.Clamped(beam.start)]}
+    if spring is not None:
+        base = ub.Turn(ub.ground(0, 0), beam.start, spring)
+        parts = {"supports": [ub.Pinned(beam.start)], "connectors": [base]}
+    return ub.Scene([beam], loads=[load], **parts, **more)
+
+
+def run(scene, scheme=None, t=(0, 2), dt=0.02, **more):
+    """The warnings of a run, and its solution."""
+    scheme = ub.Midpoint(0.05, 0.05) if scheme is None else scheme
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        solution = ub.simulate(scene, scheme, t=t, dt=dt, comm=MPI.COMM_SELF, **more)
+    return [str(one.message) for one in caught if one.category is ub.ModelWarning], solution
+
+
+def about(said, solution, *parts):
+    """The one warning that has all parts, which the solution says, too."""
+    found = [one for one in said if all(part in one for part in parts)]
+    assert len(found) == 1, said
+    assert found[0] in str(solution)
+    return found[0]
+
+
+# -- dissipation -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("reference", [False, True])
+def test_dissipation_that_falls_names_the_cell(reference):
+    """The clamped cell yields first, at M = 15 kN m of 20, in its middle."""
+    newton = ub.Newton(reference=reference)
+    said, solution = run(bent(Wrong(1.4e4, modulus=1e5, sign=-1.0)), newton=newton)
+    assert np.diff(solution.energy["plastic"]).min() < 0
+    one = about(said, solution, "girder, cell at s = 0.25", "'plastic'", "falls by")
+    begin = one.partition("between t = ")[2].partition(" and ")[0]
+    falls = np.diff(solution.energy["plastic"])
+    assert float(begin) == pytest.approx(solution.times[int(np.argmin(falls))])
+
+
+def test_dissipation_of_a_spring_names_the_connector():
+    spring = ub.Spring(1e7, law=Wrong(1.4e4, modulus=1e5, sign=-1.0))
+    said, solution = run(bent(spring=spring))
+    about(said, solution, "Turn(ground (0, 0), girder.start (0, 0)): ", "'plastic'", "falls by")
+
+
+def held_at_the_end(law):
+    beam = ub.Beam((0, 0), (2, 0), ub.Section(**STEEL), cells=2, name="girder")
+    device = ub.Slide(ub.ground(2, 0), beam.end, law, axis=(0, 1))
+    load = ub.PointLoad(beam.end, (0, -1e4))
+    return ub.Scene([beam], [], [ub.Clamped(beam.start)], [load], connectors=[device])
+
+
+def test_a_damper_that_drives():
+    damper = ub.Damper(1e2)
+    object.__setattr__(damper, "viscosity", -1e2)
+    said, solution = run(held_at_the_end(damper), t=(0, 0.05), dt=1e-3)
+    about(said, solution, "Slide(ground (2, 0), girder.end (2, 0)): ", "'damping'", "falls by")
+
+
+def test_friction_that_drives(monkeypatch):
+    """With the sign of the entry turned round."""
+    monkeypatch.setattr(connector_laws._Rubbing, "_sign", -1.0)
+    said, solution = run(held_at_the_end(ub.Coulomb(1e3)), t=(0, 0.05), dt=1e-3)
+    about(said, solution, "'friction'", "falls by")
+
+
+def test_a_law_is_judged_where_its_dissipation_is_its_own():
+    """Laws of the package and quadratic ones are; others have an error of the quadrature."""
+    own = ub.Hardening(1.0), ub.AxialBending(1.0, 1.0), PowerLaw(1.0, 1.0, 5.0), Dashpot(1.0)
+    curved = ub.RambergOsgood(1.0, 0.002, 8), ub.ArmstrongFrederick(1.0, 1.0, 1.0), ub.BoucWen(1.0)
+    for law in (*own, *curved):
+        assert judges_dissipation(law), law
+        assert has_quadratic_energies(law), law
+    for law in (Elastic(cubic=1.0), Elastic(initial=0.1)):
+        assert not judges_dissipation(law), law
+
+
+# -- stored energy ---------------------------------------------------------------------------------
+
+
+def test_stored_energy_below_zero():
+    said, solution = run(bent(Elastic(sign=-1.0)))
+    about(said, solution, "the stored energy is -", "at t = ", "elastic_energy")
+
+
+def test_an_energy_without_a_zero_may_be_negative():
+    """A spring with a force at no motion, which a compressive motion relieves."""
+    spring = ub.Spring(1e7, law=Elastic(initial=0.01))
+    said, solution = run(bent(spring=spring), ub.Midpoint(), t=(0, 0.02), dt=1e-3)
+    assert solution.energy["stored"].min() < 0
+    assert not [one for one in said if "the stored energy is" in one]
+
+
+def test_a_curved_elastic_law_may_lose_a_little():
+    """Of first order in the step; the entry falls, and no warning blames the law."""
+    said, solution = run(bent(Elastic(cubic=1e11)), dt=0.25)
+    assert np.diff(solution.energy["plastic"]).min() < 0
+    assert not said
+
+
+# -- the scheme ------------------------------------------------------------------------------------
+
+
+def shaken(period, scheme, steps, **more):
+    """A mass on a spring, shaken by a force of a given period, in steps of 1 s."""
+    body = ub.Body((0, 0), mass=1.0, inertia=1.0, name="mass")
+    way = ub.Prismatic(ub.ground(0, 0), body.middle, axis=(1, 0))
+    spring = ub.Slide(ub.ground(0, 0), body.middle, ub.Spring((2 * np.pi / 50) ** 2), axis=(1, 0))
+    push = ub.PointLoad(body.middle, (1, 0), time=lambda t: np.sin(2 * np.pi * t / period))
+    scene = ub.Scene([], [way], loads=[push], connectors=[spring], bodies=[body])
+    return run(scene, scheme, t=(0, steps), dt=1.0, **more)
+
+
+def test_a_load_at_each_step_is_lost():
+    """A jolt of alternating sign at each step, in a scheme that forgets motions at once."""
+    said, solution = shaken(2.5, ub.Midpoint(alpha=0.5, beta=0.5), 150)
+    about(said, solution, "the time scheme took", "the entry 'numerical'", "from t = 0 to 100 s")
+    assert "numerical" not in "".join(shaken(2.5, ub.Midpoint(alpha=0.5, beta=0.5), 90)[0])
+
+
+@pytest.mark.parametrize(
+    "scheme",
+    [ub.Midpoint(alpha=0.5, beta=0.5), ub.DecayingMidpoint(1 / 3), ub.GeneralizedAlpha(0.5)],
+    ids=str,
+)
+def test_a_resonance_that_only_the_scheme_damps(scheme):
+    """All work is lost, in many periods; each step loses a part of what the scene holds."""
+    said, _ = shaken(50.0, scheme, 3000)
+    assert not said
+
+
+def test_a_blow_that_dies_out():
+    """All energy is lost in some steps, down to the last digits, but once."""
+    body = ub.Body((0, 0), mass=1.0, inertia=1.0, name="mass")
+    way = ub.Prismatic(ub.ground(0, 0), body.middle, axis=(1, 0))
+    spring = ub.Slide(ub.ground(0, 0), body.middle, ub.Spring(100.0), axis=(1, 0))
+    push = ub.PointLoad(body.middle, (1, 0), time=ub.Table((0, 1, 2), (0, 1, 0)))
+    scene = ub.Scene([], [way], loads=[push], connectors=[spring], bodies=[body])
+    said, solution = run(scene, ub.Midpoint(alpha=0.5, beta=0.5), t=(0, 1000), dt=1.0)
+    assert solution.energy["numerical"][-1] > 0.9 * solution.energy["loads"][-1]
+    assert not said
+
+
+def test_states_that_were_thinned_are_judged_once():
+    law = Wrong(1.4e4, modulus=1e5, sign=-1.0)
+    said, _ = run(bent(law), dt=0.002, most=300)
+    assert len([one for one in said if "'plastic'" in one]) == 1

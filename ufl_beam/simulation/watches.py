@@ -1,0 +1,216 @@
+# SPDX-License-Identifier: MIT
+"""Watches over a run: signs in the ledger, and in forces of functions, of results that are wrong.
+
+Dissipated energy must not fall and stored energy not be negative.  A scheme must not take more
+energy than there is, and the force of a function must not change its direction at every step.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.model.connector_laws import Coulomb, Controller, Damper, ForceLaw, Spring
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
+from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.works import ENTRIES
+from ufl_beam.simulation.controllers import Controllers
+from ufl_beam.simulation.kept_states import KeptStates
+from ufl_beam.simulation.solution import Solution
+from ufl_beam.terms.links import DISSIPATED, WORK, Links
+from ufl_beam.terms.phases import weight_of_before
+
+STATES = 100
+"""Kept states that are judged together."""
+
+TURNOVER = 5.0
+"""Numerical loss in so many steps, over the largest energy in the scene meanwhile, that is wrong.
+
+A motion that steps resolve loses a small part of its energy in each.
+"""
+
+LITTLE = 1e-6
+"""Numerical loss that does not matter, as a part of the energy that went through."""
+
+ALTERNATIONS = 20
+"""Number of successive changes of direction of a force that is a fault."""
+
+LARGE = 0.5
+"""Least change of such a force, as a part of the largest force so far."""
+
+MOVED = 1e-9
+"""Least motion of such a step, as a part of the size of the scene, or rad."""
+
+
+class LedgerWatch:
+    """Judges the kept states of a run, each once.
+
+    Args:
+        grid: Its scene is watched.
+        scheme: The time scheme.
+        claimed: Part of the energy that went through by which entries may err.
+    """
+
+    def __init__(self, grid: Grid, scheme: Scheme, claimed: float) -> None:
+        self._grid, self._claimed = grid, claimed
+        laws, links = [*_laws(grid.scene)], grid.scene.links
+        grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
+        # Other schemes integrate works with the mean of the forces at both ends.
+        grows["friction"] = grows["damping"] = weight_of_before(scheme.acting) == 0.0
+        self._grows = [name for name, certain in grows.items() if certain]
+        given = any(isinstance(link.law, ForceLaw) and link.law.stored for link in links)
+        self._bounded = not given and all(map(has_quadratic_energies, laws))
+        self._in_motion = has_inertia(scheme)
+        self._throughput = self._most = 0.0
+        self._judged = 0  # number of the last state that was judged
+        self._told: set[str] = set()
+
+    def judge(self, solution: Solution, *, last: bool = False) -> Iterator[str]:
+        """Judge what was kept since the last call, if it is enough or the ``last``.
+
+        Yields warnings, of each kind the first.
+        """
+        n = len(solution)
+        while n - 1 - self._judged >= (1 if last else STATES):
+            end = min(self._judged + STATES, n - 1)
+            yield from self._judge(solution.part(self._judged, end + 1), solution.every)
+            self._judged = end
+
+    def thinned(self, solution: Solution) -> None:
+        """Go on where states, which were all judged, have been forgotten."""
+        self._judged = len(solution) - 1
+
+    def _judge(self, states: KeptStates, every: int) -> Iterator[str]:
+        times, (state, supplied, lost) = states.times, states.ledger()
+        works = sum(float(np.abs(np.diff(work)).sum()) for work in supplied.values())
+        sizes = [e if name in ENTRIES else np.abs(e - e[0]) for name, e in state.items()]
+        most = float(np.max(sum(sizes, 0.0 * times)))
+        self._throughput += works + max(most - self._most, 0.0)
+        self._most = max(self._most, most)
+        allowed = self._claimed * self._throughput
+        for name in self._grows:
+            if name in lost and name not in self._told:
+                falls = -np.diff(lost[name])
+                n = int(np.argmax(falls))
+                if falls[n] > allowed:
+                    self._told.add(name)
+                    yield self._falls(name, float(falls[n]), states, n)
+        least = float(np.min(state["stored"])) if "stored" in state and self._bounded else 0.0
+        if least < -allowed and "stored" not in self._told:
+            self._told.add("stored")
+            t = times[int(np.argmin(state["stored"]))]
+            yield (
+                f"the stored energy is {least:.3g} J at t = {t:.6g} s, and a sum of squares is not "
+                "negative: a law of material in the scene, or the step there, is wrong. Use smaller "
+                "steps; check elastic_energy of a law of your own"
+            )
+        if every > 1 or not self._in_motion or len(times) <= STATES or "numerical" not in lost:
+            return
+        loss = float(np.ptp(lost["numerical"]))
+        if loss > max(TURNOVER * most, LITTLE * self._throughput) and "numerical" not in self._told:
+            self._told.add("numerical")
+            yield (
+                f"from t = {times[0]:.6g} to {times[-1]:.6g} s the time scheme took "
+                f"{loss:.3g} J, the entry 'numerical', {loss / most:.3g} times as much as the scene "
+                f"held at most, in {STATES} steps. So most of the work that was supplied "
+                "went into motions that are too fast for the steps, and results depend on the "
+                "scheme. Use smaller steps, or smoother loads and supports; a controller that "
+                "causes it needs another sample time, inertia at its place, or a ForceLaw instead"
+            )
+
+    def _falls(self, name: str, fall: float, states: KeptStates, n: int) -> str:
+        before, after = states.times[n : n + 2]
+        return (
+            f"{self._where(name, states, n)}the dissipated energy, the entry {name!r} of the "
+            f"ledger, falls by {fall:.3g} J between t = {before:.6g} and {after:.6g} s. No law of "
+            "the scene gives dissipated energy back: a step found a wrong state there, and what "
+            "follows is wrong. Use smaller steps; check the equations of a law of your own"
+        )
+
+    def _where(self, name: str, states: KeptStates, n: int) -> str:
+        """Cell or connector whose dissipated energy falls most in a step."""
+        kind = {"friction": Coulomb, "damping": Damper}.get(name)
+        taken = states.connections[:, :, WORK if kind else DISSIPATED]
+        falls = {
+            f"{link}: ": taken[n, i] - taken[n + 1, i]
+            for i, link in enumerate(self._grid.scene.links)
+            if kind is None or isinstance(link.law, kind)
+        }
+        if kind is None:
+            cells = states.materials[:, :, [0, 5 if name == "plastic" else 6]]
+            for (cell, before), (_, after) in zip(cells[n], cells[n + 1], strict=True):
+                place = self._grid.middle(int(cell))
+                falls[f"{place.beam.name}, cell at s = {place.s:.3g}: "] = before - after
+        worst = max(falls, key=lambda one: falls[one], default="")
+        return worst if worst and falls[worst] > 0.0 else ""
+
+
+def _laws(scene: Scene) -> Iterator[MaterialLaw]:
+    """Laws of the material points of a scene."""
+    for beam in scene.beams:
+        layout = beam.section.layout(beam.section.hinge)
+        if layout is not None and not layout.elastic:
+            yield from (law for law, _ in layout.laws)
+    yield from (s.law for s in (link.law for link in scene.links) if isinstance(s, Spring) and s.law)
+
+
+class ForceWatch:
+    """Watches forces of controllers and force laws for a change of direction at every step."""
+
+    def __init__(self, couplings: Sequence[Links], controllers: Controllers, size: float) -> None:
+        kinds = Controller, ForceLaw
+        self._couplings = [one for one in couplings if isinstance(one.links[0].law, kinds)]
+        self._links = [link for one in self._couplings for link in one.links]
+        self._controllers, n = controllers, len(self._links)
+        self._length = np.array([1.0 if link.turns else size for link in self._links])
+        self._force, self._change, self._largest = np.zeros((3, n))
+        self._count: Index = np.zeros(n, dtype=int)
+
+    def __bool__(self) -> bool:
+        return bool(self._links)
+
+    def judge(self, q: Array, t: float, dt: float) -> Iterator[str]:
+        """Judge the forces in the step to an accepted state; yield warnings, one a connector."""
+        values, fresh = self._controllers.values, self._controllers.fresh
+        of_laws = np.concatenate([one.force(q) for one in self._couplings])
+        moved = np.abs(np.concatenate([one.rate for one in self._couplings])) * dt
+        force = np.array([values.get(x, λ) for x, λ in zip(self._links, of_laws, strict=True)])
+        new = np.array([link in fresh or link not in values for link in self._links])
+        fresh.clear()
+        change = np.where(new, force - self._force, self._change)
+        self._largest = np.maximum(self._largest, np.abs(force))
+        large = (np.abs(change) >= LARGE * self._largest) & (moved >= MOVED * self._length)
+        turns = large & (change * self._change < 0.0)
+        self._count = np.where(new, np.where(turns, self._count + 1, 0), self._count)
+        self._force, self._change = force, change
+        for i in np.flatnonzero(new & (self._count == ALTERNATIONS)):
+            self._largest[i] = np.inf  # it is told once
+            yield _alternates(self._links[i], t)
+
+
+def _alternates(link: Connector, t: float) -> str:
+    """Describe a force that changes its direction at every step until ``t``."""
+    sampled = isinstance(link.law, Controller) and link.law.sample
+    said = (
+        f"{link}: the force changed its direction at each of the {ALTERNATIONS} "
+        f"{'samples' if sampled else 'steps'} before t = {t:.6g} s"
+    )
+    if isinstance(link.law, ForceLaw):
+        return (
+            f"{said}: it drives a motion that is too fast for the steps. Use smaller ones, or a "
+            "scheme that damps such motions, as Midpoint(alpha=0.05, beta=0.05) does"
+        )
+    return (
+        f"{said}: the controller answers the motion that it has caused by the time it is asked "
+        "again. A force of kd times a rate that is held for a time dt needs kd dt < 2 J; J is the "
+        "inertia (along a line the mass) that it moves within dt, and a beam without a body has "
+        "hardly any there, whatever the step. Give the place the inertia of its drive, as "
+        "PointMass or Body, take smaller gains, or state the force as a ForceLaw, which has no "
+        "delay; see docs/howto_machine.md"
+    )
