@@ -2,6 +2,7 @@
 """Checks of combinations that compare runs: each states when it applies, and its tolerance."""
 
 import contextlib
+from dataclasses import replace
 
 from mpi4py import MPI
 
@@ -25,13 +26,16 @@ from ufl_beam.simulation import replicas
 
 @check
 def failed_step(case):
-    """A step that fails also fails in runs of a quarter of the step, near the same time."""
+    """Where a step fails, there may be no equilibrium: quarters of the step get as far.
+
+    What breaks or flows in statics has limit loads; long steps may come to a path that ends.
+    """
     only(case.whole.failure, "all steps converged")
     only(case.equal_steps, "adaptive steps are as short as they need be")
-    small = case.run(dt=case.whole.names["dt"] / 4, newton=ub.Newton())
-    assert small.failure, f"small steps converge; {case.whole.failure}"
-    apart = abs(small.solution.times[-1] - case.whole.solution.times[-1])
-    assert apart <= 2 * case.whole.names["dt"], case.whole.failure
+    dt = case.whole.names["dt"]
+    small = case.run(dt=dt / 4, newton=ub.Newton())
+    before = case.whole.solution.times[-1] - 2 * dt
+    assert not small.failure or small.solution.times[-1] >= before, case.whole.failure
 
 
 @check
@@ -78,26 +82,31 @@ def imbalance(run):
 
 @check
 def split(case):
-    """A run in two parts by `start=` is the run.
-
-    docs/schemes.md excepts `DecayingMidpoint`, whose first step has no step before it.
-    """
-    only(not case.combination.has("DecayingMidpoint"), "the step before is not known")
+    """A run in two parts by `start=` is the run."""
     only(case.equal_steps, "steps depend on those before")
     only(not case.exact.failure, "a step fails")
-    names, n = case.combination.make(), len(case.exact.solution) - 1
-    (t0, t1), k = names["t"], n // 2
-    at = t0 + (t1 - t0) * k / n
-    equal = {"dt": (t1 - t0) / n * (1 + 1e-10), "newton": ub.Newton(rtol=DIGITS), "names": names}
-    first = case.run(t=(t0, at), **equal)
-    second = case.run(t=(at, t1), start=first.solution, **equal)
-    assert_near(differences(first, case.exact, slice(0, k + 1)))
-    assert_near(differences(second, case.exact, slice(k, None)))
+    for parts in (1, 4, 16):  # as in assert_agree
+        names, n = case.combination.make(), (len(case.exact.solution) - 1) * parts
+        (t0, t1), k = names["t"], n // 2
+        at = t0 + (t1 - t0) * k / n
+        equal = {"dt": (t1 - t0) / n * (1 + 1e-10), "newton": ub.Newton(rtol=DIGITS)}
+        whole = case.run(**equal)
+        first = case.run(t=(t0, at), names=names, **equal)
+        second = case.run(t=(at, t1), start=first.solution, names=names, **equal)
+        if first.solution.parts + second.solution.parts == whole.solution.parts:
+            assert_near(differences(first, whole, slice(0, k + 1)))
+            assert_near(differences(second, whole, slice(k, None)))
+            return
+    raise AssertionError("one of the runs cuts steps")
 
 
 @check
 def resumed(case):
-    """A run that is interrupted and resumed is the run, to the last bit."""
+    """A run that is interrupted and resumed is the run, to the last bit.
+
+    `Newton(modified=True)` forgets its tangent where checkpoints are written, so that it is the run
+    with checkpoints.
+    """
     only(not case.whole.failure, "a step fails")
     only(case.steps >= 4, "too few steps")
     checkpoint = ub.Checkpoint(case.folder / "run.checkpoint", every=3)
@@ -110,8 +119,11 @@ def resumed(case):
     with contextlib.suppress(KeyboardInterrupt):
         go("resumed", case.steps // 2 + 1, checkpoint=checkpoint)
     resumed, again = go("resumed", 10**9, checkpoint=checkpoint)
-    _, whole = go("whole", 10**9)
-    assert_same_bits(resumed.solution, case.whole.solution)
+    other = ub.Checkpoint(case.folder / "whole.checkpoint", every=3)
+    expected, whole = go("whole", 10**9, checkpoint=other)
+    assert_same_bits(resumed.solution, expected.solution)
+    if not case.combination.has("modified"):
+        assert_same_bits(resumed.solution, case.whole.solution)
     assert_same_records(again, whole)
 
 
@@ -213,34 +225,45 @@ def loops(case):
         assert_same_bits(simulation.solution, case.whole.solution)
 
 
+def assert_agree(case, tolerance=SAME, **changes):
+    """Runs with other arguments find the motions, forces and energies of `exact`.
+
+    Where one of both must cut a step, last digits decide, and other steps have other errors; then
+    smaller steps, which none must cut, are compared.
+    """
+    only(not case.exact.failure, "a step fails")
+    for parts in (1, 4, 16):
+        dt = case.exact.names["dt"]
+        more = {"dt": dt / parts} if parts > 1 else {}
+        expected = case.run(newton=ub.Newton(rtol=DIGITS), **more) if more else case.exact
+        found = case.run(**{"newton": ub.Newton(rtol=DIGITS), **more, **changes})
+        if found.solution.parts == expected.solution.parts:
+            assert not found.failure, found.failure
+            return assert_near(differences(found, expected), tolerance)
+        only(case.equal_steps, "last digits decide on the steps")
+    raise AssertionError(f"{found.solution.parts} and {expected.solution.parts} parts of steps")
+
+
 @check
 def reference(case):
     """Both paths find the same motions, forces and energies."""
-    only(not case.exact.failure, "a step fails")
-    found = case.run(newton=ub.Newton(rtol=DIGITS, reference=True))
-    assert not found.failure, found.failure
-    assert_near(differences(found, case.exact))
+    assert_agree(case, newton=ub.Newton(rtol=DIGITS, reference=True))
 
 
 @check
 def newton_options(case):
     """Options of Newton's method change nothing but what it leaves."""
     only(case.combination.has("Newton(p", "Newton(m"), "none")
-    only(case.equal_steps, "steps depend on last digits")
-    only(not case.exact.failure, "a step fails")
-    assert not case.whole.failure, case.whole.failure
-    assert_near(differences(case.whole, case.exact), 100 * SAME)
+    options = case.exact.names["newton"]
+    assert_agree(case, 100 * SAME, newton=replace(options, rtol=min(options.rtol, 1e-11)))
 
 
 @check
 def processes(case):
     """Shared by all processes of MPI the run is the one of a single process."""
     only(MPI.COMM_WORLD.size > 1, "one process")
-    only(not case.exact.failure, "a step fails")
     smallest, replicas.SMALLEST_SHARE = replicas.SMALLEST_SHARE, 1
     try:
-        shared = case.run(newton=ub.Newton(rtol=DIGITS), comm=MPI.COMM_WORLD)
+        assert_agree(case, comm=MPI.COMM_WORLD)
     finally:
         replicas.SMALLEST_SHARE = smallest
-    assert not shared.failure, shared.failure
-    assert_near(differences(shared, case.exact))

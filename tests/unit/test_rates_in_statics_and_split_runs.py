@@ -104,6 +104,25 @@ def test_the_work_of_drag_in_two_runs_is_that_of_one(scheme):
         assert sum_of_parts == pytest.approx(whole, abs=1e-10 * throughput)
 
 
+@pytest.mark.parametrize("reference", [False, True])
+def test_the_last_step_of_decaying_midpoint_goes_on(reference):
+    """Its second differences begin with the step before; [round-off] as above."""
+    scene, scheme = pushed(), ub.DecayingMidpoint()
+    newton = {"newton": ub.Newton(reference=reference), **QUIET}
+    whole = ub.simulate(scene, scheme, t=(0, 1), dt=0.05, **newton)
+    one = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.05, **newton)
+    two = ub.simulate(scene, scheme, t=(0.5, 1), dt=0.05, start=one, **newton)
+    fresh = ub.simulate(
+        ub.Scene(scene.beams, supports=scene.supports, loads=scene.loads), scheme, t=(0.5, 1),
+        dt=0.05, start=one, **newton,
+    )  # fmt: skip
+    size = np.abs(whole.q).max()
+    assert np.abs(two.q[-1] - whole.q[-1]).max() < 1e-8 * size
+    assert np.abs(fresh.q[-1] - whole.q[-1]).max() > 1e-5 * size  # forces may have jumped
+    lost = one.energy["numerical"][-1] + two.energy["numerical"][-1]
+    assert lost == pytest.approx(whole.energy["numerical"][-1], abs=1e-8 * whole.energy.throughput)
+
+
 @pytest.mark.parametrize("scheme", [ub.Newmark(0.6, 0.3025), ub.Static()])
 def test_the_work_of_a_support_in_two_damped_runs_is_that_of_one(scheme):
     """As above; forces of damping are a part of its reaction."""

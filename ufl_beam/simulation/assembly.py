@@ -13,7 +13,7 @@ from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
+from ufl_beam.discretization.state_io import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import Coulomb, Running
@@ -25,7 +25,7 @@ from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.base import Term
-from ufl_beam.terms.beams import ElasticBeams, Inertia
+from ufl_beam.terms.beams import BEFORE, ElasticBeams, Inertia
 from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import Couplings, couplings
 from ufl_beam.terms.damping import SecondDifferences, damping_forces
@@ -115,9 +115,19 @@ class Assembly:
             self.supports.carry_on(memory, q)
         if self.inertia is not None:
             self.inertia.carry_on(memory, len(self.inertia.more))
+            if isinstance(self.inertia.scheme, DecayingMidpoint):
+                self._pass_on_step(memory, q)
         for load in self.loads:
             load.pass_on(memory)
         return memory.state()
+
+    def _pass_on_step(self, memory: Memory, q: Array) -> None:
+        """State the changes of the last step, on which the next one of the scheme depends."""
+        if self.inertia is not None:
+            self.inertia.pass_on_step(memory)
+        for term in self.equation.terms:
+            if isinstance(term, SecondDifferences):
+                term.remember(memory, q)
 
     def carry_on(self, t: float, q: Array, internal: State | None) -> list[Array]:
         """Return the loads at the initial state, which is in equilibrium with them.
@@ -142,6 +152,8 @@ class Assembly:
         if self.inertia is not None and same:
             known = sum(name in internal for name in self.inertia.scheme.kept)
             self.inertia.carry_on(memory, known)
+            if BEFORE in internal and isinstance(self.inertia.scheme, DecayingMidpoint):
+                self._pass_on_step(memory, q)
 
     def static_path(
         self, scheme: Scheme, q: Array, t0: float, loads: list[Array], together: Agreement,

@@ -7,6 +7,7 @@ import math
 from functools import cached_property
 from typing import Any, NamedTuple
 
+import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, on_demand
@@ -25,6 +26,9 @@ from ufl_beam.terms.phases import Phases, TimeFunctions, entering
 from ufl_beam.terms.rates_in_c import RatesInC
 from ufl_beam.terms.static_tangents import StaticTangent
 from ufl_beam.terms.tangent_derivatives import Cells
+
+BEFORE = "velocity before"
+"""Name of the velocities at the beginning of the last step, in what is saved."""
 
 
 class ElasticForms(NamedTuple):
@@ -164,6 +168,12 @@ class Inertia(OfMatrix):
         more = self.more or (self.v,) * known
         self.more = tuple(map(memory.at_dofs, self.scheme.kept[:known], more))
 
+    def pass_on_step(self, memory: Memory) -> None:
+        """State the velocities before the last step, and its length, at each degree of freedom."""
+        self.v_before = memory.at_dofs(BEFORE, self.v_before)
+        lengths = memory.at_dofs("last step", np.full(len(self.v), self.last_dt))
+        self.last_dt = float(lengths[0]) if len(lengths) else self.last_dt
+
     def velocities(self, s: Array) -> Array:
         """Velocities at the end of a step ``s`` of the nodes."""
         return self.scheme.rates(self._dt, s, self)[0]
@@ -195,6 +205,6 @@ class Inertia(OfMatrix):
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore velocities and the last step."""
         self.v = memory.at_dofs("velocity", self.v)
-        self.v_before = memory.at_dofs("velocity before", self.v_before)
+        self.v_before = memory.at_dofs(BEFORE, self.v_before)
         self.last_dt = memory.number("step of velocity", self.last_dt)
         self.carry_on(memory, int(memory.number("further rates", len(self.more))))
