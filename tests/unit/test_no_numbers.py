@@ -142,17 +142,20 @@ def test_a_law_without_a_value_far_away_is_met_by_shorter_steps():
     """A wall at 10 mm: the first iterate of the whole step is beyond, by 3 EI/L³ = 30 N/m."""
 
     def wall(motion, rate):
+        beyond.append(motion >= 0.01)
         return -0.01 * math.log(1 - motion / 0.01) if motion < 0.01 else math.nan
 
+    beyond = []
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
     stop = ub.Slide(ub.ground(1, 0), beam.end, ub.ForceLaw(wall), axis=(0, 1))
-    push = ub.PointLoad(beam.end, (0, 0.32), time=lambda t: t)
+    push = ub.PointLoad(beam.end, (0, 0.36), time=lambda t: t)
     scene = ub.Scene([beam], [], [ub.Clamped(beam.start)], [push], connectors=[stop])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
     way = solution.connector(stop).motion[-1]
-    assert 0.009 < way < 0.01
+    assert 0.0095 < way < 0.01
     assert solution.connector(stop).force[-1] == pytest.approx(wall(way, 0.0), rel=1e-6)
-    assert solution.parts > 2  # it was cut
+    assert any(beyond)
+    assert solution.parts > 1  # it was cut
 
 
 def test_a_guide_that_ends():
