@@ -20,7 +20,6 @@ from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.model.time_functions import value_at
 
 DENSE = 90
 """Up to this number of unknowns the null space comes from a dense decomposition."""
@@ -85,15 +84,6 @@ def _determines(link: Connector) -> bool:
     if isinstance(link.law, Stop):
         return link.law.low == 0.0 or link.law.high == 0.0
     return isinstance(link.law, (*RESISTING, Damper, Coulomb))
-
-
-def no_number(scene: Scene, times: Iterable[float]) -> str:
-    """Name the owner of a time function that is not finite at one of the times; else empty."""
-    for t in times:
-        for owner, function in scene.time_functions():
-            if not math.isfinite(value := value_at(function, t, owner)):
-                return f"{owner}: the time function is {value} at t = {t:.9g} s"
-    return ""
 
 
 def _fixed(scene: Scene) -> set[NodeDof]:

@@ -54,8 +54,9 @@ class StaticPath:
         for beam in beams:
             beam.begin(short)
             beam.add_residual(q, self.force)
+        begins = scheme.step(t0, t0 + 1.0, t0 + 1.0, q)._replace(load_time=t0, motion_time=t0)
         for coupling in couplings:
-            coupling.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
+            coupling.begin(begins)
             coupling.add_residual(q, self.force)
 
     def remember(self, memory: Memory, q: Array) -> None:

@@ -61,7 +61,7 @@ class Controllers:
             first, number = self._due(i, t)
             sample = _sample(link)
             at = first + (number + 1) * sample
-            if at < stop - _rounding(sample, at, stop):
+            if t < at < stop - _rounding(sample, at, stop):
                 stop = at
         return stop
 

@@ -13,7 +13,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.partition import Share
-from ufl_beam.errors import ConvergenceError, StepFailed
+from ufl_beam.errors import ConvergenceError, NoNumber, StepFailed
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
@@ -72,7 +72,9 @@ def no_equilibrium(
     where = f"at {named.at(t, '.9g')}"
     if end != t:
         where = f"after {named.at(t, '.9g')}, even with {named.over(end - t)}"
-    why = _singularity(equation, solution.grid, q0, q1)
+    # Where a function has no value there is no tangent to look at.
+    known = not isinstance(failure, NoNumber)
+    why = _singularity(equation, solution.grid, q0, q1) if known else ""
     said = f"{failure} ({sizes})" if sizes else str(failure)
     return ConvergenceError(
         f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=t, dt=end - t,

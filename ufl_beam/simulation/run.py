@@ -142,6 +142,7 @@ def simulate(
                 solution.seconds = float(found["seconds"])
             solution.parts, solution.iterations = simulation.parts, simulation.iterations
             solution.time_error = pace.error
+            solution.warnings = found["warnings"]
             keeper.resume(pace.steps)
             for i, recorder in enumerate(recorders):
                 recorder.resume(simulation, below(f"recorder {i}/", found))
@@ -149,7 +150,7 @@ def simulate(
         def write(keeper: Keeper) -> None:
             content = {
                 "seconds": solution.seconds + time.perf_counter() - begin, "pace": pace.state(),
-                "stateful": simulation.together(keeper.states),
+                "stateful": simulation.together(keeper.states), "warnings": solution.warnings,
                 **above("state/", simulation.state()),
             }  # fmt: skip
             for i, recorder in enumerate(recorders):
@@ -163,7 +164,7 @@ def simulate(
             if pace.steps % solution.every == 0 or pace.finished:
                 simulation.keep()
                 thins = len(solution) > most + 1 and not pace.finished
-                simulation.warn(watch.judge(solution, last=thins))
+                simulation.warn(watch.judge(solution, last=thins or pace.finished))
                 if thins:
                     solution.thin()
                     solution.every *= 2
@@ -203,9 +204,7 @@ def simulate(
 def check_ledger(simulation: Simulation) -> None:
     """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
 
-    All processes know all warnings then.
-
-    All processes call it together, at the end of a run.
+    All processes call it together, at the end of a run, and know all warnings then.
 
     Warns:
         ModelWarning: It is open, perhaps by round-off.

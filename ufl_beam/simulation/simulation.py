@@ -260,11 +260,12 @@ class Simulation(StateView):
             self.warn(self._watch.judge(q1, step.t1, step.dt), here=not self.share.alone)
 
     def warn(self, found: Iterable[str], *, here: bool = False) -> None:
-        """Warn, and note in the solution, by the first process or ``here``."""
+        """Warn, and note in the solution, of what it does not say; by one process or ``here``."""
         for said in found:
-            self.solution.warnings += f"{said}\n"
-            if here or self.comm.rank == 0:
-                warn(said)
+            if said not in self.solution.warnings:
+                self.solution.warnings += f"{said}\n"
+                if here or self.comm.rank == 0:
+                    warn(said)
 
     def ask(self) -> None:
         """Ask controllers and friction for forces and limits in the next step, on all processes."""

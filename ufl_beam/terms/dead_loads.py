@@ -15,7 +15,6 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring
-from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
@@ -53,16 +52,10 @@ class DeadLoads(LoadTerm):
         self._factors: list[float] = []
 
     def begin(self, step: Step) -> None:
-        """The loads of the step; nothing is to do for those that stay.
-
-        Raises:
-            StepFailed: A time function is not finite.
-        """
+        """The loads of the step; nothing is to do for those that stay."""
         factors = self._factors_at(step.load_time)
         if factors == self._factors and step.fraction == step.at == 1:
             return
-        if not all(map(math.isfinite, factors)):  # perhaps with no loaded place in this process
-            raise StepFailed("a load is no finite number")
         self._acts = self._end = self._times(factors)
         self._factors = factors
         if step.fraction < 1 or step.at < 1:
