@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.analysis.linearization import SmallMotions
+from ufl_beam.analysis.linearization import SmallMotions, reference_state
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
@@ -250,7 +250,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
 
     They are vibrations about the undeformed, unloaded scene, or about the last state of a solution:
     with its section forces, the stiffness of its loads and of a :class:`RotatingFrame`, and the
-    elastic stiffness of yielded material.  Nothing yields or opens further, and hinges that bear no
+    elastic stiffness of yielded material.  If only loads hold the scene, as a weight a pendulum,
+    they are vibrations about the equilibrium near the undeformed scene.  Nothing yields or opens further, and hinges that bear no
     moment any more are joints.  Sticking friction is a constraint, sliding friction and controllers
     are ignored.
 
@@ -266,7 +267,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         mesh: Discretization; as ``at``, or with the cells of the beams.
 
     Raises:
-        SceneError: The call or the scene is wrong, or nothing that moves has mass.
+        SceneError: The call or the scene is wrong, nothing that moves has mass, or the scene turns
+            with a :class:`RotatingFrame` and ``at`` is not given.
 
     Example:
         >>> shapes = ub.modes(scene, 3, mesh=ub.Mesh(refine=4))
@@ -276,8 +278,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     require_kind(scene, Scene, "modes: scene")
     n = require_count(n, "modes: n")
     if at is None:
-        # Loads that the state does not balance have no part in its stiffness.
-        scene = replace(scene, loads=())
+        scene, at = reference_state(scene, mesh)
     else:
         _require_of(at, scene, mesh, "modes")
     small = SmallMotions(scene, at, mesh=mesh)
@@ -327,7 +328,8 @@ def buckling(
                 "vanishes or a damping ratio becomes negative"
             )
     if at is None:
-        require_no_mechanism(scene)
+        if said := require_no_mechanism(scene):
+            raise SceneError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
     else:
         _require_of(at, scene, mesh, "buckling")
     small = SmallMotions(scene, at, t, mesh)

@@ -39,8 +39,12 @@ from ufl_beam.terms.work_forms import require_works
 
 
 @no_garbage_collection()
-def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
-    """Make the grid of a scene, once the scheme is known to be able to compute it."""
+def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> tuple[Grid, str]:
+    """Make the grid of a scene, once the scheme is known to be able to compute it.
+
+    Also describe a motion that only loads may hold in statics; empty if there is none.
+    """
+    loose = ""
     require_kind(scene, Scene, "scene")
     require_scheme(scheme, "scheme")
     if has_inertia(scheme):
@@ -51,7 +55,7 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
             warn_of_origin(scene)
         require_rates(scene, scheme)
     else:
-        require_no_mechanism(scene)
+        loose = require_no_mechanism(scene)
         warn_of_rates(scene)
     require_works(scene, scheme, mesh)
     require_independent(scene)
@@ -60,7 +64,7 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
     grid = Grid(scene, mesh)
     if has_inertia(scheme):
         warn_of_touching(grid)
-    return grid
+    return grid, loose
 
 
 def require_scheme(scheme: Any, what: str) -> None:

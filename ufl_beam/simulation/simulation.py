@@ -26,7 +26,7 @@ from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import Assembly, assemble
 from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
-from ufl_beam.simulation.diagnosis import no_equilibrium
+from ufl_beam.simulation.diagnosis import no_equilibrium, require_held
 from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.prediction import Prediction
@@ -104,7 +104,7 @@ class Simulation(StateView):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
         if start is not None:
             require_kind(start, Solution, "start")
-        grid = checked_grid(scene, scheme, mesh_of(start, mesh))
+        grid, self._loose = checked_grid(scene, scheme, mesh_of(start, mesh))
         share = Share(grid, sharing(comm, len(grid.cells)))
         self.scene, self.scheme, self.comm, self.grid, self.share = scene, scheme, comm, grid, share
         self.together = together = Agreement(share.comm)
@@ -146,7 +146,7 @@ class Simulation(StateView):
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
-        in_python = self._copies or self.asked or not share.alone
+        in_python = self._copies or self.asked or self._loose or not share.alone
         self._in_c = None if in_python else self._steps_in_c(parts)
 
     # -- stepping ------------------------------------------------------------------------------
@@ -244,6 +244,9 @@ class Simulation(StateView):
 
     def _accept(self, trial: Trial) -> None:
         step, q1, s = trial
+        if self._loose:
+            require_held(self.equation, self.solver, q1, self._loose)
+            self._loose = ""
         if self._branch is not None:
             self._branch.accept(self.equation.force)
         for term in self.terms:
@@ -283,7 +286,7 @@ class Simulation(StateView):
         self.end()
         raise no_equilibrium(
             self.equation, self.solver, self.solution, failure, self.q, (self.t, end),
-            advice or self.scheme.advice,
+            advice or self.scheme.advice, self._loose,
         ) from failure  # fmt: skip
 
     def settle(self) -> None:
