@@ -50,6 +50,10 @@ class Memory(ABC):
         """Rows of numbered things, each on one process only; of any lengths under one name."""
 
     @abstractmethod
+    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
+        """Rows of numbered things that all processes know."""
+
+    @abstractmethod
     def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
         """Values at some places of ``size``, of which the first ``owned`` are of this process."""
 
@@ -78,6 +82,10 @@ class Saving(Memory):
         """Save numbered rows of a table."""
         self._rows[f"{name}, {rows.shape[1]}"].append(np.column_stack([numbers, rows]))
         return rows
+
+    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
+        """Save rows that all processes know, once."""
+        return self.rows(name, numbers, rows) if self._share.comm.rank == 0 else rows
 
     def state(self) -> State:
         """Return the state of all processes, on each of them; they call it together."""
@@ -124,3 +132,7 @@ class Restoring(Memory):
         found = np.minimum(np.searchsorted(table[:, 0], numbers), len(table) - 1)
         known = table[found, 0] == numbers
         return np.where(known[:, None], table[found, 1:], rows)
+
+    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
+        """Return the saved rows of these numbers."""
+        return self.rows(name, numbers, rows)

@@ -13,7 +13,7 @@ from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import NOWHERE, Restoring, Saving, State
+from ufl_beam.discretization.state_io import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import Controller, Coulomb, Running
@@ -107,9 +107,19 @@ class Assembly:
                 if isinstance(one.links[0].law, Coulomb):
                     self.rates.update(zip(one.links, one.rates(q, self.inertia.v), strict=True))
 
+    def remember_asked(self, memory: Memory) -> None:
+        """State the forces of controllers and the limits of friction in the last step."""
+        links = [(i, x) for i, x in enumerate(self.equation.share.grid.scene.links) if x in self.asked]
+        if links:
+            numbers = np.array([i for i, _ in links])
+            forces = np.array([[self.asked[link]] for _, link in links])
+            forces = memory.known_rows("asked", numbers, forces)
+            self.asked.update((x, float(f)) for (_, x), (f,) in zip(links, forces, strict=True))
+
     def internal_variables(self, q: Array) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""
         memory = Saving(self.equation.share)
+        self.remember_asked(memory)
         for one in self.remembering:
             one.remember(memory, q)
         slips = any(isinstance(link.law, Coulomb) for link in self.asked)
@@ -136,6 +146,7 @@ class Assembly:
         ``same`` says that no force has changed since, so that accelerations are what they were.
         """
         memory = Restoring(self.equation.share, internal)
+        self.remember_asked(memory)
         for one in self.remembering:
             one.remember(memory, NOWHERE)
         if "reactions" in internal:

@@ -343,6 +343,7 @@ class Simulation(StateView):
         for term in self.terms:
             term.remember(memory, self.q)
         self.supports.remember(memory, self.q)
+        self._assembly.remember_asked(memory)
         if self._branch is not None:
             self._branch.remember(memory, self.q)
 
