@@ -16,6 +16,7 @@ from ufl_beam.compiled.csr import as_slice
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.partition import Share
+from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector
@@ -185,7 +186,16 @@ class StateView(ABC):
         return np.asarray(motion_of(self.grid, place, self.share.gather(self.q)[None])[0])
 
     def velocity(self, place: Anchor) -> Array:
-        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s."""
+        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s.
+
+        Raises:
+            SceneError: The run is static; it has no velocities.
+        """
+        if not has_inertia(self.scheme):
+            raise SceneError(
+                f"velocity of {place}: the run is static; there is none. A controller for both "
+                "kinds of runs can ask now.scheme.dynamic"
+            )
         q, v = self.share.gather(self.q), self.share.gather(self.velocities()[0])
         return np.asarray(velocity_of(self.grid, place, q[None], v[None])[0])
 
