@@ -328,6 +328,18 @@ def test_recorders_whose_state_is_missing(name, make, path, tmp_path):
         run(checkpoint=checkpoint, record=make(tmp_path / name))
 
 
+@pytest.mark.serial
+def test_extremes_of_another_shape(path):
+    checkpoint = ub.Checkpoint(path, every=100)
+    run(checkpoint=checkpoint, record=ub.Extremes())
+    format = KINDS["checkpoint"].format
+    content = archive.read(path, format)
+    content["recorder 0/forces low"] = content["recorder 0/forces low"].T
+    archive.write(path, format, content)
+    with pytest.raises(ub.SceneError, match=r"checkpoint .*the array 'forces low' is float64 of"):
+        run(checkpoint=checkpoint, record=ub.Extremes())
+
+
 def header(shape, descr="'<f8'"):
     """The beginning of an array of NumPy."""
     text = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}}}\n".encode()

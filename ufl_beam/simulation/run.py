@@ -141,9 +141,9 @@ def simulate(
             for i, recorder in enumerate(recorders):
                 try:
                     recorder.resume(simulation, below(f"recorder {i}/", found))
+                except SceneError as error:
+                    raise SceneError(f"checkpoint {keeper.path}: {error}") from None
                 except (LookupError, TypeError, ValueError) as error:
-                    if isinstance(error, SceneError):
-                        raise
                     why = f"checkpoint {keeper.path}: {recorder} cannot go on from it: {error!r}"
                     raise SceneError(f"{why}. {ADVICE['checkpoint']}") from error
 
