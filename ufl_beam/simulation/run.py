@@ -24,7 +24,7 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import above, below, decoding
+from ufl_beam.output.archive import ADVICE, above, below, decoding
 from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, say
@@ -145,7 +145,13 @@ def simulate(
             solution.warnings = found["warnings"]
             keeper.resume(pace.steps)
             for i, recorder in enumerate(recorders):
-                recorder.resume(simulation, below(f"recorder {i}/", found))
+                try:
+                    recorder.resume(simulation, below(f"recorder {i}/", found))
+                except SceneError as error:
+                    raise SceneError(f"checkpoint {keeper.path}: {error}") from None
+                except (LookupError, TypeError, ValueError) as error:
+                    why = f"checkpoint {keeper.path}: {recorder} cannot go on from it: {error!r}"
+                    raise SceneError(f"{why}. {ADVICE['checkpoint']}") from error
 
         def write(keeper: Keeper) -> None:
             content = {
