@@ -91,7 +91,7 @@ def struck(seed, record=()):
 
 seeds = range(1, 49)
 cases = [{"seed": None}, *({"seed": seed} for seed in seeds)]
-study = ub.study(struck, cases, path=output / "monte_carlo_study.h5", anew=True)
+study = ub.study(struck, cases, path=output / "monte_carlo.study", anew=True)
 ub.say(f"{len(study)} members, {len(study.failed)} failed\n")
 
 # %% [markdown]

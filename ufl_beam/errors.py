@@ -8,11 +8,14 @@ import numbers
 import os
 import sys
 import warnings
+from collections.abc import Callable
 from functools import cache
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
+
+T = TypeVar("T")
 
 LONGEST = 80
 """Characters that a message shows of a value."""
@@ -240,10 +243,35 @@ def require_kind(value: Any, kind: type | tuple[type, ...], what: str) -> None:
         raise SceneError(f"{what} = {shorten(value)} is not a {names}")
 
 
+def closed(instead: str) -> Callable[[type[T]], type[T]]:
+    """Let a class of the model have no subclasses; ``instead`` tells what a user can do.
+
+    Computations know such an object by its class and its fields.  Methods and fields of a subclass
+    would be ignored.
+    """
+
+    def close(kind: type[T]) -> type[T]:
+        def refuse(cls: type, **_: object) -> None:
+            raise SceneError(
+                f"{cls.__name__}: {kind.__name__} has no subclasses, because computations would "
+                f"ignore what is theirs; {instead}"
+            )
+
+        kind.__init_subclass__ = classmethod(refuse)  # type: ignore[assignment, method-assign, arg-type]
+        return kind
+
+    return close
+
+
 def require_text(value: Any, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is text."""
+    """Raise :class:`SceneError` naming ``what`` unless ``value`` is text that files can have."""
     if not isinstance(value, str):
         raise SceneError(f"{what} = {shorten(value)} must be text")
+    if any(c == "\0" or "\ud800" <= c <= "\udfff" for c in value):
+        raise SceneError(
+            f"{what} = {shorten(value)} has a character that files cannot have, a null or a "
+            "surrogate; leave it out"
+        )
 
 
 def require_switch(value: Any, what: str) -> None:

@@ -24,12 +24,16 @@ def is_at(file: int, path: Path) -> bool:
 def locked(path: Path) -> Iterator[None]:
     """Wait until no other process is in a context with this path; the file stays.
 
-    A file system that knows no locks locks nothing.
+    It may be removed within the context: those who wait for it take a new one.  A file system that
+    knows no locks locks nothing.
     """
-    with path.open("ab") as file:
-        with suppress(OSError):
-            fcntl.flock(file, fcntl.LOCK_EX)
-        yield
+    while True:
+        with path.open("ab") as file:
+            with suppress(OSError):
+                fcntl.flock(file, fcntl.LOCK_EX)
+            if is_at(file.fileno(), path):
+                yield
+                return
 
 
 class Lock:

@@ -8,6 +8,7 @@ import pickle
 import re
 import subprocess
 import sys
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 
@@ -290,17 +291,82 @@ def test_each_record_of_the_package_can_be_saved():
     assert all(kind.__module__.startswith("ufl_beam.") for kind in RECORDS.values())
 
 
+@dataclass(frozen=True)
 class Odd(ub.Hardening):
     """A law of a user."""
 
+    factor: float = 1.0
 
-def test_records_of_others_are_refused(shared_path):
-    section = ub.Section(**STEEL, bending=Odd(limit=1e9))
-    beam = ub.Beam((0, 0), (1, 0), section, cells=2)
-    solution = swing(ub.Scene([beam], supports=[ub.Clamped(beam.start)]))
-    with pytest.raises(ub.SceneError, match="cannot be saved: Odd is no record of ufl_beam"):
-        solution.save(shared_path / "a.h5")
-    assert not (shared_path / "a.h5").exists()
+
+def of_ones_own(factor=1.0, force=-3.0, wave=3.0):
+    """A cantilever with a law, a controller and a function of the script."""
+    section = ub.Section(**STEEL, bending=Odd(limit=0.5, modulus=10.0, factor=factor))
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2, name="left")
+    load = ub.PointLoad(beam.end, force=(0, force), time=lambda t: math.sin(wave * t))
+    turn = ub.Turn(ub.ground(0, 0), beam.end, ub.Controller(lambda now: 0.1 * now.t))
+    scene = {"supports": [ub.Clamped(beam.start)], "loads": [load], "connectors": [turn]}
+    return ub.Scene([beam], **scene)
+
+
+def test_laws_of_a_user_need_the_scene_of_the_script(shared_path):
+    """The solution has that scene, with its functions: a run can go on from it."""
+    solution, path = swing(of_ones_own()), shared_path / "a.h5"
+    solution.save(path)
+    with pytest.raises(
+        ub.SceneError,
+        match=r"a\.h5: the scene has the class Odd of your own \(module test_archive\), and files "
+        r"have no code; load it with the scene of the script, ub\.load\(path, scene=scene\)",
+    ):
+        ub.load(path)
+    scene = of_ones_own()
+    loaded = ub.load(path, scene=scene)
+    assert loaded.scene is scene
+    solution.seconds = loaded.seconds
+    require_same(loaded, solution)
+    assert solution.energy.lost["plastic"][-1] > 0
+    runs = [
+        ub.simulate(one.scene, ub.Midpoint(), t=(0.5, 0.8), dt=0.1, start=one, progress=False)
+        for one in (solution, loaded)
+    ]
+    assert same(runs[0].q, runs[1].q)
+
+
+@pytest.mark.parametrize(
+    ("other", "message"),
+    [
+        (lambda: of_ones_own(factor=2.0), r"\['factor'\] is 2\.0, in the file 1\.0"),
+        (lambda: of_ones_own(force=-4.0), r"\[1\] is -4\.0, in the file -3\.0"),
+        (lambda: of_ones_own(wave=4.0), r"\['values'\]\[\d\] is .*, in the file"),
+        (cantilever, "is a solution of another scene: its beams, cells, bodies or joints are"),
+    ],
+    ids=["law", "load", "function", "scene"],
+)
+def test_another_scene_is_refused(other, message, shared_path):
+    swing(of_ones_own()).save(shared_path / "a.h5")
+    with pytest.raises(ub.SceneError, match=message):
+        ub.load(shared_path / "a.h5", scene=other())
+
+
+def test_a_path_is_loaded_with_the_scene_of_the_script(shared_path):
+    """As other solutions are, to follow a branch with functions of the script."""
+    beam = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4, name="column")
+    load = ub.PointLoad(beam.end, force=(0, -1), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    path = ub.follow(scene, ub.LoadControl(0.5), steps=8)
+    path.save(shared_path / "a.h5")
+    loaded = ub.load(shared_path / "a.h5", scene=scene)
+    assert loaded.critical[0].state.scene is scene
+    assert same(loaded.critical[0].mode, path.critical[0].mode)
+
+
+def test_laws_of_a_user_are_not_pickled():
+    with pytest.raises(ub.SceneError, match="has the class Odd of your own"):
+        pickle.dumps(swing(of_ones_own()))
+
+
+def test_objects_that_are_no_dataclasses_are_refused():
+    with pytest.raises(ub.SceneError, match="cannot be saved: object is no record of numbers"):
+        to_data(object())
 
 
 # -- files -----------------------------------------------------------------------------------------

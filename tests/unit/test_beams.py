@@ -70,6 +70,44 @@ def test_polyline_goes_by_length():
     assert beam.at(0.875).point == pytest.approx((3, 0.5))
 
 
+def bent(beam):
+    """End of a beam whose plastic hinge in the middle yields."""
+    push = ub.PointLoad(beam.end, force=(0, -3.0), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    return solution.displacement(beam.end), solution.connector(scene.hinges[0]).motion
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda **more: ub.Beam.polyline([(0, 0), (1, 0), (2, 0)], SECTION, **more),
+        lambda **more: ub.Beam.along(lambda s: (2 * s, 0.0), SECTION, **more),
+        lambda **more: ub.Beam.arc(
+            (1, -1e6), 1e6, (math.pi / 2 + 1e-6, math.pi / 2 - 1e-6), SECTION, **more
+        ),
+    ],
+    ids=["polyline", "along", "arc"],
+)  # fmt: skip
+def test_hinges_of_curved_beams(make):
+    """Their places are parameters along the whole beam; each of these beams is straight."""
+    hinges = {0.5: ub.Hardening(limit=1.0, modulus=100.0)}
+    beam = make(cells=4, hinges=hinges)
+    assert [place.s for place in beam.hinge_laws] == [0.5]
+    end, jump = bent(beam)
+    expected, straight = bent(ub.Beam((0, 0), (2, 0), SECTION, cells=4, hinges=hinges))
+    # The hinge bears a moment of 3 N m: its jump is (3 - 1)/100 rad.  The angles of the arc differ
+    # from those of the line by 1e-6 rad, which turns the motion of 0.1 m
+    assert abs(jump[-1]) == pytest.approx(0.02, rel=0.05)
+    assert np.allclose(jump, straight, rtol=0, atol=1e-6)
+    assert np.allclose(end, expected, rtol=0, atol=1e-6)
+
+
+def test_hinges_of_curved_beams_are_checked():
+    with pytest.raises(ub.SceneError, match=r"hinge at s = 2 must lie between 0 and 1"):
+        ub.Beam.arc((0, 0), 1.0, (0, 1), SECTION, hinges={2.0: ub.Hardening(1.0)})
+
+
 def test_corners_are_vertices():
     beam = ub.Beam.polyline([(0, 0), (3, 0), (3, 1)], SECTION, cells=3)
     assert beam.vertices(()) == pytest.approx([0, 1 / 3, 2 / 3, 3 / 4, 1])

@@ -436,3 +436,99 @@ def test_a_kernel_without_vectors_is_remembered(place, tmp_path):
         simd_kernels.in_lanes.cache_clear()
         assert simd_kernels.in_lanes(source, 0, (1, 1, 0)) is None
     assert len([path for path in place.iterdir() if path.is_dir()]) == 1
+
+
+# -- what was not used for long --------------------------------------------------------------------
+
+
+def aged(path, days):
+    """Let a file be so old."""
+    then = time.time() - days * code_cache.DAY
+    os.utime(path, (then, then))
+
+
+def entries(place):
+    return sorted(path.name for path in place.iterdir() if path.name != code_cache.SWEPT)
+
+
+def test_what_was_not_used_for_a_month_is_removed_once_a_day(place):
+    builds = {name: Builds() for name in ("old_1", "used_2", "new_3")}
+    for name, build in builds.items():
+        build(name)
+    for name, days in (("old_1", 31), ("used_2", 29)):
+        aged(place / name / CHECKSUMS, days)
+        aged(place / f"{name}.lock", 99)
+    aged(place / "new_3.lock", 99)
+    (place / "old_1.rest.part").mkdir()  # of a process that was killed
+    (place / "gone_4.lock").touch()
+    aged(place / "gone_4.lock", 31)
+    code_cache.sweep(place)
+    assert entries(place) == ["new_3", "new_3.lock", "used_2", "used_2.lock"]
+    for name, count in (("old_1", 2), ("used_2", 1), ("new_3", 1)):
+        assert builds[name](name) == count
+    # On the same day nothing is looked for
+    aged(place / "new_3" / CHECKSUMS, 31)
+    code_cache.sweep(place)
+    assert (place / "new_3").exists()
+    aged(place / code_cache.SWEPT, 2)
+    code_cache.sweep(place)
+    assert not (place / "new_3").exists()
+
+
+def test_a_use_is_noted_once_a_day(place):
+    build = Builds()
+    build()
+    for days, noted in ((0.5, False), (2.0, True)):
+        aged(place / ENTRY / CHECKSUMS, days)
+        before = (place / ENTRY / CHECKSUMS).stat().st_mtime
+        assert build() == 1
+        assert ((place / ENTRY / CHECKSUMS).stat().st_mtime != before) == noted
+
+
+def test_what_is_used_while_it_is_removed_stays(place, monkeypatch):
+    """Another process finds it between the two looks at its age."""
+    build, age = Builds(), code_cache._age
+    build()
+    for path in (place / ENTRY / CHECKSUMS, place / f"{ENTRY}.lock"):
+        aged(path, 31)
+
+    def used(path):
+        found = age(path)
+        if path == place / ENTRY / CHECKSUMS:
+            os.utime(path)
+        return found
+
+    monkeypatch.setattr(code_cache, "_age", used)
+    code_cache.sweep(place)
+    assert entries(place) == [ENTRY, f"{ENTRY}.lock"]
+    assert build() == 1
+
+
+def test_what_is_removed_while_it_is_loaded_is_built_again(place):
+    build = Builds()
+    build()
+    load = build.load
+
+    def removed(directory):
+        build.load = load
+        for path in (directory / CHECKSUMS, directory / "library.so"):
+            path.unlink()
+        return load(directory)
+
+    build.load = removed
+    assert build() == 2
+
+
+def test_a_cache_that_cannot_be_written_is_not_swept(place, monkeypatch):
+    def refuse(*_, **__):
+        raise PermissionError
+
+    build = Builds()
+    build()
+    for path in (place / ENTRY / CHECKSUMS, place / f"{ENTRY}.lock"):
+        aged(path, 31)
+    for name in ("touch", "rename", "unlink"):
+        monkeypatch.setattr(Path, name, refuse)
+    monkeypatch.setattr(os, "utime", refuse)
+    code_cache.sweep(place)
+    assert build() == 1

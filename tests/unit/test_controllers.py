@@ -166,7 +166,7 @@ def test_the_criterion_of_the_pages(sample, ratio, stable):
         what = "steps" if sample is None else "samples"
         assert "Slide(ground (0, 0), slider (0, 0)): the force changed its direction" in one
         assert f"each of the 20 {what}" in one
-        assert "kd dt < 2 J" in one and "ForceLaw" in one
+        assert all(remedy in one for remedy in ("kd dt < 2 J", "ForceLaw", "PointMass"))
         assert one in str(solution)
 
 
@@ -196,7 +196,7 @@ DAMPED = ub.Midpoint(alpha=0.02, beta=0.02)
 @pytest.mark.parametrize("dt", [1e-3, 1e-4])
 def test_bang_bang_at_the_end_of_a_beam_warns(dt):
     """Of the force, and of the work that the scheme takes; shorter steps do not help."""
-    scene, beam = arm(controlled)
+    scene, _ = arm(controlled)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         solution = ub.simulate(scene, DAMPED, t=(0, 150 * dt), dt=dt, comm=MPI.COMM_SELF)

@@ -1,9 +1,12 @@
 # SPDX-License-Identifier: MIT
 """Two runs on one checkpoint: the second one is refused and touches nothing."""
 
+import fcntl
 import re
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 from mpi4py import MPI
@@ -11,7 +14,7 @@ from mpi4py import MPI
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.file_locks import Lock
+from ufl_beam.file_locks import Lock, locked
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
@@ -131,6 +134,8 @@ def test_the_lock_ends_with_its_process(tmp_path):
 
 SECOND = """
 import sys
+import threading
+import time
 from pathlib import Path
 sys.path.insert(0, sys.argv[2])
 import test_file_locks
@@ -155,3 +160,23 @@ def test_a_script_that_is_started_again_while_it_runs(tmp_path):
     assert re.search(r"run\.h5 is in use: process \d+ on .* writes it", second.stderr)
     # A line for the names, one for the initial state and each of the five steps
     assert len((tmp_path / "run.csv").read_text().splitlines()) == 1 + 6
+
+
+def test_who_waits_for_a_lock_that_is_removed_takes_a_new_one(tmp_path):
+    """Else two processes would hold two files of one name."""
+    path, found = tmp_path / "a.lock", []
+
+    def wait():
+        with locked(path) as _:
+            found.append(path.exists())
+            with path.open("ab") as other, pytest.raises(BlockingIOError):
+                fcntl.flock(other, fcntl.LOCK_EX | fcntl.LOCK_NB)
+
+    with locked(path):
+        thread = threading.Thread(target=wait)
+        thread.start()
+        time.sleep(0.1)
+        assert not found
+        path.unlink()
+    thread.join(10)
+    assert found == [True]

@@ -144,7 +144,8 @@ def test_contradictions_are_refused_by_name():
     one = beam()
     drive = ub.Turn(ub.ground(0, 0), one.start, ub.Motor(lambda t: t))
     clamped = ub.Scene([one], supports=[ub.Clamped(one.start)], connectors=[drive])
-    with raises("Turn(ground (0, 0), beam.start (0, 0)) can be left out"):
+    turned = "Turn(ground (0, 0), beam.start (0, 0)) with Motor"
+    with raises(f"{turned}; Clamped at beam.start (0, 0) can be left out"):
         run(clamped)
     axes = (1, 0), (-1, 0)
     rails = [ub.Prismatic(ub.ground(0, 0), one.end, axis=x, turning=True) for x in axes]

@@ -239,9 +239,23 @@ class OfNumPy(Half):
         return {"p": np.tanh(strain)}
 
 
+@dataclass(frozen=True)
+class Shadowing(Dashpot):
+    C: float = 0.0
+    numbers: float = 1.0
+
+
+@dataclass(frozen=True)
+class Renamed(Dashpot):
+    def numbers(self, C):
+        return {"C": 1.0, "eta": self.eta}
+
+
 @pytest.mark.parametrize(
     ("law", "says"),
     [
+        (Shadowing(1.0), "Shadowing: a field cannot have the name C or numbers"),
+        (Renamed(1.0), "Renamed.numbers has the name C"),
         (Half(), "Half has neither increments nor residuals"),
         (Misspelt(), "Misspelt.increments: what it returns lacks p and has q"),
         (Unknown(), "Unknown.increments fails .* no internal variable 'plastic'; .*: p"),

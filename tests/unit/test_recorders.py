@@ -238,6 +238,22 @@ def test_history_without_places(shared_path, on_first_rank):
     assert (rows[:, 1] == solution.energy["stored"]).all()
 
 
+def test_names_in_a_table_are_no_formulas(shared_path, on_first_rank):
+    """Spreadsheets would compute what begins with one of these characters."""
+    pushed = scene()
+    beam = pushed.beams[0]
+    names = ["=1+1", "+a", "-a", "@a", "a=b"]
+    works = [ub.Potential(name, lambda q: q[1] ** 2) for name in names]
+    pushed = ub.Scene([beam], supports=pushed.supports, works=works)
+    ub.simulate(
+        pushed, ub.Static(), t=(0, 1), dt=1.0, progress=False,
+        record=ub.History(shared_path / "a.csv"),
+    )  # fmt: skip
+    line = on_first_rank(lambda: (shared_path / "a.csv").read_text().splitlines()[0])
+    assert not [cell for cell in line.split(",") if cell[0] in "=+-@"]
+    assert {f"'{name} [J]" for name in names[:4]} | {"a=b [J]"} <= set(line.split(","))
+
+
 def test_history_of_points_of_bodies_and_of_connectors(shared_path, on_first_rank):
     scene = machine(beams=False)
     spring, damper, _ = scene.connectors

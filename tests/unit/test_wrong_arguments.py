@@ -48,7 +48,8 @@ OBJECT = [None, "x", 1.0, (0, 0), ARRAY, object(), int]
 """In the place of any object of this package."""
 LIST = [None, 1.0, "ab", [None], ["x"], [1.0], object()]
 """In the place of a list of objects of this package."""
-TEXT = [None, 1.0, b"x", ["x"]]
+TEXT = [None, 1.0, b"x", ["x"], "\ud800", "a\0"]
+HINGES = [None, 1.0, "x", [], {0.5: 1}, {1.5: ub.Hardening(1.0)}]
 SWITCH = [None, "yes", 2, 1.5, [], ARRAY]
 PATH = [None, 1.0, "", b"x", ["x"], object()]
 FUNCTION = [None, "x", 1.0, ARRAY]
@@ -185,23 +186,25 @@ TABLE = {
     "Beam": call(
         ub.Beam,
         a=V((0, 0), VECTOR), b=V((1, 0), VECTOR), section=V(SECTION, OBJECT), cells=V(2, COUNT),
-        name=V("girder", TEXT), curve=V(None, CURVE), hinges=V({}, [None, 1.0, "x", [], {0.5: 1}]),
+        name=V("girder", TEXT), curve=V(None, CURVE), hinges=V({}, HINGES),
         corners=V((), [None, 1.0, "ab", [None], ["0.5"], [NAN], [1j], [1.5], [ARRAY]]),
     ),
     "Beam.arc": call(
         ub.Beam.arc,
         center=V((0, 0), VECTOR), radius=V(1.0, POSITIVE), angles=V((0, 1), VECTOR),
         section=V(SECTION, OBJECT), cells=V(2, COUNT), name=V("girder", TEXT),
+        hinges=V({}, HINGES),
     ),
     "Beam.polyline": call(
         ub.Beam.polyline,
         points=V([(0, 0), (1, 0)], [None, 1.0, "ab", [(0, 0)], [(0, 0), None], [(0, 0), (1, NAN)]]),
         section=V(SECTION, OBJECT), cells=V(2, COUNT), name=V("girder", TEXT),
+        hinges=V({}, HINGES),
     ),
     "Beam.along": call(
         ub.Beam.along,
         curve=V(lambda s: (s, 0), [*CURVE, None]), section=V(SECTION, OBJECT), cells=V(2, COUNT),
-        name=V("girder", TEXT),
+        name=V("girder", TEXT), hinges=V({}, HINGES),
     ),
     "Beam.at": call(BEAM.at, s=V(0.5, [*NUMBER, -0.1, 1.1])),
     "Place": call(
@@ -268,7 +271,10 @@ TABLE = {
         state=V([0.0], [None, 1.0, "ab", [NAN], [1j], ["1"], [[1.0]], [HUGE]]),
         stored=V(None, optional(FUNCTION)),
     ),
-    "Controller": call(ub.Controller, force=V(lambda simulation: 1.0, FUNCTION)),
+    "Controller": call(
+        ub.Controller,
+        force=V(lambda simulation: 1.0, FUNCTION), sample=V(None, optional(POSITIVE)),
+    ),
     "Motor": call(ub.Motor, motion=V(lambda t: t, [*TIME, None])),
     "Actuator": call(ub.Actuator, force=V(lambda t: t, [*TIME, None])),
     # loads, supports, masses
@@ -406,7 +412,7 @@ TABLE = {
     # files
     "XDMF": call(ub.XDMF, path=V("run.xdmf", [*PATH, "run.h5"]), every=V(1, COUNT)),
     "VTKHDF": call(ub.VTKHDF, path=V("run.vtkhdf", [*PATH, "run.h5"]), every=V(1, COUNT)),
-    "load": call(ub.load, path=V("run.h5", PATH)),
+    "load": call(ub.load, path=V("run.h5", PATH), scene=V(None, optional(OBJECT))),
     "History": call(
         ub.History,
         path=V("run.csv", PATH), places=V((), LIST), connectors=V((), LIST), every=V(1, COUNT),

@@ -4,6 +4,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import block_array, coo_array, csr_array, diags_array
@@ -14,9 +16,11 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.one_line import bracketed, one_line
 from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.step_solver import Trial
 from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
 
 INVERSE_ITERATIONS = 50  # inverse iterations in which a mode is sought
+MODE_TOLERANCE = 1e-8  # its change in the last one; the square is the error of the eigenvalue
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +129,8 @@ class Stiffness:
     """Tangent stiffness of the whole scene, factored by every process; StepFailed if singular.
 
     Each process gives its part A of the tangent, the local degrees of freedom ``held`` by supports,
-    and its part ``rate`` of the derivative of the residual by the load factor.
+    and its part ``rate`` of the derivative of the residual by the load factor.  ``weights`` are
+    those of the :func:`metric` at all degrees of freedom.
 
     Attributes:
         negative: Number of negative eigenvalues, the forces of connectors eliminated; where it is
@@ -134,7 +139,7 @@ class Stiffness:
             (grid.size,).
     """
 
-    def __init__(self, share: Share, A: Csr, held: Index, rate: Array) -> None:
+    def __init__(self, share: Share, A: Csr, held: Index, rate: Array, weights: Array) -> None:
         grid = share.grid
         entries = share.dofs[A.rows()], share.dofs[A.indices], A.data
         parts = share.comm.allgather((*entries, share.dofs, rate, share.dofs[held]))
@@ -143,9 +148,10 @@ class Stiffness:
         shape = (grid.size, grid.size)
         self._K = csr_array(coo_array((data, (rows, columns)), shape=shape))[free][:, free]
         forces = np.bincount(dofs, weights=rates, minlength=grid.size)[free]
-        self._free, self._size = free, grid.size
+        self._free, self._size, self._weights = free, grid.size, weights[free]
         self._motions = len(free) - len(grid.multipliers)
         self._factor()
+        self._forces = forces
         self.flow = self._spread(-self._solve(forces))
 
     def _factor(self) -> None:
@@ -190,6 +196,14 @@ class Stiffness:
         x[n:] = given + self._unit * x[n:]
         return x
 
+    @property
+    def most_work(self) -> float:
+        """Work of the load if it went all along the largest motion of the softest mode; N m."""
+        units = np.sqrt(self._weights)
+        moving = units > 0.0
+        forces = np.abs(self._forces[moving]) / units[moving]
+        return float(forces.sum() * np.abs(self.softest[1][self._free] * units).max())
+
     def passed(self, other: Stiffness) -> bool:
         """Return whether an eigenvalue has passed zero on the way from another state."""
         change = self.negative - other.negative
@@ -200,15 +214,39 @@ class Stiffness:
         values[self._free] = of_free
         return values
 
-    def softest(self, weights: Array) -> tuple[float, Array]:
-        """Find the eigenvalue nearest to zero, N m, and its mode, of length 1 in a metric."""
-        w = weights[self._free]
+    @cached_property
+    def softest(self) -> tuple[float, Array]:
+        """Eigenvalue nearest to zero, N m, and its mode, of length 1 in the metric."""
+        w = self._weights
         mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
-        λ = np.inf
         for _ in range(INVERSE_ITERATIONS):
-            mode = self._solve(w * mode)
-            mode /= np.sqrt(w @ mode**2)
-            before, λ = λ, float(mode @ (self._K @ mode))
-            if abs(λ - before) <= 1e-10 * abs(λ):
+            before, mode = mode, self._solve(w * mode)
+            mode /= np.sqrt(w @ mode**2) * np.sign(w @ (mode * before) or 1.0)
+            if w @ (mode - before) ** 2 <= MODE_TOLERANCE**2:
                 break
+        # More digits, as the works of stiff cells nearly cancel
+        K, x = self._K.tocoo(), mode.astype(np.longdouble)
+        λ = float(np.sum(K.data * x[K.row] * x[K.col]))
         return λ, self._spread(mode * np.sign(mode[np.abs(w * mode).argmax()]))
+
+
+class Candidate(NamedTuple):
+    """End of a step that may be accepted, with the stiffness and the direction of the path.
+
+    At a bifurcation point with the critical mode.
+    """
+
+    trial: Trial
+    stiffness: Stiffness
+    way: Direction
+    mode: Array | None = None
+
+    @property
+    def end(self) -> Direction:
+        """State and load factor."""
+        return Direction(self.trial.q1, self.trial.step.t1)
+
+    def passed(self, before: Candidate) -> bool:
+        """Return whether an eigenvalue passed zero, or the load factor turned, since ``before``."""
+        turned = (self.way.t < 0) != (before.way.t < 0)
+        return turned or self.stiffness.passed(before.stiffness)

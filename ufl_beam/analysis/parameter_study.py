@@ -52,7 +52,7 @@ def study(
             and shapes for each case.  Files that it writes need names of their own.
         cases: Its arguments: ``[{"seed": seed, "mass": m} for m in (1, 2) for seed in range(50)]``;
             numbers, texts and lists of them, no two alike.
-        path: HDF5 file of the results, written on the way in at most a twentieth of the time.
+        path: File of the results, written on the way in at most a twentieth of the time.
             Cases that the file has are not computed again, unless they failed; what it has of
             other cases stays.
         anew: Compute all cases again and discard the results in the file, after a change of the

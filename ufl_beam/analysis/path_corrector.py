@@ -7,7 +7,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -53,18 +53,35 @@ class Plane:
         return self.corrector.along(self.normal, way) / self.reach
 
 
+class Crossing(NamedTuple):
+    """Step to a bifurcation point, with the critical mode there.
+
+    Along the mode the tangent is singular, and the load does no work: a correction along it is
+    round-off over zero.  So only the load factor moves the step along the mode, as it moves the
+    path: ``speed`` is its motion along the mode for a unit of the load factor.  The mode is in the
+    axes of supports.
+    """
+
+    predicted: Direction
+    mode: Array
+    speed: float
+
+
 class PathCorrector:
     """Newton corrector of a path: equilibrium together with the equation of the control.
 
-    A change ``factor`` of the load factor counts as much as a unit of displacement.
+    A change ``factor`` of the load factor counts as much as a unit of displacement.  Steps are
+    predicted and corrected by ``crossing``, where there is one.
     """
 
     def __init__(self, simulation: Simulation, factor: float) -> None:
         self.simulation, self.factor = simulation, factor
         self.share = simulation.share
         self.weights = metric(self.share)
+        self._all_weights = self.share.gather(self.weights)
         self.t = simulation.t
         self.dissipates = False
+        self.crossing: Crossing | None = None
         self._driven: list[Term] = [*simulation.loads, *simulation.couplings]
         self.direction: Direction = Direction(np.zeros(self.share.size), 0.0)
         self.sought = self.direction
@@ -204,6 +221,11 @@ class PathCorrector:
         supports, moving = self.simulation.supports, self.simulation.supports.moving
         if len(moving):
             z = z - self._rates
+        if self.crossing is not None:
+            mode = Direction(self.crossing.mode, 0.0)
+            y -= self.product(Direction(y, 0.0), mode) * mode.q
+            along = self.product(Direction(z, 0.0), mode) + self.crossing.speed
+            z = z - along * mode.q
         q = supports.in_plane(self._x)
         residual = self._constraint.residual(q, self.t)
         by_y = self._constraint.derivative(q, Direction(supports.in_plane(y), 0.0))
@@ -226,6 +248,8 @@ class PathCorrector:
         Closed openings that do not flow are held closed if they can be, see openings.py, unless
         ``hold`` is false, as in a direction in which they open.
         """
+        if self.crossing is not None:
+            predicted = self.crossing.predicted
         self._constraint, self.sought = constraint, predicted
         simulation = self.simulation
         self.t = simulation.t + predicted.t
@@ -246,7 +270,7 @@ class PathCorrector:
         for _ in range(2):  # the first tangent of a step is that of the forces before it
             rate = np.zeros(self.share.size)
             self.simulation.together(self.tangent, supports.in_axes(q), rate)
-        return Stiffness(self.share, self._A, supports.dofs, rate)
+        return Stiffness(self.share, self._A, supports.dofs, rate, self._all_weights)
 
     def direction_of(self, stiffness: Stiffness) -> Direction:
         """Return the direction of the path in which the load factor grows."""

@@ -3,13 +3,15 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
-from typing import NamedTuple
+from contextlib import suppress
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
-from ufl_beam.analysis.critical_points import Branch, CriticalPoint, Direction, Stiffness
-from ufl_beam.analysis.path_corrector import Control, PathCorrector, Plane
+from ufl_beam.analysis.critical_points import Branch, Candidate, CriticalPoint, Direction
+from ufl_beam.analysis.path_corrector import Control, Crossing, PathCorrector, Plane
 from ufl_beam.errors import StepFailed
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.step_solver import Trial
@@ -18,6 +20,11 @@ SMALLEST_STEP_PART = 2.0**-12  # a step is cut down to this part of it
 TARGET_ITERATIONS = 12  # steps of more are followed by shorter ones, of fewer by longer ones
 MOST_FAILURES = 4  # of steps, before a critical point is sought from another state
 LOCATION_TOLERANCE = 1e-7  # critical points are located to this part of a step
+BRACKET = 1e-2  # part of a step within which motions along a critical mode are interpolated
+SEPARABLE = 1.5e-5  # critical points closer than this part of a step need not be told apart
+MOST_CROSSING_STEPS = 8  # steps to a bifurcation point from there
+SOFT = 0.1  # part of its size at the ends of a step that an eigenvalue is in such a bracket
+IDLE = 1e-6  # part of the most work of a load, below which it does none
 MOST_LOCATION_STEPS = 60  # steps in which a critical point is sought
 LEAST_COSINE = 0.5  # cosine of the angle by which a step may leave the direction of its predictor
 LARGEST_LENGTH_RATIO = 10.0  # ratio by which a step may be longer than its predictor
@@ -27,24 +34,6 @@ LEAP_PART = 0.1  # part of a step by which states before and at a critical point
 SINGULAR_RATIO = 1e-3  # what is below this part of its size at the ends of a step vanishes
 
 
-class Candidate(NamedTuple):
-    """End of a step that may be accepted, with the stiffness and the direction of the path."""
-
-    trial: Trial
-    stiffness: Stiffness
-    way: Direction
-
-    @property
-    def end(self) -> Direction:
-        """State and load factor."""
-        return Direction(self.trial.q1, self.trial.step.t1)
-
-    def passed(self, before: Candidate) -> bool:
-        """Return whether an eigenvalue passed zero, or the load factor turned, since ``before``."""
-        turned = (self.way.t < 0) != (before.way.t < 0)
-        return turned or self.stiffness.passed(before.stiffness)
-
-
 class PathStepper:
     """Stepper of a path: it sets lengths of steps and locates critical points."""
 
@@ -52,7 +41,6 @@ class PathStepper:
         self._simulation, self._control = simulation, control
         self._corrector = PathCorrector(simulation, control.factor)
         self.critical: list[CriticalPoint] = []
-        self._weights = simulation.share.gather(self._corrector.weights)
         self._part = 1.0
         self._before: Candidate | None = None
         self._landed = False
@@ -70,8 +58,12 @@ class PathStepper:
             given = Plane(corrector, factor, 1.0, corrector.start + -factor)
             simulation.accept(corrector.attempt(still, given))
         corrector.begin()
-        way = corrector.direction_of(corrector.stiffness_at(simulation.q))
+        stiffness = corrector.stiffness_at(simulation.q)
+        way = corrector.direction_of(stiffness)
         corrector.direction = way if self._control.sense(corrector, way, None) > 0 else -way
+        here = Trial(corrector.step_at(simulation.t), simulation.q, np.zeros(corrector.share.size))
+        # A run that ended at a critical point may go on from there.
+        self._before, self._landed = Candidate(here, stiffness, corrector.direction), not fresh
 
     @property
     def tried(self) -> float:
@@ -111,18 +103,24 @@ class PathStepper:
             self._landed = False
             self._take(self._seek(part))
             return
+        if found.mode is not None:
+            way, self._landed = corrector.direction, False  # signs are those beyond it
+            self._take(found)
+            self._note(found, way, len(self._simulation.solution), limit=False)
+            return
         self._landed = found.passed(before)
         # The load factor has turned in the state that was found, as at a kink, or its slope
         # vanishes.  It and the eigenvalue need not change their signs in the same last digit.
+        soft = _vanishes(self._softness, found, before, after)
         limit = self._turned(found) or _vanishes(self._slope, found, before, after)
+        limit = limit and not (soft and self._idle(found, before, after))
         if self._landed and not corrector.dissipates and corrector.dissipation(found.trial.q1) > 0:
             self._pass_kink(found, reached - 2 * LOCATION_TOLERANCE * part, part, limit)
             return
         # What yields or opens may change signs without an eigenvalue of zero.
-        soft = limit or _vanishes(self._softness, found, before, after)
         way = corrector.direction
         self._take(found)
-        if self._landed and soft:
+        if self._landed and (soft or limit):
             self._note(found, way, len(self._simulation.solution), limit)
 
     def _pass_kink(self, after: Candidate, last: float, part: float, limit: bool) -> None:
@@ -167,18 +165,30 @@ class PathStepper:
     def _locate(self, before: Candidate, after: Candidate, part: float) -> tuple[Candidate, float]:
         """The first state whose signs have changed, and the part of the step that leads there.
 
-        By false position with halved weights (Illinois).  Where a step in between fails, or the
-        signs change in a leap to another branch, the last state before, for shorter steps from
-        there.
+        By false position with halved weights (Illinois).  At a bifurcation, from states so far on
+        both sides that round-off along the mode is small there, see :meth:`_cross`.  Where a step
+        in between fails, or the signs change in a leap to another branch, the last state before,
+        for shorter steps from there.
         """
-        measure = self._slope if self._turned(after) else self._softness
-        below = self._corrector.start
-        low, high, here, there = 0.0, part, measure(before), -measure(after)
-        last = failed = 0
+        low, high, first, last = 0.0, part, before, after
+        weight_low, weight_high, bracket = 1.0, 1.0, BRACKET
+        side = failed = 0
         for _ in range(MOST_LOCATION_STEPS):
             if high - low <= LOCATION_TOLERANCE * part:
                 break
+            turned = self._turned(last)
+            if not turned and high - low <= bracket * part and self._soft(last, before, after):
+                several = abs(last.stiffness.negative - before.stiffness.negative) > 1
+                if not several or bracket <= SEPARABLE:
+                    with suppress(StepFailed):
+                        return self._cross((low, high), (first, last), (before, after), part)
+                bracket /= 10
+            measure = self._slope if turned else self._softness
+            here, there = weight_low * measure(first), -weight_high * measure(last)
             middle = (low * there - high * here) / (there - here)
+            if not turned and high - low > bracket * part:
+                # Beyond the estimate, so that it comes to lie between two states.
+                middle += 0.4 * bracket * part * (1 if here < -there else -1)
             margin = min(0.01 * (high - low), LOCATION_TOLERANCE * part)
             middle = min(max(middle, low + margin), high - margin)
             try:
@@ -186,26 +196,85 @@ class PathStepper:
             except StepFailed:
                 failed += 1
                 if failed < MOST_FAILURES:
-                    there *= 4
+                    weight_high *= 4
                     continue
                 if low > 0:
                     self._part = (high - low) / 2
                     return self._seek(low), low
                 break
-            side = -1 if found.passed(before) else 1
-            if side > 0:
-                low, here, below = middle, measure(found), found.end
-                there /= 2 if last == side else 1
+            if found.passed(before):
+                weight_low *= 0.5 if side < 0 else 1.0
+                high, last, weight_high, side = middle, found, 1.0, -1
             else:
-                high, there = middle, -measure(found)
-                here /= 2 if last == side else 1
-            last = side
+                weight_high *= 0.5 if side > 0 else 1.0
+                low, first, weight_low, side = middle, found, 1.0, 1
         found, start = self._seek(high), self._corrector.start
+        below = start if low == 0.0 else first.end
         leap, whole = (self._corrector.length(found.end + -one) for one in (below, start))
         if low > 0 and leap > LEAP_PART * whole:
             self._part = (part - low) / 2
             return self._seek(low), low
         return found, high
+
+    def _cross(
+        self,
+        parts: tuple[float, float],
+        near: tuple[Candidate, Candidate],
+        ends: tuple[Candidate, Candidate],
+        part: float,
+    ) -> tuple[Candidate, float]:
+        """The bifurcation point between two states near to it, and the part that leads there.
+
+        Close to it, round-off and what the solver leaves would move the state along the mode,
+        perhaps to the other branch.  So motions along the mode and the direction of the path are
+        those of a cubic between the two states.  Signs are those of the second state.
+
+        Raises:
+            StepFailed: It is no bifurcation point, or was not found.
+        """
+        corrector, leave = self._corrector, self._simulation.supports.leave
+        (first, last), (before, after) = near, ends
+        whole, stiffness = last.end + -first.end, last.stiffness
+        if not whole.t * first.way.t * last.way.t:
+            raise StepFailed("the load factor turns here")
+        speeds = [whole.t / one.way.t * one.way.q for one in near]
+        path = CubicHermiteSpline([0.0, 1.0], [first.end.q, last.end.q], speeds)
+        (x0, λ0), (x, λ) = ((float(k), one.stiffness.softest[0]) for k, one in enumerate(near))
+        for _ in range(MOST_CROSSING_STEPS):
+            x0, x = x, (x0 * λ - x * λ0) / (λ - λ0) if λ != λ0 else math.nan
+            if not 0.0 <= x <= 1.0:
+                break
+            end, way = Direction(path(x), first.end.t + x * whole.t), Direction(path(x, 1), whole.t)
+            mode = np.array(stiffness.softest[1][corrector.share.dofs])
+            leave(seen := mode.copy())
+            speed = corrector.product(way, Direction(seen, 0.0)) / way.t
+            corrector.crossing = Crossing(end + -corrector.start, mode, speed)
+            reached = (1 - x) * parts[0] + x * parts[1]
+            try:
+                found = self._seek(reached)
+            finally:
+                corrector.crossing = None
+            stiffness = found.stiffness
+            λ0, λ = λ, stiffness.softest[0]
+            near_by = abs(x - x0) * (parts[1] - parts[0]) <= LOCATION_TOLERANCE * part
+            if not near_by and abs(λ) < abs(λ0) / 2:
+                continue
+            # Where it falls no more, the eigenvalue is round-off.
+            if not self._soft(found, first, last) or not self._idle(found, before, after):
+                break
+            way = (1.0 if way.t * first.way.t > 0 else -1.0) / corrector.length(way) * way
+            leave(mode := np.array(stiffness.softest[1][corrector.share.dofs]))
+            return Candidate(found.trial, last.stiffness, way, mode), reached
+        raise StepFailed("no bifurcation point was found")
+
+    def _idle(self, found: Candidate, before: Candidate, after: Candidate) -> bool:
+        """Return whether the load does no work on the critical mode, or as little as round-off."""
+        least = IDLE * found.stiffness.most_work
+        return self._work(found) < least or _vanishes(self._work, found, before, after)
+
+    def _soft(self, found: Candidate, before: Candidate, after: Candidate) -> bool:
+        """Return whether an eigenvalue is small, compared with those at the ends of a step."""
+        return self._softness(found) < SOFT * max(map(self._softness, (before, after)))
 
     def _turned(self, found: Candidate) -> bool:
         """Return whether the load factor goes the other way than before the step."""
@@ -213,7 +282,7 @@ class PathStepper:
 
     def _softness(self, found: Candidate) -> float:
         """Size of the eigenvalue nearest to zero; N m."""
-        return abs(found.stiffness.softest(self._weights)[0])
+        return abs(found.stiffness.softest[0])
 
     def _slope(self, found: Candidate) -> float:
         """Change of the load factor along the path over that of the configuration.
@@ -223,15 +292,25 @@ class PathStepper:
         """
         return abs(found.way.t) / self._corrector.size(found.way)
 
+    def _work(self, found: Candidate) -> float:
+        """Work of the load on the critical mode, near a critical point; N m.
+
+        As t'/|q'| = λ/(f·x) where the motion is along a mode x of length 1 with the eigenvalue λ.
+        The quotient tends to zero where the load does no work on it, whatever round-off adds to q'.
+        """
+        slope = self._slope(found)
+        return self._softness(found) / slope if slope else math.inf
+
     def _note(self, found: Candidate, before: Direction, n: int, limit: bool) -> None:
         """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
         corrector, simulation, way = self._corrector, self._simulation, found.way
         if limit:
             # At a limit point the path goes along the mode.
             mode = np.asarray(way.q / corrector.size(way), dtype=np.float64)
+        elif found.mode is not None:
+            mode = found.mode
         else:
-            critical = found.stiffness.softest(self._weights)[1]
-            mode = np.asarray(critical[corrector.share.dofs], dtype=np.float64)
+            mode = np.array(found.stiffness.softest[1][corrector.share.dofs])
             simulation.supports.leave(mode)
             # What the path goes along the mode is lost in a singular stiffness.
             strayed = Direction(way.q - before.q, 0.0)

@@ -14,7 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.output.archive import above, below, decoding, read, require_arrays, write
-from ufl_beam.output.output_files import require_path, require_writable
+from ufl_beam.output.output_files import require_path
 from ufl_beam.rich_display import Rich
 
 Outcome = dict[str, Array] | str  # result of a member, or the reason of its failure
@@ -92,7 +92,6 @@ class Study(Rich):
             OSError: There is no space for it.
         """
         file = require_path(path, "study")
-        require_writable(file)
         content = {
             "member": self.member, "cases": [*map(text_of, self.cases)], "seconds": self.seconds,
             "errors": [self.failed.get(i, "") for i in range(len(self))],

@@ -3,7 +3,8 @@
 
 An entry is a directory with the files of one build and a list of their checksums.  It is built
 elsewhere, written to the disk and renamed, so that a process that dies leaves no part of one.  The
-lock of an entry belongs to the operating system, which frees it when the process ends.
+lock of an entry belongs to the operating system, which frees it when the process ends.  Entries
+that were not used for a month are removed, at most once a day.
 """
 
 from __future__ import annotations
@@ -14,8 +15,10 @@ import os
 import shutil
 import stat
 import tempfile
+import time
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import TypeVar
@@ -40,7 +43,10 @@ def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tu
     place, foreign = _place(), False
     if intact(place / name):
         try:
+            _note_use(place / name)
             return load(place / name), place / name
+        except FileNotFoundError:
+            pass  # removed in between, as it was not used for long
         except ImportError:
             foreign = True  # built for another system
     if not os.access(place, os.W_OK | os.X_OK):
@@ -107,6 +113,60 @@ def _sync(path: Path) -> None:
         os.close(descriptor)
 
 
+# -- what was not used for long ------------------------------------------------------------------
+
+DAY = 86_400.0
+"""Time after which a use is noted again, and unused entries are looked for again; s."""
+
+UNUSED = 30 * DAY
+"""Time after which an entry that was not used is removed; s."""
+
+SWEPT = "swept"
+"""File whose time of change is when unused entries were looked for last."""
+
+
+def _age(path: Path) -> float:
+    """Time since a file was written, or used as :func:`_note_use` notes it; s."""
+    return time.time() - path.stat().st_mtime
+
+
+def _note_use(entry: Path) -> None:
+    """Note that an entry is in use, at most once a day; FileNotFoundError if it is gone."""
+    if _age(entry / CHECKSUMS) > DAY:
+        with suppress(PermissionError):  # of the administrator
+            os.utime(entry / CHECKSUMS)
+
+
+def sweep(place: Path) -> None:
+    """Remove entries that were not used for long, with their locks; at most once a day.
+
+    An entry is moved away before it is removed, so that no process finds a part of it.
+    """
+    with suppress(OSError):
+        if (place / SWEPT).exists() and _age(place / SWEPT) < DAY:
+            return
+        (place / SWEPT).touch()
+        for lock in place.glob("*.lock"):
+            if _age(lock) > UNUSED:
+                with locked(lock):
+                    _remove_unused(lock.with_suffix(""), lock)
+
+
+def _remove_unused(entry: Path, lock: Path) -> None:
+    """Remove an entry, unless it was used, and its lock, which is held."""
+    aside = entry.with_name(f"{entry.name}.unused.part")
+    if entry.exists():
+        if _age(entry / CHECKSUMS) < UNUSED:
+            return
+        entry.rename(aside)
+        if _age(aside / CHECKSUMS) < UNUSED:  # by a process that found it just before
+            aside.rename(entry)
+            return
+    for rest in entry.parent.glob(f"{entry.name}.*.part"):
+        shutil.rmtree(rest, ignore_errors=True)
+    lock.unlink()
+
+
 # -- directories ---------------------------------------------------------------------------------
 
 
@@ -146,6 +206,8 @@ def _place() -> Path:
     chosen = jit_directory() / "ufl_beam"
     if why := _made(chosen):
         return _temporary(f"the cache {chosen} cannot be used: {why}")
+    if MPI.COMM_WORLD.rank == 0:
+        sweep(chosen)
     return chosen
 
 

@@ -141,7 +141,7 @@ class Beam(Member):
     @classmethod
     def arc(
         cls, center: Point, radius: float, angles: tuple[float, float], section: Section, *,
-        cells: int = 8, name: str = "beam",
+        cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
         """Circular arc from ``angles[0]`` to ``angles[1]`` (rad, counter-clockwise from x)."""
         middle = require_vector(center, f"{name}: center")
@@ -150,12 +150,14 @@ class Beam(Member):
         if first == last:
             raise SceneError(f"{name}: zero length, both angles of the arc are {first:g}")
         curve = Arc(middle, float(radius), first, last)
-        return cls(curve(0), curve(1), section, cells=cells, name=name, curve=curve)
+        ends = curve(0), curve(1)
+        return cls(*ends, section, cells=cells, name=name, curve=curve, hinges=hinges)
 
     @classmethod
     def polyline(
-        cls, points: Sequence[Point], section: Section, *, cells: int = 8, name: str = "beam"
-    ) -> Beam:
+        cls, points: Sequence[Point], section: Section, *,
+        cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
+    ) -> Beam:  # fmt: skip
         """Straight pieces through ``points``, rigidly joined; ``s`` is the part of the length."""
         points = require_sequence(points, f"{name}: points")
         xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
@@ -167,11 +169,16 @@ class Beam(Member):
             raise SceneError(f"{name}: zero length between two points at {where}")
         ends = [0.0, *accumulate(lengths)]
         at = tuple(end / ends[-1] for end in ends)
-        curve = Polyline(tuple(xy), at)
-        return cls(xy[0], xy[-1], section, cells=cells, name=name, curve=curve, corners=at[1:-1])
+        return cls(
+            xy[0], xy[-1], section, cells=cells, name=name, curve=Polyline(tuple(xy), at),
+            corners=at[1:-1], hinges=hinges,
+        )  # fmt: skip
 
     @classmethod
-    def along(cls, curve: Curve, section: Section, *, cells: int = 8, name: str = "beam") -> Beam:
+    def along(
+        cls, curve: Curve, section: Section, *,
+        cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
+    ) -> Beam:  # fmt: skip
         """Any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
         a, b = (point_of(curve, s, f"{name}: curve") for s in (0.0, 1.0))
-        return cls(a, b, section, cells=cells, name=name, curve=curve)
+        return cls(a, b, section, cells=cells, name=name, curve=curve, hinges=hinges)

@@ -10,7 +10,7 @@ from functools import partial
 from numbers import Real
 from typing import Annotated, Any, Protocol
 
-from ufl_beam.errors import SceneError, require_function, require_number, require_returned
+from ufl_beam.errors import SceneError, closed, require_function, require_number, require_returned
 from ufl_beam.model.curves import Curve
 from ufl_beam.model.force_laws import ForceLaw as ForceLaw
 from ufl_beam.model.law_checks import require_bulk_law
@@ -20,7 +20,11 @@ from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.time_functions import Constant, Timed
 from ufl_beam.one_line import one_line
 
+OWN_LAW = "use a ForceLaw of your own"
+"""Message of classes that are closed."""
 
+
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class Motor(Record):
     """Prescribed relative motion of a connector; its force is unknown.
@@ -41,6 +45,7 @@ class Motor(Record):
     __repr__ = one_line
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class Actuator(Record):
     """Prescribed force or moment of a connector; a positive one makes the motion grow.
@@ -75,6 +80,7 @@ class Running(Protocol):
         """Return the force that a joint or support bears across its motion; N."""
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class Controller(Record):
     """Force by a function of the running simulation, constant until it is evaluated again.
@@ -110,6 +116,7 @@ class Controller(Record):
         return require_returned(self.force(simulation), f"{link}: the controller", at)
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class Spring(Record):
     """Elastic spring of a connector, which may yield and break.
@@ -135,6 +142,7 @@ class Spring(Record):
     softening: Instance[AnySoftening | None] = None
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class Damper(Record):
     """Viscous damper: a force in proportion to the rate of the motion.
@@ -153,6 +161,7 @@ class Damper(Record):
     viscosity: Positive
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class Stop(Record):
     """Elastic stop: a contact force where the motion leaves an interval.
@@ -189,6 +198,7 @@ class Stop(Record):
             )
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class Coulomb(Record):
     """Coulomb friction: sticks below a limit of the force, slides at the limit.
@@ -233,6 +243,7 @@ class Coulomb(Record):
         return self.force + self.coefficient * simulation.press(self.joint)
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class RigidPlastic(Record):
     """Rigid-plastic law: no motion below a limit of the force, flow or softening at it.
@@ -256,6 +267,7 @@ class RigidPlastic(Record):
     law: Annotated[HingeLaw, require_hinge_law]
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class Guide(Record):
     """The point stays on a curve of the plane, free along it; see :func:`Guided`."""

@@ -14,7 +14,7 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, NodeDof, node
-from ufl_beam.model.connector_laws import HOLDING, RESISTING, Coulomb, Damper, Stop
+from ufl_beam.model.connector_laws import HOLDING, RESISTING, Coulomb, Damper, RigidPlastic, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
@@ -110,51 +110,103 @@ Row = list[tuple[Node, Array]]
 def require_independent(scene: Scene) -> None:
     """Raise :class:`SceneError` if constraints repeat or contradict each other.
 
-    They do if their gradients in the undeformed scene, by what moves freely, are dependent.
+    They do if their gradients in the undeformed scene, by what moves freely, are dependent.  What
+    is rigid-plastic is a constraint below its limit.
     """
-    if not any(isinstance(link.law, HOLDING) for link in scene.links):
-        return
-    owners, within = _dependences(scene, HOLDING)
+    rows, within = _dependences(scene, (*HOLDING, RigidPlastic))
     if within.shape[1] == 0:
         return
-    dependent = np.flatnonzero(np.abs(within).max(axis=1) > 1e-6)
-    names = dict.fromkeys(str(owners[i]) for i in dependent)
+    dependent = [rows[i] for i in np.flatnonzero(np.abs(within).max(axis=1) > 1e-6)]
+    joints = {holder: joint for joint in scene.joints for holder in joint.holders}
+    owners: list[object] = [joints.get(owner, owner) for owner, _ in dependent]
+    owners += _already(scene, [row for _, row in dependent])
+    names = [_with_law(owner) for owner in {id(owner): owner for owner in owners}.values()]
+    rigid = any(isinstance(getattr(owner, "law", None), RigidPlastic) for owner in owners)
     raise SceneError(
         f"constraints repeat or contradict each other: {within.shape[1]} of those of "
-        f"{'; '.join(names)} can be left out. Remove one, or make it elastic: a Spring, or a Beam "
-        "in the place of a rigid part"
+        f"{'; '.join(names)} can be left out. Remove one, or make it elastic: "
+        + (
+            "a RigidPlastic connector holds its motion until it yields, and a "
+            "Spring(stiffness, law=...) yields, too; of two in parallel make one of both limits"
+            if rigid
+            else "a Spring, or a Beam in the place of a rigid part"
+        )
     )
+
+
+def _with_law(owner: object) -> str:
+    """Name of a joint, support or connector, with that of its law."""
+    kind = type(owner.law).__name__ if isinstance(owner, Connector) else ""
+    return f"{owner}{f' with {kind}' if kind else ''}"
+
+
+def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
+    """Supports that hold motions of some constraints, and joints that make their ends equal."""
+    same = scene.representatives
+    supports = {same[node(s.place), c]: s for s in scene.supports for c in s.held if not s.angle}
+    for row in rows:
+        ends = [same[of, c] for of, factors in row for c in range(3) if factors[c]]
+        yield from (supports[dof] for dof in ends if dof in supports)
+        twice = {dof for dof in ends if ends.count(dof) > 1}
+        for joint in scene.joints:
+            if any(same[dof] in twice for c in joint.shared for dof in joint.equal(c)):
+                yield joint
 
 
 def friction_repeats(scene: Scene) -> bool:
     """Return whether places that stick hold what is held already, by joints or by each other."""
     if not any(isinstance(link.law, Coulomb) for link in scene.links):
         return False
-    return _dependences(scene, (*HOLDING, Coulomb))[1].shape[1] > 0
+    return _dependences(scene, (*HOLDING, RigidPlastic, Coulomb))[1].shape[1] > 0
 
 
-def _dependences(scene: Scene, laws: tuple[type, ...]) -> tuple[list[object], Array]:
+def _dependences(scene: Scene, laws: tuple[type, ...]) -> tuple[list[tuple[object, Row]], Array]:
     """Find dependent constraints of connectors with some laws and of supports in turned axes.
 
-    Returns the owner of each constraint and, in columns, the combinations of constraints that
-    vanish for all that can move.
+    Returns the constraints with their owners, those left out that are alone in moving something,
+    and, in columns, the combinations of constraints that vanish for all that can move.
     """
+    if not any(isinstance(link.law, laws) for link in scene.links):
+        return [], np.zeros((0, 0))
     same, fixed = scene.representatives, _fixed(scene)
-    holders: dict[object, object] = {h: joint for joint in scene.joints for h in joint.holders}
     rows = [
         *_of_connectors(scene, lambda link: isinstance(link.law, laws)),
         *_of_supports(support for support in scene.supports if support.angle),
     ]
-    columns: dict[NodeDof, int] = {}
-    entries = []
-    for number, (_, row) in enumerate(rows):
+    moved: list[dict[NodeDof, float]] = []
+    for _, row in rows:
+        moved.append({})
         for of, factors in row:
             for component, factor in enumerate(factors):
                 dof = same[of, component]
                 if factor and dof not in fixed:
-                    entries.append((columns.setdefault(dof, len(columns)), number, factor))
-    gradients = _sparse(entries, (max(len(columns), 1), len(rows)))
-    return [holders.get(owner, owner) for owner, _ in rows], _null_space(gradients)
+                    moved[-1][dof] = moved[-1].get(dof, 0.0) + factor
+        # Ends that are one node leave nothing but round-off.
+        moved[-1] = {dof: factor for dof, factor in moved[-1].items() if abs(factor) > 1e-12}
+    users: dict[NodeDof, set[int]] = {}
+    for number, factors_of in enumerate(moved):
+        for dof in factors_of:
+            users.setdefault(dof, set()).add(number)
+    left = set(range(len(rows)))
+    alone = [dof for dof, numbers in users.items() if len(numbers) == 1]
+    while alone:
+        for number in users[alone.pop()] & left:
+            left.discard(number)
+            for dof in moved[number]:
+                users[dof].discard(number)
+                if len(users[dof]) == 1:
+                    alone.append(dof)
+    numbers = sorted(left)
+    columns: dict[NodeDof, int] = {}
+    entries = [
+        (columns.setdefault(dof, len(columns)), column, factor)
+        for column, number in enumerate(numbers)
+        for dof, factor in moved[number].items()
+    ]
+    if not numbers:
+        return [], np.zeros((0, 0))
+    gradients = _sparse(entries, (max(len(columns), 1), len(numbers)))
+    return [rows[number] for number in numbers], _null_space(gradients)
 
 
 def require_no_mechanism(scene: Scene) -> None:

@@ -12,7 +12,7 @@ from itertools import combinations
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_function, require_vector, shorten
+from ufl_beam.errors import SceneError, closed, require_function, require_vector, shorten
 
 Point = tuple[float, float]
 
@@ -35,6 +35,7 @@ WEIGHTS = np.array(
 # -- of beam axes: records, so that scenes are compared and saved by their numbers ---------------
 
 
+@closed("any function of s will do")
 @dataclass(frozen=True)
 class Straight:
     """Straight line between two ends; m."""

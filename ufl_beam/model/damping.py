@@ -5,11 +5,12 @@ from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
 
-from ufl_beam.errors import SceneError, require_sequence
+from ufl_beam.errors import SceneError, closed, require_sequence
 from ufl_beam.model.bodies import Member, require_beam
 from ufl_beam.model.records import NotNegative, Positive, Record
 
 
+@closed("state other damping as a VirtualWork of v")
 @dataclass(frozen=True)
 class Rayleigh(Record):
     """Rayleigh damping (a0 M + a1 K) v with the stiffness K of the undeformed scene, P(92).
@@ -43,6 +44,7 @@ class Rayleigh(Record):
             raise SceneError("Rayleigh: mass and stiffness are both zero; leave damping out")
 
 
+@closed("state other damping as a VirtualWork of v")
 @dataclass(frozen=True, eq=False)
 class KelvinVoigt(Record):
     """Kelvin-Voigt damping: C times the strain rates, beside the elastic resultants; objective.

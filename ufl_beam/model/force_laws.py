@@ -7,11 +7,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ufl_beam.errors import SceneError, require_function, require_row
+from ufl_beam.errors import SceneError, closed, require_function, require_row
 from ufl_beam.model.named_parameters import parameters_by_name
 from ufl_beam.one_line import one_line
 
 
+@closed("give it a function of your own")
 @dataclass(frozen=True)
 class ForceLaw:
     """Force of a connector as a function of its motion and rate, of time and its own history.

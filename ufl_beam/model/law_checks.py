@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from numbers import Real
 
 import numpy as np
@@ -40,12 +41,20 @@ def require_law(law: object, what: str) -> None:
     parameters = getattr(type(law), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen or not parameters.eq:
         raise SceneError(f"{what}: {kind} must be a dataclass: @dataclass(frozen=True)")
+    if taken := sorted(RESERVED & {field.name for field in fields(law)}):  # type: ignore[arg-type]
+        raise SceneError(
+            f"{what}: {kind}: a field cannot have the name {' or '.join(taken)}, which every "
+            "MaterialLaw gives to something else: C is the elastic stiffness at the point, the "
+            "others are its methods and attributes"
+        )
     ways = [w for w in WAYS if getattr(type(law), w) is not getattr(MaterialLaw, w)]
     if len(ways) != (1 if law.variables else len(ways)):
         has = "both increments and residuals" if ways else "neither increments nor residuals"
         raise SceneError(f"{what}: {kind} has {has}; define one of both methods")
     C = tuple(np.ones(1) for _ in law.resultants or "x")
     numbers = law.numbers(law.as_argument(C))
+    if "C" in numbers:
+        raise SceneError(f"{what}: {kind}.numbers has the name C, that of the elastic stiffness")
     for name, value in numbers.items():
         number = isinstance(value, Real | np.ndarray) and not isinstance(value, bool)
         if not number and not hasattr(value, "draw"):
@@ -59,6 +68,9 @@ def require_law(law: object, what: str) -> None:
     state = State({name: np.full(1, float(x)) for name, x in law.variables.items()})
     _try(tried, state, f"{what}: {kind}", (*ways, "increments")[0])
 
+
+RESERVED = frozenset({*vars(MaterialLaw), *MaterialLaw.__annotations__})
+"""Names that a field of a law cannot have."""
 
 WAYS = ("increments", "residuals")
 """Methods of a law by which its variables evolve."""

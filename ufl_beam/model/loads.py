@@ -6,7 +6,7 @@ from __future__ import annotations
 from abc import ABC
 from dataclasses import dataclass
 
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import SceneError, closed
 from ufl_beam.model.bodies import Anchor, Member, carries, require_anchors, require_beam
 from ufl_beam.model.records import Number, Record, Vector
 from ufl_beam.model.time_functions import Timed, TimeFunction, steady
@@ -32,6 +32,11 @@ class LoadAtPlace(Record, ABC):
     _label = __str__
 
 
+OWN_LOAD = "state other loads as a VirtualWork, a Potential or a connector with a ForceLaw"
+"""Message of classes that are closed."""
+
+
+@closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False)
 class PointLoad(LoadAtPlace):
     """Dead force and moment at a place: they keep their direction in the plane.
@@ -53,6 +58,7 @@ class PointLoad(LoadAtPlace):
     __repr__ = one_line
 
 
+@closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False)
 class FollowerLoad(LoadAtPlace):
     """Follower force at a place: it turns with the cross-section and is not conservative.
@@ -82,6 +88,7 @@ class FollowerLoad(LoadAtPlace):
             )
 
 
+@closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False)
 class LineLoad(Record):
     """Distributed dead force and moment along a beam, per undeformed length.
@@ -117,6 +124,7 @@ class LineLoad(Record):
     _label = __str__
 
 
+@closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False)
 class Gravity(Record):
     """Weight of all beams, bodies and point masses.
@@ -141,6 +149,7 @@ class Gravity(Record):
         return "Gravity"
 
 
+@closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False)
 class RotatingFrame(Record):
     """Centrifugal and Coriolis forces on all masses, in a frame that turns steadily.

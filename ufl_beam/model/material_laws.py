@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, is_infinite, require_kind, require_number
+from ufl_beam.errors import SceneError, closed, is_infinite, require_kind, require_number
 from ufl_beam.model.law_functions import Values, below, exp, positive, sign, where
 from ufl_beam.model.material_law import MaterialLaw, State
 
@@ -27,9 +27,17 @@ def _require_from_zero_to_infinity(value: float, what: str) -> None:
         require_number(value, what, at_least=0.0)
 
 
+OWN_LAW = "state a MaterialLaw of your own"
+OWN_HINGE = (
+    "join both sides by Turn(a, b, law) with Spring(stiffness, law=) or a ForceLaw of your own"
+)
+"""Messages of classes that are closed."""
+
+
 # -- bulk --------------------------------------------------------------------------------------
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class Perzyna:
     """Perzyna viscoplasticity: overstress in proportion to the plastic strain rate, P(39).
@@ -53,6 +61,7 @@ class Perzyna:
         return np.full_like(stiffness, self.eta)
 
 
+@closed(OWN_LAW)
 @dataclass(frozen=True)
 class DuvautLions:
     """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
@@ -223,6 +232,7 @@ class SofteningLaw(ABC):
         """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
 
 
+@closed(OWN_HINGE)
 class Softening(SofteningLaw):
     """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
 
@@ -250,6 +260,7 @@ class Softening(SofteningLaw):
         return self.traction(ξ) * _mean_of_decay(self.limit / self.energy * a)
 
 
+@closed(OWN_HINGE)
 class LinearSoftening(SofteningLaw):
     """Linear softening of a hinge or crack, to zero at the opening 2 energy / limit.
 
@@ -300,6 +311,11 @@ def require_hinge_law(law: object, what: str) -> None:
         )
     require_kind(law, (Softening, Hardening, LinearSoftening), what)
     if isinstance(law, Hardening):
+        if type(law) is not Hardening:
+            raise SceneError(
+                f"{what}: {type(law).__name__} is a subclass of Hardening, and a hinge of zero "
+                f"length would ignore what is its own; {OWN_HINGE}"
+            )
         _require_from_zero_to_infinity(law.limit, f"{what}: limit")
         if isinstance(law.viscosity, DuvautLions):
             raise SceneError(

@@ -260,6 +260,20 @@ class Scene(Rich):
                 f"Scene: a work is called {work.name!r} {twice}, the name of its entry in the "
                 "energy ledger; give one of them another name"
             )
+        of_time = {work.in_time: work for work in self.works if isinstance(work, Potential)}
+        for work in self.works:
+            if work.name in of_time:
+                raise SceneError(
+                    f"Scene: {work} has the name of another entry of the energy ledger, of what "
+                    f"{of_time[work.name]} gains in time; give one of them another name"
+                )
+        frames = [load for load in self.loads if isinstance(load, RotatingFrame)]
+        if len(frames) > 1:
+            raise SceneError(
+                f"Scene: {len(frames)} rotating frames, {frames[0]} and {frames[1]}: a scene is in "
+                "one frame, whose forces go with the square of its rate; give one, of the whole "
+                "rate"
+            )
 
     def _require_together(self, joint: Joint) -> None:
         here, *others = joint.places

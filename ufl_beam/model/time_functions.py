@@ -11,7 +11,14 @@ from typing import Annotated
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, require_number, require_returned, require_sequence, shorten
+from ufl_beam.errors import (
+    SceneError,
+    closed,
+    require_number,
+    require_returned,
+    require_sequence,
+    shorten,
+)
 from ufl_beam.one_line import one_line
 
 TimeFunction = Callable[[float], float]
@@ -45,6 +52,7 @@ def ramp(duration: float) -> TimeFunction:
     return Table((0.0, duration), (0.0, 1.0))
 
 
+@closed("any function of t will do")
 @dataclass(frozen=True)
 class Table:
     """Time function by points, linear between them and constant outside.

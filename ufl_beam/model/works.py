@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 
 from ufl_beam.errors import (
     SceneError,
+    closed,
     require_count,
     require_function,
     require_number,
@@ -113,6 +114,7 @@ class Work:
         return beams if self.beams is None else self.beams
 
 
+@closed("give it a function of your own")
 @dataclass(frozen=True, eq=False)
 class VirtualWork(Work):
     """Virtual work of a distributed effect, which a user states in UFL.
@@ -162,6 +164,7 @@ class VirtualWork(Work):
     __repr__ = bracketed
 
 
+@closed("give it a function of your own")
 @dataclass(frozen=True, eq=False)
 class Potential(Work):
     """Potential energy of a distributed effect, which a user states in UFL.
@@ -193,5 +196,10 @@ class Potential(Work):
     """
 
     arguments = ("q", "axis", "t")
+
+    @property
+    def in_time(self) -> str:
+        """Name of the entry of what a change in time supplies."""
+        return f"{self.name} in time"
 
     __repr__ = bracketed

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.errors import SceneError, warn
-from ufl_beam.output.output_files import put_in_place
+from ufl_beam.output.output_files import put_in_place, require_writable
 from ufl_beam.version import version
 
 Content = dict[str, Any]
@@ -64,9 +64,11 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
     whenever the meaning of files changes.  ``at`` is a part of messages, such as the time.
 
     Raises:
-        SceneError: The content is something else than numbers, texts, lists and dicts.
-        OSError: The file cannot be written.
+        SceneError: The file cannot be written, or the content is something else than numbers,
+            texts, lists and dicts.
+        OSError: There is no space for it.
     """
+    require_writable(path)
     what, file = format.partition(" ")[0], io.BytesIO()
     try:
         with zipfile.ZipFile(file, "w") as archive:

@@ -24,6 +24,7 @@ from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
 
 MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))  # columns of a place, and their units
+FORMULA = ("=", "+", "-", "@", "\t", "\r")  # beginnings of formulas in spreadsheets
 CONNECTOR = ("motion", "force", "work")  # columns of a connector
 
 
@@ -99,8 +100,15 @@ class History(Recorder):
             turns = simulation.scene.links[link].turns
             units = ("rad", "N m", "J") if turns else ("m", "N", "J")
             names += [f"{c} {name} [{unit}]" for c, unit in zip(CONNECTOR, units, strict=True)]
-        energies = (f"{name} [J]" for group in simulation.entries() for name in group)
-        self._header = _line([simulation.parameter.column, *names, *energies])
+        energies = [f"{name} [J]" for group in simulation.entries() for name in group]
+        for twice in {*names} & {*energies}:
+            raise SceneError(
+                f"History {self._path}: {twice!r} would be a column of a connector and of the "
+                "energy ledger; give the work that is called so another name"
+            )
+        columns = [simulation.parameter.column, *names, *energies]
+        # Spreadsheets take what begins so for a formula, which may run programs
+        self._header = _line([f"'{c}" if c.startswith(FORMULA) else c for c in columns])
 
     def _begin(self, path: Path, content: bytes) -> None:
         self.close()

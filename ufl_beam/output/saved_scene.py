@@ -2,7 +2,8 @@
 """Scenes as JSON data: each record with the exact numbers that made it.
 
 Functions of a user are no data.  Those of time are saved by their values at the times of a
-solution, curves by many points; of others the name is left.
+solution, curves by many points; of others the name is left.  Of laws and other records of a user
+numbers and the name of the class are saved, to be compared with a scene that the user has built.
 """
 
 from __future__ import annotations
@@ -168,27 +169,43 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
         if id(value) not in numbers:
             record = value
             if RECORDS.get(type(value).__name__) is not type(value):
-                if not callable(value):
+                if callable(value):
+                    record = sampling(owner, field, value)
+                elif not dataclasses.is_dataclass(value):
                     raise SceneError(
                         f"{value!r} cannot be saved: {type(value).__name__} is no record of "
-                        "ufl_beam, which are numbers and names"
+                        "numbers and names; make it a dataclass"
                     )
-                record = sampling(owner, field, value)
             content = {
                 f.name: describe(getattr(record, f.name), record, f.name)
                 for f in dataclasses.fields(record)
                 if f.init
             }
             numbers[id(value)] = len(records), value
-            records.append({"is": type(record).__name__, **content})
+            kind = type(record)
+            if RECORDS.get(kind.__name__) is not kind:
+                content["from"] = kind.__module__
+            records.append({"is": kind.__qualname__, **content})
         return {"record": numbers[id(value)][0]}
 
     root = describe(value, None, "")
     return {"records": records, "root": root}
 
 
+def require_no_code(data: Data) -> None:
+    """Raise :class:`SceneError` if a scene has records of classes that the package has not."""
+    for record in data["records"]:
+        if "from" in record:
+            kind = f"the class {record['is']} of your own (module {record['from']})"
+            raise SceneError(
+                f"the scene has {kind}, and files have no code; load it with the scene of the "
+                "script, ub.load(path, scene=scene)"
+            )
+
+
 def from_data(data: Data) -> Any:
     """Rebuild the records that :func:`to_data` described, without repeating warnings."""
+    require_no_code(data)
     made: list[Any] = []
 
     def make(data: Data) -> Any:

@@ -207,7 +207,8 @@ class VTKHDF(TimeSeries):
     """Time series for ParaView, VTK and PyVista in one HDF5 file, with the fields of :class:`XDMF`.
 
     Each step is flushed, so the file can be read during the run.  After a kill it has all complete
-    steps, except if HDF5 was just rearranging its index, for some microseconds.
+    steps, except if HDF5 was just rearranging its index, for some microseconds.  A restarted run
+    compares the numbers and goes on in a copy, as HDF5 may crash in a damaged file.
 
     Args:
         path: File, ending in ``.vtkhdf``.

@@ -186,7 +186,8 @@ def plot_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         solution.material(solution.scene.beams[0])  # or its error
     energy, t = solution.energy, solution.progress
     held = energy.total
-    supplied = held[0] + sum(energy.supplied.values(), np.zeros_like(t))
+    work, gone = (sum(x.values(), np.zeros_like(t)) for x in (energy.supplied, energy.lost))
+    supplied = held[0] + gone[0] + work - work[0]
     start = held[0] > 1e-12 * energy.throughput
     with style.panel(ax, (8.0, 5.0)) as axes:
         style.time_axes(axes)

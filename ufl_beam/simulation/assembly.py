@@ -214,8 +214,8 @@ def assemble(
     controllers = Controllers(share)
     rates = dict(controllers.values)
     connectors = Setting(
-        controllers.values, rates, scene.size, scheme, ledger, friction_repeats(scene), search, by.points,
-        by.slips,
+        controllers.values, rates, scene.size, scheme, ledger, friction_repeats(scene), search,
+        by.points, by.slips,
     )  # fmt: skip
     of_links = share, connectors, A
     coupled = together(lambda: [*couplings(*of_links, by.couplings), *guides(*of_links)])

@@ -20,7 +20,7 @@ from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_locks import Lock
 from ufl_beam.output.archive import Content, above, decoding, read, write
-from ufl_beam.output.output_files import part_of, require_path
+from ufl_beam.output.output_files import part_of, require_path, require_writable
 from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state
 from ufl_beam.simulation.solution import Solution
 
@@ -137,6 +137,7 @@ class Keeper:
             with decoding(self.path, FORMAT):
                 self.found = read(self.path, FORMAT)
                 self._require_same(self.found)
+        require_writable(self.path)
 
     def _require_same(self, found: Content) -> None:
         now, then = self._described.texts, found["call"]

@@ -29,14 +29,15 @@ from ufl_beam.output.joint_histories import (
     position_of,
     velocity_of,
 )
-from ufl_beam.output.output_files import require_path, require_writable
+from ufl_beam.output.output_files import require_path
+from ufl_beam.output.saved_scene import require_no_code
 from ufl_beam.parallel import active_comm
 from ufl_beam.parameter import TIME
 from ufl_beam.rich_display import Rich
 from ufl_beam.simulation.force_diagrams import Diagram, ForcesAlongCells
 from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
-from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, text_of
+from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, require_same, text_of
 from ufl_beam.terms.energy_ledger import Energy
 from ufl_beam.terms.links import FORCE
 
@@ -100,27 +101,18 @@ class Solution(Rich):
     def save(self, path: str | Path) -> None:
         """Write a file with a checksum, which :func:`load` reads; all processes call it together.
 
-        It has all results and the scene with all its numbers.  Functions of a user cannot be
-        saved: those of time have their values at the kept times, curves those at many points,
-        others, such as controllers, their names.  Results and pictures need no more.
-
-        Args:
-            path: File; one that is there is replaced once the new one is complete.
+        It has all results and the numbers of the scene, but no code: functions of time are saved
+        as values at the kept times, curves as points, other functions and laws of a user by name.
+        A file that is there is replaced once the new one is complete.
 
         Raises:
-            SceneError: The file cannot be written, or the scene has records of another package.
+            SceneError: The file cannot be written, or an object of the scene is no dataclass.
             OSError: There is no space for it.
         """
         file = require_path(path, "save")
-
-        def put() -> None:
-            require_writable(file)
-            write(file, FORMAT, self._content())
-
-        on_first(active_comm(), put)
+        on_first(active_comm(), lambda: write(file, FORMAT, self._content()))
 
     def _content(self) -> Content:
-        """Text and arrays that are saved."""
         text = {"kind": type(self).__name__, **text_of(self.grid, self.times, self.position)}
         return {**text, **{name: getattr(self, name) for name in NAMED}, **self._arrays()}
 
@@ -138,7 +130,8 @@ class Solution(Rich):
             setattr(self, name, kind(content[name]))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return restored, (self._content(),)
+        require_no_code((content := self._content())["scene"])
+        return restored, (content,)
 
     def __len__(self) -> int:
         """Number of kept states."""
@@ -353,10 +346,12 @@ class Solution(Rich):
         return f"<{type(self).__name__}: {'; '.join(self.summary()[:2])}>"
 
 
-def restored(content: Content) -> Solution:
-    """Make a solution from what was saved of it."""
-    grid = grid_of(content)
+def restored(content: Content, scene: Scene | None = None) -> Solution:
+    """Make a solution from what was saved of it, with a scene of its own or the given one."""
+    grid = grid_of(content, scene)
     kinds = {kind.__name__: kind for kind in (Solution, *Solution.__subclasses__())}
     solution = kinds[content["kind"]](grid.scene, grid)
     solution._take(content)
+    if scene is not None:
+        require_same(content["scene"], solution._content()["scene"])
     return solution

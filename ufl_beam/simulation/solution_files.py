@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -17,6 +18,7 @@ from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data
+from ufl_beam.simulation.fingerprint import Description, difference
 from ufl_beam.version import version
 
 FORMAT = "solution of ufl_beam, 2"
@@ -48,15 +50,26 @@ def text_of(grid: Grid, times: Array, position: Callable[[Anchor], Array]) -> di
     }  # fmt: skip
 
 
-def grid_of(text: dict[str, Any]) -> Grid:
-    """Make the grid of a saved solution, with its scene."""
-    grid = Grid(from_data(text["scene"]), from_data(text["mesh"]))
+def grid_of(text: dict[str, Any], scene: Scene | None) -> Grid:
+    """Make the grid of a saved solution, with its scene or another one of the same numbering."""
+    grid = Grid(from_data(text["scene"]) if scene is None else scene, from_data(text["mesh"]))
     if grid.checksum() != text["numbering"]:
+        if scene is not None:
+            raise SceneError(
+                "it is a solution of another scene: its beams, cells, bodies or joints are others"
+            )
         raise SceneError(
             f"it was written by version {text['version']} of ufl_beam, which numbers degrees of "
             f"freedom otherwise than this one, {version()}; load it with that version"
         )
     return grid
+
+
+def require_same(saved: Any, given: Any) -> None:
+    """Raise :class:`SceneError` unless two scenes are the same as data, see :func:`text_of`."""
+    now, then = (Description({"scene": json.loads(json.dumps(d))}).texts for d in (given, saved))
+    if differs := difference(now, then):
+        raise SceneError(f"it is a solution of another scene: {differs}")
 
 
 def _used_curve(scene: Scene, position: Callable[[Anchor], Array], curve: Curve) -> SavedCurve:

@@ -14,7 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_laws import Coulomb, Controller, Damper, ForceLaw, Spring
+from ufl_beam.model.connector_laws import Controller, Coulomb, Damper, ForceLaw, Spring
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
 from ufl_beam.model.material_law import MaterialLaw
@@ -27,7 +27,7 @@ from ufl_beam.terms.links import DISSIPATED, WORK, Links
 from ufl_beam.terms.phases import weight_of_before
 
 STATES = 100
-"""Kept states that are judged together."""
+"""Number of successive steps in which numerical losses are added."""
 
 TURNOVER = 5.0
 """Numerical loss in so many steps, over the largest energy in the scene meanwhile, that is wrong.
@@ -76,11 +76,11 @@ class LedgerWatch:
 
         Yields warnings, of each kind the first.
         """
-        n = len(solution)
-        while n - 1 - self._judged >= (1 if last else STATES):
-            end = min(self._judged + STATES, n - 1)
-            yield from self._judge(solution.part(self._judged, end + 1), solution.every)
-            self._judged = end
+        number = len(solution) - 1 - self._judged
+        number -= 0 if last else number % STATES
+        if number > 0:
+            first, self._judged = self._judged, self._judged + number
+            yield from self._judge(solution.part(first, self._judged + 1), solution.every)
 
     def thinned(self, solution: Solution) -> None:
         """Go on where states, which were all judged, have been forgotten."""
@@ -90,9 +90,9 @@ class LedgerWatch:
         times, (state, supplied, lost) = states.times, states.ledger()
         works = sum(float(np.abs(np.diff(work)).sum()) for work in supplied.values())
         sizes = [e if name in ENTRIES else np.abs(e - e[0]) for name, e in state.items()]
-        most = float(np.max(sum(sizes, 0.0 * times)))
-        self._throughput += works + max(most - self._most, 0.0)
-        self._most = max(self._most, most)
+        held = np.asarray(sum(sizes, 0.0 * times))
+        self._throughput += works + max(float(np.max(held)) - self._most, 0.0)
+        self._most = max(self._most, float(np.max(held)))
         allowed = self._claimed * self._throughput
         for name in self._grows:
             if name in lost and name not in self._told:
@@ -106,22 +106,27 @@ class LedgerWatch:
             self._told.add("stored")
             t = times[int(np.argmin(state["stored"]))]
             yield (
-                f"the stored energy is {least:.3g} J at t = {t:.6g} s, and a sum of squares is not "
-                "negative: a law of material in the scene, or the step there, is wrong. Use smaller "
-                "steps; check elastic_energy of a law of your own"
+                f"the stored energy is {least:.3g} J at t = {t:.6g} s, and a sum of squares is "
+                "not negative: a law of material in the scene, or the step there, is wrong. Use "
+                "smaller steps; check elastic_energy of a law of your own"
             )
-        if every > 1 or not self._in_motion or len(times) <= STATES or "numerical" not in lost:
+        starts = np.arange(0, len(times) - STATES, STATES)
+        if every > 1 or not self._in_motion or "numerical" not in lost or not len(starts):
             return
-        loss = float(np.ptp(lost["numerical"]))
-        if loss > max(TURNOVER * most, LITTLE * self._throughput) and "numerical" not in self._told:
+        losses = lost["numerical"][starts + STATES] - lost["numerical"][starts]
+        most = np.maximum.reduceat(held, starts)
+        wrong = losses > np.maximum(TURNOVER * most, LITTLE * self._throughput)
+        if wrong.any() and "numerical" not in self._told:
             self._told.add("numerical")
+            k = int(np.argmax(wrong))
+            begin, end = times[starts[k]], times[starts[k] + STATES]
             yield (
-                f"from t = {times[0]:.6g} to {times[-1]:.6g} s the time scheme took "
-                f"{loss:.3g} J, the entry 'numerical', {loss / most:.3g} times as much as the scene "
-                f"held at most, in {STATES} steps. So most of the work that was supplied "
-                "went into motions that are too fast for the steps, and results depend on the "
-                "scheme. Use smaller steps, or smoother loads and supports; a controller that "
-                "causes it needs another sample time, inertia at its place, or a ForceLaw instead"
+                f"from t = {begin:.6g} to {end:.6g} s the time scheme took {losses[k]:.3g} J, the "
+                f"entry 'numerical', {losses[k] / most[k]:.3g} times as much as the scene held at "
+                f"most, in {STATES} steps. So most of the work that was supplied went into motions "
+                "that are too fast for the steps, and results depend on the scheme. Use smaller "
+                "steps, or smoother loads and supports; a controller that causes it needs another "
+                "sample time, inertia at its place, or a ForceLaw instead"
             )
 
     def _falls(self, name: str, fall: float, states: KeptStates, n: int) -> str:
@@ -157,7 +162,8 @@ def _laws(scene: Scene) -> Iterator[MaterialLaw]:
         layout = beam.section.layout(beam.section.hinge)
         if layout is not None and not layout.elastic:
             yield from (law for law, _ in layout.laws)
-    yield from (s.law for s in (link.law for link in scene.links) if isinstance(s, Spring) and s.law)
+    springs = [link.law for link in scene.links if isinstance(link.law, Spring)]
+    yield from (spring.law for spring in springs if spring.law is not None)
 
 
 class ForceWatch:

@@ -150,9 +150,12 @@ class Energy(Rich):
 
     @property
     def imbalance(self) -> Array:
-        """Energy that the ledger does not account for; (n+1,); J."""
-        total = self.total
-        return np.asarray(total - total[0] - _sum(self.supplied) + _sum(self.lost))
+        """Energy since the first state that the ledger does not account for; (n+1,); J.
+
+        A path begins in a state that bears its constant loads: their work is in the entries then.
+        """
+        since = self.total - _sum(self.supplied) + _sum(self.lost)
+        return np.asarray(since - since[0])
 
     @property
     def throughput(self) -> float:

@@ -10,7 +10,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import NamedTuple
 
+import ufl
+from ufl.algorithms import expand_derivatives
+from ufl.corealg.traversal import unique_pre_traversal
+
 from ufl_beam.compiled.c_library import names
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.fibres import Kind, Layout
 from ufl_beam.model.law_functions import Values, absolute, positive
@@ -54,8 +59,27 @@ class End(NamedTuple):
     relaxed: Values  # work of the mean of both stresses on plastic strain, less that at the end
     resistance: Values  # of the discontinuity
     left: Values  # stored elastically if the point lets go of its stress
+    missed: Values  # numerically by schemes over the step, where elasticity is not linear
     stress: tuple[Values, ...]
     changes: tuple[Values, ...]  # of the variables
+
+
+@stated
+def curved(kind: Kind) -> bool:
+    """Return whether stresses are not linear in strains while the variables stay."""
+    (law, numbers), state = kind, prefixed("state", kind.law.variables)
+    stiffness, strains = rows(law, "stiffness"), rows(law, "strain")
+    at = Pointwise((*stiffness, *strains, *state, *prefixed("number", numbers))).at
+    e = [ufl.variable(at[name]) for name in strains]
+    C = law.as_argument(tuple(at[name] for name in stiffness))
+    of_point = law.of(C, {name: at[f"number {name}"] for name in numbers})
+    variables = State({name: at[f"state {name}"] for name in law.variables})
+    try:
+        stress = law.as_tuple(of_point.stress(law.as_argument(tuple(e)), variables))
+        slopes = [expand_derivatives(ufl.diff(ufl.as_ufl(σ), x)) for σ in stress for x in e]
+    except Exception:
+        return False  # where the law is compiled, it says why
+    return any(one in e for slope in slopes for one in unique_pre_traversal(slope))
 
 
 class PointEquations:
@@ -63,7 +87,8 @@ class PointEquations:
 
     def __init__(self, kind: Kind, softening: SofteningLaw | None, scheme: Scheme) -> None:
         self._kind, self._softening, self._scheme = kind, softening, scheme
-        self._names = kind.law.variables
+        self._names, self._curved = kind.law.variables, curved(kind)
+        self._over_step = scheme.average(0.0, 1.0) != 1.0
 
     def law(self, at: At) -> MaterialLaw:
         """The law with the numbers of points."""
@@ -160,15 +185,23 @@ class PointEquations:
         # Energies are quadratic but for laws that state no dissipation: these account for the rest.
         hardened = law.hardening_energy(changes)
         lost = law.elastic_energy(some(de), changes) + hardened
+        elastically, missed, C = de, zero, tuple(at[n] for n in rows(law, "stiffness"))
+        if self._curved:
+            # What the formula below makes of the step while the variables stay is no dissipation.
+            ends = tuple(law.as_tuple(law.stress(some(e1), old)))
+            elastically = tuple((y - x) / c for x, y, c in zip(before, ends, C, strict=True))
+            work = sum(σ * e for σ, e in zip(self.elastic_stress(at), de, strict=True))
+            stored = law.elastic_energy(some(e1), old) - law.elastic_energy(some(e0), old)
+            none = State(dict.fromkeys(self._names, zero))
+            missed = work - stored - (2 * θ - 1) * law.elastic_energy(some(de), none)
         worked = law.dissipation(self.strain(at), _plus(old, at_θ), changes, at["dt"])
         if worked is None:
             work = sum(σ * e for σ, e in zip(self.stress(at), de, strict=True))
             stored = elastic - law.elastic_energy(some(e0), old)
             stored = stored + hardening - law.hardening_energy(old)
-            worked = work - stored - (2 * θ - 1) * lost
-        C = tuple(at[n] for n in rows(law, "stiffness"))
+            worked = work - stored - (2 * θ - 1) * lost - missed
         relaxed = hardened
-        for σ0, σ1, e, c in zip(before, now, de, C, strict=True):
+        for σ0, σ1, e, c in zip(before, now, elastically, C, strict=True):
             relaxed = relaxed - (σ1 - σ0) / 2 * (e - (σ1 - σ0) / c)
         broken, resistance, left = zero, zero, zero
         if softening is not None:
@@ -177,7 +210,8 @@ class PointEquations:
             left = law.elastic_energy(e1[0] - now[0] / C[0], new)
         return End(
             worked + zero, broken, lost + zero, elastic + zero, hardening + zero,
-            positive(relaxed) + zero, resistance, left, now,
+            positive(relaxed) + zero, resistance, left,
+            missed + zero if self._over_step else zero, now,
             tuple(getattr(changes, name) for name in self._names),
         )  # fmt: skip
 

@@ -239,7 +239,7 @@ class ReferencePoints(Points):
         gone = at["traction"] == 0
         for relieved, name in zip(stress, self._rows("stiffness"), strict=True):
             at["jump"][:] += np.where(gone, relieved / at[name] * at["length"], 0.0)
-        released = np.sum(np.where(gone, volume * (energy - end.left), 0.0))
+        released = np.sum(np.where(gone, volume * (energy - end.left), 0.0) + volume * end.missed)
         energy, stress = np.where(gone, end.left, energy), np.where(gone, 0.0, stress)
 
         B = layout.strains.reshape(-1, len(stress), 3)

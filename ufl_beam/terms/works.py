@@ -186,7 +186,7 @@ class Storing(Acting):
         """Make its entries of state, work and loss."""
         ledger.state[work.name] += 0.0
         if stated.varies(work):
-            ledger.supplied[f"{work.name} in time"] += 0.0
+            ledger.supplied[work.in_time] += 0.0
         if stated.lost is not None:
             ledger.lost["numerical"] += 0.0
 
@@ -205,7 +205,7 @@ class Storing(Acting):
             moved = self._energy.value(q1) - self._energy.value(self._q0)
             self._put(end, {})
             gained = self._energy.value(q1) - self._held - moved
-            self._ledger.supplied[f"{self._name} in time"] += gained
+            self._ledger.supplied[self._work.in_time] += gained
 
     def add_state(self, q: Array, t: float) -> None:
         """Enter the energy of the accepted state."""

@@ -146,7 +146,8 @@ enum { CLOSED, FLOWING, RELEASED };
 
 /* What the end of a step brings a point; then come stresses and changes of variables. */
 enum point_output {
-  WORKED, BROKEN, LOST, ELASTIC, HARDENING, RELAXED, RESISTANCE, LEFT, POINT_OUTPUTS
+  WORKED, BROKEN, LOST, ELASTIC, HARDENING, RELAXED, RESISTANCE, LEFT, MISSED,
+  POINT_OUTPUTS
 };
 
 enum { MOST_VARIABLES = 16, MOST_CORRECTIONS = 100 }; /* of a law */

@@ -483,7 +483,7 @@ double missed_by_points(void *self, const double *q, const double *r, double sca
  * Each cell keeps what it bears (3), the jump of its last point, and what it dissipated by plastic
  * strains and by discontinuities; sum gets what all cells dissipated so in the step, what they lost
  * numerically at theta = 1, what they store elastically and by hardening, what breaking points let go
- * of, and what mean stresses do more on plastic strains than those at the end, where these are less.
+ * of and steps miss of elasticity that is not linear, and what mean stresses do more on plastic strains than those at the end, where these are less.
  */
 void commit(points *p)
 {
@@ -525,6 +525,7 @@ void commit(points *p)
       sum[2] += volume * s[LOST];
       sum[3] += volume * s[ELASTIC];
       sum[4] += volume * s[HARDENING];
+      sum[5] += volume * s[MISSED];
       sum[6] += volume * s[RELAXED];
       for (int a = 0; a < d; ++a)
         for (int k = 0; k < 3; ++k) kept[k] += weight[i] * stress[a] * p->B[3 * (d * i + a) + k];

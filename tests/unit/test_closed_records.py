@@ -1,0 +1,69 @@
+# SPDX-License-Identifier: MIT
+"""Subclasses of records: refused by name where computations would ignore what is theirs."""
+
+from dataclasses import dataclass
+
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.model.connector_laws import Law
+from ufl_beam.model.damping import Damping
+from ufl_beam.model.loads import Load
+from ufl_beam.model.material_laws import AnySoftening
+
+CLOSED = [
+    *Law.__args__, *Load.__args__, *Damping.__args__, *AnySoftening.__args__,
+    *(ub.VirtualWork, ub.Potential, ub.Perzyna, ub.DuvautLions, ub.Table),
+]  # fmt: skip
+"""Classes by which terms, forms, ledger and events choose what they compute."""
+
+
+@pytest.mark.parametrize("kind", CLOSED, ids=lambda kind: kind.__name__)
+def test_no_subclass_is_ignored(kind):
+    with pytest.raises(ub.SceneError, match=f"Mine: {kind.__name__} has no subclasses"):
+        dataclass(frozen=True)(type("Mine", (kind,), {"__annotations__": {"more": float}}))
+
+
+@dataclass(frozen=True)
+class Saturating(ub.Hardening):
+    """Hardening by a number of its own; linear, so that its stress is known."""
+
+    more: float = 0.0
+
+    def increments(self, strain, state, dt):
+        f = ub.law_functions
+        trial = self.stress(strain, state)
+        over = f.positive(f.absolute(trial) - self.limit - self.more * state.accumulated)
+        γ = over / (self.C + self.more)
+        return {"plastic": f.sign(trial) * γ, "accumulated": γ}
+
+    def hardening_energy(self, state):
+        return self.more * state.accumulated**2 / 2
+
+
+@pytest.mark.parametrize("reference", [False, True])
+@pytest.mark.parametrize("more", [0.0, 500.0])
+def test_a_subclass_of_hardening_is_followed(more, reference):
+    """[closed] A bar of EA = 1000 beyond its limit of 1 has the slope EA H/(EA + H)."""
+    section = ub.Section(EA=1e3, GA=1e3, EI=1.0, axial=Saturating(1.0, more=more))
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2)
+    pull = ub.Prescribed(beam.end, u=lambda t: 0.01 * t, v=0.0, psi=0.0)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
+    newton = ub.Newton(reference=reference)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, newton=newton, progress=False)
+    force = 1.0 + 1e3 * more / (1e3 + more) * (0.01 - 0.001)
+    assert run.section_forces_at(beam.start)[-1, 0] == pytest.approx(force, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda law: ub.Beam((0, 0), (1, 0), ub.Section(EA=1, GA=1, EI=1), hinges={0.5: law}),
+        ub.RigidPlastic,
+    ],
+    ids=["hinge", "connector"],
+)
+def test_a_hinge_of_zero_length_refuses_it(make):
+    """Its equations are those of Hardening."""
+    with pytest.raises(ub.SceneError, match="Saturating is a subclass of Hardening, and a hinge"):
+        make(Saturating(1.0, more=1.0))

@@ -1,0 +1,147 @@
+# SPDX-License-Identifier: MIT
+"""Bifurcations of stiff, perfect structures: their kind, the primary path, and linear buckling.
+
+With EA L²/EI of 1e6 and more, the last digits of axial forces move a state along the critical mode,
+the more the nearer it is to the critical point.
+"""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import ufl
+
+import ufl_beam as ub
+
+CONTROLS = [ub.LoadControl(0.3), ub.ArcLength(0.05, factor=4), ub.ArcLength(0.2)]
+
+
+def growing(t):
+    return t
+
+
+def a_frame(EA, cells):
+    """(place, scene, axial force at the factor 1) of two members with a load at their apex."""
+    section = ub.Section(EA=EA, GA=EA, EI=1.0)
+    left = ub.Beam((0, 0), (1, 1), section, cells=cells)
+    right = ub.Beam((1, 1), (2, 0), section, cells=cells)
+    load = ub.PointLoad(right.start, force=(0, -8), time=growing)
+    supports = [ub.Clamped(left.start), ub.Clamped(right.end)]
+    scene = ub.Scene([left, right], [ub.Rigid(left.end, right.start)], supports, [load])
+    return right.start, scene, 8 / 2**0.5
+
+
+def column(EA, cells):
+    """A column at 53 degrees, so that round-off of its axial force moves it sideways."""
+    beam = ub.Beam((0, 0), (0.6, 0.8), ub.Section(EA=EA, GA=EA, EI=1.0), cells=cells)
+    load = ub.PointLoad(beam.end, force=(-0.6, -0.8), time=growing)
+    return beam.end, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), 1.0
+
+
+def portal(EA, cells):
+    """A portal that sways."""
+    section, points = ub.Section(EA=EA, GA=EA, EI=1.0), [(0, 0), (0, 1), (1, 1), (1, 0)]
+    beams = [ub.Beam(a, b, section, cells=cells) for a, b in pairwise(points)]
+    left, girder, right = beams
+    joints = [ub.Rigid(left.end, girder.start), ub.Rigid(girder.end, right.start)]
+    loads = [ub.PointLoad(p, force=(0, -1), time=growing) for p in (left.end, right.start)]
+    supports = [ub.Pinned(left.start), ub.Pinned(right.end)]
+    return left.end, ub.Scene(beams, joints, supports, loads), 1.0
+
+
+@pytest.mark.parametrize("control", CONTROLS, ids=lambda one: type(one).__name__ + str(one.step))
+@pytest.mark.parametrize("EA", [1e4, 1e6, 1e8])
+@pytest.mark.parametrize("make", [a_frame, column, portal])
+def test_buckling_against_follow(make, EA, control):
+    """The factor of linear buckling, but for the strains before, which are N/EA.
+
+    A step is 1.5 of the factor at most, and the point is located to 1e-7 of it.
+    """
+    place, scene, N = make(EA, 16)
+    factor = ub.buckling(scene, 1).factors[0]
+    path = ub.follow(scene, control, until=lambda now: now.t > 1.2 * factor, progress=False)
+    (point,) = path.critical
+    assert point.kind == "bifurcation"
+    assert point.factor == pytest.approx(factor, rel=factor * N / EA + 2e-7)
+    assert (np.diff(path.factor) > 0).all()
+    # Without the mode the rotation is that of the strains, at most the axial ones.
+    assert np.abs(path.displacement(place)[:, 2]).max() <= 2 * path.factor[-1] * N / EA
+
+
+@pytest.mark.parametrize("EA", [1e4, 1e6])
+@pytest.mark.parametrize("cells", [16, 48])
+@pytest.mark.parametrize("control", [ub.LoadControl(0.5), ub.ArcLength(0.05, factor=5)])
+def test_a_ring_under_pressure(EA, cells, control):
+    """[closed] p = 3 EI/R³ for a pressure that stays normal, of a quarter with symmetric ends.
+
+    The tangent of this work is unsymmetric where it ends.  The polygon has a second-order error:
+    0.0233 with 16 cells, 0.0026 with 48.  The radius shrinks by p/EA, twice that at the nodes.
+    """
+
+    def pressure(q, w, axis, p):
+        t = axis.t0 + axis.d(ufl.as_vector([q[0], q[1]]))
+        return p * (-t[1] * w[0] + t[0] * w[1])
+
+    section = ub.Section(EA=EA, GA=EA, EI=1.0)
+    arc = ub.Beam.arc((0, 0), 1.0, (0, np.pi / 2), section, cells=cells)
+    supports = [ub.Prescribed(arc.start, v=0, psi=0), ub.Prescribed(arc.end, u=0, psi=0)]
+    water = ub.VirtualWork("water", pressure, numbers={"p": growing})
+    scene = ub.Scene([arc], supports=supports, works=[water])
+    path = ub.follow(scene, control, until=lambda now: now.t >= 4, progress=False)
+    (point,) = path.critical
+    assert point.kind == "bifurcation"
+    assert point.factor == pytest.approx(3.0, abs=6.5 / cells**2 + 20 / EA)
+    assert (np.diff(path.factor) > 0).all()
+    assert np.abs(path.displacement(arc.start)[:, 0]).max() <= 2 * path.factor[-1] / EA
+    branches = [
+        ub.follow(scene, ub.ArcLength(0.05), start=point.branch(k), steps=4) for k in (1, -1)
+    ]
+    one, other = (branch.displacement(arc.start)[-1, 0] for branch in branches)
+    assert one * other < 0
+    assert min(abs(one), abs(other)) > 0.05
+
+
+def test_all_bifurcations_of_a_column():
+    """Those of linear buckling, also in the first step, and where a step passes two of them.
+
+    Two columns side by side buckle at factors that differ by 1e-4.
+    """
+    for step in (2.0, 33.0):
+        beam = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e8, GA=1e8, EI=1.0), cells=16)
+        supports = [ub.Pinned(beam.start), ub.Prescribed(beam.end, u=0)]
+        load = ub.PointLoad(beam.end, force=(0, -1), time=growing)
+        scene = ub.Scene([beam], supports=supports, loads=[load])
+        path = ub.follow(scene, ub.LoadControl(step), until=lambda now: now.t > 100)
+        assert [point.kind for point in path.critical] == ["bifurcation"] * 3
+        factors = [point.factor for point in path.critical]
+        np.testing.assert_allclose(factors, ub.buckling(scene, 3).factors, rtol=1e-6)
+    sections = [ub.Section(EA=1e6, GA=1e6, EI=EI) for EI in (1.0, 1.0001)]
+    beams = [ub.Beam((x, 0), (x, 1), s, cells=8) for x, s in enumerate(sections)]
+    loads = [ub.PointLoad(beam.end, force=(0, -1), time=growing) for beam in beams]
+    scene = ub.Scene(beams, supports=[ub.Clamped(beam.start) for beam in beams], loads=loads)
+    path = ub.follow(scene, ub.LoadControl(0.3), until=lambda now: now.t > 3)
+    factors = [point.factor for point in path.critical]
+    np.testing.assert_allclose(factors, ub.buckling(scene, 2).factors, rtol=5e-6)
+
+
+def test_a_frame_of_roorda_has_a_limit_point():
+    """The column shortens and turns the joint: where it buckles there is no bifurcation.
+
+    The stiffer it is, the nearer is the limit point to the factor of linear buckling; as with any
+    imperfection ε of this asymmetric kind, by a distance in proportion to √ε, and ε is P/EA.
+    """
+    missing = []
+    for EA in (1e4, 1e5):
+        section = ub.Section(EA=EA, GA=EA, EI=1.0)
+        post = ub.Beam((0, 0), (0, 1), section, cells=16)
+        girder = ub.Beam((0, 1), (1, 1), section, cells=16)
+        load = ub.PointLoad(post.end, force=(0, -1), time=growing)
+        supports = [ub.Pinned(post.start), ub.Pinned(girder.end)]
+        scene = ub.Scene([post, girder], [ub.Rigid(post.end, girder.start)], supports, [load])
+        path = ub.follow(
+            scene, ub.ArcLength(0.02, factor=5), until=lambda now: bool(now.solution.critical)
+        )
+        (point,) = path.critical
+        assert point.kind == "limit"
+        missing.append(1 - point.factor / ub.buckling(scene, 1).factors[0])
+    assert missing[0] / missing[1] == pytest.approx(10**0.5, rel=0.05)
