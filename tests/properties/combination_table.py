@@ -3,6 +3,7 @@
 
 import tempfile
 import time
+import warnings
 from collections import Counter
 from pathlib import Path
 
@@ -46,6 +47,7 @@ def outcome_of(combination, folder, names):
 
 def table_of(seeds, names):
     """Run many; print flags as they come, and return the table of checks."""
+    warnings.simplefilter("error", RuntimeWarning)  # as in tests
     counts = {name: Counter() for name in ("run", *names)}
     for seed in seeds:
         with tempfile.TemporaryDirectory() as folder:
