@@ -14,7 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index, Snapshot, on_demand
 from ufl_beam.compiled.csr import as_slice
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Fields, SectionForces
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
@@ -22,11 +22,13 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
+from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
 from ufl_beam.parameter import Parameter
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import FORCE, Links
 from ufl_beam.terms.supports import Supports
@@ -48,6 +50,9 @@ class StateView(ABC):
     fields: Fields
     t: float  # s
     q: Array = on_demand()  # configuration at the local degrees of freedom
+    q_before: Array = on_demand()  # that at the beginning of the last step
+    between: float  # part of a step at whose configuration forces are in equilibrium
+    cell_forces: CellForces
     parts: int  # steps so far, parts of cut steps counted each
     ledger: Ledger
     supports: Supports
@@ -93,7 +98,8 @@ class StateView(ABC):
         material = self._material_table() if self._has_inelastic else NO_MATERIAL
         return Snapshot(
             self.t, self.share.gather(self.q), v[0] if v else None, self.reactions(),
-            self.entries(), material, connections,
+            self.entries(), material, connections, self.share.gather_cells(self.cell_forces().T).T,
+            self.share.gather(self.q_before) if self.between < 1 else None,
         )  # fmt: skip
 
     def _material_table(self) -> Array:
@@ -203,17 +209,26 @@ class StateView(ABC):
         return float(np.linalg.norm(self.connections()[numbers, 1]))
 
     def section_forces(self) -> Array:
-        """(N, V, M) in all cells; (num_cells, 3); N, N, N m."""
-        here = np.empty((len(self.share.cells), 3))
-        self._section_forces.write(self.q, here)
-        forces = self.share.gather_cells(here)
-        for cells, rows in self.material():
-            forces[cells] = rows[:, :3]
-        return forces
+        """(N, V, M) in the middle of all cells; (num_cells, 3); N, N, N m.
+
+        They belong to the equation of the last step, see :meth:`Solution.diagram`.
+        """
+        return self.forces_along(MIDDLE)[:, 0]
+
+    def forces_along(self, parts: Array) -> Array:
+        """(N, V, M) at parts of all cells, from 0 to 1; (num_cells, len(parts), 3); N, N, N m."""
+        dofs, before = self._dofs_along, self.q_before if self.between < 1 else None
+        q, before = (None if x is None else x[dofs] for x in (self.q, before))
+        here = self._along(self.share.cells, parts, self.cell_forces(), q, before)
+        return self.share.gather_cells(here)
 
     @cached_property
-    def _section_forces(self) -> SectionForces:
-        return SectionForces(self.fields)
+    def _along(self) -> ForcesAlongCells:
+        return ForcesAlongCells(self.grid, self.between)
+
+    @cached_property
+    def _dofs_along(self) -> Index:
+        return self.share.cell_dofs.reshape(len(self.share.cells), 3, -1)
 
     def material(self) -> list[tuple[Index, Array]]:
         """Cells that can yield or break, and :attr:`Points.kept`; later steps change them."""

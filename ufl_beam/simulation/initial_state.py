@@ -16,6 +16,7 @@ from ufl_beam.discretization.model_warnings import (
     warn_of_origin,
     warn_of_touching,
 )
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.errors import SceneError, require_kind, shorten, warn
@@ -98,6 +99,13 @@ def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, Sta
     transfer = Transfer(start.grid, grid)
     q = transfer.state(q0)
     return q, v if v0 is None else transfer.velocity(v0), transfer.internal(start.internal)
+
+
+def last_forces(grid: Grid, start: Solution | None, share: Share) -> Array | None:
+    """Forces of the cells of a share in the last step of ``start``, if its cells are the same."""
+    if start is None or not same_unknowns(start.grid, grid):
+        return None
+    return np.ascontiguousarray(start.cell_forces(-1)[:, share.cells])
 
 
 def _initial_velocity(grid: Grid) -> Array:

@@ -19,7 +19,6 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import (
     CompiledFields,
     Fields,
-    SectionForces,
     Strains,
     mass_matrix,
 )
@@ -29,6 +28,7 @@ from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
 from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import above, below
+from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
@@ -60,8 +60,9 @@ class KeptStates:
         self._grid = grid
         self._blocks: list[Snapshots] = []
         self._ends: list[int] = []  # number of states up to the end of each block
+        self._rule: tuple[float, ForcesAlongCells] | None = None
         self._latest: tuple[int, Snapshot] | None = None  # state that was asked for last
-        self._computed: tuple[Snapshot, Array] | None = None  # forces in the last state asked for
+        self._computed: tuple[Snapshot, float, int, Array] | None = None  # forces asked for last
 
     def append(self, states: Snapshots) -> None:
         """Append states that come after those here."""
@@ -118,6 +119,16 @@ class KeptStates:
         """Columns of ``Connection`` for all links; (n+1, num_links, 5)."""
         return Blocks([block.connections for block in self._blocks])
 
+    @property
+    def cells(self) -> Blocks:
+        """Forces of all cells, ``cell_number`` of loops.h; (n+1, 9, num_cells); N, N m."""
+        return Blocks([block.cells for block in self._blocks])
+
+    @property
+    def before(self) -> Blocks:
+        """Configurations at the beginnings of the steps; empty where they do not matter."""
+        return Blocks([block.before for block in self._blocks if block.before is not None])
+
     def ledger(self) -> list[dict[str, Array]]:
         """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
         parts = []
@@ -134,7 +145,13 @@ class KeptStates:
         arrays = {
             "q": self.q[:,], "reactions": self.reactions[:,], "connections": self.connections[:,],
             "material": self.materials[:,], "times": self.times, "v": self.v[:,],
+            "cells": self.cells[:,],
         }  # fmt: skip
+        before = self.before[:,]
+        if len(before) and not np.array_equal(before[1:], arrays["q"][:-1]):
+            arrays["before"] = before  # else each step begins where the one before ends
+        elif len(before):
+            arrays["before"] = before[:1]
         for kind, entries in zip(LEDGER, self.ledger(), strict=True):
             arrays |= above(f"{kind}: ", entries)
         return arrays
@@ -148,12 +165,14 @@ class KeptStates:
         }  # fmt: skip
         found = {**nothing, **{name: values for name, values in arrays.items() if len(values)}}
         ledger = tuple(below(f"{kind}: ", found) for kind in LEDGER)
+        if len(before := arrays.get("before", ())) < n and len(before):
+            found["before"] = np.concatenate([before, found["q"][:-1]])
         self._blocks, self._ends, self._latest = [], [], None
         if n:
             self.append(
                 Snapshots(
                     found["times"], found["q"], found.get("v"), found["reactions"], ledger,
-                    found["material"], found["connections"],
+                    found["material"], found["connections"], found["cells"], found.get("before"),
                 )
             )  # fmt: skip
 
@@ -165,34 +184,44 @@ class KeptStates:
         return CompiledFields(Share(self._grid, MPI.COMM_SELF))
 
     @cached_property
-    def _section_forces(self) -> SectionForces:
-        return SectionForces(self._fields)
-
-    @cached_property
     def _strains(self) -> Strains:
         return Strains(self._fields)
 
-    def forces(self, n: int) -> Array:
-        """(N, V, M), kept where history decides, else computed from the motion; (num_cells, 3)."""
-        state = self[n]
-        if self._computed is None or self._computed[0] is not state:
-            forces = np.empty((len(self._grid.cells), 3))
-            self._section_forces.write(state.q, forces)
-            cells, rows = cells_of(state)
-            forces[cells] = rows[:, :3]
-            forces.flags.writeable = False
-            self._computed = state, forces
-        return self._computed[1]
+    @cached_property
+    def _dofs(self) -> Index:
+        """Degrees of freedom (u, v, ψ) of the nodes of all cells; (num_cells, 3, degree + 1)."""
+        return self._grid.dofs[self._grid.nodes_of_cells].transpose(0, 2, 1)
 
-    def forces_in_points(self, state: Snapshot) -> Array:
-        """(N, V, M) in the Gauss points, as :meth:`forces`; (num_cells, degree, 3)."""
-        fields = self._fields
-        forces = np.empty((len(fields.order), self._grid.mesh.degree, 3))
-        C = fields.of_sections(fields.element.stiffness)
-        forces[fields.order] = self._strains(state.q).reshape(forces.shape) * C[:, None]
-        cells, rows = cells_of(state)
-        forces[cells] = rows[:, None, :3]
-        return forces
+    def _along(self, between: float) -> ForcesAlongCells:
+        if self._rule is None or self._rule[0] != between:
+            self._rule = between, ForcesAlongCells(self._grid, between)
+        return self._rule[1]
+
+    def forces(self, n: int, between: float, points: int = 1) -> Array:
+        """(N, V, M) in equally spaced points of the cells, or in the middle of each.
+
+        (num_cells, points, 3).
+        """
+        state = self[n]
+        asked = self._computed
+        if asked is None or asked[0] is not state or asked[1:3] != (between, points):
+            parts = MIDDLE if points == 1 else np.arange(points) / (points - 1)
+            q, before = state.q[self._dofs], None
+            if state.before is not None:
+                before = state.before[self._dofs]
+            forces = self._along(between)(slice(None), parts, state.cells, q, before)
+            forces.flags.writeable = False
+            asked = self._computed = state, between, points, forces
+        return asked[3]
+
+    def forces_at(self, place: Place, between: float) -> Array:
+        """(N, V, M) at a place at all kept times; (n+1, 3)."""
+        cell, part = self._grid.cell_and_part(place)
+        dofs, n = self._dofs[cell], len(self)
+        q, before = self.q[:, dofs], self.before[:, dofs] if len(self.before) else None
+        numbers = np.ascontiguousarray(self.cells[:, :, cell].T)
+        cells = np.full(n, cell)
+        return np.asarray(self._along(between)(cells, np.array([part]), numbers, q, before)[:, 0])
 
     def strains(self, n: int) -> Array:
         """(Σ, Γ, K); (num_cells, 3); 1, 1, 1/m."""
@@ -200,14 +229,14 @@ class KeptStates:
         strains[self._fields.order] = self._strains.mean(self[n].q)
         return strains
 
-    def material(self, n: int, cells: Index | int) -> Material:
+    def material(self, n: int, cells: Index | int, between: float) -> Material:
         """State of the material of some cells."""
         inelastic, rows = cells_of(self[n])
         if not len(inelastic) and not self._grid.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
         everything = np.zeros((len(self._grid.cells), 6))
-        everything[:, :3] = self.forces(n)
-        everything[inelastic, 3:] = rows[:, 3:]
+        everything[:, :3] = self.forces(n, between)[:, 0]
+        everything[inelastic] = rows  # of the law
         chosen = everything[cells].T
         return Material(chosen[:3].T, *chosen[3:])
 
@@ -216,10 +245,10 @@ class KeptStates:
         cell = self._grid.cell(place)
         return np.array([of(n)[cell] for n in range(len(self))])
 
-    def material_at(self, place: Place) -> Material:
+    def material_at(self, place: Place, between: float) -> Material:
         """State of the material in the cell at a place; arrays begin with (n+1,)."""
         cell = self._grid.cell(place)
-        kept = [self.material(n, cell) for n in range(len(self))]
+        kept = [self.material(n, cell, between) for n in range(len(self))]
         return Material(*map(np.array, zip(*kept, strict=True)))
 
     def momentum(self) -> Array:

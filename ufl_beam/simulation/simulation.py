@@ -24,10 +24,11 @@ from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import Assembly, assemble
+from ufl_beam.simulation.branch_check import add_forces_at_rest
 from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
 from ufl_beam.simulation.diagnosis import no_equilibrium
 from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
-from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
+from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
@@ -116,7 +117,7 @@ class Simulation(StateView):
         self.equation, self.terms = parts.equation, parts.equation.terms
 
         self.t, self.parts, self.left = t0, 0, [0, 0]
-        self.q = q[share.dofs]
+        self.q = self.q_before = q[share.dofs]
         weights, in_motion = self.equation.weights, has_inertia(scheme)
         self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
         self._continues = start is not None
@@ -135,6 +136,10 @@ class Simulation(StateView):
                 together(warn_of_jumps, grid, t0, q, self.connections()[:, 0])
         self._branch = parts.static_path(scheme, self.q, t0, loaded, together)
         self.reactions_known = self._branch is not None
+        self.cell_forces, self.between = parts.cell_forces, float(scheme.average(0.0, 1.0))
+        if not self.reactions_known:
+            together(add_forces_at_rest, self.beams, scheme, self.q, np.zeros(share.size))
+            self.cell_forces.begin(last_forces(grid, start, share))
 
         factors = by.factors(share, self.equation.A)
         self._steps = StepSolver(
@@ -142,6 +147,7 @@ class Simulation(StateView):
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
+        self.solution.between = self.between
         in_python = self._copies or self.asked or not share.alone
         self._in_c = None if in_python else self._steps_in_c(parts)
 
@@ -201,7 +207,7 @@ class Simulation(StateView):
         fresh = not self._continues and begins_loaded(self.scene, self.scheme, self.t)
         return compiled_steps(
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
-            parts.openings, LARGEST_TURN, fresh, self.support_dofs,
+            parts.openings, LARGEST_TURN, fresh, self.support_dofs, parts.cell_forces, self.between,
         )  # fmt: skip
 
     def take_back(self) -> None:
@@ -240,12 +246,13 @@ class Simulation(StateView):
         step, q1, s = trial
         if self._branch is not None:
             self._branch.accept(self.equation.force)
+        self.cell_forces.accept()
         for term in self.terms:
             term.accept(q1, s)
         self.supports.enter(s)
         self.supports.accept(s)
         self.prediction.accept(self.q, q1, step.dt)
-        self.q, self.t = q1, step.t1
+        self.q_before, self.q, self.t = self.q, q1, step.t1
         self.parts += 1
         self.ledger.begin()
         for term in self.terms:
@@ -312,6 +319,7 @@ class Simulation(StateView):
         """The state now, as a solution that other runs may start with; all processes call it."""
         self.settle()
         now = Solution(self.scene, self.grid)
+        now.between = self.between
         now.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
         self.take_back()
         now.internal = self._assembly.internal_variables(self.q)
@@ -339,6 +347,8 @@ class Simulation(StateView):
         self.solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
         self.prediction.remember(memory)
+        self.q_before = self.prediction.q_before
+        self.cell_forces.remember(memory)
         self.ledger.remember(memory)
         for term in self.terms:
             term.remember(memory, self.q)

@@ -24,10 +24,10 @@ from ufl_beam.version import version
 
 T = TypeVar("T")
 
-FORMAT = "solution of ufl_beam, 1"
+FORMAT = "solution of ufl_beam, 2"
 """The number grows whenever the meaning of files changes."""
 
-NAMED = ("seconds", "time_error", "open_ledger")
+NAMED = ("seconds", "time_error", "open_ledger", "between")
 """Attributes that are saved as they are."""
 
 TIME_FUNCTIONS = ("time", "held", "motion", "force", "numbers")

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.compiled_points import CompiledPoints
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import STIFF, SearchFlags
 from ufl_beam.terms.phases import Phases, TimeFunctions, beginning
@@ -133,6 +135,10 @@ class InelasticBeams(Cells, ABC):
     @abstractmethod
     def _forget(self) -> None:
         """Forget the latest response: the points would answer otherwise now."""
+
+    def in_cells(self) -> Sequence[InCells]:
+        """The forces of the resultants."""
+        return [InCells(self._force, lib.STRESS, self._fields.order)]
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
