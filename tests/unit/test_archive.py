@@ -358,7 +358,7 @@ SPOILT = {
     "HDF5": (lambda path: h5py.File(path, "w").close(), "the file holds no solution of ufl_beam$"),
     "later": (
         spoil(lambda file: file.attrs.modify("format", "solution of ufl_beam, 9")),
-        "is a solution of ufl_beam, 9, and this version of ufl_beam reads number 1",
+        "is a solution of ufl_beam, 9, and this version of ufl_beam reads number 2",
     ),
     "array": (spoil(lambda file: file.__delitem__("history/q")), "or is damaged"),
     "record": (spoil(renamed), "the file is damaged: .*odd"),

@@ -228,7 +228,7 @@ class StateView(ABC):
 
     @cached_property
     def _dofs_along(self) -> Index:
-        return self.share.cell_dofs.reshape(len(self.share.cells), 3, -1)
+        return self.share.cell_dofs.reshape(len(self.share.cells), 3, self.grid.mesh.degree + 1)
 
     def material(self) -> list[tuple[Index, Array]]:
         """Cells that can yield or break, and :attr:`Points.kept`; later steps change them."""

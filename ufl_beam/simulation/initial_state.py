@@ -101,11 +101,18 @@ def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, Sta
     return q, v if v0 is None else transfer.velocity(v0), transfer.internal(start.internal)
 
 
-def last_forces(grid: Grid, start: Solution | None, share: Share) -> Array | None:
-    """Forces of the cells of a share in the last step of ``start``, if its cells are the same."""
-    if start is None or not same_unknowns(start.grid, grid):
-        return None
-    return np.ascontiguousarray(start.cell_forces(-1)[:, share.cells])
+def last_forces(
+    share: Share, between: float, start: Solution | None
+) -> tuple[Array | None, Array | None]:
+    """Forces of cells in the last step of ``start``, and the local configuration at its beginning.
+
+    None without a start, with other cells, and where a step has another equation.
+    """
+    if start is None or not same_unknowns(start.grid, share.grid) or start.between != between:
+        return None, None
+    last = start.last
+    cells = np.ascontiguousarray(last.cells[:, share.cells])
+    return cells, None if last.before is None else last.before[share.dofs]
 
 
 def _initial_velocity(grid: Grid) -> Array:

@@ -139,7 +139,9 @@ class Simulation(StateView):
         self.cell_forces, self.between = parts.cell_forces, float(scheme.average(0.0, 1.0))
         if not self.reactions_known:
             together(add_forces_at_rest, self.beams, scheme, self.q, np.zeros(share.size))
-            self.cell_forces.begin(last_forces(grid, start, share))
+            forces, before = last_forces(share, self.between, start)
+            self.cell_forces.begin(forces)
+            self.q_before = self.q if before is None else before
 
         factors = by.factors(share, self.equation.A)
         self._steps = StepSolver(

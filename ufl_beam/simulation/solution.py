@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Snapshots
+from ufl_beam.arrays import Array, Snapshot, Snapshots
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
@@ -268,9 +268,10 @@ class Solution(Rich):
         forces = self._kept.forces(n, self.between, int(points))[cells]
         return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
 
-    def cell_forces(self, n: int) -> Array:
-        """``cell_number`` of loops.h for all cells at the n-th kept time; (9, num_cells)."""
-        return self._kept[n].cells
+    @property
+    def last(self) -> Snapshot:
+        """The last state that was kept."""
+        return self._kept[-1]
 
     def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.

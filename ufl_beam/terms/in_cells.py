@@ -56,6 +56,7 @@ class CellForces:
         self._share, self._linear = share, list[tuple[InCells, Any]]()
         self._alive: list[Any] = [parts]
         self._forces = ffi.new("force_in_cells[]", len(parts))
+        vectors: dict[Any, Any] = {}  # places of them, and of those of the accepted step
         for c, one in zip(self._forces, parts, strict=True):
             each, lanes, other = one.form.keep_entries()
             c.kind, c.factor, c.number, c.lanes = one.kind, one.factor, len(one.order), lanes
@@ -67,7 +68,9 @@ class CellForces:
                 c.latest, c.entries = each, ffi.addressof(c, "accepted")
             else:
                 other = np.zeros(share.size)
-                c.latest, c.entries, c.form = one.vector, each, one.form.cells
+                if one.vector not in vectors:
+                    c.latest, vectors[one.vector] = one.vector, ffi.addressof(c, "accepted")
+                c.vector, c.entries, c.form = vectors[one.vector], each, one.form.cells
                 if c.form == ffi.NULL:
                     self._linear.append((one, c))
             c.accepted = doubles(other)
@@ -88,14 +91,14 @@ class CellForces:
             fill(self.c, given=numbers)
             return
         for c in self._forces:
-            if c.kind == lib.STRESS:
+            if c.kind == lib.STRESS and c.latest:
                 c.accepted, c.latest[0] = c.latest[0], c.accepted
 
     def __call__(self) -> Array:
         """Compute ``cell_number`` of loops.h for the cells of this process; (9, num_cells)."""
         size = self._share.size
         for one, c in self._linear:
-            vector = np.frombuffer(ffi.buffer(c.accepted, 8 * size))
+            vector = np.frombuffer(ffi.buffer(c.vector[0], 8 * size))
             one.form.add(vector, np.zeros(size))
         out: Array = np.empty((lib.CELL_NUMBERS, self.c.cells))
         lib.find_cell_forces(self.c, doubles(out))

@@ -8,6 +8,7 @@ void accept_cell_forces(cell_forces *c)
   for (int k = 0; k < c->forces; ++k) {
     force_in_cells *f = c->force + k;
     double *last = f->accepted;
+    if (!f->latest) continue;
     f->accepted = *f->latest;
     *f->latest = last;
   }
@@ -68,7 +69,7 @@ void find_cell_forces(const cell_forces *c, double *out)
   memset(out, 0, size);
   for (int k = 0; k < c->forces; ++k) {
     const force_in_cells *f = c->force + k;
-    if (f->form) add_cells((void *)f->form, f->accepted, 0);
+    if (f->form) add_cells((void *)f->form, *f->vector, 0);
     add_all(c, f->lanes, f->number, f->kind, f->factor, *f->entries, f->cell, out);
   }
   for (int k = 0; c->loads && k < c->loads->vectors; ++k)

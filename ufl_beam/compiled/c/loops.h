@@ -143,7 +143,8 @@ enum force_kind { STRESS, WORK, DENSITY };
  * linear in a vector, that vector: in the latest residual and in that of the accepted step. */
 typedef struct {
   const cells *form; /* that is linear, if C evaluates it; or none */
-  double **latest, *accepted;
+  double **latest, *accepted; /* or none, if another form has the same vector */
+  double *const *vector;
   double *const *entries; /* of the accepted step, in batches */
   double factor;
   int kind, number, lanes;
