@@ -118,7 +118,7 @@ class Shapes(Rich, ABC):
         for q in np.ascontiguousarray(states):
             form.add(q, r)
             of_cells.accept()
-            found.append(of_cells())
+            found.append(of_cells(q, q))
         return np.array(found)
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:

@@ -90,7 +90,7 @@ class DolfinxForm:
         if len(self._spaces) == 1:
             vector = fem.assemble_vector(self._form).array
             np.add.at(b.reshape(-1), self._rows, vector)
-            if self._each is not None:
+            if self._each is not None and self._each[0]:
                 entries = vector[dofs_of_cells(self._spaces[0])]
                 ffi.memmove(self._each[0], doubles(entries), entries.nbytes)
         else:

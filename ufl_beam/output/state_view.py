@@ -50,8 +50,9 @@ class StateView(ABC):
     fields: Fields
     t: float  # s
     q: Array = on_demand()  # configuration at the local degrees of freedom
-    q_before: Array = on_demand()  # that at the beginning of the last step
+    q_before: Array  # that at the beginning of the last step
     between: float  # part of a step at whose configuration forces are in equilibrium
+    begun: bool  # whether section forces depend on the configuration at its beginning
     cell_forces: CellForces
     parts: int  # steps so far, parts of cut steps counted each
     ledger: Ledger
@@ -98,9 +99,16 @@ class StateView(ABC):
         material = self._material_table() if self._has_inelastic else NO_MATERIAL
         return Snapshot(
             self.t, self.share.gather(self.q), v[0] if v else None, self.reactions(),
-            self.entries(), material, connections, self.share.gather_cells(self.cell_forces().T).T,
-            self.share.gather(self.q_before) if self.between < 1 else None,
+            self.entries(), material, connections, self._kept_forces(),
+            self.share.gather(self.q_before) if self.begun else None,
         )  # fmt: skip
+
+    def _kept_forces(self) -> Array:
+        """What solutions keep of the forces of cells."""
+        record = self.cell_forces.record() if self.share.alone else None
+        if record is not None:
+            return record
+        return self.share.gather_cells(self.cell_forces(self.q, self.q_before).T).T
 
     def _material_table(self) -> Array:
         """Numbers of cells and rows of their material, in the order of the numbers; (m, 7)."""
@@ -217,9 +225,10 @@ class StateView(ABC):
 
     def forces_along(self, parts: Array) -> Array:
         """(N, V, M) at parts of all cells, from 0 to 1; (num_cells, len(parts), 3); N, N, N m."""
-        dofs, before = self._dofs_along, self.q_before if self.between < 1 else None
+        dofs, before = self._dofs_along, self.q_before if self.begun else None
         q, before = (None if x is None else x[dofs] for x in (self.q, before))
-        here = self._along(self.share.cells, parts, self.cell_forces(), q, before)
+        numbers = self.cell_forces(self.q, self.q_before)
+        here = self._along(self.share.cells, parts, numbers, q, before)
         return self.share.gather_cells(here)
 
     @cached_property

@@ -59,7 +59,6 @@ class Stepping(Protocol):
 
     t: float
     q: Array
-    q_before: Array
     prediction: Prediction
     parts: int
     left: list[int]  # steps that Python still takes, and how many it was to when C failed last
@@ -84,11 +83,11 @@ class CompiledSteps:
         path: StaticPath | None, openings: Openings | None, largest_turn: float,
         phases: list[Phases], times: TimeFunctions, whole: tuple[float, float, float],
         turns: tuple[bool, bool], applies_loads: bool, support_dofs: Index, cell_forces: CellForces,
-        between: float,
+        begun: bool,
     ) -> None:  # fmt: skip
         self._equation, self._solver, self._inertia, self._path = equation, solver, inertia, path
         self._phases, self._times, self.ahead = phases, times, False
-        self._applies_loads, self._between = applies_loads, between
+        self._applies_loads, self._begun = applies_loads, begun
         share = equation.share
         self._space, rotations = np.zeros((2, share.size)), share.rotations()
         limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
@@ -130,18 +129,15 @@ class CompiledSteps:
         inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
         links = [one for one in equation.terms if isinstance(one, Links)]
         scene = share.grid.scene
-        counts = len(scene.links), len(share.cells)
-        self._of_rows = ledger, equation.supports, support_dofs, inelastic, links, *counts
+        more = len(scene.links), cell_forces.kept
+        self._of_rows = ledger, equation.supports, support_dofs, inelastic, links, *more
         self._rows: KeptRows | None = None
 
     def _kept(self, q: Array) -> KeptRows:
         """Rows of numbers, one for each step that C keeps."""
         if self._rows is None:
             self._rows = rows = KeptRows(self.c, *self._of_rows, q)
-            fill(
-                self.c, kinds=len(rows.kinds), width=rows.width, kept=rows.kinds,
-                cell_forces_at=rows.cells.start,
-            )  # fmt: skip
+            fill(self.c, kinds=len(rows.kinds), width=rows.width, kept=rows.kinds)
         return self._rows
 
     def _list(self, place: Any, loops: Sequence[Loop]) -> None:
@@ -168,7 +164,7 @@ class CompiledSteps:
         c, steps = self.c, len(ends)
         rows: Array = np.zeros((1, 0))
         if keep:
-            kept = self._kept(state.q)
+            kept = self._rows or self._kept(state.q)
             steps = min(steps, 1 + ROOM // kept.width)
             rows = np.zeros((steps + 1, kept.width))  # the first one is of the state before
             rows[0, kept.q] = state.q
@@ -184,7 +180,7 @@ class CompiledSteps:
             if keep:
                 if taken < steps:
                     rows = rows[: taken + 1].copy()  # so that the rest does not stay
-                states = kept.states(ends[:taken].copy(), rows, self._between < 1)
+                states = kept.states(ends[:taken].copy(), rows, self._begun)
                 state.solution.keep(states, state.parts, self._solver.iterations)
         state.left = [0, 0]
         if c.failed:
@@ -194,6 +190,19 @@ class CompiledSteps:
             self.hand_back(state)
             self._raise()
         return taken
+
+    def q_before(self) -> Array:
+        """The configuration at the beginning of the last step, a new array."""
+        return self._copy(self.c.prediction.q_before)
+
+    def now(self, state: Stepping) -> Snapshots:
+        """The state that C has."""
+        kept = self._rows or self._kept(state.q)
+        rows = np.zeros((2, kept.width))
+        if self._begun:
+            rows[0, kept.q] = self.q_before()
+        lib.keep_state(self.c, doubles(rows[1]))
+        return kept.states(np.array([self.c.t]), rows, self._begun)
 
     def _begins(self, state: Stepping) -> bool:
         """Return whether the next step is like those that follow."""
@@ -223,8 +232,6 @@ class CompiledSteps:
     def _lend(self, state: Stepping) -> None:
         """Let Python copy the state when it asks for it; C leaves it alone until the next one."""
         state.q = self._on_demand(self.c.q)
-        if self._between < 1:
-            state.q_before = self._on_demand(self.c.prediction.q_before)
         if self._inertia is not None:
             self._inertia.v = self._on_demand(self.c.rates.rate[V])
 
@@ -250,7 +257,7 @@ def compiled_steps(
     scheme: Scheme, equation: StepEquation, solver: Solver, ledger: Ledger,
     inertia: Inertia | None, path: StaticPath | None, openings: Openings | None,
     largest_turn: float, applies_loads: bool, support_dofs: Index, cell_forces: CellForces,
-    between: float,
+    begun: bool,
 ) -> CompiledSteps | None:  # fmt: skip
     """Make the steps of a scene in C, if all that takes part in them has loops there."""
     known: Any = scheme
@@ -265,7 +272,7 @@ def compiled_steps(
         phases.append(of_term)
     return CompiledSteps(
         equation, solver, ledger, inertia, path, openings, largest_turn, phases, times, whole,
-        turns, applies_loads, support_dofs, cell_forces, between,
+        turns, applies_loads, support_dofs, cell_forces, begun,
     )  # fmt: skip
 
 

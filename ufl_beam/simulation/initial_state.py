@@ -102,17 +102,16 @@ def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, Sta
 
 
 def last_forces(
-    share: Share, between: float, start: Solution | None
+    share: Share, scheme: Scheme, start: Solution | None
 ) -> tuple[Array | None, Array | None]:
     """Forces of cells in the last step of ``start``, and the local configuration at its beginning.
 
-    None without a start, with other cells, and where a step has another equation.
+    None without a start, with other cells, and after steps of another scheme.
     """
-    if start is None or not same_unknowns(start.grid, share.grid) or start.between != between:
+    if start is None or start.scheme != scheme or not same_unknowns(start.grid, share.grid):
         return None, None
-    last = start.last
-    cells = np.ascontiguousarray(last.cells[:, share.cells])
-    return cells, None if last.before is None else last.before[share.dofs]
+    cells, before = start.last_forces()
+    return np.ascontiguousarray(cells[:, share.cells]), None if before is None else before[share.dofs]
 
 
 def _initial_velocity(grid: Grid) -> Array:

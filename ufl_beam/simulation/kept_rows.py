@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, Snapshots
-from ufl_beam.compiled.c_library import ffi, integers, lib
+from ufl_beam.compiled.c_library import ffi, integers
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.links import CONNECTION, FORCE, Links
 from ufl_beam.terms.material_points import Points
@@ -39,18 +39,18 @@ class Inelastic(Protocol):
 class KeptRows:
     """Rows of a scene: vectors and the ledger, then the tables of a state, row by row.
 
-    ``q`` is the accepted configuration.
+    ``cell_forces`` are :attr:`CellForces.kept`, and ``q`` is the accepted configuration.
 
     Attributes:
-        q, cells: Columns of the configuration, and of the forces of cells.
+        q: Columns of the configuration.
         width: Numbers of a row.
         kinds: List of ``kept_numbers`` of loops.h.
     """
 
     def __init__(
         self, march: Any, ledger: Ledger, supports: Supports, support_dofs: Index,
-        inelastic: Sequence[Inelastic], couplings: Sequence[Links], num_links: int, num_cells: int,
-        q: Array,
+        inelastic: Sequence[Inelastic], couplings: Sequence[Links], num_links: int,
+        cell_forces: Sequence[tuple[Any, int]], q: Array,
     ) -> None:  # fmt: skip
         self._alive, self._kinds = list[Any](), list[Any]()
         moving = march.rates != ffi.NULL
@@ -61,12 +61,12 @@ class KeptRows:
         cells = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *kept]))
         sizes = [
             march.size, march.size * moving, *map(len, accounts), support_dofs.size,
-            MATERIAL * len(cells), CONNECTION * num_links, lib.CELL_NUMBERS * num_cells,
+            MATERIAL * len(cells), CONNECTION * num_links, sum(n for _, n in cell_forces),
         ]  # fmt: skip
         ends = list(accumulate([0, *sizes]))
         self.width, columns = ends[-1], [slice(*pair) for pair in pairwise(ends)]
         self.q, v, *self._entries, self._reactions, self._material = columns[:-2]
-        self._connections, self.cells = columns[-2:]
+        self._connections, self._cells = columns[-2:]
         self._v = v if moving else None
 
         now = ffi.addressof(march, "q")
@@ -90,6 +90,9 @@ class KeptRows:
             for column, numbers in link.kept(q):
                 apart = numbers.strides[0] // numbers.itemsize
                 self._add(self._place(numbers), apart * np.arange(len(rows)), rows + column)
+        at = self._cells.start
+        for place, number in cell_forces:
+            self._copy(place, slice(at, at := at + number))
         self.kinds = ffi.new("kept_numbers[]", self._kinds)
 
     def _place(self, numbers: Array) -> Any:
@@ -121,5 +124,5 @@ class KeptRows:
             tuple(dict(zip(of, rows[:, at].T, strict=True)) for of, at in names),
             rows[:, self._material].reshape(n, -1, MATERIAL),
             rows[:, self._connections].reshape(n, -1, CONNECTION),
-            rows[:, self.cells].reshape(n, lib.CELL_NUMBERS, -1), begun,
+            rows[:, self._cells], begun,
         )  # fmt: skip

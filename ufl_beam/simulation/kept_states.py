@@ -29,6 +29,7 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import above, below
 from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
+from ufl_beam.terms.in_cells import CellForces
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
@@ -54,12 +55,17 @@ class Material(NamedTuple):
 
 
 class KeptStates:
-    """States that were kept; methods with a number ``n`` give results of all cells in the n-th."""
+    """States that were kept; methods with a number ``n`` give results of all cells in the n-th.
+
+    Attributes:
+        cell_forces: Forces of cells, of whose records the states have some; None if of none.
+    """
 
     def __init__(self, grid: Grid) -> None:
         self._grid = grid
         self._blocks: list[Snapshots] = []
         self._ends: list[int] = []  # number of states up to the end of each block
+        self.cell_forces: CellForces | None = None
         self._rule: tuple[float, ForcesAlongCells] | None = None
         self._latest: tuple[int, Snapshot] | None = None  # state that was asked for last
         self._computed: tuple[Snapshot, float, int, Array] | None = None  # forces asked for last
@@ -119,10 +125,22 @@ class KeptStates:
         """Columns of ``Connection`` for all links; (n+1, num_links, 5)."""
         return Blocks([block.connections for block in self._blocks])
 
-    @property
-    def cells(self) -> Blocks:
-        """Forces of all cells, ``cell_number`` of loops.h; (n+1, 9, num_cells); N, N m."""
-        return Blocks([block.cells for block in self._blocks])
+    def _complete(self) -> None:
+        """Compute the forces of cells where records are kept in their place."""
+        for k, block in enumerate(self._blocks):
+            if block.cells.ndim == 2:
+                states = map(block.one, range(len(block.t)))
+                cells = np.array([self.numbers(state) for state in states])
+                self._blocks[k], self._latest = block._replace(cells=cells), None
+
+    def numbers(self, state: Snapshot) -> Array:
+        """``cell_number`` of loops.h for all cells; (9, num_cells); N, N m."""
+        if state.cells.ndim == 2:
+            return state.cells
+        if self.cell_forces is None:
+            raise SceneError("section forces: these states were kept without them")
+        before = state.q if state.before is None else state.before
+        return self.cell_forces.of_record(state.cells, state.q, before)
 
     @property
     def before(self) -> Blocks:
@@ -142,10 +160,11 @@ class KeptStates:
 
     def arrays(self) -> State:
         """Return all states, as arrays by name."""
+        self._complete()
         arrays = {
             "q": self.q[:,], "reactions": self.reactions[:,], "connections": self.connections[:,],
             "material": self.materials[:,], "times": self.times, "v": self.v[:,],
-            "cells": self.cells[:,],
+            "cells": Blocks([block.cells for block in self._blocks])[:,],
         }  # fmt: skip
         before = self.before[:,]
         if len(before) and not np.array_equal(before[1:], arrays["q"][:-1]):
@@ -209,7 +228,7 @@ class KeptStates:
             q, before = state.q[self._dofs], None
             if state.before is not None:
                 before = state.before[self._dofs]
-            forces = self._along(between)(slice(None), parts, state.cells, q, before)
+            forces = self._along(between)(slice(None), parts, self.numbers(state), q, before)
             forces.flags.writeable = False
             asked = self._computed = state, between, points, forces
         return asked[3]
@@ -219,7 +238,7 @@ class KeptStates:
         cell, part = self._grid.cell_and_part(place)
         dofs, n = self._dofs[cell], len(self)
         q, before = self.q[:, dofs], self.before[:, dofs] if len(self.before) else None
-        numbers = np.ascontiguousarray(self.cells[:, :, cell].T)
+        numbers = np.array([self.numbers(self[k])[:, cell] for k in range(n)]).T
         cells = np.full(n, cell)
         return np.asarray(self._along(between)(cells, np.array([part]), numbers, q, before)[:, 0])
 

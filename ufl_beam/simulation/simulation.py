@@ -117,7 +117,8 @@ class Simulation(StateView):
         self.equation, self.terms = parts.equation, parts.equation.terms
 
         self.t, self.parts, self.left = t0, 0, [0, 0]
-        self.q = self.q_before = q[share.dofs]
+        self._begun_at: Array | None = None  # of the state before the first step
+        self.q = q[share.dofs]
         weights, in_motion = self.equation.weights, has_inertia(scheme)
         self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
         self._continues = start is not None
@@ -139,9 +140,10 @@ class Simulation(StateView):
         self.cell_forces, self.between = parts.cell_forces, float(scheme.average(0.0, 1.0))
         if not self.reactions_known:
             together(add_forces_at_rest, self.beams, scheme, self.q, np.zeros(share.size))
-            forces, before = last_forces(share, self.between, start)
+            forces, before = last_forces(share, scheme, start)
             self.cell_forces.begin(forces)
-            self.q_before = self.q if before is None else before
+            self._begun_at = before
+        self.begun = self.between < 1 or self.cell_forces.asks_for_before
 
         factors = by.factors(share, self.equation.A)
         self._steps = StepSolver(
@@ -149,7 +151,7 @@ class Simulation(StateView):
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
-        self.solution.between = self.between
+        self._describe(self.solution)
         in_python = self._copies or self.asked or not share.alone
         self._in_c = None if in_python else self._steps_in_c(parts)
 
@@ -209,7 +211,7 @@ class Simulation(StateView):
         fresh = not self._continues and begins_loaded(self.scene, self.scheme, self.t)
         return compiled_steps(
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
-            parts.openings, LARGEST_TURN, fresh, self.support_dofs, parts.cell_forces, self.between,
+            parts.openings, LARGEST_TURN, fresh, self.support_dofs, parts.cell_forces, self.begun,
         )  # fmt: skip
 
     def take_back(self) -> None:
@@ -254,11 +256,19 @@ class Simulation(StateView):
         self.supports.enter(s)
         self.supports.accept(s)
         self.prediction.accept(self.q, q1, step.dt)
-        self.q_before, self.q, self.t = self.q, q1, step.t1
+        self._begun_at = None
+        self.q, self.t = q1, step.t1
         self.parts += 1
         self.ledger.begin()
         for term in self.terms:
             term.add_state(q1)
+
+    @property
+    def q_before(self) -> Array:  # type: ignore[override]
+        """Configuration at the beginning of the last step."""
+        if self._in_c is not None and self._in_c.ahead:
+            return self._in_c.q_before()
+        return self.prediction.q_before if self._begun_at is None else self._begun_at
 
     def ask(self) -> None:
         """Ask controllers and friction for forces and limits in the next step, on all processes."""
@@ -293,6 +303,11 @@ class Simulation(StateView):
         if self._copies is not None:
             self._copies.leave()
 
+    def _describe(self, solution: Solution) -> None:
+        """Tell a solution how section forces follow from what it keeps."""
+        solution.between = self.between
+        solution.find_cell_forces(self.scheme, self.cell_forces if self.share.alone else None)
+
     # -- the end, and going on -----------------------------------------------------------------
 
     @property
@@ -307,7 +322,10 @@ class Simulation(StateView):
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
-        self.solution.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
+        in_c = self._in_c
+        ahead = in_c is not None and in_c.ahead
+        now = in_c.now(self) if ahead else Snapshots.of(self.gather())
+        self.solution.keep(now, self.parts, self.iterations)
 
     def end(self) -> None:
         """Let the solution have the last state, and what another run that starts there needs."""
@@ -321,7 +339,7 @@ class Simulation(StateView):
         """The state now, as a solution that other runs may start with; all processes call it."""
         self.settle()
         now = Solution(self.scene, self.grid)
-        now.between = self.between
+        self._describe(now)
         now.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
         self.take_back()
         now.internal = self._assembly.internal_variables(self.q)
@@ -349,8 +367,8 @@ class Simulation(StateView):
         self.solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
         self.prediction.remember(memory)
-        self.q_before = self.prediction.q_before
-        self.cell_forces.remember(memory)
+        self._begun_at = None
+        self.cell_forces.remember(memory, self.q, self.q_before)
         self.ledger.remember(memory)
         for term in self.terms:
             term.remember(memory, self.q)

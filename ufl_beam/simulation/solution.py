@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Snapshot, Snapshots
+from ufl_beam.arrays import Array, Snapshots
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_number
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -38,6 +39,7 @@ from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
 from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, text_of
 from ufl_beam.terms.energy_ledger import Energy
+from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.links import FORCE
 
 
@@ -60,6 +62,7 @@ class Solution(Rich):
         open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
         internal: Internal variables of cells and connectors at the end of the run.
         between: Part of a step at whose configuration its forces are in equilibrium.
+        scheme: Of the run; None if the solution was loaded.
 
     Example:
         >>> print((1e3 * solution.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad, at t = 1 s
@@ -71,6 +74,7 @@ class Solution(Rich):
     """
 
     parameter = TIME
+    scheme: Scheme | None
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
@@ -78,7 +82,7 @@ class Solution(Rich):
         self.time_error, self.seconds, self.building = math.nan, 0.0, 0.0
         self.every, self.open_ledger = 1, ""
         self.internal: State = {}
-        self.between = 1.0
+        self.between, self.scheme = 1.0, None
         self._kept = KeptStates(grid)
 
     def keep(self, states: Snapshots, parts: int, iterations: int) -> None:
@@ -268,10 +272,13 @@ class Solution(Rich):
         forces = self._kept.forces(n, self.between, int(points))[cells]
         return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
 
-    @property
-    def last(self) -> Snapshot:
-        """The last state that was kept."""
-        return self._kept[-1]
+    def find_cell_forces(self, scheme: Scheme, forces: CellForces | None) -> None:
+        """Take note of the scheme, and of how forces of cells follow from what is kept."""
+        self.scheme, self._kept.cell_forces = scheme, forces
+
+    def last_forces(self) -> tuple[Array, Array | None]:
+        """``cell_number`` of loops.h in the last step, and the configuration at its beginning."""
+        return self._kept.numbers(self._kept[-1]), self._kept[-1].before
 
     def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.

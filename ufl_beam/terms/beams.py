@@ -71,6 +71,10 @@ class ElasticBeams(OfForms, Cells):
         if self._static is not None:
             self._static.begin(step)
 
+    def in_cells(self) -> Sequence[InCells]:
+        """The forces of the resultants, which both configurations of a step determine."""
+        return [InCells(self._force, lib.STRESS, self._order, q0=self._q0)]
+
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
         if self._static is not None:

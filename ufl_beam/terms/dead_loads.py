@@ -66,10 +66,11 @@ class DeadLoads(LoadTerm):
         if not any(along is not None for along in self._along):
             return ffi.NULL
         along = [ffi.NULL if one is None else doubles(one) for one in self._along]
-        return struct(
+        c = struct(
             "loads_in_cells", vectors=len(along), vector=ffi.new("double *[]", along),
             latest=self._parts[0], accepted=self._parts[3],
         )  # fmt: skip
+        return ffi.gc(c, lambda _, kept=(c, along): None)  # solutions outlive the term
 
     def begin(self, step: Step) -> None:
         """The loads of the step; nothing is to do for those that stay.

@@ -19,6 +19,7 @@ from ufl_beam.discretization.compiled_forms import CellForm, stated
 from ufl_beam.discretization.function_spaces import Element, mass_form
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.dolfinx_compat import fem
 
 
 class InCells(NamedTuple):
@@ -30,6 +31,7 @@ class InCells(NamedTuple):
         order: Positions in ``share.cells`` of its cells.
         vector: If the form is linear: place of the address of the vector that it is evaluated at.
         factor: Factor of the forces.
+        q0: If the form depends on nothing but the configurations at both ends of the step: the first.
     """
 
     form: CellForm
@@ -37,6 +39,7 @@ class InCells(NamedTuple):
     order: Index
     vector: Any = None
     factor: float = 1.0
+    q0: fem.Function | None = None
 
 
 @stated
@@ -50,11 +53,15 @@ class CellForces:
 
     Attributes:
         c: ``cell_forces`` of loops.h.
+        asks_for_before: Whether they depend on the configuration at the beginning of the step.
+        kept: Places of arrays that the forces follow from, besides configurations, and their sizes.
     """
 
     def __init__(self, share: Share, parts: Sequence[InCells], loads: Any = ffi.NULL) -> None:
-        self._share, self._linear = share, list[tuple[InCells, Any]]()
+        self._share, self._space = share, np.zeros(share.size)
         self._alive: list[Any] = [parts]
+        self._linear, self._of_ends = list[tuple[CellForm, Any]](), list[tuple[InCells, Any, Any]]()
+        self.kept: list[tuple[Any, int]] = []
         self._forces = ffi.new("force_in_cells[]", len(parts))
         vectors: dict[Any, Any] = {}  # places of them, and of those of the accepted step
         for c, one in zip(self._forces, parts, strict=True):
@@ -64,21 +71,31 @@ class CellForces:
                 order = one.order.astype(np.int32)
                 c.cell = integers(order)
                 self._alive.append(order)
-            if one.vector is None:
-                c.latest, c.entries = each, ffi.addressof(c, "accepted")
+            accepted = ffi.addressof(c, "accepted")
+            c.entries = accepted
+            if one.q0 is not None:
+                each[0] = ffi.NULL
+                self._of_ends.append((one, each, other))
+            elif one.vector is None:
+                c.latest = each
+                self.kept.append((accepted, other.size))
             else:
                 other = np.zeros(share.size)
                 if one.vector not in vectors:
-                    c.latest, vectors[one.vector] = one.vector, ffi.addressof(c, "accepted")
+                    c.latest, vectors[one.vector] = one.vector, accepted
+                    self.kept.append((accepted, share.size))
                 c.vector, c.entries, c.form = vectors[one.vector], each, one.form.cells
                 if c.form == ffi.NULL:
-                    self._linear.append((one, c))
+                    self._linear.append((one.form, c))
             c.accepted = doubles(other)
             self._alive.append((each, other))
-        nodes = share.grid.mesh.nodes
+        if loads != ffi.NULL:
+            self.kept.append((ffi.addressof(loads, "accepted"), loads.vectors))
+        self.asks_for_before = any(one.form.uses(one.q0) for one, *_ in self._of_ends)
+        first, *between, last = share.grid.mesh.nodes - 0.5
         self.c = fill(
-            ffi.new("cell_forces *"), cells=len(share.cells), nodes=len(nodes), forces=len(parts),
-            force=self._forces, loads=loads, from_middle=nodes[[0, -1, *range(1, len(nodes) - 1)]] - 0.5,
+            ffi.new("cell_forces *"), cells=len(share.cells), nodes=2 + len(between), force=self._forces,
+            forces=len(parts), loads=loads, from_middle=np.array([first, last, *between]),
         )  # fmt: skip
 
     def accept(self) -> None:
@@ -94,17 +111,47 @@ class CellForces:
             if c.kind == lib.STRESS and c.latest:
                 c.accepted, c.latest[0] = c.latest[0], c.accepted
 
-    def __call__(self) -> Array:
-        """Compute ``cell_number`` of loops.h for the cells of this process; (9, num_cells)."""
-        size = self._share.size
-        for one, c in self._linear:
-            vector = np.frombuffer(ffi.buffer(c.vector[0], 8 * size))
-            one.form.add(vector, np.zeros(size))
+    def __call__(self, q: Array, before: Array) -> Array:
+        """Compute ``cell_number`` of loops.h for the cells of this process; (9, num_cells).
+
+        ``q`` and ``before`` are the configurations at the end and at the beginning of the step.
+        """
+        for one, each, entries in self._of_ends:
+            each[0] = doubles(entries)
+            one.form.set(one.q0, before)
+            one.form.add(np.ascontiguousarray(q), self._space)
+            each[0] = ffi.NULL
+        for form, c in self._linear:
+            form.add(np.frombuffer(ffi.buffer(c.vector[0], self._space.nbytes)), self._space)
         out: Array = np.empty((lib.CELL_NUMBERS, self.c.cells))
         lib.find_cell_forces(self.c, doubles(out))
         return out
 
-    def remember(self, memory: Memory) -> None:
-        """Save or restore what is known of the accepted step."""
-        numbers = memory.rows("forces of cells", self._share.cells, self().T)
+    # -- what solutions keep -------------------------------------------------------------------
+
+    def record(self) -> Array | None:
+        """Copy of all that the forces follow from besides configurations; None if they are given."""
+        if self.c.given:
+            return None
+        arrays = [np.frombuffer(ffi.buffer(place[0], 8 * n)) for place, n in self.kept]
+        return np.concatenate(arrays) if arrays else np.zeros(0)
+
+    def of_record(self, record: Array, q: Array, before: Array) -> Array:
+        """The numbers of a :meth:`record`, as a call returns them."""
+        given, now, at = self.c.given, [place[0] for place, _ in self.kept], 0
+        record = np.array(record)
+        try:
+            self.c.given = ffi.NULL
+            for place, n in self.kept:
+                place[0] = doubles(record[at : at + n])
+                at += n
+            return self(q, before)
+        finally:
+            self.c.given = given
+            for (place, _), old in zip(self.kept, now, strict=True):
+                place[0] = old
+
+    def remember(self, memory: Memory, q: Array, before: Array) -> None:
+        """Save or restore the forces of the accepted step."""
+        numbers = memory.rows("forces of cells", self._share.cells, self(q, before).T)
         fill(self.c, given=np.ascontiguousarray(numbers.T))

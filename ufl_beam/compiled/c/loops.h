@@ -140,10 +140,11 @@ enum cell_number {
 enum force_kind { STRESS, WORK, DENSITY };
 
 /* A form whose entries are forces on nodes of cells; `latest` and `accepted` are these, or, if it is
- * linear in a vector, that vector: in the latest residual and in that of the accepted step. */
+ * linear in a vector, that vector: in the latest residual and in that of the accepted step. Entries that
+ * depend on nothing but configurations are computed when they are asked for. */
 typedef struct {
   const cells *form; /* that is linear, if C evaluates it; or none */
-  double **latest, *accepted; /* or none, if another form has the same vector */
+  double **latest, *accepted; /* latest: or none; also if another form has the same vector */
   double *const *vector;
   double *const *entries; /* of the accepted step, in batches */
   double factor;
@@ -699,7 +700,6 @@ typedef struct {
   int kinds, width; /* of numbers that are kept; of a row */
   const kept_numbers *kept;
   cell_forces *cell_forces;
-  int cell_forces_at; /* in a row */
 } march;
 
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s);
@@ -728,4 +728,5 @@ void change_of_form(void *self, const double *q1, energy_change *sum);
 void change_of_points(void *self, const double *q1, energy_change *sum);
 void change_of_couplings(void *self, const double *q1, energy_change *sum);
 double value_at(const time_function *f, double t);
+void keep_state(const march *m, double *row);
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows);

@@ -567,7 +567,7 @@ static double seconds_now(void)
 }
 
 /* What is kept of the state, into a row of zeros. */
-static void keep(const march *m, double *row)
+void keep_state(const march *m, double *row)
 {
   for (int k = 0; k < m->kinds; ++k) {
     const kept_numbers *n = m->kept + k;
@@ -577,7 +577,6 @@ static void keep(const march *m, double *row)
     else
       for (int i = 0; i < n->number; ++i) row[n->to[i]] += from[n->at[i]];
   }
-  find_cell_forces(m->cell_forces, row + m->cell_forces_at);
 }
 
 /* Steps to the times `ends`, up to the first that fails, or that ends so many seconds later; how many
@@ -591,7 +590,7 @@ int take_steps(march *m, int steps, const double *ends, double seconds, int keep
       m->failed = 1;
       return k;
     }
-    if (keeps) keep(m, rows + (size_t)k * m->width);
+    if (keeps) keep_state(m, rows + (size_t)k * m->width);
     if (steps > 1 && seconds_now() > end) return k + 1;
   }
   return steps;
