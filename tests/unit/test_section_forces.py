@@ -268,3 +268,79 @@ def test_section_forces_of_places():
         for n in range(len(run)):
             exact = np.array(run.diagram(beam, n)[1:])[:, point]
             assert np.abs(found[n] - exact).max() <= 1e-12 * max(1.0, np.abs(exact).max())
+
+
+# -- supports at one node --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()], ids=str)
+@pytest.mark.parametrize("along", [(1, 0), (1, 1), (-2, 1)])
+@pytest.mark.parametrize("turns_first", [False, True])
+def test_supports_at_one_node_have_what_they_hold(scheme, along, turns_first):
+    """[closed] The force of a roller is across it, the other support bears the moment alone."""
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
+    roller, turning = ub.Roller(beam.end, along=along), ub.Prescribed(beam.end, psi=0.0)
+    clamp, both = ub.Clamped(beam.start), [roller, turning]
+    scene = ub.Scene(
+        [beam], supports=[clamp, *(reversed(both) if turns_first else both)],
+        loads=[ub.LineLoad(beam, force=(0.0, -1.0))],
+    )  # fmt: skip
+    simulation = ub.Simulation(scene, scheme)
+    simulation.keep()
+    for n in range(4):
+        simulation.step_to(0.01 * (n + 1))
+        simulation.keep()
+    run = simulation.solution
+    of_roller, of_turning = run.reaction(roller)[-1], run.reaction(turning)[-1]
+    assert abs(of_roller @ (*along, 0.0)) < ROUND_OFF
+    assert of_roller[2] == 0.0
+    assert np.array_equal(of_turning[:2], (0.0, 0.0))
+    assert abs(of_turning[2]) > 1e-3
+    assert simulation.press(turning) == 0.0
+    assert simulation.press(roller) == pytest.approx(np.hypot(*of_roller[:2]), rel=1e-15)
+    d = run.diagram(beam, points=2)
+    end = np.array([d.N[-1], d.V[-1], d.M[-1]])  # the end does not turn
+    # Across the roller, and along it nothing but the residual
+    assert np.abs(of_roller + of_turning - end).max() < 1e-9
+    if scheme == ub.Static():
+        total = sum(run.reaction(support)[-1, :2] for support in scene.supports)
+        assert total == pytest.approx((0.0, 1.0), abs=1e-9)
+    simulation.close()
+
+
+def test_supports_of_places_that_a_joint_puts_together():
+    """Places that a joint makes one node are one node: u and v are of one support, ψ of another."""
+    a = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="a")
+    b = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="b")
+    pin, hold = ub.Pinned(a.end), ub.Prescribed(b.start, psi=0.0)
+    scene = ub.Scene(
+        [a, b], joints=[ub.Rigid(a.end, b.start)], supports=[ub.Pinned(a.start), pin, hold],
+        loads=[ub.PointLoad(b.end, force=(0.0, -1.0))],
+    )  # fmt: skip
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    # [closed] b is a cantilever: 1 N, 1 N m
+    assert run.reaction(pin)[-1] == pytest.approx((0, 1, 0), abs=1e-6)
+    assert run.reaction(hold)[-1] == pytest.approx((0, 0, 1), abs=1e-6)
+    grounded = ub.Scene(
+        [a], joints=[ub.Revolute(ub.ground(0, 0), a.start)],
+        supports=[ub.Prescribed(a.start, psi=0.0)], loads=[ub.PointLoad(a.end, force=(0, -1.0))],
+    )  # fmt: skip
+    run = ub.simulate(grounded, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    # [closed] The ground bears the force, not the support
+    assert run.reaction(grounded.supports[0])[-1] == pytest.approx((0, 0, 1), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "held"),
+    [
+        (lambda p: ub.Pinned(p), lambda p: ub.Roller(p), "v"),
+        (lambda p: ub.Roller(p, along=(1, 1)), lambda p: ub.Roller(p, along=(-1, 1)), "u"),
+        (lambda p: ub.Roller(p, along=(1, 2)), lambda p: ub.Prescribed(p, u=0.0), "u"),
+        (lambda p: ub.Prescribed(p, psi=0.1), lambda p: ub.Clamped(p), "psi"),
+    ],
+)
+def test_two_supports_that_hold_the_same_are_refused(one, other, held):
+    a = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="a")
+    b = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="b")
+    with pytest.raises(ub.SceneError, match=f"supports in conflict: .* both hold {held}; remove"):
+        ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)], supports=[one(a.end), other(b.start)])

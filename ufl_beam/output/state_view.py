@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from functools import cached_property
 from typing import Any
@@ -139,27 +140,33 @@ class StateView(ABC):
         return self._support_forces()
 
     def _support_forces(self) -> Array:
-        """Forces of all supports in the latest residual; (num_supports, 3); N, N, N m."""
-        dofs, mine = self._support_dofs
-        here: Array = self.supports.all_reactions(self.share.size)[dofs]
+        """Forces of all supports in the latest residual; (num_supports, 3); N, N, N m.
+
+        Several supports may be at one node: each has the forces of the components that it holds.
+        """
+        dofs = self.support_dofs
+        here = np.where(dofs >= 0, self.supports.all_reactions(self.share.size)[dofs], 0.0)
         if not self.share.alone:
-            here[~mine] = 0.0
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
+        for force, support in zip(here, self.scene.supports, strict=True):
+            if support.angle:
+                c, s = math.cos(support.angle), math.sin(support.angle)
+                force[:2] = c * force[0] - s * force[1], s * force[0] + c * force[1]
         return here
 
-    @property
-    def support_dofs(self) -> Index:
-        """Local degrees of freedom of the supports; (num_supports, 3)."""
-        return self._support_dofs[0] if self.scene.supports else np.zeros((0, 3), dtype=np.int64)
-
     @cached_property
-    def _support_dofs(self) -> tuple[Index, Index]:
-        """Local degrees of freedom of the supports, and which of them this process owns."""
-        dofs = np.array([self.share.at(support.place) for support in self.scene.supports])
-        mine = self.share.owns(dofs)
-        local = np.zeros_like(dofs)
-        local[mine] = self.share.local(dofs[mine])
-        return local, mine
+    def support_dofs(self) -> Index:
+        """Local degrees of freedom that the supports hold, those that this process owns.
+
+        (num_supports, 3), -1 for others; of a support at an angle they are those of its axes.
+        """
+        local = np.full((len(self.scene.supports), 3), -1, dtype=np.int64)
+        for here, support in zip(local, self.scene.supports, strict=True):
+            held = np.array([*support.held])
+            dofs = self.share.at(support.place)[held]
+            mine = self.share.owns(dofs)
+            here[held[mine]] = self.share.local(dofs[mine])
+        return local
 
     def entries(self) -> tuple[dict[str, float], ...]:
         """The ledger over all processes: state, supplied, lost; J."""

@@ -221,6 +221,9 @@ class Solution(Rich):
     def reaction(self, support: Support) -> Array:
         """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
 
+        They are of the components of motion that it holds; another support at the same node has its
+        own.
+
         In statics the first row is what the initial state bears: nothing in the undeformed scene,
         for loads act from the first step on; with ``start=`` the reactions of its equilibrium.  In
         dynamics they act during the step that ends at each time; the first row is NaN.
