@@ -16,11 +16,13 @@ import numpy as np
 from ufl_beam.analysis.linearization import SmallMotions, reference_state
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.collective_errors import on_first
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import CompiledFields, SectionForces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
+from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.constraint_checks import require_no_mechanism
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
@@ -33,6 +35,8 @@ from ufl_beam.parallel import active_comm
 from ufl_beam.rich_display import Rich
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
+from ufl_beam.terms.beams import elastic_forms
+from ufl_beam.terms.in_cells import CellForces, InCells
 
 MOST_TITLES = 4  # modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
@@ -98,11 +102,24 @@ class Shapes(Rich, ABC):
         require_count(count, "motion: count")
         times = np.arange(count + 1) / count
         swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
-        history = {"times": times, "q": self.q + swing, "every": np.array([1])}
+        q = self.q + swing
+        history = {"times": times, "q": q, "every": np.array([1]), "cells": self._cell_forces(q)}
         none = dict.fromkeys(("v", "reactions", "connections"), np.empty(0))
         solution = Solution(self.scene, self.grid)
         solution.resume(history | none)
         return solution
+
+    def _cell_forces(self, states: Array) -> Array:
+        """Forces of elastic cells in some configurations; (n, 9, num_cells)."""
+        share = Share(self.grid, MPI.COMM_SELF)
+        fields, r = CompiledFields(share), np.zeros(share.size)
+        form = fields.hot_kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
+        of_cells, found = CellForces(share, [InCells(form, lib.STRESS, fields.order)]), []
+        for q in np.ascontiguousarray(states):
+            form.add(q, r)
+            of_cells.accept()
+            found.append(of_cells(q, q))
+        return np.array(found)
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
         """Write a time series for ParaView with the k-th mode at time k.
