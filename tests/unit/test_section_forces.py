@@ -8,6 +8,9 @@ import pytest
 
 import ufl_beam as ub
 
+# Static runs warn of drag in a preload; here it is meant.
+pytestmark = pytest.mark.filterwarnings("ignore:.*takes v:ufl_beam.ModelWarning")
+
 SECTION = ub.Section(EA=1e6, GA=4e5, EI=2e3, rhoA=3.0, rhoI=0.02)
 ROUND_OFF = 1e-13  # of the largest force: sums of some ten numbers, some of them cancel
 SOLVED = 1e-8  # part of the largest value that the tolerance of the solver, 1e-10, leaves at most
