@@ -248,8 +248,9 @@ class Coulomb(Record):
 class RigidPlastic(Record):
     """Rigid-plastic law: no motion below a limit of the force, flow or softening at it.
 
-    There is no elastic stiffness: below the limit the motion is held exactly.  Plastic hinges of
-    beams, ``Beam(hinges={s: law})``, are rotations with this law.
+    There is no elastic stiffness: below the limit the motion is held exactly, and nothing else may
+    hold it, see docs/warnings.md.  Plastic hinges of beams, ``Beam(hinges={s: law})``, are
+    rotations with this law.
 
     Args:
         law: :class:`Softening` or :class:`Hardening`; limit in N m or N, moduli in N m/rad or N/m,

@@ -83,7 +83,9 @@ class KeptStates:
         while first < last:
             block, end = self._blocks[k], self._ends[k]
             begin, k = end - len(block.t), k + 1
-            part.append(block.view(slice(first - begin, last - begin)))
+            if first > begin or last < end:
+                block = block.view(slice(first - begin, last - begin))
+            part.append(block)
             first = end
         return part
 
@@ -162,10 +164,15 @@ class KeptStates:
         """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
         parts = []
         for k in range(len(LEDGER)):
-            blocks = [(block.entries[k], np.zeros(len(block.t))) for block in self._blocks]
-            names = dict.fromkeys(chain.from_iterable(entries for entries, _ in blocks))
-            parts.append({n: np.concatenate([e.get(n, zero) for e, zero in blocks]) for n in names})
+            names = dict.fromkeys(chain.from_iterable(b.entries[k] for b in self._blocks))
+            parts.append({name: self._entry(k, name) for name in names})
         return parts
+
+    def _entry(self, k: int, name: str) -> Array:
+        """An entry of the k-th part of the ledger, zero where it is not there; (n+1,); J."""
+        found = [block.entries[k].get(name) for block in self._blocks]
+        pairs = zip(found, self._blocks, strict=True)
+        return np.concatenate([np.zeros(len(b.t)) if e is None else e for e, b in pairs])
 
     # -- files ---------------------------------------------------------------------------------
 
