@@ -13,7 +13,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_kind
-from ufl_beam.output.archive import above, below, decoding, read, require_arrays, write
+from ufl_beam.output.archive import above, below, decoding, plain, read, require_arrays, write
 from ufl_beam.output.output_files import require_path
 from ufl_beam.rich_display import Rich
 
@@ -125,7 +125,7 @@ def text_of(case: dict[str, Any], what: str = "case") -> str:
     for name in case:
         require_kind(name, str, f"{what}: name")
     try:
-        return json.dumps(case, sort_keys=True, ensure_ascii=False, default=_plain)
+        return json.dumps(case, sort_keys=True, ensure_ascii=False, default=plain)
     except (TypeError, ValueError):
         raise SceneError(
             f"{what} = {case}: values must be numbers, texts or lists of them; let the member "
@@ -150,9 +150,3 @@ def numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
             )
         arrays[name] = array.astype(float)
     return arrays
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, np.generic | np.ndarray):
-        return value.tolist()
-    raise TypeError

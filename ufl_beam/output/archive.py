@@ -77,7 +77,7 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
             arrays = {n: v for n, v in content.items() if isinstance(v, np.ndarray)}
             text = {n: v for n, v in content.items() if n not in arrays}
             with archive.open("text.json", "w") as member:
-                member.write(json.dumps(text, default=_plain).encode())
+                member.write(json.dumps(text, default=plain).encode())
             for name, values in arrays.items():
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                     NPY.write_array(member, values, allow_pickle=False)
@@ -100,7 +100,8 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
         ) from None
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """Return arrays and numbers of NumPy as JSON has them; TypeError for other objects."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     raise TypeError(repr(value))
