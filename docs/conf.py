@@ -40,6 +40,10 @@ html_static_path = ["_static"]
 html_css_files = ["site.css"]
 html_show_sourcelink = html_show_copyright = html_show_sphinx = False
 html_copy_source = False
+ADDRESS = re.search(
+    r'^Repository = "(.+)"', (DOCS.parent / "pyproject.toml").read_text("utf-8"), re.MULTILINE
+)
+"""The public address, if there is one."""
 html_theme_options = {
     "light_css_variables": {"color-brand-primary": "#00598a", "color-brand-content": "#00598a"},
     "dark_css_variables": {"color-brand-primary": "#7cc4f0", "color-brand-content": "#7cc4f0"},
@@ -132,6 +136,8 @@ def rewrite(app, docname, source):
         .replace("](../demos/", "](demos/")
         .replace("](demos/README.md)", "](gallery.md)")
     )
+    if ADDRESS:
+        text = text.replace("git clone ADDRESS", f"git clone {ADDRESS[1]}")
     text = re.sub(r"\[(\w+\.md)\]\(\1\)", r"[](\1)", text)  # the title in the place of the file
     source[0] = OUTSIDE.sub(r"] (`\1`)", text)
 

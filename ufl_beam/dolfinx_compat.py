@@ -14,6 +14,13 @@ import numpy.typing as npt
 
 Array = npt.NDArray[np.float64]
 
+SOURCES = Path(__file__).resolve().parents[1]
+WAYS = (
+    'It comes by conda install -c conda-forge fenics-dolfinx "petsc=*=real*" slepc4py c-compiler, '
+    "by apt-get install python3-dolfinx-real (Debian 13), or in the Docker image dolfinx/dolfinx"
+) + (f"; or run through {SOURCES}/env, see docs/installation.md" * (SOURCES / "env").is_file())
+"""How to get DOLFINx, of an installed package and of a source tree."""
+
 try:
     from mpi4py import MPI
     from petsc4py import PETSc
@@ -27,21 +34,17 @@ try:
     from dolfinx import mesh as mesh
 except ImportError as error:  # pragma: no cover - depends on the machine
     raise ImportError(
-        "ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI "
-        f"({error}). Run through ./env of the source tree, or see docs/installation.md."
+        f"ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI ({error}). {WAYS}"
     ) from error
 
 VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
 VERSIONS = f"DOLFINx {dolfinx.__version__} and FFCx {ffcx.__version__}"
 if VERSION < (0, 9):
-    raise ImportError(
-        f"ufl_beam needs DOLFINx 0.9 or newer, this is {dolfinx.__version__}; "
-        "run through ./env of the source tree, or see docs/installation.md"
-    )
+    raise ImportError(f"ufl_beam needs DOLFINx 0.9 or newer, this is {dolfinx.__version__}. {WAYS}")
 if np.dtype(PETSc.ScalarType) != np.float64:
     raise ImportError(
         "ufl_beam needs PETSc with real numbers of double precision; those of this PETSc are "
-        f"{np.dtype(PETSc.ScalarType)}. Debian: python3-dolfinx-real; conda: petsc=*=*real*"
+        f"{np.dtype(PETSc.ScalarType)}. Debian: python3-dolfinx-real; conda: petsc=*=real*"
     )
 
 if all(

@@ -25,6 +25,23 @@ def test_script_of_the_readme_runs(tmp_path, monkeypatch, capsys):
     assert "imbalance" in capsys.readouterr().out
 
 
+PAGES = ("README.md", "docs/start.md", "docs/installation.md")
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_of_the_pages_exist(page):
+    """Targets of make, and the packages that ./env asks for in one line."""
+    text = (README.parent / page).read_text("utf-8")
+    makefile = (README.parent / "Makefile").read_text("utf-8")
+    targets = set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
+    commands = re.findall(r"(?:^|`|: )make ([a-z-]+)", text, re.MULTILINE)
+    assert commands
+    assert set(commands) <= targets
+    (tools,) = re.findall('^tools="(.*)"', (README.parent / "env").read_text("utf-8"), re.MULTILINE)
+    assert f"sudo apt-get install git make {tools}\n" in text
+    assert "<this repository>" not in text
+
+
 def test_the_readme_is_one_screen():
     assert len(README.read_text("utf-8").splitlines()) <= 60
 

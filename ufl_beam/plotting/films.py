@@ -86,7 +86,7 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
         theirs.close()
         try:
             for frame in chain([first], frames):
-                ours.sendall(np.ascontiguousarray(frame), socket.MSG_NOSIGNAL)
+                ours.sendall(np.ascontiguousarray(frame).data, socket.MSG_NOSIGNAL)
         except ConnectionError:
             pass  # it has ended, and said why
         except BaseException:

@@ -38,7 +38,7 @@ def _slepc() -> Any:
     except ImportError as error:  # pragma: no cover - depends on the machine
         raise ImportError(
             "modes and buckling need slepc4py; install the package slepc4py of conda-forge, or "
-            "python3-slepc4py-real of Debian, see docs/installation.md"
+            "python3-slepc4py-real of Debian"
         ) from error
     return SLEPc
 
