@@ -218,6 +218,41 @@ def test_a_rotating_frame_keeps_energy():
     assert solution.energy.worst < 1e-9  # the ledger closes
 
 
+def test_what_acts_in_the_undeformed_scene_is_named():
+    """Vibrations about a state that is none of equilibrium are refused, or a warning names why."""
+    scene = cantilever(loads=[ub.RotatingFrame(12.0)])
+    with pytest.raises(ub.SceneError, match=r"RotatingFrame; give .* at=simulate\(scene, Static"):
+        ub.modes(scene, 1)
+    beam = scene.beams[0]
+    others = {
+        "VirtualWork 'wind'": {"works": [ub.VirtualWork("wind", lambda q, w, axis: w[1])]},
+        "Potential 'well'": {"works": [ub.Potential("well", lambda q, axis: q[0])]},
+        "Stretch": {
+            "connectors": [ub.Stretch(ub.ground(3, 1), beam.end, ub.Actuator(lambda t: 5.0))],
+        },
+    }
+    for name, more in others.items():
+        with pytest.warns(ub.ModelWarning, match=f"{name}.*no equilibrium.*give at=simulate"):
+            ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)], **more), 1)
+    held = [ub.Clamped(beam.start), ub.Prescribed(beam.end, u=0.001)]
+    with pytest.warns(ub.ModelWarning, match="Prescribed at .* no equilibrium"):
+        ub.modes(ub.Scene([beam], supports=held), 1)
+    # What balances, a load of the undeformed scene, and a work without a force there: no warning.
+    bed = ub.Potential("bed", lambda q, axis: 5 * q[1] ** 2)
+    pull = ub.PointLoad(beam.end, force=(1, 0))
+    ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[pull], works=[bed]), 1)
+
+
+def test_modes_of_what_its_weight_holds():
+    """[closed] ω² = g/l of a point; a body that falls has none, with or without its weight."""
+    body = ub.Body((0, -1), mass=1.0, inertia=1e-12)
+    pin = ub.Revolute(ub.ground(0, 0), body.at(0, 0))
+    scene = ub.Scene([], [pin], bodies=[body], loads=[ub.Gravity()])
+    assert ub.modes(scene, 1).omega[0] == pytest.approx(9.81**0.5, rel=1e-9)
+    falling = ub.Scene([], bodies=[body], loads=[ub.Gravity()])
+    assert np.abs(ub.modes(falling, 3).omega).max() == 0.0
+
+
 def test_a_thrown_body_flies_straight():
     """[closed] Seen from the frame a free body spirals; the midpoint rule is of second order."""
     rate, mass = 2.0, 1.5

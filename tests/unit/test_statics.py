@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Static runs: loads that are there from the start, relaxation, first reactions, broken springs."""
 
+import itertools
+import re
 from pathlib import Path
 
 import numpy as np
@@ -220,3 +222,80 @@ def test_who_asks_for_a_velocity_is_told():
     with pytest.raises(ub.SceneError, match="there is none"):
         simulation.velocity(beam.end)
     simulation.close()
+
+
+# -- what only loads hold -------------------------------------------------------------------------
+
+ROD = ub.Section(EA=1e6, GA=1e6, EI=1e4, rhoA=1.0)
+
+
+def rods(*points, loads=None, **more):
+    """Rods between points, hinged to each other and to a pin at the first point, and their load."""
+    beams = [ub.Beam(a, b, ROD, cells=4) for a, b in itertools.pairwise(points)]
+    joints = [ub.Revolute(a.end, b.start) for a, b in itertools.pairwise(beams)]
+    supports = [ub.Pinned(beams[0].start)]
+    acting = [ub.Gravity()] if loads is None else loads(beams[-1])
+    return ub.Scene(beams, joints, supports, acting, **more)
+
+
+def test_a_hanging_body():
+    """[closed] The pin bears the weight."""
+    body = ub.Body((0.3, -0.4), mass=2.0, inertia=1e-3)
+    pin = ub.Revolute(ub.ground(0.3, 0.6), body.at(0.3, 0.6))
+    scene = ub.Scene([], [pin], bodies=[body], loads=[ub.Gravity()])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
+    np.testing.assert_allclose(run.displacement(body.middle)[-1], 0.0, atol=1e-12)
+    assert np.hypot(*run.joint(pin).force[-1]) == pytest.approx(2 * 9.81, rel=1e-9)
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()])
+def test_hanging_rods(scheme):
+    """[closed] ∫N/EA: (3/2 + 1/2) m g l/EA, for l = 1; small strains 2e-5."""
+    scene = rods((0, 0), (0, -1), (0, -2))
+    run = ub.simulate(scene, scheme, t=(0, 3), dt=0.5)
+    sunk = run.displacement(scene.beams[-1].end)[-1]
+    np.testing.assert_allclose(sunk, [0, -2 * 9.81 / 1e6, 0], rtol=1e-4, atol=1e-12)
+
+
+def test_a_path_of_what_its_weight_holds():
+    """[closed] A force F across a hanging rod at its end: tan of its angle is F over W/2.
+
+    It bends by less than W l²/(8 EI) = 1e-4 of its length.
+    """
+    beam = ub.Beam((0, 0), (0, -1), ROD, cells=4)
+    push = ub.PointLoad(beam.end, force=(1, 0), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=[ub.Gravity(), push])
+    path = ub.follow(scene, ub.ArcLength(0.2), until=lambda now: now.t > 5)
+    u, v, _ = path.displacement(beam.end).T
+    np.testing.assert_allclose(u / (1 - v), path.factor / (9.81 / 2), rtol=1e-4, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("points", "loads", "said"),
+    [
+        # nothing acts; it falls; it is not where its weight balances; it is pulled, but flies
+        ([(0, 0), (0, -1)], lambda rod: [], r"can turn about \(.*\)\. Add supports"),
+        ([(0, 0), (1, -1)], None, "where they balance, as a weight below its hinge"),
+        # the load turns with the rod; steady rotation is the same at any angle
+        (
+            [(0, 0), (1, 0)],
+            lambda rod: [ub.FollowerLoad(rod.end, force=(5, 0))],
+            "loads do not hold it either",
+        ),
+        ([(0, 0), (1, 0)], lambda rod: [ub.RotatingFrame(3.0)], "loads do not hold it either"),
+    ],
+)
+def test_what_loads_do_not_hold(points, loads, said):
+    """It is refused with names, by statics, paths and buckling."""
+    with pytest.raises(ub.SceneError, match="free to move in 1 way.*can turn about") as failure:
+        ub.simulate(rods(*points, loads=loads), ub.Static(), t=(0, 1), dt=1)
+    assert re.search(said, str(failure.value))
+    with pytest.raises(ub.SceneError, match=r"free to move|stiffness of its own"):
+        ub.buckling(rods(*points, loads=loads), 1)
+
+
+def test_a_free_rod_that_is_pulled_is_free():
+    beam = ub.Beam((0, 0), (1, 0), ROD, cells=4, name="rod")
+    ends = [ub.PointLoad(beam.start, force=(-5, 0)), ub.PointLoad(beam.end, force=(5, 0))]
+    with pytest.raises(ub.SceneError, match="free to move in 3 independent ways.*rod"):
+        ub.simulate(ub.Scene([beam], loads=ends), ub.Static(), t=(0, 1), dt=1)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar
@@ -18,13 +19,14 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Complex, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.errors import ModelWarning, SceneError, warn
+from ufl_beam.errors import ModelWarning, SceneError
 from ufl_beam.mechanics.classical import Newmark, Static
 from ufl_beam.mechanics.time_schemes import Rates, Step
 from ufl_beam.model.constraint_checks import require_no_mechanism
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
+from ufl_beam.model.time_functions import value_at
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
@@ -34,6 +36,7 @@ from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
 V = TypeVar("V", Array, Complex)
 
 COUPLING_TOLERANCE = 1e-9  # couplings below this part of the largest damping do not count
+BALANCED = 1e-13  # forces below this part of stiffness times size are round-off
 AT_REST = 1e300  # length of a step in which all rates vanish; s
 
 
@@ -59,21 +62,16 @@ def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | 
 
     Raises:
         SceneError: The scene turns steadily, and the state of that is not given.
-
-    Warns:
-        ModelWarning: The scene is free to move, and no state bears its loads.
     """
     if any(isinstance(load, RotatingFrame) for load in scene.loads):
         raise SceneError(
             "modes: the undeformed scene is not at rest in a RotatingFrame; give the state of "
             "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
         )
-    if scene.loads and (said := require_no_mechanism(scene)):
-        try:
-            state = simulate(scene, Static(), t=(0.0, 1.0), dt=1.0, mesh=mesh, progress=False)
-            return scene, state
-        except SceneError:
-            warn(f"modes: {said}The loads do not hold it, and do not count")
+    if scene.loads and require_no_mechanism(scene):
+        with suppress(SceneError):  # where it is not held, loads do not count either
+            run = simulate(scene, Static(), t=(0.0, 1.0), dt=1.0, mesh=mesh, progress=False)
+            return scene, run
     return replace(scene, loads=()), None
 
 
@@ -152,6 +150,29 @@ class SmallMotions:
             flexibility = diags_array(1 / (T.diagonal()[laws] + (T.diagonal()[laws] == 0.0)))
             T = T - T[:, laws] @ flexibility @ T[laws, :]
         return csr_array(self._Z.T @ T @ self._Z)
+
+    def unbalanced(self) -> str:
+        """Describe what is in no equilibrium in the state: works, connectors, motions of supports.
+
+        Empty if all of them balance.
+        """
+        t = self._simulation.t
+        r, data = linearise(self._simulation, self.q, AT_REST)
+        sizes = abs(self._matrix(data)).max(axis=1).toarray().ravel()
+        apart = np.abs(self._axes().T @ r) > BALANCED * self.scene.size * sizes
+        apart[self._simulation.supports.dofs] = False
+        links = zip(self.scene.links, self.grid.multipliers, strict=True)
+        names = [str(link) for link, force in links if apart[force]]
+        apart[self.grid.multipliers] = False
+        names += [str(work) for work in self.scene.works if apart.any()]
+        supports = ((s, motion) for s in self.scene.supports for motion in s.held.values())
+        names += [str(s) for s, motion in supports if value_at(motion, t, s) != 0.0]
+        if not names:
+            return ""
+        return (
+            f"modes: {', '.join(names)}: the undeformed scene is no equilibrium with these; for "
+            "vibrations about the equilibrium give at=simulate(scene, Static(), ...)"
+        )
 
     # -- frequencies ---------------------------------------------------------------------------
 

@@ -21,7 +21,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import CompiledFields, SectionForces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
-from ufl_beam.errors import SceneError, require_count, require_kind, require_number
+from ufl_beam.errors import SceneError, require_count, require_kind, require_number, warn
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.constraint_checks import require_no_mechanism
@@ -267,10 +267,10 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
 
     They are vibrations about the undeformed, unloaded scene, or about the last state of a solution:
     with its section forces, the stiffness of its loads and of a :class:`RotatingFrame`, and the
-    elastic stiffness of yielded material.  If only loads hold the scene, as a weight a pendulum,
-    they are vibrations about the equilibrium near the undeformed scene.  Nothing yields or opens further, and hinges that bear no
-    moment any more are joints.  Sticking friction is a constraint, sliding friction and controllers
-    are ignored.
+    elastic stiffness of yielded material.  If only loads hold the scene, as its weight holds a
+    pendulum, they are vibrations about the equilibrium with these.  Nothing yields or opens
+    further, and hinges that bear no moment any more are joints.  Sticking friction is a constraint,
+    sliding friction and controllers are ignored.
 
     Without damping they are eigenvalues of K x = ω² M x.  With damping, Coriolis or follower forces
     they are those of (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that
@@ -287,6 +287,9 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         SceneError: The call or the scene is wrong, nothing that moves has mass, or the scene turns
             with a :class:`RotatingFrame` and ``at`` is not given.
 
+    Warns:
+        ModelWarning: Works, connectors, or motions of supports make the undeformed scene move.
+
     Example:
         >>> shapes = ub.modes(scene, 3, mesh=ub.Mesh(refine=4))
         >>> print(shapes.frequencies.round(1))  # Hz
@@ -299,6 +302,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     else:
         _require_of(at, scene, mesh, "modes")
     small = SmallMotions(scene, at, mesh=mesh)
+    if at is None and (said := small.unbalanced()):
+        warn(said)
     if not small.M.data.any():
         raise SceneError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)

@@ -259,6 +259,7 @@ class Simulation(StateView):
         if self._loose:
             require_held(self.equation, self.solver, q1, self._loose)
             self._loose = ""
+            self.solver.forget_idle()  # tangents are regular from now on
         if self._branch is not None:
             self._branch.accept(self.equation.force)
         self.cell_forces.accept()

@@ -43,6 +43,7 @@ class BorderedNewton:
         rate.fill(0.0)
         with self._callbacks.noted():
             self.border.tangent(self._vectors.view(x), rate)
+            self._callbacks.hold_idle()
         P.stateIncrease()
         self._vectors.add_ghosts(self._rate)
         rate[self._held] = 0.0

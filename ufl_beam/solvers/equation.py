@@ -197,10 +197,14 @@ class SnesCallbacks:
         self.vectors.update_ghosts(x)
         with self.noted():
             self.equation.tangent(self.vectors.view(x))
-            if self.idle is not None:
-                entries, stiffnesses = self.idle
-                self.equation.A.data[entries] += stiffnesses
+            self.hold_idle()
         P.stateIncrease()
+
+    def hold_idle(self) -> None:
+        """Add the stiffnesses against idle motions to the tangent."""
+        if self.idle is not None:
+            entries, stiffnesses = self.idle
+            self.equation.A.data[entries] += stiffnesses
 
     def test(self, snes: Any, iteration: int, norms: Any) -> int:
         """Return why to stop after an iteration, or zero."""

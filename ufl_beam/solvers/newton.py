@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from functools import cached_property
+from collections.abc import Callable
+from functools import cached_property, partial
 from typing import Any
 
 from petsc4py import PETSc
@@ -164,7 +165,7 @@ class Solver:
         self._go_to(guess)
         reason = self._iterate(self._snes, 2, like_last=like_last)
         if reason == lib.SINGULAR and self._may_go_on():
-            reason = self._hold_idle(guess)
+            reason = self._hold_idle(partial(self._again, guess))
         if reason == lib.STALLED:
             self._equation.restart(Tangents.EXACT)
             reason = self._iterate(self._careful, PATIENCE)
@@ -176,9 +177,18 @@ class Solver:
     def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
         """Find the configuration as :meth:`solve` does, together with the unknown of a border."""
         self.convergence.take_loads(loads)
-        self._go_to(guess)
-        self._equation.restart(Tangents.FIRST)
-        return self._solution(self._iterate(self._along(border), 12))
+        start = border.t
+
+        def iterate() -> int:
+            border.t = start
+            self._go_to(guess)
+            self._equation.restart(Tangents.FIRST)
+            return self._iterate(self._along(border), 12)
+
+        reason = iterate()
+        if reason == lib.SINGULAR and self._may_go_on():
+            reason = self._hold_idle(iterate)
+        return self._solution(reason)
 
     @cached_property
     def _idle(self) -> IdleMotions:
@@ -187,20 +197,27 @@ class Solver:
             self._share, self._equation.A, self.convergence.diagonal, self._equation.held
         )
 
-    def _hold_idle(self, guess: Array) -> int:
-        """Iterate with idle motions held; without any if that does not help."""
+    def _again(self, guess: Array) -> int:
+        """Iterate from a guess once more."""
+        self._go_to(guess)
+        return self._iterate(self._snes, 2)
 
-        def again() -> int:
-            self._put_idle()
-            self._go_to(guess)
-            return self._iterate(self._snes, 2)
-
+    def _hold_idle(self, again: Callable[[], int]) -> int:
+        """Iterate again with idle motions held; without any if that does not help."""
         reason, now = int(lib.SINGULAR), self.convergence
         while reason == lib.SINGULAR and self._idle.find(now.residuals(), now.scale()):
+            self._put_idle()
             reason = again()
-        if reason <= 0 and self._idle.forget():
+        if reason <= 0 and self.forget_idle():
             reason = again()
         return reason
+
+    def forget_idle(self) -> bool:
+        """Hold idle motions no more; return whether any were held."""
+        some = self._idle.forget()
+        if some:
+            self._put_idle()
+        return some
 
     def _put_idle(self) -> None:
         """Add the stiffnesses against idle motions to tangents from now on."""
