@@ -109,12 +109,13 @@ class Assembly:
 
     def remember_asked(self, memory: Memory) -> None:
         """State the forces of controllers and the limits of friction in the last step."""
-        links = [(i, x) for i, x in enumerate(self.equation.share.grid.scene.links) if x in self.asked]
-        if links:
-            numbers = np.array([i for i, _ in links])
-            forces = np.array([[self.asked[link]] for _, link in links])
-            forces = memory.known_rows("asked", numbers, forces)
-            self.asked.update((x, float(f)) for (_, x), (f,) in zip(links, forces, strict=True))
+        if not self.asked:
+            return
+        links, asked = self.equation.share.grid.scene.links, self.asked
+        numbers = np.array([i for i, link in enumerate(links) if link in asked])
+        forces = np.array([[asked[links[i]]] for i in numbers])
+        forces = memory.known_rows("asked", numbers, forces).ravel()
+        asked.update({links[i]: float(force) for i, force in zip(numbers, forces, strict=True)})
 
     def internal_variables(self, q: Array) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""
@@ -200,15 +201,15 @@ def assemble(
             of = (layout, *setting, search, by.points)
             inelastic.append(by.inelastic(fields.part(part), *of))
     beams: list[Cells] = [*inelastic]
-    decays = isinstance(scheme, DecayingMidpoint)
-    if (scheme.alpha or decays) and sum(len(cells) for _, cells in groups) < len(share.grid.cells):
+    loses = scheme.alpha or isinstance(scheme, DecayingMidpoint)
+    if loses and sum(len(cells) for _, cells in groups) < len(share.grid.cells):
         ledger.lost["numerical"] += 0.0
     numerical: list[Term] = []
     if elastic.any():
         part = np.flatnonzero(elastic)
         on_part = fields if elastic.all() else fields.part(part)
         beams.append(ElasticBeams(on_part, *setting))
-        if decays:
+        if isinstance(scheme, DecayingMidpoint):
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     asked = {link: 0.0 for link in scene.links if isinstance(link.law, Controller | Coulomb)}
