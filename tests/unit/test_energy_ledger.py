@@ -279,7 +279,12 @@ def test_a_ledger_is_a_mapping():
     one = energy()
     assert [*one] == [*one.keys()] == ["stored", "kinetic", "loads", "numerical"]
     assert len(one) == 4
-    assert "loads" in one and "friction" not in one and 0 not in one
-    assert one.get("friction") is None and one.get("stored") is one["stored"]
+    assert "loads" in one
+    assert "friction" not in one
+    assert 0 not in one
+    assert one.get("friction") is None
+    assert one.get("stored") is one["stored"]
     assert {name: values[-1] for name, values in one.items()}["numerical"] == 3.0
-    assert one == one and one != energy() and {one: 1}[one] == 1  # by identity, as before
+    assert one == one
+    assert one != energy()
+    assert {one: 1}[one] == 1

@@ -2,6 +2,7 @@
 """Entries of the energy ledger: names that are taken, frames, and elasticity that is not linear."""
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ def test_a_work_may_not_have_the_name_of_what_a_potential_gains():
     wind = ub.VirtualWork("soil in time", lambda w: w[1])
     bed = ub.Potential("soil in time", lambda q: q[1] ** 2)
     for other in (wind, bed):
-        with pytest.raises(ub.SceneError, match="'soil in time' has the name .* 'soil' gains"):
+        with pytest.raises(ub.SceneError, match=r"'soil in time' has the name .* 'soil' gains"):
             ub.Scene([beam()], works=[other, soil])
     ub.Scene([beam()], works=[wind])
 
@@ -58,7 +59,7 @@ class Stiffening(ub.MaterialLaw):
 
     k: float
     rate: float = 0.0
-    variables = {"creep": 0.0}
+    variables: ClassVar = {"creep": 0.0}
 
     def stress(self, strain, state):
         e = strain - state.creep
@@ -77,9 +78,11 @@ class OneSided(Stiffening):
     """Elastic in one direction, soft in the other."""
 
     def stress(self, strain, state):
-        return ub.law_functions.where(ub.law_functions.below(strain, 0.1), 0.1, 1.0) * (
-            self.C * (strain - 0.1)
-        ) + 0.01 * self.C
+        return (
+            ub.law_functions.where(ub.law_functions.below(strain, 0.1), 0.1, 1.0)
+            * (self.C * (strain - 0.1))
+            + 0.01 * self.C
+        )
 
     def elastic_energy(self, strain, state):
         e = strain - 0.1
@@ -102,13 +105,15 @@ def test_an_elastic_law_dissipates_nothing(law, scheme, reference):
     """[exact] zero: the same operations in both terms of a difference."""
     energy = bent(law, scheme, reference)
     assert energy["stored"][-1] > 0.01
-    assert not energy["plastic"].any() and not energy["hardening"].any()
+    assert not energy["plastic"].any()
+    assert not energy["hardening"].any()
     if scheme in EXACT:
-        assert energy.worst < 1e-9 and energy.lost["numerical"].any()
+        assert energy.worst < 1e-9
+        assert energy.lost["numerical"].any()
 
 
 def test_the_ledger_of_an_elastic_law_in_statics_is_of_second_order():
-    """[estimate] the order of two halvings is within 0.1 of 2; it was 1, of what was called plastic."""
+    """[estimate] the order of two halvings is within 0.1 of 2."""
     worst = [bent(Stiffening(5.0), ub.Static(), dt=dt).worst for dt in (0.05, 0.025, 0.0125)]
     assert np.log2(worst[0] / worst[1]) == pytest.approx(2, abs=0.1)
     assert np.log2(worst[1] / worst[2]) == pytest.approx(2, abs=0.1)

@@ -84,6 +84,7 @@ def test_a_loop_goes_on_bit_for_bit():
         one.step_to(end)
         if k >= 9:
             other.step_to(end)
-    assert np.array_equal(one.q, other.q) and one.iterations == other.iterations
+    assert np.array_equal(one.q, other.q)
+    assert one.iterations == other.iterations
     one.close()
     other.close()

@@ -2,6 +2,7 @@
 """Entries of the ledger and columns of tables have the order of the scene on any processes."""
 
 import math
+from itertools import pairwise
 
 from mpi4py import MPI
 
@@ -21,7 +22,7 @@ def chain():
         ub.Beam((i, 0), (i + 1, 0), elastic if i < 2 else yielding, cells=4, name=f"b{i}")
         for i in range(4)
     ]
-    joints = [ub.Rigid(a.end, b.start) for a, b in zip(beams, beams[1:], strict=False)]
+    joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
     laws = [
         ub.Spring(2.0), ub.ForceLaw(lambda x, rate: x), ub.Damper(1.0),
         ub.RigidPlastic(ub.Hardening(0.1, modulus=1.0)),
@@ -52,7 +53,9 @@ def test_entries_have_the_order_of_one_process(scheme):
         return after
 
     state, supplied, lost = names(MPI.COMM_SELF)
-    assert len(state) >= 3 and len(supplied) >= 3 and len(lost) >= 4
+    assert len(state) >= 3
+    assert len(supplied) >= 3
+    assert len(lost) >= 4
     assert names(MPI.COMM_WORLD) == [state, supplied, lost]
 
 
@@ -75,7 +78,8 @@ def test_a_table_goes_on_on_other_processes(shared_path, on_first_rank):
         return header, [[float(x) for x in line.split(",")] for line in lines]
 
     (header, split), (same, whole) = on_first_rank(lambda: (rows("split"), rows("whole")))
-    assert header == same and len(split) == len(whole) == 5
+    assert header == same
+    assert len(split) == len(whole) == 5
     for one, other in zip(split, whole, strict=True):
         # [estimate] Sums in another order, and what Newton's tolerance makes of that.
         assert one == pytest.approx(other, rel=1e-6, abs=1e-9)

@@ -162,7 +162,8 @@ def test_a_finer_run_does_not_sharpen_what_is_negligible():
     """Changes below the floor have no order: no part of them is known to be left."""
     law = {"cells": (0.0, 2.0), "steps": (1e-14, 2.0)}
     one = cross((0, 0), **law)
-    assert one.cells.used == one.steps.used == 0 and one.error(0, 0) > 0
+    assert one.cells.used == one.steps.used == 0
+    assert one.error(0, 0) > 0
     for fine in ((0.0, 1.0), (1.0, 1.0)):
         values = [manufactured(at, **law) for at in ((0.0, 0.0), fine)]
         assert one.sharpened(*values, (0.0, 0.0), fine) is one

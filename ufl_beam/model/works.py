@@ -109,6 +109,11 @@ class Work:
         """True if the function takes ``v`` or ``dt``: only a step in time gives it a value."""
         return not {"v", "dt"}.isdisjoint(self.asked)
 
+    @property
+    def in_time(self) -> str:
+        """Name of the entry of what a potential gains by a change in time."""
+        return f"{self.name} in time"
+
     def on(self, beams: Sequence[Member]) -> Sequence[Member]:
         """Those of the beams of a scene on which it acts."""
         return beams if self.beams is None else self.beams
@@ -196,10 +201,5 @@ class Potential(Work):
     """
 
     arguments = ("q", "axis", "t")
-
-    @property
-    def in_time(self) -> str:
-        """Name of the entry of what a change in time supplies."""
-        return f"{self.name} in time"
 
     __repr__ = bracketed

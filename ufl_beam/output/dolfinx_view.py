@@ -200,7 +200,8 @@ class DolfinxView:
             >>> bool(view.stiffness.x.array[2] == section.EI)
             True
         """
-        return self._put(self._named("stiffness"), self._fields.of_sections(self._fields.element.stiffness))
+        values = self._fields.of_sections(self._fields.element.stiffness)
+        return self._put(self._named("stiffness"), values)
 
     @property
     def configuration(self) -> fem.Function:
@@ -287,8 +288,9 @@ class DolfinxView:
     def _named(self, name: str) -> fem.Function:
         """A function of the configurations, or one with three values in each cell."""
         if name not in self._functions:
-            element, of_nodes = self._fields.element, name in ("configuration", "velocity")
-            space = element.space if of_nodes else element.stiffness.function_space
+            of = self._fields.element
+            in_cells = name not in ("configuration", "velocity")
+            space = of.stiffness.function_space if in_cells else of.space
             self._functions[name] = fem.Function(space, name=name)
         return self._functions[name]
 

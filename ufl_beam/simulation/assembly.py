@@ -203,15 +203,15 @@ def assemble(
             of = (layout, *setting, search, by.points)
             inelastic.append(by.inelastic(fields.part(part), *of))
     beams: list[Cells] = [*inelastic]
-    decays = isinstance(scheme, DecayingMidpoint)
-    if (scheme.alpha or decays) and sum(len(cells) for _, cells in groups) < len(share.grid.cells):
+    loses = scheme.alpha or isinstance(scheme, DecayingMidpoint)
+    if loses and sum(len(cells) for _, cells in groups) < len(share.grid.cells):
         ledger.lost["numerical"] += 0.0
     numerical: list[Term] = []
     if elastic.any():
         part = np.flatnonzero(elastic)
         on_part = fields if elastic.all() else fields.part(part)
         beams.append(ElasticBeams(on_part, *setting))
-        if decays:
+        if isinstance(scheme, DecayingMidpoint):
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     controllers = Controllers(share)

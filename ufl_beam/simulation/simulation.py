@@ -83,8 +83,7 @@ class Simulation(StateView):
     """
 
     def __repr__(self) -> str:
-        at = self.solution.parameter.at(self.t)
-        return f"<Simulation at {at}: {self.grid}, {self.scheme!r}>"
+        return f"<Simulation at {self.parameter.at(self.t)}: {self.grid}, {self.scheme!r}>"
 
     def __init__(
         self,
@@ -127,6 +126,7 @@ class Simulation(StateView):
         self._continues = start is not None
         loaded: list[Array] = []
         same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
+        goes_on = same and "reactions" in internal and start is not None and not len(start.v)
         if self._continues or (has_inertia(scheme) and scheme.kept):
             loaded = together(parts.carry_on, t0, self.q, internal if same else None)
         if start is not None:
@@ -137,7 +137,6 @@ class Simulation(StateView):
             self.inertia = parts.inertia
             if scene.links or scene.supports:
                 together(warn_of_jumps, grid, t0, q, self.connections()[:, 0])
-        goes_on = same and "reactions" in internal and not len(start.v)
         self._branch = parts.static_path(scheme, self.q, t0, loaded, together, goes_on=goes_on)
         self.reactions_known = self._branch is not None
         self.cell_forces, self.between = parts.cell_forces, float(scheme.average(0.0, 1.0))

@@ -8,14 +8,15 @@ The law holds at t_n+θ: its variables there are those after a backward-Euler st
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import NamedTuple
 
 import ufl
 from ufl.algorithms import expand_derivatives
+from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_pre_traversal
 
 from ufl_beam.compiled.c_library import names
-from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.fibres import Kind, Layout
 from ufl_beam.model.law_functions import Values, absolute, positive
@@ -64,18 +65,19 @@ class End(NamedTuple):
     changes: tuple[Values, ...]  # of the variables
 
 
-@stated
+@lru_cache(maxsize=128)
 def curved(kind: Kind) -> bool:
     """Return whether stresses are not linear in strains while the variables stay."""
-    (law, numbers), state = kind, prefixed("state", kind.law.variables)
-    stiffness, strains = rows(law, "stiffness"), rows(law, "strain")
-    at = Pointwise((*stiffness, *strains, *state, *prefixed("number", numbers))).at
-    e = [ufl.variable(at[name]) for name in strains]
-    C = law.as_argument(tuple(at[name] for name in stiffness))
-    of_point = law.of(C, {name: at[f"number {name}"] for name in numbers})
-    variables = State({name: at[f"state {name}"] for name in law.variables})
+
+    def symbol(_: str) -> Expr:
+        return ufl.variable(ufl.as_ufl(0.5))
+
+    law = kind.law
+    C, e = (tuple(map(symbol, rows(law, name))) for name in ("stiffness", "strain"))
+    of_point = law.of(law.as_argument(C), {name: symbol(name) for name in kind.numbers})
+    state = State({name: symbol(name) for name in law.variables})
     try:
-        stress = law.as_tuple(of_point.stress(law.as_argument(tuple(e)), variables))
+        stress = law.as_tuple(of_point.stress(law.as_argument(e), state))
         slopes = [expand_derivatives(ufl.diff(ufl.as_ufl(σ), x)) for σ in stress for x in e]
     except Exception:
         return False  # where the law is compiled, it says why
