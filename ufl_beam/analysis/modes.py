@@ -22,7 +22,7 @@ from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
 from ufl_beam.model.bodies import Anchor
-from ufl_beam.model.constraint_checks import require_no_mechanism
+from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_prestress
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -36,6 +36,8 @@ from ufl_beam.simulation.solution import Solution
 
 MOST_TITLES = 4  # modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
+
+IN_EQUILIBRIUM = "give at=, a static solution"
 
 
 @dataclass(frozen=True, eq=False)
@@ -278,6 +280,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     if at is None:
         # Loads that the state does not balance have no part in its stiffness.
         scene = replace(scene, loads=())
+        require_no_prestress(scene, "modes", IN_EQUILIBRIUM)
     else:
         _require_of(at, scene, mesh, "modes")
     small = SmallMotions(scene, at, mesh=mesh)
@@ -328,6 +331,7 @@ def buckling(
             )
     if at is None:
         require_no_mechanism(scene)
+        require_no_prestress(scene, "buckling", IN_EQUILIBRIUM)
     else:
         _require_of(at, scene, mesh, "buckling")
     small = SmallMotions(scene, at, t, mesh)

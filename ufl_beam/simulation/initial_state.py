@@ -27,6 +27,7 @@ from ufl_beam.model.constraint_checks import (
     require_inertia,
     require_masses,
     require_no_mechanism,
+    require_no_prestress,
     require_rates,
 )
 from ufl_beam.model.mesh_options import Mesh
@@ -38,8 +39,11 @@ from ufl_beam.terms.work_forms import require_works
 
 
 @no_garbage_collection()
-def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
-    """Make the grid of a scene, once the scheme is known to be able to compute it."""
+def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool) -> Grid:
+    """Make the grid of a scene, once the scheme is known to be able to compute it.
+
+    ``fresh`` says that the run begins with the undeformed scene.
+    """
     require_kind(scene, Scene, "scene")
     require_scheme(scheme, "scheme")
     if has_inertia(scheme):
@@ -51,6 +55,9 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
         require_rates(scene, scheme)
     else:
         require_no_mechanism(scene)
+        if fresh and scheme.theta < 1:  # it would oscillate about equilibrium for ever
+            instead = "begin with a run by Static() or ExactStatic(theta=1), as start="
+            require_no_prestress(scene, repr(scheme), instead)
     require_works(scene, scheme, mesh)
     require_independent(scene)
     warn_of_far_points(scene)
