@@ -143,3 +143,45 @@ class Swelling(ub.MaterialLaw):
 
     def elastic_energy(self, strain, state):
         return self.C * (strain - state.free) ** 2 / 2
+
+
+@dataclass(frozen=True)
+class Eigenstrain(ub.MaterialLaw):
+    """Elastic about a strain e0, as of temperature, shrinkage or prestress."""
+
+    e0: float
+    variables: ClassVar = {"none": 0.0}
+
+    def stress(self, strain, state):
+        return self.C * (strain - self.e0)
+
+    def increments(self, strain, state, dt):
+        return {"none": 0.0 * strain}
+
+    def elastic_energy(self, strain, state):
+        return self.C * (strain - self.e0) ** 2 / 2
+
+
+@dataclass(frozen=True)
+class YieldingEigenstrain(SameHardening):
+    """Hardening by residuals about a strain of 0.01."""
+
+    e0: float = 0.01
+
+    def stress(self, strain, state):
+        return super().stress(strain - self.e0, state)
+
+    def residuals(self, strain, old, new, dt):
+        # What the base asks of stress() has the strain taken off already.
+        trial = self.C * (strain - self.e0 - old.p) - self.B * old.p
+        over = f.sign(trial) * (self.stress(strain, new) - self.B * new.p)
+        over = over - self.limit - self.H * new.xi
+        flows = f.below(self.limit + self.H * old.xi - f.absolute(trial), 0.0)
+        flow = over * dt - self.eta * (new.xi - old.xi)
+        return {
+            "p": new.p - old.p - f.sign(trial) * (new.xi - old.xi),
+            "xi": f.where(flows, flow, new.xi - old.xi),
+        }
+
+    def elastic_energy(self, strain, state):
+        return super().elastic_energy(strain - self.e0, state)

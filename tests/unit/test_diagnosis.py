@@ -133,3 +133,24 @@ def test_null_vectors_in_any_units(monkeypatch, size):
     held = csc_array(scale @ (chain + diags_array(np.eye(1, size)[0])) @ scale)
     # The smallest singular value of a chain that is held at one end is some (π / (2 size))².
     assert null_vector(held)[0] > 1e-7
+
+
+def test_perfectly_plastic_cells_in_a_row():
+    """The seed is one of 1600 in which two of them flow in the same step; hardening mends it."""
+
+    def rod(**more):
+        strength = ub.Normal(300e6, 60e6, seed=1558)
+        fibres = ub.Fibres(ub.Hardening(strength, **more), number=4)
+        section = ub.Section.rectangle(b=0.02, h=0.02, E=200e9, nu=0.3, fibres=fibres)
+        beam = ub.Beam((0, 0), (1, 0), section, cells=4)
+        held = [ub.Prescribed(beam.at(k / 4), v=0.0, psi=0.0) for k in range(1, 4)]
+        pulled = ub.Prescribed(beam.end, u=lambda t: 0.008 * t, v=0.0, psi=0.0)
+        return pulled, ub.Scene([beam], supports=[ub.Clamped(beam.start), pulled, *held])
+
+    assert "if they are in a row, nothing tells which of them flows" in str(
+        failure(rod()[1], t=(0, 1), dt=0.25)
+    )
+    pulled, hardens = rod(modulus=200e9 * 1e-6)
+    run = ub.simulate(hardens, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    # N; the weakest cell bears about 300 MPa on 4 cm²
+    assert 0.8 < run.reaction(pulled)[-1, 0] / 120e3 < 1.2

@@ -135,6 +135,26 @@ def test_without_the_text_of_the_kernel(tmp_path):
         simd_kernels.written(tmp_path / "gone.c")
 
 
+CONDITIONS = {
+    "and": lambda x: ufl.And(ufl.gt(x, -0.5), ufl.le(x, 1.0)),
+    "or": lambda x: ufl.Or(ufl.lt(x, -0.5), ufl.ge(x, 1.0)),
+    "not": lambda x: ufl.Not(ufl.lt(x, 0.25)),
+    "equal": lambda x: ufl.Or(ufl.eq(x, 0.5), ufl.Not(ufl.ne(x, -1.0))),
+    "nested": lambda x: ufl.Not(
+        ufl.Or(ufl.And(ufl.gt(x, -0.5), ufl.ne(x, 1.0)), ufl.Not(ufl.lt(x, 1.5)))
+    ),
+}
+
+
+@pytest.mark.parametrize("condition", CONDITIONS)
+def test_logical_operators(condition):
+    """Exactly: cells choose one number or the other."""
+    values, holds = np.linspace(-1.0, 2.0, 13), CONDITIONS[condition]
+    one, several = both(lambda x: ufl.conditional(holds(x), x**2, -1.0), values)
+    assert np.array_equal(several, one)
+    assert 0 < np.sum(one == -1.0) < 13
+
+
 # -- the check of what is compiled ---------------------------------------------------------------
 
 
@@ -166,6 +186,19 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
         assert np.allclose(values, np.sin(q), rtol=1e-14)
         caplog.clear()
         simd_kernels.in_lanes.cache_clear()
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(
+    ("condition", "lanes"),
+    [(CONDITIONS["nested"], simd_kernels.LANES), (lambda x: ufl.lt(ufl.as_ufl(1.0), 2.0), 1)],
+    ids=["logical", "known"],
+)
+def test_the_compiler_says_nothing(fresh, capfd, condition, lanes):
+    kernel, _ = pointwise(lambda x: ufl.conditional(condition(x), x, -1.0), np.linspace(0, 1, 9))
+    in_lanes(kernel)
+    assert kernel.cells.lanes == lanes
+    assert "error" not in capfd.readouterr().err
 
 
 @pytest.mark.serial

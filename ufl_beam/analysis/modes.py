@@ -24,7 +24,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number, warn
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.bodies import Anchor
-from ufl_beam.model.constraint_checks import require_no_mechanism
+from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_prestress
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -40,6 +40,8 @@ from ufl_beam.terms.in_cells import CellForces, InCells
 
 MOST_TITLES = 4  # modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
+
+IN_EQUILIBRIUM = "give at=, a static solution"
 
 
 @dataclass(frozen=True, eq=False)
@@ -298,6 +300,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     require_kind(scene, Scene, "modes: scene")
     n = require_count(n, "modes: n")
     if at is None:
+        require_no_prestress(scene, "modes", IN_EQUILIBRIUM)
         scene, at = reference_state(scene, mesh)
     else:
         _require_of(at, scene, mesh, "modes")
@@ -352,6 +355,7 @@ def buckling(
     if at is None:
         if said := require_no_mechanism(scene):
             raise SceneError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
+        require_no_prestress(scene, "buckling", IN_EQUILIBRIUM)
     else:
         _require_of(at, scene, mesh, "buckling")
     small = SmallMotions(scene, at, t, mesh)

@@ -58,7 +58,8 @@ _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 def in_vectors(kernel: str) -> str:
     """Rewrite the C of a kernel of FFCx with vectors in the place of numbers, if lanes.h can.
 
-    Divisions by numbers, and by what divides more than once, become multiplications.
+    Divisions by numbers, and by what divides more than once, become multiplications.  Conditions
+    are masks, all bits of a lane zero or one, so that logical operators become those of bits.
     """
     body = kernel[kernel.index("{") :]
     called = re.findall(r"\b(?!for\b)([a-z_]\w*)\(", body)
@@ -81,7 +82,11 @@ def in_vectors(kernel: str) -> str:
             line = re.sub(rf"\bdouble (\w+) = ({_NUMBER});", r"lanes \1 = ALL(\2);", line)
             line = re.sub(rf"= ({_NUMBER} \* weights_\w+\[iq\]);", r"= ALL(\1);", line)
             line = re.sub(r"\bdouble\b", "lanes", line)
-            line = re.sub(r"\bbool\b", "mask", line)
+            if "bool " in line:
+                line = line.replace("&&", "&").replace("||", "|")
+                line = re.sub(r"!(?!=)", "~", re.sub(r"\bbool\b", "mask", line))
+                if re.search(rf"= {_NUMBER} [<>!=]=? {_NUMBER};", line):
+                    raise Refused("a condition on numbers that are known")
             line = re.sub(r"= ([^;?]+) \? ([^;:]+) : ([^;:]+);", r"= PICK(\1, \2, \3);", line)
             line = re.sub(rf"\b({'|'.join(FUNCTIONS)})\(", r"lanes_\1(", line)
         lines.append(line)

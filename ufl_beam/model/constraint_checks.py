@@ -14,10 +14,19 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, NodeDof, node
-from ufl_beam.model.connector_laws import HOLDING, RESISTING, Coulomb, Damper, RigidPlastic, Stop
+from ufl_beam.model.connector_laws import (
+    HOLDING,
+    RESISTING,
+    Coulomb,
+    Damper,
+    RigidPlastic,
+    Spring,
+    Stop,
+)
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
+from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 
@@ -314,6 +323,31 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
         elif max(abs(u), abs(v)) > 1e-6:
             found.append(f"{part.name} ({kind}) can shift along ({u:.3g}, {v:.3g})")
     return found
+
+
+def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
+    """Raise :class:`SceneError` if a law bears a stress at no strain, as with an eigenstrain.
+
+    The undeformed scene is no state of equilibrium then; ``what`` begins with it.
+    """
+    laws: list[tuple[object, MaterialLaw, tuple[float, ...]]] = [
+        (link, link.law.law, (link.law.stiffness,))
+        for link in scene.connectors if isinstance(link.law, Spring) and link.law.law is not None
+    ]  # fmt: skip
+    for beam in scene.beams:
+        if (layout := beam.section.layout(None)) is not None:
+            first = np.cumsum([0, *(n for _, n in layout.laws)])
+            of_points = np.reshape(layout.stiffness, (len(layout.weights), -1))
+            laws += [
+                (beam.name, law, tuple(of_points[k]))
+                for (law, _), k in zip(layout.laws, first[:-1], strict=True)
+            ]
+    for owner, law, C in laws:
+        if law.stressed(C):
+            raise SceneError(
+                f"{what}: {type(law).__name__} of {owner} bears a stress at no strain, so that "
+                f"the undeformed scene is not in equilibrium; {instead}"
+            )
 
 
 class Rated(Protocol):

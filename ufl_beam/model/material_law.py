@@ -4,10 +4,14 @@
 from __future__ import annotations
 
 import copy
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import fields
+from functools import cache
 from typing import Any, ClassVar
+
+import numpy as np
 
 Values = Any
 """Array of real or complex numbers, or a UFL expression; for interacting resultants a tuple."""
@@ -130,6 +134,17 @@ class MaterialLaw(ABC):
         return type(self).residuals is not MaterialLaw.residuals
 
     @property
+    def prestressed(self) -> bool:
+        """True if laws of this class may bear a stress at no strain; numbers do not matter."""
+        return _prestressed(type(self), tuple(vars(self)))
+
+    def stressed(self, C: tuple[Values, ...]) -> bool:
+        """Return whether the law with its numbers bears a stress at no strain."""
+        numbers = self.numbers(self.as_argument(C))
+        known = {n: 1.0 if hasattr(x, "draw") else x for n, x in numbers.items()}
+        return _bears(self.of(self.as_argument(C), known))
+
+    @property
     def must_dissipate(self) -> bool:
         """True if solutions of :meth:`residuals` with a negative dissipation are refused."""
         return self.solves and not self.active
@@ -141,3 +156,20 @@ class MaterialLaw(ABC):
     def as_argument(self, values: tuple[Values, ...]) -> Values:
         """Strains or stiffnesses of a point as the methods take them."""
         return values if self.resultants else values[0]
+
+
+@cache
+def _prestressed(kind: type[MaterialLaw], numbers: tuple[str, ...]) -> bool:
+    """Whether a law whose numbers have nothing in common bears a stress at no strain."""
+    law = object.__new__(kind)
+    vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(numbers)})
+    return _bears(law.of(law.as_argument(tuple(1.0 for _ in law.resultants or "x")), {}))
+
+
+def _bears(law: MaterialLaw) -> bool:
+    none = law.as_argument(tuple(np.zeros(1) for _ in law.resultants or "x"))
+    with np.errstate(all="ignore"):
+        stress = law.stress(
+            none, State({n: np.full(1, float(x)) for n, x in law.variables.items()})
+        )
+    return any(bool(np.any(σ != 0)) for σ in law.as_tuple(stress))

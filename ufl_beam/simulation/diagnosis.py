@@ -15,6 +15,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import ConvergenceError, NoNumber, SceneError, StepFailed
 from ufl_beam.model.constraint_checks import INSTEAD
+from ufl_beam.model.material_laws import Hardening
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
@@ -241,7 +242,19 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
     if ways:
         give = "gives way" if len(ways) == 1 else "give way together"
         said += f"; {_list(ways)} {give} at no further force"
+    if len(cells.soft) > 1 and any(_perfectly_plastic(grid, i) for i in cells.soft):
+        said += (
+            "; if they are in a row, nothing tells which of them flows: let the law harden a "
+            "little, as Hardening(limit, modulus) with a millionth of the stiffness"
+        )
     return said
+
+
+def _perfectly_plastic(grid: Grid, cell: int) -> bool:
+    """Return whether a law of a cell is Hardening that does not harden."""
+    layout = grid.scene.beams[grid.beam_of_cell[cell]].section.layout(None)
+    laws = () if layout is None else layout.laws
+    return any(isinstance(law, Hardening) and law.bounded and law.opens for law, _ in laws)
 
 
 def _strains(grid: Grid, q: Array, x: Array) -> Array:

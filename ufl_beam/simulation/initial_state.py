@@ -29,6 +29,7 @@ from ufl_beam.model.constraint_checks import (
     require_inertia,
     require_masses,
     require_no_mechanism,
+    require_no_prestress,
     require_rates,
 )
 from ufl_beam.model.mesh_options import Mesh
@@ -40,10 +41,11 @@ from ufl_beam.terms.work_forms import require_works
 
 
 @no_garbage_collection()
-def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> tuple[Grid, str]:
+def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool) -> tuple[Grid, str]:
     """Make the grid of a scene, once the scheme is known to be able to compute it.
 
-    Also describe a motion that only loads may hold in statics; empty if there is none.
+    ``fresh`` says that the run begins with the undeformed scene.  Also describe a motion that only
+    loads may hold in statics; empty if there is none.
     """
     loose = ""
     require_kind(scene, Scene, "scene")
@@ -58,6 +60,9 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> tuple[Grid, str]:
     else:
         loose = require_no_mechanism(scene)
         warn_of_rates(scene)
+        if fresh and scheme.theta < 1:  # it would oscillate about equilibrium for ever
+            instead = "begin with a run by Static() or ExactStatic(theta=1), as start="
+            require_no_prestress(scene, repr(scheme), instead)
     require_works(scene, scheme, mesh)
     require_independent(scene)
     warn_of_far_points(scene)

@@ -104,7 +104,8 @@ class Simulation(StateView):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
         if start is not None:
             require_kind(start, Solution, "start")
-        grid, self._loose = checked_grid(scene, scheme, mesh_of(start, mesh))
+        fresh = start is None
+        grid, self._loose = checked_grid(scene, scheme, mesh_of(start, mesh), fresh=fresh)
         share = Share(grid, sharing(comm, len(grid.cells)))
         self.scene, self.scheme, self.comm, self.grid, self.share = scene, scheme, comm, grid, share
         self.together = together = Agreement(share.comm)
@@ -133,6 +134,8 @@ class Simulation(StateView):
             parts.take_over(self.q, t0, internal, same=same)
         for term in self.terms:
             term.add_state(self.q)
+        for coupling in parts.couplings if start is None else ():
+            coupling.put_forces(self.q)
         if parts.inertia is not None:
             self.inertia = parts.inertia
             if scene.links or scene.supports:

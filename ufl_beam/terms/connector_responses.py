@@ -162,6 +162,10 @@ class Response(ABC):
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""
 
+    def borne(self) -> Array | None:
+        """Forces of springs in the state that :meth:`start` has begun at; (num_links,)."""
+        return None
+
     def freeze(self) -> None:
         """Keep everything elastic from now on: nothing yields or breaks further."""
 

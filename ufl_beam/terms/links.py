@@ -96,6 +96,11 @@ class Links(InternalForces):
         """Take the forces in ``q`` as those before the next step."""
         self._before[:] = self.force(q)
 
+    def put_forces(self, q: Array) -> None:
+        """Put the forces that springs bear in the undeformed scene into its configuration."""
+        if (borne := self.response.borne()) is not None:
+            q[self._forces_at] = self._before[:] = borne
+
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return 0.0

@@ -169,6 +169,17 @@ class PointEquations:
         law = self.law(at)
         return law.as_tuple(law.stress(self.strain(at), self.state(at)))
 
+    def _elastic_growth(self, law: MaterialLaw, de: tuple[Values, ...], dz: State) -> Values:
+        """Part of second order of the elastic energy that strains and variables of a step add."""
+        growth = law.elastic_energy(law.as_argument(de), dz)
+        if not law.prestressed:
+            return growth
+        back, none = (State({n: k * z for n, z in vars(dz).items()}) for k in (-1.0, 0.0))
+        there = law.elastic_energy(law.as_argument(tuple(-e for e in de)), back)
+        return (growth + there) / 2 - law.elastic_energy(
+            law.as_argument(tuple(0 * e for e in de)), none
+        )
+
     def end(self, at: At) -> End:
         """State and energies at the end of the step."""
         law, softening, θ, a = self.law(at), self.softening(at), at["theta"], at["growth"]
@@ -186,7 +197,7 @@ class PointEquations:
         elastic, hardening = law.elastic_energy(some(e1), new), law.hardening_energy(new)
         # Energies are quadratic but for laws that state no dissipation: these account for the rest.
         hardened = law.hardening_energy(changes)
-        lost = law.elastic_energy(some(de), changes) + hardened
+        lost = self._elastic_growth(law, de, changes) + hardened
         elastically, missed, C = de, zero, tuple(at[n] for n in rows(law, "stiffness"))
         if self._curved:
             # What the formula below makes of the step while the variables stay is no dissipation.
@@ -195,7 +206,7 @@ class PointEquations:
             work = sum(σ * e for σ, e in zip(self.elastic_stress(at), de, strict=True))
             stored = law.elastic_energy(some(e1), old) - law.elastic_energy(some(e0), old)
             none = State(dict.fromkeys(self._names, zero))
-            missed = work - stored - (2 * θ - 1) * law.elastic_energy(some(de), none)
+            missed = work - stored - (2 * θ - 1) * self._elastic_growth(law, de, none)
         worked = law.dissipation(self.strain(at), _plus(old, at_θ), changes, at["dt"])
         if worked is None:
             work = sum(σ * e for σ, e in zip(self.stress(at), de, strict=True))

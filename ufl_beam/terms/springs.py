@@ -94,5 +94,8 @@ class _Sprung(Response):
         self.points.start(self._at(e))
         self.points.refresh(self._at(e))
 
+    def borne(self) -> Array | None:
+        return self.points.kept[:, 0]
+
     def freeze(self) -> None:
         self.points.freeze()

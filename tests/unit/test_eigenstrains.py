@@ -1,0 +1,199 @@
+# SPDX-License-Identifier: MIT
+"""Laws that bear a stress at no strain: temperature, shrinkage, prestress."""
+
+import math
+import warnings
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+from bars import LENGTH, Bars, C, histories
+from laws_of_ones_own import Eigenstrain, YieldingEigenstrain
+
+import ufl_beam as ub
+from ufl_beam.terms.compiled_points import CompiledPoints
+from ufl_beam.terms.reference_points import ReferencePoints
+
+L, EI, E0 = 8.0, 1e8, 1e-4
+STIFF = {"EA": 1e9, "GA": 1e9, "EI": EI, "rhoA": 100.0, "rhoI": 1.0}
+CURVED = ub.Section(**STIFF, bending=Eigenstrain(E0))
+SIMPLE = [lambda beam: ub.Pinned(beam.start), lambda beam: ub.Roller(beam.end)]
+CLAMPED = [lambda beam: ub.Clamped(beam.start), lambda beam: ub.Clamped(beam.end)]
+STATICS = [ub.Static(), ub.ExactStatic(1.0)]
+
+
+def scene(supports, section=CURVED, **more):
+    beam = ub.Beam((0, 0), (L, 0), section, cells=8, name="girder")
+    return beam, ub.Scene([beam], supports=[make(beam) for make in supports], **more)
+
+
+@pytest.mark.parametrize("reference", [False, True])
+@pytest.mark.parametrize("dt", [1.0, 0.25])
+@pytest.mark.parametrize("scheme", STATICS, ids=str)
+def test_beams(scheme, dt, reference):
+    """[closed] The simple beam bends to e0 and bears nothing; the clamped one bears -EI e0."""
+    newton = ub.Newton(reference=reference)
+    beam, simple = scene(SIMPLE)
+    run = ub.simulate(simple, scheme, t=(0, 1), dt=dt, newton=newton, progress=False)
+    # An arc of the angle 8e-4: its rise differs by the square of that.
+    rise = (1 - math.cos(E0 * L / 2)) / E0
+    assert -run.displacement(beam.at(0.5))[-1, 1] == pytest.approx(rise, rel=1e-6)
+    assert np.abs(run.diagram(beam).M).max() < 1e-9 * EI * E0
+    beam, clamped = scene(CLAMPED)
+    run = ub.simulate(clamped, scheme, t=(0, 1), dt=dt, newton=newton, progress=False)
+    assert np.abs(run.displacement(beam.at(0.5))).max() < 1e-15 * L
+    assert np.abs(run.diagram(beam).M + EI * E0).max() < 1e-9 * EI * E0
+    assert run.energy.worst < 1e-12
+
+
+def pressed(section):
+    """A simple beam with a load that grows in its middle."""
+    beam, simple = scene(SIMPLE, section)
+    load = ub.PointLoad(beam.at(0.5), force=(0, -1e3), time=lambda t: t)
+    return ub.Scene([beam], supports=simple.supports, loads=[load])
+
+
+@pytest.mark.parametrize("reference", [False, True])
+def test_a_load_beside_it(reference):
+    """[closed] Deflections of a small load and of the eigenstrain add up, in each of many steps."""
+    newton = ub.Newton(reference=reference)
+    both, plain = map(pressed, (CURVED, ub.Section(**STIFF)))
+    (beam,) = both.beams
+    run = ub.simulate(both, ub.Static(), t=(0, 1), dt=0.1, newton=newton, progress=False)
+    y = run.displacement(beam.at(0.5))[:, 1]
+    added = ub.simulate(plain, ub.Static(), t=(0, 1), dt=0.1, progress=False)
+    added = added.displacement(plain.beams[0].at(0.5))[:, 1]
+    assert y[1:] - y[1] == pytest.approx(added[1:] - added[1], rel=1e-5)  # (e0 L)², with dy
+    path = ub.follow(both, ub.LoadControl(0.1), steps=10, newton=newton, progress=False)
+    assert path.displacement(beam.at(0.5))[0, 1] == pytest.approx(y[-1] - (y[-1] - y[1]) / 0.9)
+    assert path.displacement(beam.at(0.5))[-1, 1] == pytest.approx(y[-1], rel=1e-6)
+    assert path.energy.worst < 1e-7  # of the trapezoidal rule, (curvature L)²
+
+
+@pytest.mark.parametrize("reference", [False, True])
+def test_a_spring_that_is_too_long(reference):
+    """[closed] Two springs in a row, one of them by e0 too long: its stiffness takes its share."""
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(**STIFF), cells=2)
+    springs = [
+        ub.Stretch(ub.ground(-1, 0), beam.start, ub.Spring(1e3, law=Eigenstrain(0.02))),
+        ub.Stretch(beam.end, ub.ground(2, 0), ub.Spring(3e3)),
+    ]
+    guide = [ub.Roller(beam.start), ub.Roller(beam.end)]
+    held = ub.Scene([beam], supports=guide, connectors=springs)
+    newton = ub.Newton(reference=reference)
+    run = ub.simulate(held, ub.Static(), t=(0, 1), dt=0.5, newton=newton, progress=False)
+    assert run.displacement(beam.start)[-1, 0] == pytest.approx(0.02 / 4, rel=1e-5)  # of EA
+    with pytest.raises(ub.SceneError, match=r"modes: Eigenstrain of Stretch\(.*at no strain"):
+        ub.modes(held, 1)
+
+
+@dataclass(frozen=True)
+class Both(ub.MaterialLaw):
+    """Axial strain and curvature that are free."""
+
+    axial: float
+    bending: float
+    resultants: ClassVar = "NM"
+
+    def stress(self, strain, state):
+        return tuple(c * (e - x) for c, e, x in zip(self.C, strain, self._free, strict=True))
+
+    def elastic_energy(self, strain, state):
+        return sum(c * (e - x) ** 2 / 2 for c, e, x in zip(self.C, strain, self._free, strict=True))
+
+    @property
+    def _free(self):
+        return self.axial, self.bending
+
+
+def test_of_interacting_resultants():
+    """[closed] A cantilever grows by the axial one, and its end turns by the other times L."""
+    section = ub.Section(**STIFF, interaction=Both(1e-3, E0))
+    beam, cantilever = scene(CLAMPED[:1], section)
+    run = ub.simulate(cantilever, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    assert run.displacement(beam.end)[-1, 2] == pytest.approx(E0 * L, rel=1e-9)
+    assert run.displacement(beam.end)[-1, 0] == pytest.approx(1e-3 * L, rel=1e-3)  # less the arc's
+    assert np.abs(run.section_forces_at(beam.start)[-1, 0]) < 1e-9 * 1e9 * 1e-3
+
+
+@pytest.mark.parametrize(
+    "scheme", [ub.Midpoint(), ub.Midpoint(0.05), ub.DecayingMidpoint(), ub.Newmark()], ids=repr
+)
+def test_dynamics(scheme):
+    """From the undeformed scene it vibrates about the static solution; from that it stays there."""
+    beam, simple = scene(SIMPLE)
+    run = ub.simulate(simple, scheme, t=(0, 0.5), dt=2e-3, progress=False)
+    y, rise = -run.displacement(beam.at(0.5))[:, 1], E0 * L**2 / 8
+    # The first mode has 32/(π³) of it, and is 0.04 s long: means over 12 periods
+    assert y.mean() == pytest.approx(rise, rel=0.03)
+    assert y.max() == pytest.approx(2 * rise, rel=0.1)
+    if not isinstance(scheme, ub.Newmark):
+        assert run.energy.worst < 1e-9
+    still = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    # Midpoint rules say in a warning how many digits the energies of a scene at rest have.
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", ub.ModelWarning)
+        run = ub.simulate(simple, scheme, t=(1, 1.1), dt=2e-3, start=still, progress=False)
+    assert np.ptp(run.displacement(beam.at(0.5))[:, 1]) < 1e-9 * rise
+
+
+def test_analyses_about_the_undeformed_scene_are_refused():
+    """It is not in equilibrium; about a static solution they are those of the elastic beam."""
+    beam, simple = scene(SIMPLE, loads=[])
+    plain, elastic = scene(SIMPLE, ub.Section(**STIFF))
+    push = [ub.PointLoad(one.end, force=(-1e5, 0)) for one in (beam, plain)]
+    pushed = ub.Scene([beam], supports=simple.supports, loads=push[:1])
+    for analyse in (lambda: ub.modes(simple, 1), lambda: ub.buckling(pushed, 1)):
+        with pytest.raises(ub.SceneError, match="Eigenstrain of girder bears a stress at no strai"):
+            analyse()
+    with pytest.raises(ub.SceneError, match=r"ExactStatic\(theta=0.5\): Eigenstrain of girder"):
+        ub.simulate(simple, ub.ExactStatic(0.5), t=(0, 1), dt=0.5, progress=False)
+    at = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    with warnings.catch_warnings():  # see above
+        warnings.simplefilter("ignore", ub.ModelWarning)
+        held = ub.simulate(simple, ub.ExactStatic(0.5), t=(1, 2), dt=0.5, start=at, progress=False)
+    y = held.displacement(beam.at(0.5))[:, 1]
+    assert y == pytest.approx(np.full(3, at.displacement(beam.at(0.5))[-1, 1]), rel=1e-9)
+    omega = ub.modes(elastic, 1).omega
+    assert ub.modes(simple, 1, at=at).omega == pytest.approx(omega, rel=1e-6)  # (e0 L)²
+    factors = ub.buckling(ub.Scene([plain], supports=elastic.supports, loads=push[1:]), 1).factors
+    assert ub.buckling(pushed, 1, at=at).factors == pytest.approx(factors, rel=1e-4)
+
+
+@pytest.mark.parametrize("by", [CompiledPoints, ReferencePoints])
+@pytest.mark.parametrize(
+    "law", [Eigenstrain(0.01), YieldingEigenstrain(2.0, 20.0, 10.0, 0.5)], ids=["elastic", "yields"]
+)
+@pytest.mark.parametrize("scheme", [ub.ExactStatic(0.5), ub.ExactStatic(0.8), ub.ExactStatic(1.0)])
+def test_work_is_stored_or_dissipated_or_lost(scheme, law, by):
+    """At points; what is dissipated is none, or what limit and viscosity take."""
+    for k in range(4):
+        one, through = Bars(1, law, None, scheme, by=by), 0.0
+        one.points.refresh(np.zeros((1, 3)))
+        stored = one.points.sums[3:5].sum()
+        assert stored == pytest.approx(C * 0.01**2 / 2 * LENGTH)
+        for strain in histories(8)[:, 2 * k + 1]:
+            before = one.strain[0]
+            (σ,) = one.step([strain])
+            plastic, _, lost, elastic, hardening, _, _ = one.points.sums
+            work, now = σ * (strain - before) * LENGTH, elastic + hardening
+            through = max(through, abs(work), now, C * strain**2 * LENGTH)
+            left = work - (now - stored) - plastic - (2 * scheme.theta - 1) * lost
+            assert abs(left) < 1e-13 * through
+            assert plastic > -1e-13 * through
+            if isinstance(law, Eigenstrain):
+                assert plastic < 1e-13 * through
+            stored = now
+
+
+@pytest.mark.parametrize("law", [ub.ArmstrongFrederick(1e12, 1.0, 1.0), Eigenstrain(0.0)], ids=repr)
+def test_round_off_of_dissipation_turns_no_path(law):
+    """A path on which nothing yields is that of the elastic beam."""
+    paths = []
+    for section in (ub.Section(**STIFF), ub.Section(**STIFF, bending=law)):
+        beam, _ = scene(SIMPLE, section)
+        load = ub.PointLoad(beam.at(0.5), force=(0, -1e5), time=lambda t: t)
+        loaded = ub.Scene([beam], supports=[make(beam) for make in SIMPLE], loads=[load])
+        paths.append(ub.follow(loaded, ub.ArcLength(0.01), steps=20, progress=False).times)
+    assert paths[1] == pytest.approx(paths[0], rel=1e-9)
