@@ -19,8 +19,6 @@ pytest_mpi = python3 -m pytest -q --color=no -p no:cacheprovider
 # random scenes and their invariance, elimination, gathering, files, agreement. All other units run on 2 ranks only;
 # whole suites on 2 and 3 ranks took half an hour.
 sharing = tests/properties $(addprefix tests/unit/test_,$(addsuffix .py,archive checkpoint collective_errors csr factorization file_locks mesh modes output_files parameter_study recorders replicas solution static_condensation substructuring))
-# Tests of code that depends on the version of DOLFINx: forms, kernels of FFCx, calls of PETSc.
-versions = $(addprefix tests/unit/test_,$(addsuffix .py,c_equation c_interface compiled_forms factorization jit modes newton simd_kernels static_condensation))
 cheap_demos = $(addprefix demos/demo_,$(addsuffix .py,four_beam_swing roll_up emergency_stop fibre_damping monte_carlo adaptive_steps lee_frame hinge_snapback rotating_beam))
 
 help: ## this list
@@ -36,8 +34,8 @@ test-mpi: ## unit tests on 2 ranks; properties and tests of sharing on 3
 	@$(call mpi,2) $(pytest_mpi) tests/unit
 	@$(call mpi,3) $(pytest_mpi) $(sharing)
 
-test-sid: ## forms, kernels, solver and a demo on the DOLFINx of Debian sid; builds its root once
-	@UFL_BEAM_SUITE=sid ./env sh -ec '$(with_workers) python3 -m pytest $$workers $(versions)'
+test-sid: ## the same as `make test` on the DOLFINx of Debian sid, and a demo; builds its root once
+	@UFL_BEAM_SUITE=sid $(MAKE) --no-print-directory test
 	@UFL_BEAM_SUITE=sid ./env python3 demos/demo_roll_up.py
 
 verify: ## the slow verification studies, then the unit tests with sanitizers

@@ -19,6 +19,26 @@ def keep(name, record):
         file.write(json.dumps({**record, **machine()}) + "\n")
 
 
+def in_lines(value, margin=""):
+    """Return JSON in which each record without lists of records in it is one line."""
+    if not _has_records(value):
+        return json.dumps(value)
+    inside = margin + " "
+    if isinstance(value, dict):
+        rows = [f"{inside}{json.dumps(k)}: {in_lines(v, inside)}" for k, v in value.items()]
+    else:
+        rows = [inside + in_lines(one, inside) for one in value]
+    begin, end = "{}" if isinstance(value, dict) else "[]"
+    return "\n".join([begin, ",\n".join(rows), margin + end])
+
+
+def _has_records(value):
+    """Return whether there is a list of records in a value, or it is one."""
+    if isinstance(value, dict):
+        return any(map(_has_records, value.values()))
+    return isinstance(value, list) and any(isinstance(one, dict) for one in value)
+
+
 @cache
 def machine():
     """Commit, versions and machine of a measurement."""

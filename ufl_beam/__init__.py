@@ -19,6 +19,7 @@ Example:
 """
 
 from ufl_beam import dolfinx_compat  # noqa: F401 - first, because it explains what is not installed
+from ufl_beam import broken_pipes  # noqa: F401 - after PETSc, whose signal handler it replaces
 
 # isort: split
 

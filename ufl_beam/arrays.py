@@ -53,6 +53,8 @@ class Snapshot(NamedTuple):
     entries: tuple[dict[str, float], ...]  # the ledger: state, supplied, lost; J
     material: Array  # numbers of the cells that can yield or break, and their material; (m, 7)
     connections: Array  # columns of ``Connection`` for all links; (num_links, 5)
+    cells: Array  # ``cell_number`` of loops.h of all cells, (9, num_cells), or a record, (k,)
+    before: Array | None  # q at the beginning of the step, where its equation is not that of its end
 
 
 class Snapshots(NamedTuple):
@@ -65,6 +67,8 @@ class Snapshots(NamedTuple):
     entries: tuple[dict[str, Array], ...]
     material: Array
     connections: Array
+    cells: Array
+    before: Array | None
 
     @classmethod
     def of(cls, one: Snapshot) -> Snapshots:
@@ -73,7 +77,8 @@ class Snapshots(NamedTuple):
             np.array([one.t]), one.q[None], None if one.v is None else one.v[None],
             one.reactions[None],
             tuple({name: np.array([x]) for name, x in part.items()} for part in one.entries),
-            one.material[None], one.connections[None],
+            one.material[None], one.connections[None], one.cells[None],
+            None if one.before is None else one.before[None],
         )  # fmt: skip
 
     def one(self, n: int) -> Snapshot:

@@ -71,6 +71,10 @@ class StepFailed(Exception):
         return other
 
 
+class NoNumber(StepFailed, SceneError):
+    """A function of a user returned no finite number; a shorter step may not ask for it."""
+
+
 class ConvergenceError(RuntimeError):
     """No equilibrium was found for a step, even after cutting it; results so far are kept.
 
@@ -202,14 +206,17 @@ def require_number(
     return number
 
 
-def require_returned(value: object, function: str, at: str) -> float:
+def require_returned(value: object, function: str, at: str, *, finite: bool = False) -> float:
     """Return what a function of a user returned ``at`` some point as a float; NaN may pass."""
     try:
-        return as_float(value)
+        number = as_float(value)
     except (TypeError, ValueError, OverflowError):
         raise SceneError(
             f"{function} returned {shorten(value)} at {at}; it must return a number"
         ) from None
+    if finite and not math.isfinite(number):
+        raise SceneError(f"{function} returned {number} at {at}; it must return a finite number")
+    return number
 
 
 def is_infinite(value: object) -> bool:

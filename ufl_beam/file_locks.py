@@ -52,7 +52,7 @@ class Lock:
             OSError: The file cannot be written.
         """
         while True:
-            file = self.path.open("a+")
+            file = self.path.open("a+", encoding="utf-8", errors="replace")
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError:

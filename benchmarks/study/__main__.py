@@ -17,7 +17,7 @@ sys.path.append(str(Path(__file__).parents[1]))
 
 from cases import CASES
 from measure import Bench
-from records import machine
+from records import in_lines, machine
 from report import save
 
 ROOT = Path(__file__).parents[2]
@@ -50,7 +50,7 @@ def main() -> int:
             print(f"{case.name:25s} {len(measured[-1]['runs']):4d} runs {took:6.1f} s", flush=True)
         took = time.perf_counter() - begin
         study = {"quick": options.quick, "seconds": took, "failed": failed, **machine()}
-        results.write_text(json.dumps({**study, "cases": measured}, indent=1) + "\n")
+        results.write_text(in_lines({**study, "cases": measured}) + "\n")
     save(json.loads(results.read_text()), docs)
     print(f"written: {results}, {docs / 'study.md'}")
     return 0

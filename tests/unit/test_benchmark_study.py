@@ -2,6 +2,8 @@
 """What `make study` says follows from its numbers; the runs themselves are not made here."""
 
 import importlib.util
+import json
+import math
 from pathlib import Path
 
 import pytest
@@ -66,3 +68,16 @@ def test_the_table_over_scenes():
     assert rows["| A"].split(" | ")[2] == "2.00 (2 of 2)"
     assert rows["| B"].split(" | ")[2] == "1.05 (2 of 2)"
     assert rows["| D"].split(" | ")[2] == "— (0 of 1)"
+
+
+def test_results_have_a_line_for_each_record():
+    spec = importlib.util.spec_from_file_location("records", PATH.parents[1] / "records.py")
+    records = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(records)
+    text = (PATH.parents[1] / "results" / "study.json").read_text(encoding="utf-8")
+    study = json.loads(text)
+    assert records.in_lines(study) + "\n" == text
+    rows = sum(len(case["runs"]) + len(case["dials"]) for case in study["cases"])
+    assert rows < len(text.splitlines()) < rows + 20 * len(study["cases"])
+    for value in ({}, [], [{}], {"a": [{"b": [1.5, None]}, {"c": {"d": [{"e": "f"}]}}]}, math.pi):
+        assert json.loads(records.in_lines(value)) == value

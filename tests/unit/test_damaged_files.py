@@ -297,6 +297,49 @@ def test_wrong_content_is_refused(wrong, path):
     refused(KINDS[what], path, message)
 
 
+class Notes(ub.Recorder):
+    """A recorder of a user, with a state of one array."""
+
+    def open(self, simulation):
+        self.count = np.zeros(1)
+
+    def write(self, simulation):
+        self.count += 1
+
+    def state(self):
+        return {"count": self.count}
+
+    def resume(self, simulation, state):
+        self.count = state["count"].copy()
+
+
+@pytest.mark.serial
+@pytest.mark.parametrize(
+    ("name", "make"), [("run.csv", ub.History), ("run.xdmf", ub.XDMF), ("notes", lambda _: Notes())]
+)
+def test_recorders_whose_state_is_missing(name, make, path, tmp_path):
+    checkpoint = ub.Checkpoint(path, every=100)
+    run(checkpoint=checkpoint, record=make(tmp_path / name))
+    format = KINDS["checkpoint"].format
+    content = archive.read(path, format)
+    without = {n: x for n, x in content.items() if not n.startswith("recorder 0/")}
+    archive.write(path, format, without)
+    with pytest.raises(ub.SceneError, match=r"checkpoint .* cannot go on from it: KeyError\('"):
+        run(checkpoint=checkpoint, record=make(tmp_path / name))
+
+
+@pytest.mark.serial
+def test_extremes_of_another_shape(path):
+    checkpoint = ub.Checkpoint(path, every=100)
+    run(checkpoint=checkpoint, record=ub.Extremes())
+    format = KINDS["checkpoint"].format
+    content = archive.read(path, format)
+    content["recorder 0/forces low"] = content["recorder 0/forces low"].T
+    archive.write(path, format, content)
+    with pytest.raises(ub.SceneError, match=r"checkpoint .*the array 'forces low' is float64 of"):
+        run(checkpoint=checkpoint, record=ub.Extremes())
+
+
 def header(shape, descr="'<f8'"):
     """The beginning of an array of NumPy."""
     text = f"{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}}}\n".encode()

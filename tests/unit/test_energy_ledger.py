@@ -273,3 +273,13 @@ def test_small_strains_keep_their_digits():
         scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
         solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.5), dt=0.01, progress=False)
         assert solution.energy.worst < 1e-12
+
+
+def test_a_ledger_is_a_mapping():
+    one = energy()
+    assert [*one] == [*one.keys()] == ["stored", "kinetic", "loads", "numerical"]
+    assert len(one) == 4
+    assert "loads" in one and "friction" not in one and 0 not in one
+    assert one.get("friction") is None and one.get("stored") is one["stored"]
+    assert {name: values[-1] for name, values in one.items()}["numerical"] == 3.0
+    assert one == one and one != energy() and {one: 1}[one] == 1  # by identity, as before

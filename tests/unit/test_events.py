@@ -108,3 +108,34 @@ def test_events_go_on_from_a_checkpoint(shared_path):
     assert events.found == whole
     assert {event.what for event in whole} == {"yields", "opens"}
     assert min(event.time for event in whole) < 0.5 < max(event.time for event in whole)
+
+
+def pushed_brake():
+    """A cantilever whose end is pushed against friction of 0.5 N: it slides from 0.14 s on."""
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0, rhoA=1.0), cells=2)
+    brake = ub.Slide(ub.ground(1, 1), beam.end, ub.Coulomb(0.5), axis=(0, 1))
+    push = ub.PointLoad(beam.end, (0, 1), time=lambda t: 4 * t)
+    shake = ub.PointLoad(beam.at(0.5), (0, 0.1))  # something moves before
+    held = [ub.Clamped(beam.start)]
+    return ub.Scene([beam], supports=held, loads=[push, shake], connectors=[brake])
+
+
+@pytest.mark.parametrize("last", [0.06, 0.2], ids=["sticking", "sliding"])
+@pytest.mark.parametrize("goes_on", ["checkpoint", "start"])
+def test_friction_goes_on_as_it_was(shared_path, last, goes_on):
+    """Whether a place sticks depends on a limit, which is known in a run that goes on."""
+    scene, options = pushed_brake(), {"dt": 0.02, "progress": False}
+    whole, first, rest = (ub.Events() for _ in range(3))
+    ub.simulate(scene, ub.Midpoint(), t=(0, 0.3), record=whole, **options)
+    if goes_on == "checkpoint":
+        options["checkpoint"] = ub.Checkpoint(shared_path / "run.h5", every=100)
+    one = ub.simulate(scene, ub.Midpoint(), t=(0, last), record=first, **options)
+    if goes_on == "checkpoint":
+        ub.simulate(scene, ub.Midpoint(), t=(0, 0.3), record=rest, **options)
+        found = rest.found
+    else:
+        ub.simulate(scene, ub.Midpoint(), t=(last, 0.3), start=one, record=rest, **options)
+        found = [*first.found, *rest.found]
+    told = [(event.what, event.time) for event in found]
+    assert [what for what, _ in told] == ["slides"]
+    assert told == [(event.what, pytest.approx(event.time)) for event in whole.found]

@@ -180,3 +180,12 @@ def test_who_waits_for_a_lock_that_is_removed_takes_a_new_one(tmp_path):
         path.unlink()
     thread.join(10)
     assert found == [True]
+
+
+def test_an_owner_that_is_no_text(tmp_path):
+    """The file of a lock that is held may have anything."""
+    lock = tmp_path / "run.lock"
+    lock.write_bytes(b"\xff\xfe process 1")
+    with lock.open() as held:
+        fcntl.flock(held, fcntl.LOCK_EX)
+        assert Lock(tmp_path / "run").take() == "\ufffd\ufffd process 1"

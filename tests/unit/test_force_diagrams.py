@@ -137,20 +137,13 @@ def test_the_initial_state_bears_nothing():
     assert not np.any(static(scene).diagram(beam, 0)[1:])
 
 
-def test_dynamics_has_loads_and_inertia_at_the_nodes():
-    """A beam in free fall bears nothing, and M has corners but no steps in a vibrating one."""
+def test_beams_in_free_fall_bear_nothing():
     beam = ub.Beam((0, 0), (2, 0), STIFF, cells=4)
     fall = ub.simulate(
         ub.Scene([beam], loads=[ub.Gravity()]), ub.Midpoint(), t=(0, 1), dt=0.25, progress=False
     )
     # Round-off of EA and EI times strains of displacements of 5 m
     assert np.abs(fall.diagram(beam)[1:]).max() < 1e-4
-    scene, beam = supported(4, lambda b: ub.Gravity())
-    swing = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.25, progress=False)
-    M = swing.diagram(beam).M.reshape(4, 9)
-    np.testing.assert_allclose(np.diff(M, 2, axis=1), 0.0, atol=1e-6 * np.abs(M).max())
-    M_middle = swing.section_forces(beam)[:, 2]
-    close(M[:, 4], M_middle)
 
 
 def test_yielding_beams_and_hinges(shared_path):

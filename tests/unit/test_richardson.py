@@ -158,6 +158,19 @@ def test_a_finer_run_bounds_the_limit_of_an_order_that_is_not_known(order):
         assert np.abs(sharp.limit - 7.0).max() <= sharp.uncertainty
 
 
+def test_a_finer_run_does_not_sharpen_what_is_negligible():
+    """Changes below the floor have no order: no part of them is known to be left."""
+    law = {"cells": (0.0, 2.0), "steps": (1e-14, 2.0)}
+    one = cross((0, 0), **law)
+    assert one.cells.used == one.steps.used == 0 and one.error(0, 0) > 0
+    for fine in ((0.0, 1.0), (1.0, 1.0)):
+        values = [manufactured(at, **law) for at in ((0.0, 0.0), fine)]
+        assert one.sharpened(*values, (0.0, 0.0), fine) is one
+    still = cross((0, 0), cells=(0.0, 2.0), steps=(0.0, 2.0))  # and no error at all
+    assert still.error(0, 0) == 0
+    assert still.sharpened(values[0], values[0], (0.0, 0.0), (1.0, 1.0)) is still
+
+
 def test_dials_that_depend_on_each_other_are_not_seen():
     one = cross((0, 0), mixed=-0.25)
     assert one.cells.seen

@@ -223,15 +223,6 @@ def test_section_forces_in_any_direction():
         assert pytest.approx(2e-3 * np.array([1.75, 1.25, 0.75, 0.25]), rel=1e-3) == M
 
 
-def test_section_forces_at_a_place_are_those_of_its_cell():
-    scene, beam = cantilever(lambda b: ub.PointLoad(b.end, force=(3, -40), time=ub.ramp(1)))
-    solution = static(scene)
-    for n in range(5):
-        forces = solution.section_forces(beam, n)
-        for s, cell in ((0.0, 0), (0.1, 0), (0.25, 0), (0.26, 1), (0.5, 1), (0.9, 3), (1.0, 3)):
-            assert (solution.section_forces_at(beam.at(s))[n] == forces[cell]).all()
-
-
 def test_section_forces_of_the_right_beam():
     scene = frame()
     solution = static(scene)

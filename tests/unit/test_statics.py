@@ -206,3 +206,17 @@ def test_reactions_where_a_run_ends():
     force = solution.reaction(scene.supports[0])[-1]
     # Forces are met to 1e-10 of themselves.
     assert force[:2] == pytest.approx([0.0, 4.0 * t], abs=1e-8)
+
+
+def test_who_asks_for_a_velocity_is_told():
+    """A controller, before anything is computed; a loop of one's own."""
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0), cells=2)
+    brake = ub.Controller(lambda now: -0.1 * now.velocity(beam.end)[1])
+    slide = ub.Slide(ub.ground(2, 0), beam.end, brake, axis=(0, 1))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[slide])
+    with pytest.raises(ub.SceneError, match=r"velocity of beam.end .*the run is static"):
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+    simulation = ub.Simulation(ub.Scene([beam], supports=scene.supports), ub.ExactStatic())
+    with pytest.raises(ub.SceneError, match="there is none"):
+        simulation.velocity(beam.end)
+    simulation.close()

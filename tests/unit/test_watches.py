@@ -196,3 +196,12 @@ def test_states_that_were_thinned_are_judged_once():
     law = Wrong(1.4e4, modulus=1e5, sign=-1.0)
     said, _ = run(bent(law), dt=0.002, most=300)
     assert len([one for one in said if "'plastic'" in one]) == 1
+
+
+def test_a_run_that_goes_on_remembers_its_warnings(shared_path):
+    backup = ub.Checkpoint(shared_path / "run.checkpoint", every=10)
+    scene = bent(Wrong(1.4e4, modulus=1e5, sign=-1.0))
+    said, _ = run(scene, t=(0, 1), dt=0.02, checkpoint=backup)
+    again, solution = run(scene, t=(0, 2), dt=0.02, checkpoint=backup)
+    about(said, solution, "'plastic'")
+    assert not [one for one in again if "'plastic'" in one]

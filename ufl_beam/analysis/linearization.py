@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from dataclasses import replace
 from functools import partial
 from typing import TypeVar
 
@@ -17,11 +18,14 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Complex, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.errors import ModelWarning, SceneError
-from ufl_beam.mechanics.classical import Newmark
+from ufl_beam.errors import ModelWarning, SceneError, warn
+from ufl_beam.mechanics.classical import Newmark, Static
 from ufl_beam.mechanics.time_schemes import Rates, Step
+from ufl_beam.model.constraint_checks import require_no_mechanism
+from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
+from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers import eigensolvers
@@ -46,6 +50,31 @@ def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array
         coupling.response.freeze()
     step = Step(0.0, dt, simulation.q, simulation.t, simulation.t, fraction=1.0)
     return simulation.equation.linearise(q, step)
+
+
+def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | None]:
+    """Return the scene without loads, or with them and the state in which they hold it.
+
+    Loads that a state does not balance have no part in its stiffness.
+
+    Raises:
+        SceneError: The scene turns steadily, and the state of that is not given.
+
+    Warns:
+        ModelWarning: The scene is free to move, and no state bears its loads.
+    """
+    if any(isinstance(load, RotatingFrame) for load in scene.loads):
+        raise SceneError(
+            "modes: the undeformed scene is not at rest in a RotatingFrame; give the state of "
+            "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
+        )
+    if scene.loads and (said := require_no_mechanism(scene)):
+        try:
+            state = simulate(scene, Static(), t=(0.0, 1.0), dt=1.0, mesh=mesh, progress=False)
+            return scene, state
+        except SceneError:
+            warn(f"modes: {said}The loads do not hold it, and do not count")
+    return replace(scene, loads=()), None
 
 
 class _Standstill(Newmark):

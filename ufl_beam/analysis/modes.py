@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +13,16 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.analysis.linearization import SmallMotions
+from ufl_beam.analysis.linearization import SmallMotions, reference_state
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.collective_errors import on_first
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import CompiledFields, SectionForces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number
+from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.constraint_checks import require_no_mechanism
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
@@ -33,6 +35,8 @@ from ufl_beam.parallel import active_comm
 from ufl_beam.rich_display import Rich
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
+from ufl_beam.terms.beams import elastic_forms
+from ufl_beam.terms.in_cells import CellForces, InCells
 
 MOST_TITLES = 4  # modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
@@ -98,11 +102,24 @@ class Shapes(Rich, ABC):
         require_count(count, "motion: count")
         times = np.arange(count + 1) / count
         swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
-        history = {"times": times, "q": self.q + swing, "every": np.array([1])}
+        q = self.q + swing
+        history = {"times": times, "q": q, "every": np.array([1]), "cells": self._cell_forces(q)}
         none = dict.fromkeys(("v", "reactions", "connections"), np.empty(0))
         solution = Solution(self.scene, self.grid)
         solution.resume(history | none)
         return solution
+
+    def _cell_forces(self, states: Array) -> Array:
+        """Forces of elastic cells in some configurations; (n, 9, num_cells)."""
+        share = Share(self.grid, MPI.COMM_SELF)
+        fields, r = CompiledFields(share), np.zeros(share.size)
+        form = fields.hot_kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
+        of_cells, found = CellForces(share, [InCells(form, lib.STRESS, fields.order)]), []
+        for q in np.ascontiguousarray(states):
+            form.add(q, r)
+            of_cells.accept()
+            found.append(of_cells(q, q))
+        return np.array(found)
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
         """Write a time series for ParaView with the k-th mode at time k.
@@ -250,7 +267,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
 
     They are vibrations about the undeformed, unloaded scene, or about the last state of a solution:
     with its section forces, the stiffness of its loads and of a :class:`RotatingFrame`, and the
-    elastic stiffness of yielded material.  Nothing yields or opens further, and hinges that bear no
+    elastic stiffness of yielded material.  If only loads hold the scene, as a weight a pendulum,
+    they are vibrations about the equilibrium near the undeformed scene.  Nothing yields or opens further, and hinges that bear no
     moment any more are joints.  Sticking friction is a constraint, sliding friction and controllers
     are ignored.
 
@@ -266,7 +284,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         mesh: Discretization; as ``at``, or with the cells of the beams.
 
     Raises:
-        SceneError: The call or the scene is wrong, or nothing that moves has mass.
+        SceneError: The call or the scene is wrong, nothing that moves has mass, or the scene turns
+            with a :class:`RotatingFrame` and ``at`` is not given.
 
     Example:
         >>> shapes = ub.modes(scene, 3, mesh=ub.Mesh(refine=4))
@@ -276,8 +295,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     require_kind(scene, Scene, "modes: scene")
     n = require_count(n, "modes: n")
     if at is None:
-        # Loads that the state does not balance have no part in its stiffness.
-        scene = replace(scene, loads=())
+        scene, at = reference_state(scene, mesh)
     else:
         _require_of(at, scene, mesh, "modes")
     small = SmallMotions(scene, at, mesh=mesh)
@@ -327,7 +345,8 @@ def buckling(
                 "vanishes or a damping ratio becomes negative"
             )
     if at is None:
-        require_no_mechanism(scene)
+        if said := require_no_mechanism(scene):
+            raise SceneError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
     else:
         _require_of(at, scene, mesh, "buckling")
     small = SmallMotions(scene, at, t, mesh)

@@ -221,7 +221,9 @@ class Cross:
         dials = (self.cells, at[0], finer_at[0]), (self.steps, at[1], finer_at[1])
         before = sum(dial.at(a) for dial, a, _ in dials)
         after = sum(dial.at(b) for dial, _, b in dials)
-        slow = sum(dial.at(a) * dial.slowest(b - a) for dial, a, b in dials) / before
+        slow = sum(dial.at(a) * dial.slowest(b - a) for dial, a, b in dials) / (before or 1.0)
+        if not (before > 0 and slow < 1):
+            return self  # what is left is negligible and has no order: nothing falls
         left = min(max(after / before, FASTEST), slow)
         change = finer - value
         off = change - (self.lack(*at) - self.lack(*finer_at))

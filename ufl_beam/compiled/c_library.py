@@ -24,7 +24,7 @@ from ufl_beam.dolfinx_compat import VERSIONS
 T = TypeVar("T")
 
 SOURCES = (
-    "loops", "material_points", "rigid_plastic", "connectors", "elimination", "fronts", "newton",
+    "loops", "cell_forces", "material_points", "rigid_plastic", "connectors", "elimination", "fronts", "newton",
     "prediction", "march",
 )  # fmt: skip
 """Files of C beside this one; they are one translation unit."""

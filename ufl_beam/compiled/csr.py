@@ -205,9 +205,14 @@ class StepProduct:
             place = {"place": ffi.from_buffer("uint8_t[]", places.astype(np.uint8))}
         self.c = struct(
             "step_product", size=A.size, A=self.A.c, begin=tangent.indptr, **place,
-            rotations=len(rotations), rotation=rotations, space=scratch,
+            rotations=len(rotations), rotation=rotations, space=scratch, rate=np.zeros(A.size),
             turn=np.full(len(rotations), np.nan), half=np.empty(len(rotations)),
         )  # fmt: skip
+
+    @property
+    def rate(self) -> Any:
+        """Place of the address of ``factor s - back v`` in the latest forces."""
+        return ffi.addressof(self.c, "rate")
 
     def matrix(self) -> Csr:
         """Return the matrix, a new one."""

@@ -98,7 +98,8 @@ def compiled(
         flags: For the compiler.
         check: Called with the module once it has been compiled; may raise :class:`Refused`.
     """
-    flags = [*flags, "-fvisibility=hidden", *EXTRA]
+    # Python's own flags have -g: names for debuggers take a fifth of the time, and half of the file
+    flags = [*flags, "-g0", "-fvisibility=hidden", *EXTRA]
     name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version, repr(PROCESSOR))}"
 
     def build(directory: Path) -> ModuleType | Refused:

@@ -128,6 +128,14 @@ class CellForm(Protocol):
     def value(self, q: Array) -> float:
         """Return the value of the functional at the unknown ``q``."""
 
+    def keep_entries(self) -> tuple[Any, int, Array]:
+        """Keep the entries of all cells in each evaluation from now on.
+
+        Returns:
+            A place with the address of an array for them, which C may change; the number of cells
+            in a batch, see :func:`in_batches`; and a second such array.
+        """
+
 
 def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
     """Fields of ``cells`` of loops.h for :meth:`Csr.blocks`: batches alike have one pattern.
@@ -289,6 +297,13 @@ class Kernel:
         self._in_lanes = ffi.cast("in_lanes *", address)
         self._lanes, self._coordinates = LANES, coordinates
         self._change()
+
+    def keep_entries(self) -> tuple[Any, int, Array]:
+        """See :meth:`CellForm.keep_entries`; nothing else of the kernel changes afterwards."""
+        batches = -(-len(self._dofs) // self._lanes)
+        each, other = np.zeros((2, batches, self._entries, self._lanes))
+        fill(self.cells, each=each)
+        return ffi.addressof(self.cells, "each"), self._lanes, other
 
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""

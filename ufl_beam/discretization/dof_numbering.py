@@ -229,7 +229,7 @@ class Grid:
 
     # -- places ----------------------------------------------------------------------------------
 
-    def _cell_and_part(self, place: Place) -> tuple[int, float]:
+    def cell_and_part(self, place: Place) -> tuple[int, float]:
         """The cell at a place, and the part of it that lies before the place."""
         require_kind(place, Place, "place")
         if place.beam not in self._number_of_beam:
@@ -242,7 +242,7 @@ class Grid:
 
     def cell(self, place: Place) -> int:
         """The cell at a place; at a vertex the one before it, at the start the first one."""
-        return self._cell_and_part(place)[0]
+        return self.cell_and_part(place)[0]
 
     def vertex(self, place: Place) -> int:
         """The vertex at a place that something is attached to."""
@@ -253,12 +253,12 @@ class Grid:
             return int(self.first_vertices[i])
         if place.s == 1.0:
             return int(self.first_vertices[i + 1]) - 1
-        cell, part = self._cell_and_part(place)
+        cell, part = self.cell_and_part(place)
         return cell + i + round(part)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
         """Nodes of the cell at a place, vertices first, and their weights there; (degree + 1,)."""
-        cell, part = self._cell_and_part(place)
+        cell, part = self.cell_and_part(place)
         first, *between, last = self.mesh.weights(part)
         nodes = self.nodes_of_cells[cell].copy()
         if part in (0.0, 1.0):  # the side of a hinge that is attached to, not that of the cell

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import ffi
+from ufl_beam.compiled.c_library import doubles, ffi
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.discretization.function_spaces import Element, Fields, derivative
@@ -75,6 +76,7 @@ class DolfinxForm:
         space = unknown.function_space
         self._at = np.empty(len(unknown.x.array), dtype=np.int32)
         self._at[dofs_of_cells(space)] = cell_dofs[order]
+        self._each: Any = None
         self._rows: Index = self._at
         if len(self._spaces) == 1 and self._spaces[0] != space:
             dofs = dofs_of_cells(self._spaces[0])
@@ -114,9 +116,19 @@ class DolfinxForm:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
         self.set(self._unknown, q)
         if len(self._spaces) == 1:
-            np.add.at(b.reshape(-1), self._rows, fem.assemble_vector(self._form).array)
+            vector = fem.assemble_vector(self._form).array
+            np.add.at(b.reshape(-1), self._rows, vector)
+            if self._each is not None and self._each[0]:
+                entries = vector[dofs_of_cells(self._spaces[0])]
+                ffi.memmove(self._each[0], doubles(entries), entries.nbytes)
         else:
             np.add.at(b, self._entries, fem.assemble_matrix(self._form).data)
+
+    def keep_entries(self) -> tuple[Any, int, Array]:
+        """See :meth:`CellForm.keep_entries`; no two cells of the mesh share a vertex."""
+        each, other = np.zeros((2, *dofs_of_cells(self._spaces[0]).shape))
+        self._kept, self._each = each, ffi.new("double *[1]", [doubles(each)])
+        return self._each, 1, other
 
     def value(self, q: Array) -> float:
         """Return the value of the functional at the unknown ``q``."""
@@ -133,7 +145,7 @@ class DolfinxFields(Fields):
 
     def __init__(self, share: Share, part: Index | None = None) -> None:
         grid, cells = share.grid, share.cells if part is None else share.cells[part]
-        vertices, numbers = np.unique(grid.cells[cells], return_inverse=True)
+        vertices, numbers = self._vertices(grid.cells[cells])
         self.mesh = line_mesh(grid.points[vertices], numbers.reshape(-1, 2))
         order: Index = np.asarray(self.mesh.topology.original_cell_index)
         # The order of the vertices of a cell orients the beam.
@@ -141,6 +153,11 @@ class DolfinxFields(Fields):
         if not np.array_equal(cell_coordinates(self.mesh)[:, :, :2], expected):
             raise RuntimeError("this version of DOLFINx turns cells around; please report it")
         super().__init__(share, order if part is None else part[order])
+
+    def _vertices(self, cells: Index) -> tuple[Index, Index]:
+        """Vertices of the mesh, and the numbers in them of those of the cells."""
+        vertices, numbers = np.unique(cells, return_inverse=True)
+        return vertices, numbers
 
     def _element(self) -> Element:
         element = Element(self.share.grid.mesh, self.mesh)
@@ -165,3 +182,10 @@ class DolfinxFields(Fields):
         force, tangent = self.kernel(work, q1), self.kernel(derivative(work, q1), q1)
         tangent.place(A)
         return force, tangent
+
+
+class SeparateCells(DolfinxFields):
+    """Such cells with vertices of their own, so that vectors have the entries of each cell."""
+
+    def _vertices(self, cells: Index) -> tuple[Index, Index]:
+        return cells.ravel(), np.arange(cells.size)

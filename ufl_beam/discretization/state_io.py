@@ -85,7 +85,7 @@ class Saving(Memory):
         return rows
 
     def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Save numbered rows of a table, once."""
+        """Save rows that all processes know, once."""
         return self.rows(name, numbers, rows) if self._share.comm.rank == 0 else rows
 
     def state(self) -> State:

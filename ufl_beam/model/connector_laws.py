@@ -113,7 +113,7 @@ class Controller(Record):
     def ask(self, simulation: Running, link: object) -> float:
         """Evaluate the force of ``link`` from now on; all processes call it together."""
         at = f"t = {simulation.t:.9g} s"
-        return require_returned(self.force(simulation), f"{link}: the controller", at)
+        return require_returned(self.force(simulation), f"{link}: the controller", at, finite=True)
 
 
 @closed(OWN_LAW)

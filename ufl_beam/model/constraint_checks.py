@@ -20,7 +20,9 @@ from ufl_beam.model.curves import Point
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.model.time_functions import value_at
+
+INSTEAD = "Add supports or joints, or run dynamics (Midpoint)"
+"""What to do where statics has no unique answer."""
 
 DENSE = 90
 """Up to this number of unknowns the null space comes from a dense decomposition."""
@@ -85,15 +87,6 @@ def _determines(link: Connector) -> bool:
     if isinstance(link.law, Stop):
         return link.law.low == 0.0 or link.law.high == 0.0
     return isinstance(link.law, (*RESISTING, Damper, Coulomb))
-
-
-def no_number(scene: Scene, times: Iterable[float]) -> str:
-    """Name the owner of a time function that is not finite at one of the times; else empty."""
-    for t in times:
-        for owner, function in scene.time_functions():
-            if not math.isfinite(value := value_at(function, t, owner)):
-                return f"{owner}: the time function is {value} at t = {t:.9g} s"
-    return ""
 
 
 def _fixed(scene: Scene) -> set[NodeDof]:
@@ -209,22 +202,27 @@ def _dependences(scene: Scene, laws: tuple[type, ...]) -> tuple[list[tuple[objec
     return [rows[number] for number in numbers], _null_space(gradients)
 
 
-def require_no_mechanism(scene: Scene) -> None:
+def require_no_mechanism(scene: Scene) -> str:
     """Raise :class:`SceneError` if a part of the scene is free to move in statics.
 
     An elastic beam resists every motion but the three rigid ones, so a motion without strain moves
     each beam as a rigid body; it exists if joints and supports leave those motions a null space.
+    Loads may hold it, as its weight holds a pendulum.  Then the motion is described, for whoever
+    knows the tangent in equilibrium; the description is empty if nothing is free.
     """
     free = _null_space(_constraints(scene, also=_under_works(scene)))
     if free.shape[1] == 0:
-        return
+        return ""
     moving = _moving(scene, free[:, 0])
     more = f"; and {len(moving) - 4} more" if len(moving) > 4 else ""
     ways = "way" if free.shape[1] == 1 else "independent ways"
-    raise SceneError(
+    said = (
         f"the scene is free to move in {free.shape[1]} {ways}, so statics has no unique answer: "
-        f"{'; '.join(moving[:4])}{more}. Add supports or joints, or run dynamics (Midpoint)"
+        f"{'; '.join(moving[:4])}{more}. "
     )
+    if not scene.loads:
+        raise SceneError(said + INSTEAD)
+    return said
 
 
 def _center(part: Member | Body) -> Point:

@@ -12,6 +12,7 @@ from typing import Annotated
 import numpy as np
 
 from ufl_beam.errors import (
+    NoNumber,
     SceneError,
     closed,
     require_number,
@@ -125,8 +126,15 @@ Timed = Annotated[TimeFunction, require_time_function]
 
 
 def value_at(function: TimeFunction, t: float, owner: object) -> float:
-    """Evaluate a time function of a user, or raise :class:`SceneError` naming its owner."""
+    """Evaluate a time function of a user.
+
+    Raises:
+        NoNumber: The value is not finite.
+        SceneError: It is no number.
+    """
     value = function(t)
-    if type(value) is float:
-        return value
-    return require_returned(value, f"{owner}: the time function", f"t = {t:.9g} s")
+    if type(value) is not float:
+        value = require_returned(value, f"{owner}: the time function", f"t = {t:.9g} s")
+    if not math.isfinite(value):
+        raise NoNumber(f"{owner}: the time function is {value} at t = {t:.9g} s")
+    return value

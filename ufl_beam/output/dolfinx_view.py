@@ -243,7 +243,7 @@ class DolfinxView:
 
     @property
     def forces(self) -> fem.Function:
-        """Resultants (N, V, M), means of the cells; N, N, N m.
+        """Section forces (N, V, M) in the middle of the cells, in the last step; N, N, N m.
 
         Example:
             >>> M = view.forces.x.array.reshape(-1, 3)[:, 2]

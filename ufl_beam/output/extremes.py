@@ -12,6 +12,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.one_line import one_line
+from ufl_beam.output.archive import require_arrays
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
 
@@ -91,6 +92,9 @@ class Extremes(Recorder):
     def resume(self, simulation: StateView, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._grid = simulation.grid
+        for what, values in zip(("forces", "q"), _state(simulation), strict=True):
+            names = (f"{what} {name}" for name in Extent._fields)
+            require_arrays(state, dict.fromkeys(names, values.shape))
         self._forces, self._q = (
             Extent(*(state[f"{what} {name}"].copy() for name in Extent._fields))
             for what in ("forces", "q")

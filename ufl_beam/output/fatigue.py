@@ -74,8 +74,8 @@ class HotSpot:
 class Fatigue(Recorder):
     """Recorder of the rainflow cycles of the stress at named places.
 
-    Its memory does not grow with the number of steps.  Between the middle of a cell, where the
-    element knows it, and the place the moment varies by the shear force.
+    Its memory does not grow with the number of steps.  Section forces are those of the equation of
+    each step at the place, see :meth:`Solution.diagram`.
 
     Args:
         spots: Where.
@@ -117,14 +117,15 @@ class Fatigue(Recorder):
         self._count()  # A stress that is no number is found at once.
 
     def _prepare(self, grid: Grid) -> None:
-        self._cells = np.array([grid.cell(spot.place) for spot in self.spots], dtype=np.int64)
-        self._offsets = [_offset(grid, spot.place) for spot in self.spots]
+        at = [grid.cell_and_part(spot.place) for spot in self.spots]
+        self._cells = np.array([cell for cell, _ in at], dtype=np.int64)
+        self._parts, self._part = np.unique([part for _, part in at], return_inverse=True)
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
         self._block: list[Array] = []
 
     def write(self, simulation: StateView) -> None:
         """Note the section forces, and count now and then."""
-        self._block.append(simulation.section_forces()[self._cells])
+        self._block.append(simulation.forces_along(self._parts)[self._cells, self._part])
         self._end = simulation.t
         if len(self._block) == BLOCK:
             self._count()
@@ -133,7 +134,7 @@ class Fatigue(Recorder):
         forces, self._block = np.stack(self._block, axis=-1), []
         for k, spot in enumerate(self.spots):
             N, V, M = (forces[k, i] for i in range(3))
-            stress = np.asarray(spot.stress(N, V, M - self._offsets[k] * V), dtype=np.float64)
+            stress = np.asarray(spot.stress(N, V, M), dtype=np.float64)
             if stress.shape != N.shape or not np.isfinite(stress).all():
                 raise SceneError(f"HotSpot {spot}: stress(N, V, M) must be a finite number each")
             self._counters[spot].add(stress)
@@ -192,11 +193,3 @@ class Fatigue(Recorder):
                 f"damage {self.damage(spot):.4g}, life {self.life(spot):.4g} s"
             )
         return "\n".join(lines)
-
-
-def _offset(grid: Grid, place: Place) -> float:
-    """Distance of a place from the middle of its cell, positive towards the end; m."""
-    nodes, weights = grid.weights(place)
-    start, end = grid.points[nodes[:2]]
-    axis = (end - start) / np.linalg.norm(end - start)
-    return float((weights @ grid.points[nodes] - (start + end) / 2) @ axis)

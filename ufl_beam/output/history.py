@@ -13,7 +13,7 @@ import numpy as np
 
 from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
-from ufl_beam.errors import require_count, require_kind, require_sequence
+from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
 from ufl_beam.model.bodies import Anchor, require_anchors
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from functools import cached_property
 from typing import Any
@@ -14,19 +15,22 @@ import numpy as np
 from ufl_beam.arrays import Array, Index, Snapshot, on_demand
 from ufl_beam.compiled.csr import as_slice
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Fields, SectionForces
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
+from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
+from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
 from ufl_beam.parameter import Parameter
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import FORCE, Links
 from ufl_beam.terms.supports import Supports
@@ -48,6 +52,10 @@ class StateView(ABC):
     fields: Fields
     t: float  # s
     q: Array = on_demand()  # configuration at the local degrees of freedom
+    q_before: Array  # that at the beginning of the last step
+    between: float  # part of a step at whose configuration forces are in equilibrium
+    begun: bool  # whether section forces depend on the configuration at its beginning
+    cell_forces: CellForces
     parts: int  # steps so far, parts of cut steps counted each
     ledger: Ledger
     supports: Supports
@@ -93,8 +101,16 @@ class StateView(ABC):
         material = self._material_table() if self._has_inelastic else NO_MATERIAL
         return Snapshot(
             self.t, self.share.gather(self.q), v[0] if v else None, self.reactions(),
-            self.entries(), material, connections,
+            self.entries(), material, connections, self._kept_forces(),
+            self.share.gather(self.q_before) if self.begun else None,
         )  # fmt: skip
+
+    def _kept_forces(self) -> Array:
+        """What solutions keep of the forces of cells."""
+        record = self.cell_forces.record() if self.share.alone else None
+        if record is not None:
+            return record
+        return self.share.gather_cells(self.cell_forces(self.q, self.q_before).T).T
 
     def _material_table(self) -> Array:
         """Numbers of cells and rows of their material, in the order of the numbers; (m, 7)."""
@@ -125,27 +141,33 @@ class StateView(ABC):
         return self._support_forces()
 
     def _support_forces(self) -> Array:
-        """Forces of all supports in the latest residual; (num_supports, 3); N, N, N m."""
-        dofs, mine = self._support_dofs
-        here: Array = self.supports.all_reactions(self.share.size)[dofs]
+        """Forces of all supports in the latest residual; (num_supports, 3); N, N, N m.
+
+        Several supports may be at one node: each has the forces of the components that it holds.
+        """
+        dofs = self.support_dofs
+        here = np.where(dofs >= 0, self.supports.all_reactions(self.share.size)[dofs], 0.0)
         if not self.share.alone:
-            here[~mine] = 0.0
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
+        for force, support in zip(here, self.scene.supports, strict=True):
+            if support.angle:
+                c, s = math.cos(support.angle), math.sin(support.angle)
+                force[:2] = c * force[0] - s * force[1], s * force[0] + c * force[1]
         return here
 
-    @property
-    def support_dofs(self) -> Index:
-        """Local degrees of freedom of the supports; (num_supports, 3)."""
-        return self._support_dofs[0] if self.scene.supports else np.zeros((0, 3), dtype=np.int64)
-
     @cached_property
-    def _support_dofs(self) -> tuple[Index, Index]:
-        """Local degrees of freedom of the supports, and which of them this process owns."""
-        dofs = np.array([self.share.at(support.place) for support in self.scene.supports])
-        mine = self.share.owns(dofs)
-        local = np.zeros_like(dofs)
-        local[mine] = self.share.local(dofs[mine])
-        return local, mine
+    def support_dofs(self) -> Index:
+        """Local degrees of freedom that the supports hold, those that this process owns.
+
+        (num_supports, 3), -1 for others; of a support at an angle they are those of its axes.
+        """
+        local = np.full((len(self.scene.supports), 3), -1, dtype=np.int64)
+        for here, support in zip(local, self.scene.supports, strict=True):
+            held = np.array([*support.held])
+            dofs = self.share.at(support.place)[held]
+            mine = self.share.owns(dofs)
+            here[held[mine]] = self.share.local(dofs[mine])
+        return local
 
     def entries(self) -> tuple[dict[str, float], ...]:
         """The ledger over all processes: state, supplied, lost; J."""
@@ -185,7 +207,16 @@ class StateView(ABC):
         return np.asarray(motion_of(self.grid, place, self.share.gather(self.q)[None])[0])
 
     def velocity(self, place: Anchor) -> Array:
-        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s."""
+        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s.
+
+        Raises:
+            SceneError: The run is static; it has no velocities.
+        """
+        if not has_inertia(self.scheme):
+            raise SceneError(
+                f"velocity of {place}: the run is static; there is none. A controller for both "
+                "kinds of runs can ask now.scheme.dynamic"
+            )
         q, v = self.share.gather(self.q), self.share.gather(self.velocities()[0])
         return np.asarray(velocity_of(self.grid, place, q[None], v[None])[0])
 
@@ -203,17 +234,27 @@ class StateView(ABC):
         return float(np.linalg.norm(self.connections()[numbers, 1]))
 
     def section_forces(self) -> Array:
-        """(N, V, M) in all cells; (num_cells, 3); N, N, N m."""
-        here = np.empty((len(self.share.cells), 3))
-        self._section_forces.write(self.q, here)
-        forces = self.share.gather_cells(here)
-        for cells, rows in self.material():
-            forces[cells] = rows[:, :3]
-        return forces
+        """(N, V, M) in the middle of all cells; (num_cells, 3); N, N, N m.
+
+        They belong to the equation of the last step, see :meth:`Solution.diagram`.
+        """
+        return self.forces_along(MIDDLE)[:, 0]
+
+    def forces_along(self, parts: Array) -> Array:
+        """(N, V, M) at parts of all cells, from 0 to 1; (num_cells, len(parts), 3); N, N, N m."""
+        dofs, before = self._dofs_along, self.q_before if self.begun else None
+        q, before = (None if x is None else x[dofs] for x in (self.q, before))
+        numbers = self.cell_forces(self.q, self.q_before)
+        here = self._along(self.share.cells, parts, numbers, q, before)
+        return self.share.gather_cells(here)
 
     @cached_property
-    def _section_forces(self) -> SectionForces:
-        return SectionForces(self.fields)
+    def _along(self) -> ForcesAlongCells:
+        return ForcesAlongCells(self.grid, self.between)
+
+    @cached_property
+    def _dofs_along(self) -> Index:
+        return self.share.cell_dofs.reshape(len(self.share.cells), 3, self.grid.mesh.degree + 1)
 
     def material(self) -> list[tuple[Index, Array]]:
         """Cells that can yield or break, and :attr:`Points.kept`; later steps change them."""

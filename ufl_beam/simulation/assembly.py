@@ -33,6 +33,7 @@ from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.follower_loads import FollowerLoads
 from ufl_beam.terms.guide_curves import guides
+from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.inelastic_cells import inelastic_cells
 from ufl_beam.terms.links import Links
@@ -90,6 +91,7 @@ class Assembly:
     supports: Supports
     openings: Openings | None  # search for what opens; None if nothing can
     equation: StepEquation
+    cell_forces: CellForces
 
     @property
     def remembering(self) -> list[InelasticBeams | Links]:
@@ -169,6 +171,7 @@ class Assembly:
             return None
         share, state = self.equation.share, (self.ledger, q, t0)
         path = together(StaticPath, share, scheme, self.beams, self.couplings, *state)
+        self.cell_forces.accept()
         if not goes_on:
             r = np.asarray(path.force - sum(loads))
             self.supports.enter(r)
@@ -240,8 +243,14 @@ def assemble(
         equation.leave_to_c()
     return Assembly(
         fields, ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
-        supports, openings, equation,
+        supports, openings, equation, _cell_forces(share, equation.terms),
     )  # fmt: skip
+
+
+def _cell_forces(share: Share, terms: list[Term]) -> CellForces:
+    parts = [part for term in terms for part in term.in_cells()]
+    dead = [term.loads_in_cells() for term in terms if isinstance(term, DeadLoads)]
+    return CellForces(share, parts, *dead)
 
 
 def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[LoadTerm]:

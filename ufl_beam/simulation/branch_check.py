@@ -28,6 +28,16 @@ KINK = 1e-6
 """Work that a kink of a law may leave unexplained, as a part of the energy that went through."""
 
 
+def add_forces_at_rest(
+    beams: Sequence[InternalForces], scheme: Scheme, q: Array, force: Array
+) -> None:
+    """Add the forces of beams at ``q``, in a step so short that nothing viscous flows."""
+    short = scheme.step(0.0, sys.float_info.min, sys.float_info.min, q)
+    for beam in beams:
+        beam.begin(short)
+        beam.add_residual(q, force)
+
+
 class StaticPath:
     """Checks of a static step before it is accepted, from the state in which the path begins.
 
@@ -49,13 +59,10 @@ class StaticPath:
         self._beams, self._couplings = beams, couplings
         self._rotations = share.rotations()
         self.force: Array = np.zeros(share.size)
-        # In so short a step nothing viscous flows; forces of connectors are among the unknowns.
-        short = scheme.step(0.0, sys.float_info.min, sys.float_info.min, q)
-        for beam in beams:
-            beam.begin(short)
-            beam.add_residual(q, self.force)
+        add_forces_at_rest(beams, scheme, q, self.force)  # connectors have theirs among the unknowns
+        begins = scheme.step(t0, t0 + 1.0, t0 + 1.0, q)._replace(load_time=t0, motion_time=t0)
         for coupling in couplings:
-            coupling.begin(scheme.step(t0, t0 + 1.0, t0 + 1.0, q))
+            coupling.begin(begins)
             coupling.add_residual(q, self.force)
 
     def remember(self, memory: Memory, q: Array) -> None:

@@ -24,6 +24,7 @@ from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.follower_loads import FollowerLoads
+from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import Openings
@@ -81,11 +82,12 @@ class CompiledSteps:
         self, equation: StepEquation, solver: Solver, ledger: Ledger, inertia: Inertia | None,
         path: StaticPath | None, openings: Openings | None, largest_turn: float,
         phases: list[Phases], times: TimeFunctions, whole: tuple[float, float, float],
-        turns: tuple[bool, bool], applies_loads: bool, support_dofs: Index,
+        turns: tuple[bool, bool], applies_loads: bool, support_dofs: Index, cell_forces: CellForces,
+        begun: bool,
     ) -> None:  # fmt: skip
         self._equation, self._solver, self._inertia, self._path = equation, solver, inertia, path
         self._phases, self._times, self.ahead = phases, times, False
-        self._applies_loads = applies_loads
+        self._applies_loads, self._begun = applies_loads, begun
         share = equation.share
         self._space, rotations = np.zeros((2, share.size)), share.rotations()
         limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
@@ -104,7 +106,7 @@ class CompiledSteps:
             multipliers=len(multipliers), multiplier=multipliers,
             loads=dead, follower_loads=following,
             supports=equation.supports.in_c(times),
-            states=len(ledger.state), state=ledger.state.numbers,
+            states=len(ledger.state), state=ledger.state.numbers, cell_forces=cell_forces.c,
         )  # fmt: skip
         over = [
             doubles(one.over) + i
@@ -130,7 +132,8 @@ class CompiledSteps:
         inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
         links = [one for one in equation.terms if isinstance(one, Links)]
         scene = share.grid.scene
-        self._of_rows = ledger, equation.supports, support_dofs, inelastic, links, len(scene.links)
+        more = len(scene.links), cell_forces.kept
+        self._of_rows = ledger, equation.supports, support_dofs, inelastic, links, *more
         self._rows: KeptRows | None = None
 
     def _kept(self, q: Array) -> KeptRows:
@@ -162,14 +165,15 @@ class CompiledSteps:
             state.left = [still - 1, last]
             return 0
         c, steps = self.c, len(ends)
-        rows: Array = np.zeros((0, 0))
+        rows: Array = np.zeros((1, 0))
         if keep:
-            kept = self._kept(state.q)
+            kept = self._rows or self._kept(state.q)
             steps = min(steps, 1 + ROOM // kept.width)
-            rows = np.zeros((steps, kept.width))
+            rows = np.zeros((steps + 1, kept.width))  # the first one is of the state before
+            rows[0, kept.q] = state.q
         if not self.ahead:
             self._hand_over(state)
-        taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows)))
+        taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows[1:])))
         if taken:
             state.t = c.t
             state.parts += taken
@@ -178,8 +182,8 @@ class CompiledSteps:
             c.iterations = 0
             if keep:
                 if taken < steps:
-                    rows = rows[:taken].copy()  # so that the rest does not stay
-                states = kept.states(ends[:taken].copy(), rows)
+                    rows = rows[: taken + 1].copy()  # so that the rest does not stay
+                states = kept.states(ends[:taken].copy(), rows, self._begun)
                 state.solution.keep(states, state.parts, self._solver.iterations)
         state.left = [0, 0]
         if c.failed:
@@ -189,6 +193,19 @@ class CompiledSteps:
             self.hand_back(state)
             self._raise()
         return taken
+
+    def q_before(self) -> Array:
+        """The configuration at the beginning of the last step, a new array."""
+        return self._copy(self.c.prediction.q_before)
+
+    def now(self, state: Stepping) -> Snapshots:
+        """The state that C has."""
+        kept = self._rows or self._kept(state.q)
+        rows = np.zeros((2, kept.width))
+        if self._begun:
+            rows[0, kept.q] = self.q_before()
+        lib.keep_state(self.c, doubles(rows[1]))
+        return kept.states(np.array([self.c.t]), rows, self._begun)
 
     def _begins(self, state: Stepping) -> bool:
         """Return whether the next step is like those that follow."""
@@ -242,7 +259,8 @@ class CompiledSteps:
 def compiled_steps(
     scheme: Scheme, equation: StepEquation, solver: Solver, ledger: Ledger,
     inertia: Inertia | None, path: StaticPath | None, openings: Openings | None,
-    largest_turn: float, applies_loads: bool, support_dofs: Index,
+    largest_turn: float, applies_loads: bool, support_dofs: Index, cell_forces: CellForces,
+    begun: bool,
 ) -> CompiledSteps | None:  # fmt: skip
     """Make the steps of a scene in C, if all that takes part in them has loops there."""
     known: Any = scheme
@@ -257,7 +275,7 @@ def compiled_steps(
         phases.append(of_term)
     return CompiledSteps(
         equation, solver, ledger, inertia, path, openings, largest_turn, phases, times, whole,
-        turns, applies_loads, support_dofs,
+        turns, applies_loads, support_dofs, cell_forces, begun,
     )  # fmt: skip
 
 

@@ -29,12 +29,11 @@ class Controllers:
         asked = [link for link in links if isinstance(link.law, Controller | Coulomb)]
         self.values: dict[Connector, float] = dict.fromkeys(asked, 0.0)
         self.fresh: set[Connector] = set()
-        sampled = [i for i, link in enumerate(links) if _sample(link)]
-        self._sampled = [links[i] for i in sampled]
+        self._sampled = [link for link in asked if _sample(link)]
         self._each_step = [link for link in asked if not _sample(link)]
-        self._numbers = np.array(sampled, dtype=int)
+        self._numbers = np.array([i for i, x in enumerate(links) if x in self.values], dtype=int)
         # Of each that has a sample time: time of the first sample (s), number of the last one.
-        self._samples = np.full((len(sampled), 2), math.nan)
+        self._samples = np.full((len(self._sampled), 2), math.nan)
 
     def ask(self, now: Running) -> None:
         """Evaluate what is due at the time ``now.t``; all processes call it together."""
@@ -61,23 +60,25 @@ class Controllers:
             first, number = self._due(i, t)
             sample = _sample(link)
             at = first + (number + 1) * sample
-            if at < stop - _rounding(sample, at, stop):
+            if t < at < stop - _rounding(sample, at, stop):
                 stop = at
         return stop
 
     def remember(self, memory: Memory, t: float) -> None:
-        """Pass on the forces that are held in the state at ``t``, and their samples.
+        """Pass on the forces and limits in the state at ``t``, and the samples.
 
         Where a run begins at another time, sampling begins anew.
         """
-        if not self._sampled:
+        if not self.values:
             return
-        forces = [self.values[link] for link in self._sampled]
-        held = np.column_stack([forces, self._samples, np.full(len(forces), t)])
-        rows = memory.known_rows("samples", self._numbers, held)
-        for i, link in enumerate(self._sampled):
-            if rows[i, 3] == t:
-                self.values[link], self._samples[i] = float(rows[i, 0]), rows[i, 1:3]
+        held = np.full((len(self.values), 4), math.nan)
+        held[:, 0], held[:, 3] = [*self.values.values()], t
+        sampled = [i for i, link in enumerate(self.values) if _sample(link)]
+        held[sampled, 1:3] = self._samples
+        rows = memory.known_rows("asked", self._numbers, held)
+        self.values.update(zip(self.values, rows[:, 0].tolist(), strict=True))
+        if np.all(rows[:, 3] == t):
+            self._samples[:] = rows[sampled, 1:3]
 
 
 def _sample(link: Connector) -> float:

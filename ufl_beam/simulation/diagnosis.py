@@ -13,7 +13,8 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.partition import Share
-from ufl_beam.errors import ConvergenceError, StepFailed
+from ufl_beam.errors import ConvergenceError, NoNumber, SceneError, StepFailed
+from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Solver
@@ -31,6 +32,16 @@ SOFT = 1e-3
 NEAR = 1e-3
 """Motion from the beginning of a step, in sizes of the scene or radians, after which the tangent
 tells what yields as the step begins."""
+
+HELD = 1e-3
+"""Stiffness against a motion without strain, as a part of the forces over the size of the scene,
+below which loads do not hold it: weights and tensions are some tenths of it."""
+
+NOT_HELD = (
+    "Loads can hold it where they balance, as a weight below its hinge, and there is no such state "
+    f"near that in which the run begins. Begin there. {INSTEAD}. In the first step: "
+)
+"""What is said of a run of statics whose first step fails where a motion without strain is free."""
 
 ROOM = 10.0
 """Largest imbalance of an exact ledger over the tolerance of the solver."""
@@ -64,20 +75,48 @@ def no_equilibrium(
     q0: Array,
     times: tuple[float, float],
     advice: str,
-) -> ConvergenceError:
-    """Describe why even the smallest step, from ``q0``, failed; all processes call it together."""
+    loose: str,
+) -> ConvergenceError | SceneError:
+    """Describe why even the smallest step, from ``q0``, failed; all processes call it together.
+
+    In the first step a motion without strain may be ``loose``, which no equilibrium has held yet.
+    """
+    if loose:
+        return SceneError(f"{loose}{NOT_HELD}{failure}")
     q1, (t, end), named = equation.supports.in_plane(newton.iterate()), times, solution.parameter
     forces = _forces_by_kind(equation, newton, q1)
     sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
     where = f"at {named.at(t, '.9g')}"
     if end != t:
         where = f"after {named.at(t, '.9g')}, even with {named.over(end - t)}"
-    why = _singularity(equation, solution.grid, q0, q1)
+    # Where a function has no value there is no tangent to look at.
+    known = not isinstance(failure, NoNumber)
+    why = _singularity(equation, solution.grid, q0, q1) if known else ""
     said = f"{failure} ({sizes})" if sizes else str(failure)
     return ConvergenceError(
         f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=t, dt=end - t,
         solution=solution, residuals=failure.residuals, forces=forces, reason=failure.reason,
     )  # fmt: skip
+
+
+def require_held(equation: StepEquation, newton: Solver, q1: Array, loose: str) -> None:
+    """Raise :class:`SceneError` if loads do not hold a motion without strain in an equilibrium.
+
+    It is described by ``loose``.  All processes call it together.
+    """
+    share, grid = equation.share, equation.share.grid
+    if not equation.respond_at(q1):
+        return
+    K, free = free_matrix(share, equation.A, equation.supports.dofs)
+    lengths = np.full(grid.size, grid.scene.size)
+    lengths[grid.rotations] = 1.0
+    moves = np.ones(grid.size)
+    moves[grid.multipliers] = 0.0
+    x = null_vector(K)[1]
+    motion = np.abs(x * moves[free] / lengths[free]).max()
+    forces = np.linalg.norm((K @ x) * moves[free] * lengths[free])
+    if forces <= HELD * newton.convergence.scale() * grid.scene.size * motion:
+        raise SceneError(f"{loose}The loads do not hold it either. {INSTEAD}")
 
 
 def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-from ufl_beam.discretization.dolfinx_forms import DolfinxFields
+from ufl_beam.discretization.dolfinx_forms import SeparateCells
 from ufl_beam.discretization.function_spaces import CompiledFields, Fields
 from ufl_beam.solvers.direct_solver import DirectSolver
 from ufl_beam.solvers.static_condensation import ChainsFirst
@@ -40,6 +40,6 @@ COMPILED = Classes(
     ChainsFirst, True,
 )  # fmt: skip
 REFERENCE = Classes(
-    DolfinxFields, ReferencePoints, ReferenceInelasticBeams, ReferenceCouplings, ReferenceSlips,
+    SeparateCells, ReferencePoints, ReferenceInelasticBeams, ReferenceCouplings, ReferenceSlips,
     DirectSolver, False,
 )  # fmt: skip

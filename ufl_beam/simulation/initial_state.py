@@ -17,6 +17,7 @@ from ufl_beam.discretization.model_warnings import (
     warn_of_rates,
     warn_of_touching,
 )
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.errors import SceneError, require_kind, shorten, warn
@@ -39,8 +40,12 @@ from ufl_beam.terms.work_forms import require_works
 
 
 @no_garbage_collection()
-def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
-    """Make the grid of a scene, once the scheme is known to be able to compute it."""
+def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> tuple[Grid, str]:
+    """Make the grid of a scene, once the scheme is known to be able to compute it.
+
+    Also describe a motion that only loads may hold in statics; empty if there is none.
+    """
+    loose = ""
     require_kind(scene, Scene, "scene")
     require_scheme(scheme, "scheme")
     if has_inertia(scheme):
@@ -51,7 +56,7 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
             warn_of_origin(scene)
         require_rates(scene, scheme)
     else:
-        require_no_mechanism(scene)
+        loose = require_no_mechanism(scene)
         warn_of_rates(scene)
     require_works(scene, scheme, mesh)
     require_independent(scene)
@@ -60,7 +65,7 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh) -> Grid:
     grid = Grid(scene, mesh)
     if has_inertia(scheme):
         warn_of_touching(grid)
-    return grid
+    return grid, loose
 
 
 def require_scheme(scheme: Any, what: str) -> None:
@@ -100,6 +105,19 @@ def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, Sta
     transfer = Transfer(start.grid, grid)
     q = transfer.state(q0)
     return q, v if v0 is None else transfer.velocity(v0), transfer.internal(start.internal)
+
+
+def last_forces(
+    share: Share, scheme: Scheme, start: Solution | None
+) -> tuple[Array | None, Array | None]:
+    """Forces of cells in the last step of ``start``, and the local configuration at its beginning.
+
+    None without a start, with other cells, and after steps of another scheme.
+    """
+    if start is None or start.scheme != scheme or not same_unknowns(start.grid, share.grid):
+        return None, None
+    cells, before = start.last_forces()
+    return np.ascontiguousarray(cells[:, share.cells]), None if before is None else before[share.dofs]
 
 
 def _initial_velocity(grid: Grid) -> Array:

@@ -39,16 +39,18 @@ class Inelastic(Protocol):
 class KeptRows:
     """Rows of a scene: vectors and the ledger, then the tables of a state, row by row.
 
-    ``q`` is the accepted configuration.
+    ``cell_forces`` are :attr:`CellForces.kept`, and ``q`` is the accepted configuration.
 
     Attributes:
+        q: Columns of the configuration.
         width: Numbers of a row.
         kinds: List of ``kept_numbers`` of loops.h.
     """
 
     def __init__(
         self, march: Any, ledger: Ledger, supports: Supports, support_dofs: Index,
-        inelastic: Sequence[Inelastic], couplings: Sequence[Links], num_links: int, q: Array,
+        inelastic: Sequence[Inelastic], couplings: Sequence[Links], num_links: int,
+        cell_forces: Sequence[tuple[Any, int]], q: Array,
     ) -> None:  # fmt: skip
         self._alive, self._kinds = list[Any](), list[Any]()
         moving = march.rates != ffi.NULL
@@ -59,15 +61,16 @@ class KeptRows:
         cells = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *kept]))
         sizes = [
             march.size, march.size * moving, *map(len, accounts), support_dofs.size,
-            MATERIAL * len(cells), CONNECTION * num_links,
+            MATERIAL * len(cells), CONNECTION * num_links, sum(n for _, n in cell_forces),
         ]  # fmt: skip
         ends = list(accumulate([0, *sizes]))
         self.width, columns = ends[-1], [slice(*pair) for pair in pairwise(ends)]
-        self._q, v, *self._entries, self._reactions, self._material, self._connections = columns
+        self.q, v, *self._entries, self._reactions, self._material = columns[:-2]
+        self._connections, self._cells = columns[-2:]
         self._v = v if moving else None
 
         now = ffi.addressof(march, "q")
-        self._copy(now, self._q)
+        self._copy(now, self.q)
         if moving:
             self._copy(ffi.addressof(march.rates, "rate", V), v)
         for account, entries in zip(accounts, self._entries, strict=True):
@@ -87,6 +90,9 @@ class KeptRows:
             for column, numbers in link.kept(q):
                 apart = numbers.strides[0] // numbers.itemsize
                 self._add(self._place(numbers), apart * np.arange(len(rows)), rows + column)
+        at = self._cells.start
+        for place, number in cell_forces:
+            self._copy(place, slice(at, at := at + number))
         self.kinds = ffi.new("kept_numbers[]", self._kinds)
 
     def _place(self, numbers: Array) -> Any:
@@ -105,14 +111,18 @@ class KeptRows:
         self._alive.append(both)
         self._kinds.append((place, at.size, 0, *map(integers, both)))
 
-    def states(self, times: Array, rows: Array) -> Snapshots:
-        """The states at these times, as views of their rows."""
-        n = len(rows)
+    def states(self, times: Array, rows: Array, before: bool) -> Snapshots:
+        """The states at these times, as views of their rows, which one of the state before leads.
+
+        ``before`` says whether configurations at the beginnings of the steps are asked for.
+        """
+        n, rows, begun = len(times), rows[1:], rows[:-1, self.q] if before else None
         names = zip(self._names, self._entries, strict=True)
         return Snapshots(
-            times, rows[:, self._q], None if self._v is None else rows[:, self._v],
+            times, rows[:, self.q], None if self._v is None else rows[:, self._v],
             rows[:, self._reactions].reshape(n, self._num_supports, 3),
             tuple(dict(zip(of, rows[:, at].T, strict=True)) for of, at in names),
             rows[:, self._material].reshape(n, -1, MATERIAL),
             rows[:, self._connections].reshape(n, -1, CONNECTION),
+            rows[:, self._cells], begun,
         )  # fmt: skip

@@ -15,11 +15,11 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Blocks, Index, Snapshot, Snapshots
 from ufl_beam.compiled.csr import Product
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import (
     CompiledFields,
     Fields,
-    SectionForces,
     Strains,
     mass_matrix,
 )
@@ -29,6 +29,8 @@ from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
 from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import above, below, require_arrays
+from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
+from ufl_beam.terms.in_cells import CellForces
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
@@ -54,14 +56,20 @@ class Material(NamedTuple):
 
 
 class KeptStates:
-    """States that were kept; methods with a number ``n`` give results of all cells in the n-th."""
+    """States that were kept; methods with a number ``n`` give results of all cells in the n-th.
+
+    Attributes:
+        cell_forces: Forces of cells, of whose records the states have some; None if of none.
+    """
 
     def __init__(self, grid: Grid) -> None:
         self._grid = grid
         self._blocks: list[Snapshots] = []
         self._ends: list[int] = []  # number of states up to the end of each block
+        self.cell_forces: CellForces | None = None
+        self._rule: tuple[float, ForcesAlongCells] | None = None
         self._latest: tuple[int, Snapshot] | None = None  # state that was asked for last
-        self._computed: tuple[Snapshot, Array] | None = None  # forces in the last state asked for
+        self._computed: tuple[Snapshot, float, int, Array] | None = None  # forces asked for last
 
     def append(self, states: Snapshots) -> None:
         """Append states that come after those here."""
@@ -128,6 +136,28 @@ class KeptStates:
         """Columns of ``Connection`` for all links; (n+1, num_links, 5)."""
         return Blocks([block.connections for block in self._blocks])
 
+    def _complete(self) -> None:
+        """Compute the forces of cells where records are kept in their place."""
+        for k, block in enumerate(self._blocks):
+            if block.cells.ndim == 2:
+                states = map(block.one, range(len(block.t)))
+                cells = np.array([self.numbers(state) for state in states])
+                self._blocks[k], self._latest = block._replace(cells=cells), None
+
+    def numbers(self, state: Snapshot) -> Array:
+        """``cell_number`` of loops.h for all cells; (9, num_cells); N, N m."""
+        if state.cells.ndim == 2:
+            return state.cells
+        if self.cell_forces is None:
+            raise SceneError("section forces: these states were kept without them")
+        before = state.q if state.before is None else state.before
+        return self.cell_forces.of_record(state.cells, state.q, before)
+
+    @property
+    def before(self) -> Blocks:
+        """Configurations at the beginnings of the steps; empty where they do not matter."""
+        return Blocks([block.before for block in self._blocks if block.before is not None])
+
     def ledger(self) -> list[dict[str, Array]]:
         """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
         parts = []
@@ -141,10 +171,17 @@ class KeptStates:
 
     def arrays(self) -> State:
         """Return all states, as arrays by name."""
+        self._complete()
         arrays = {
             "q": self.q[:,], "reactions": self.reactions[:,], "connections": self.connections[:,],
             "material": self.materials[:,], "times": self.times, "v": self.v[:,],
+            "cells": Blocks([block.cells for block in self._blocks])[:,],
         }  # fmt: skip
+        before = self.before[:,]
+        if len(before) and not np.array_equal(before[1:], arrays["q"][:-1]):
+            arrays["before"] = before  # else each step begins where the one before ends
+        elif len(before):
+            arrays["before"] = before[:1]
         for kind, entries in zip(LEDGER, self.ledger(), strict=True):
             arrays |= above(f"{kind}: ", entries)
         return arrays
@@ -168,8 +205,13 @@ class KeptStates:
         ledger = tuple(below(f"{kind}: ", found) for kind in LEDGER)
         self._blocks, self._ends, self._latest = [], [], None
         if n:
-            shapes |= {"q": (n, grid.size)} | ({"v": (n, grid.size)} if "v" in found else {})
+            shapes |= {"q": (n, grid.size), "cells": (n, lib.CELL_NUMBERS, len(grid.cells))}
+            shapes |= {"v": (n, grid.size)} if "v" in found else {}
+            shapes |= {"before": (-1, grid.size)} if "before" in found else {}
             require_arrays(found, shapes)
+            if 1 == len(found.get("before", ())) < n:
+                found["before"] = np.concatenate([found["before"], found["q"][:-1]])
+            require_arrays(found, {"before": (n, grid.size)} if "before" in found else {})
             for entries in ledger:
                 require_arrays(entries, dict.fromkeys(entries, (n,)))
             cells = found["material"][:, :, 0]
@@ -178,7 +220,7 @@ class KeptStates:
             self.append(
                 Snapshots(
                     found["times"], found["q"], found.get("v"), found["reactions"], ledger,
-                    found["material"], found["connections"],
+                    found["material"], found["connections"], found["cells"], found.get("before"),
                 )
             )  # fmt: skip
 
@@ -190,34 +232,44 @@ class KeptStates:
         return CompiledFields(Share(self._grid, MPI.COMM_SELF))
 
     @cached_property
-    def _section_forces(self) -> SectionForces:
-        return SectionForces(self._fields)
-
-    @cached_property
     def _strains(self) -> Strains:
         return Strains(self._fields)
 
-    def forces(self, n: int) -> Array:
-        """(N, V, M), kept where history decides, else computed from the motion; (num_cells, 3)."""
-        state = self[n]
-        if self._computed is None or self._computed[0] is not state:
-            forces = np.empty((len(self._grid.cells), 3))
-            self._section_forces.write(state.q, forces)
-            cells, rows = cells_of(state)
-            forces[cells] = rows[:, :3]
-            forces.flags.writeable = False
-            self._computed = state, forces
-        return self._computed[1]
+    @cached_property
+    def _dofs(self) -> Index:
+        """Degrees of freedom (u, v, ψ) of the nodes of all cells; (num_cells, 3, degree + 1)."""
+        return self._grid.dofs[self._grid.nodes_of_cells].transpose(0, 2, 1)
 
-    def forces_in_points(self, state: Snapshot) -> Array:
-        """(N, V, M) in the Gauss points, as :meth:`forces`; (num_cells, degree, 3)."""
-        fields = self._fields
-        forces = np.empty((len(fields.order), self._grid.mesh.degree, 3))
-        C = fields.of_sections(fields.element.stiffness)
-        forces[fields.order] = self._strains(state.q).reshape(forces.shape) * C[:, None]
-        cells, rows = cells_of(state)
-        forces[cells] = rows[:, None, :3]
-        return forces
+    def _along(self, between: float) -> ForcesAlongCells:
+        if self._rule is None or self._rule[0] != between:
+            self._rule = between, ForcesAlongCells(self._grid, between)
+        return self._rule[1]
+
+    def forces(self, n: int, between: float, points: int = 1) -> Array:
+        """(N, V, M) in equally spaced points of the cells, or in the middle of each.
+
+        (num_cells, points, 3).
+        """
+        state = self[n]
+        asked = self._computed
+        if asked is None or asked[0] is not state or asked[1:3] != (between, points):
+            parts = MIDDLE if points == 1 else np.arange(points) / (points - 1)
+            q, before = state.q[self._dofs], None
+            if state.before is not None:
+                before = state.before[self._dofs]
+            forces = self._along(between)(slice(None), parts, self.numbers(state), q, before)
+            forces.flags.writeable = False
+            asked = self._computed = state, between, points, forces
+        return asked[3]
+
+    def forces_at(self, place: Place, between: float) -> Array:
+        """(N, V, M) at a place at all kept times; (n+1, 3)."""
+        cell, part = self._grid.cell_and_part(place)
+        dofs, n = self._dofs[cell], len(self)
+        q, before = self.q[:, dofs], self.before[:, dofs] if len(self.before) else None
+        numbers = np.array([self.numbers(self[k])[:, cell] for k in range(n)]).T
+        cells = np.full(n, cell)
+        return np.asarray(self._along(between)(cells, np.array([part]), numbers, q, before)[:, 0])
 
     def strains(self, n: int) -> Array:
         """(Σ, Γ, K); (num_cells, 3); 1, 1, 1/m."""
@@ -225,14 +277,14 @@ class KeptStates:
         strains[self._fields.order] = self._strains.mean(self[n].q)
         return strains
 
-    def material(self, n: int, cells: Index | int) -> Material:
+    def material(self, n: int, cells: Index | int, between: float) -> Material:
         """State of the material of some cells."""
         inelastic, rows = cells_of(self[n])
         if not len(inelastic) and not self._grid.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
         everything = np.zeros((len(self._grid.cells), 6))
-        everything[:, :3] = self.forces(n)
-        everything[inelastic, 3:] = rows[:, 3:]
+        everything[:, :3] = self.forces(n, between)[:, 0]
+        everything[inelastic] = rows  # of the law
         chosen = everything[cells].T
         return Material(chosen[:3].T, *chosen[3:])
 
@@ -241,10 +293,10 @@ class KeptStates:
         cell = self._grid.cell(place)
         return np.array([of(n)[cell] for n in range(len(self))])
 
-    def material_at(self, place: Place) -> Material:
+    def material_at(self, place: Place, between: float) -> Material:
         """State of the material in the cell at a place; arrays begin with (n+1,)."""
         cell = self._grid.cell(place)
-        kept = [self.material(n, cell) for n in range(len(self))]
+        kept = [self.material(n, cell, between) for n in range(len(self))]
         return Material(*map(np.array, zip(*kept, strict=True)))
 
     def momentum(self) -> Array:

@@ -24,7 +24,7 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import above, below, decoding
+from ufl_beam.output.archive import ADVICE, above, below, decoding
 from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, say
@@ -142,14 +142,21 @@ def simulate(
                 solution.seconds = float(found["seconds"])
             solution.parts, solution.iterations = simulation.parts, simulation.iterations
             solution.time_error = pace.error
+            solution.warnings = found["warnings"]
             keeper.resume(pace.steps)
             for i, recorder in enumerate(recorders):
-                recorder.resume(simulation, below(f"recorder {i}/", found))
+                try:
+                    recorder.resume(simulation, below(f"recorder {i}/", found))
+                except SceneError as error:
+                    raise SceneError(f"checkpoint {keeper.path}: {error}") from None
+                except (LookupError, TypeError, ValueError) as error:
+                    why = f"checkpoint {keeper.path}: {recorder} cannot go on from it: {error!r}"
+                    raise SceneError(f"{why}. {ADVICE['checkpoint']}") from error
 
         def write(keeper: Keeper) -> None:
             content = {
                 "seconds": solution.seconds + time.perf_counter() - begin, "pace": pace.state(),
-                "stateful": simulation.together(keeper.states),
+                "stateful": simulation.together(keeper.states), "warnings": solution.warnings,
                 **above("state/", simulation.state()),
             }  # fmt: skip
             for i, recorder in enumerate(recorders):
@@ -163,7 +170,7 @@ def simulate(
             if pace.steps % solution.every == 0 or pace.finished:
                 simulation.keep()
                 thins = len(solution) > most + 1 and not pace.finished
-                simulation.warn(watch.judge(solution, last=thins))
+                simulation.warn(watch.judge(solution, last=thins or pace.finished))
                 if thins:
                     solution.thin()
                     solution.every *= 2
@@ -203,9 +210,7 @@ def simulate(
 def check_ledger(simulation: Simulation) -> None:
     """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
 
-    All processes know all warnings then.
-
-    All processes call it together, at the end of a run.
+    All processes call it together, at the end of a run, and know all warnings then.
 
     Warns:
         ModelWarning: It is open, perhaps by round-off.

@@ -25,10 +25,11 @@ from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import Assembly, assemble
+from ufl_beam.simulation.branch_check import add_forces_at_rest
 from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
-from ufl_beam.simulation.diagnosis import no_equilibrium
+from ufl_beam.simulation.diagnosis import no_equilibrium, require_held
 from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
-from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
+from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
@@ -104,7 +105,7 @@ class Simulation(StateView):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
         if start is not None:
             require_kind(start, Solution, "start")
-        grid = checked_grid(scene, scheme, mesh_of(start, mesh))
+        grid, self._loose = checked_grid(scene, scheme, mesh_of(start, mesh))
         share = Share(grid, sharing(comm, len(grid.cells)))
         self.scene, self.scheme, self.comm, self.grid, self.share = scene, scheme, comm, grid, share
         self.together = together = Agreement(share.comm)
@@ -119,6 +120,7 @@ class Simulation(StateView):
         self.equation, self.terms = parts.equation, parts.equation.terms
 
         self.t, self.parts, self.left = t0, 0, [0, 0]
+        self._begun_at: Array | None = None  # of the state before the first step
         self.q = q[share.dofs]
         weights, in_motion = self.equation.weights, has_inertia(scheme)
         self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
@@ -138,6 +140,15 @@ class Simulation(StateView):
         goes_on = same and "reactions" in internal and not len(start.v)
         self._branch = parts.static_path(scheme, self.q, t0, loaded, together, goes_on=goes_on)
         self.reactions_known = self._branch is not None
+        self.cell_forces, self.between = parts.cell_forces, float(scheme.average(0.0, 1.0))
+        if not self.reactions_known:
+            together(add_forces_at_rest, self.beams, scheme, self.q, np.zeros(share.size))
+        goes_on = goes_on or not self.reactions_known
+        forces, before = last_forces(share, scheme, start) if goes_on else (None, None)
+        if forces is not None or not self.reactions_known:
+            self.cell_forces.begin(forces)
+            self._begun_at = before
+        self.begun = self.between < 1 or self.cell_forces.asks_for_before
 
         factors = by.factors(share, self.equation.A)
         self._steps = StepSolver(
@@ -145,8 +156,9 @@ class Simulation(StateView):
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
+        self._describe(self.solution)
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
-        in_python = self._copies or self.asked or not share.alone
+        in_python = self._copies or self.asked or self._loose or not share.alone
         self._in_c = None if in_python else self._steps_in_c(parts)
 
     # -- stepping ------------------------------------------------------------------------------
@@ -207,7 +219,7 @@ class Simulation(StateView):
         fresh = not self._continues and begins_loaded(self.scene, self.scheme, self.t)
         return compiled_steps(
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
-            parts.openings, LARGEST_TURN, fresh, self.support_dofs,
+            parts.openings, LARGEST_TURN, fresh, self.support_dofs, parts.cell_forces, self.begun,
         )  # fmt: skip
 
     def take_back(self) -> None:
@@ -244,13 +256,18 @@ class Simulation(StateView):
 
     def _accept(self, trial: Trial) -> None:
         step, q1, s = trial
+        if self._loose:
+            require_held(self.equation, self.solver, q1, self._loose)
+            self._loose = ""
         if self._branch is not None:
             self._branch.accept(self.equation.force)
+        self.cell_forces.accept()
         for term in self.terms:
             term.accept(q1, s)
         self.supports.enter(s)
         self.supports.accept(s)
         self.prediction.accept(self.q, q1, step.dt)
+        self._begun_at = None
         self.q, self.t = q1, step.t1
         self.parts += 1
         self.ledger.begin()
@@ -260,11 +277,19 @@ class Simulation(StateView):
             self.warn(self._watch.judge(q1, step.t1, step.dt), here=not self.share.alone)
 
     def warn(self, found: Iterable[str], *, here: bool = False) -> None:
-        """Warn, and note in the solution, by the first process or ``here``."""
+        """Warn, and note in the solution, of what it does not say; by one process or ``here``."""
         for said in found:
-            self.solution.warnings += f"{said}\n"
-            if here or self.comm.rank == 0:
-                warn(said)
+            if said not in self.solution.warnings:
+                self.solution.warnings += f"{said}\n"
+                if here or self.comm.rank == 0:
+                    warn(said)
+
+    @property
+    def q_before(self) -> Array:  # type: ignore[override]
+        """Configuration at the beginning of the last step."""
+        if self._in_c is not None and self._in_c.ahead:
+            return self._in_c.q_before()
+        return self.prediction.q_before if self._begun_at is None else self._begun_at
 
     def ask(self) -> None:
         """Ask controllers and friction for forces and limits in the next step, on all processes."""
@@ -282,7 +307,7 @@ class Simulation(StateView):
         self.end()
         raise no_equilibrium(
             self.equation, self.solver, self.solution, failure, self.q, (self.t, end),
-            advice or self.scheme.advice,
+            advice or self.scheme.advice, self._loose,
         ) from failure  # fmt: skip
 
     def settle(self) -> None:
@@ -299,6 +324,11 @@ class Simulation(StateView):
         if self._copies is not None:
             self._copies.leave()
 
+    def _describe(self, solution: Solution) -> None:
+        """Tell a solution how section forces follow from what it keeps."""
+        solution.between = self.between
+        solution.find_cell_forces(self.scheme, self.cell_forces if self.share.alone else None)
+
     # -- the end, and going on -----------------------------------------------------------------
 
     @property
@@ -313,7 +343,10 @@ class Simulation(StateView):
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
-        self.solution.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
+        in_c = self._in_c
+        ahead = in_c is not None and in_c.ahead
+        now = in_c.now(self) if ahead else Snapshots.of(self.gather())
+        self.solution.keep(now, self.parts, self.iterations)
 
     def end(self) -> None:
         """Let the solution have the last state, and what another run that starts there needs."""
@@ -327,6 +360,7 @@ class Simulation(StateView):
         """The state now, as a solution that other runs may start with; all processes call it."""
         self.settle()
         now = Solution(self.scene, self.grid)
+        self._describe(now)
         now.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
         self.take_back()
         now.internal = self._assembly.internal_variables(self.q, self.t)
@@ -355,6 +389,8 @@ class Simulation(StateView):
         self.q = memory.at_dofs("q", self.q)
         self.controllers.remember(memory, self.t)
         self.prediction.remember(memory)
+        self._begun_at = None
+        self.cell_forces.remember(memory, self.q, self.q_before)
         self.ledger.remember(memory)
         for term in self.terms:
             term.remember(memory, self.q)

@@ -14,6 +14,7 @@ from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_number
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -34,11 +35,12 @@ from ufl_beam.output.saved_scene import require_no_code
 from ufl_beam.parallel import active_comm
 from ufl_beam.parameter import TIME
 from ufl_beam.rich_display import Rich
-from ufl_beam.simulation.force_diagrams import Diagram, ForcesAlongCells
+from ufl_beam.simulation.force_diagrams import Diagram
 from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
 from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, require_same, text_of
 from ufl_beam.terms.energy_ledger import Energy
+from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.links import FORCE
 
 
@@ -61,6 +63,8 @@ class Solution(Rich):
         open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
         warnings: What the run has warned of, a line each; see docs/warnings.md.
         internal: Internal variables of cells and connectors at the end of the run.
+        between: Part of a step at whose configuration its forces are in equilibrium.
+        scheme: Of the run; None if the solution was loaded.
 
     Example:
         >>> print((1e3 * solution.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad, at t = 1 s
@@ -72,6 +76,7 @@ class Solution(Rich):
     """
 
     parameter = TIME
+    scheme: Scheme | None
 
     def __init__(self, scene: Scene, grid: Grid) -> None:
         self.scene, self.grid = scene, grid
@@ -79,8 +84,8 @@ class Solution(Rich):
         self.time_error, self.seconds, self.building = math.nan, 0.0, 0.0
         self.every, self.open_ledger, self.warnings = 1, "", ""
         self.internal: State = {}
+        self.between, self.scheme = 1.0, None
         self._kept = KeptStates(grid)
-        self._along = ForcesAlongCells(grid, self._kept.forces_in_points)
 
     def keep(self, states: Snapshots, parts: int, iterations: int) -> None:
         """Append states of a run, up to the last of which so many were done."""
@@ -220,6 +225,9 @@ class Solution(Rich):
     def reaction(self, support: Support) -> Array:
         """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
 
+        They are of the components of motion that it holds; another support at the same node has its
+        own.
+
         In statics the first row is what the initial state bears: nothing in the undeformed scene,
         for loads act from the first step on; with ``start=`` the reactions of its equilibrium.  In
         dynamics they act during the step that ends at each time; the first row is NaN.
@@ -233,25 +241,34 @@ class Solution(Rich):
         return self._kept.reactions[:, number]
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
-        """(N, V, M) in the cells of a beam at the n-th kept time; (num_cells, 3); N, N, N m."""
-        return self._kept.forces(n)[self.grid.cells_of(beam)]
+        """(N, V, M) in the middle of the cells of a beam, as :meth:`diagram` has it, at a kept time.
+
+        (num_cells, 3); N, N, N m.
+        """
+        return self._kept.forces(n, self.between)[self.grid.cells_of(beam), 0]
 
     def section_forces_at(self, place: Place) -> Array:
-        """(N, V, M) in the cell at a place; (n+1, 3); N, N, N m.
+        """(N, V, M) at a place, as :meth:`diagram` has it; (n+1, 3); N, N, N m.
 
-        At a vertex it is the cell before it, at the start of a beam the first one.
+        At a vertex they are those at the end of the cell before it, at the start of a beam those at the
+        start of the first one.
 
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
-        return self._kept.at(place, self._kept.forces)
+        return self._kept.forces_at(place, self.between)
 
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
         """Section forces along a beam, by equilibrium of its cells, at the n-th kept time.
 
-        Between the vertices V is linear and M parabolic under a uniform load in statics; in
-        dynamics loads and inertia act on the nodes.  ``points`` are those of each cell, equally
-        spaced, both ends included.
+        At the ends of the cells they are those of the equation of the step that ends there, with
+        stresses, inertia, damping, loads and works: the same as :meth:`reaction` at a support, and as
+        forces of joints.  Between them V is linear and M parabolic under a uniform load.  ``points``
+        are those of each cell, equally spaced, both ends included.
+
+        The initial state of a static run bears nothing unless it has a ``start=``.  That of a dynamic
+        one has the last step of ``start=``, or the forces of its strains, as its accelerations are not
+        known.
 
         Raises:
             SceneError: The beam is not in the scene, or ``points`` is less than 2.
@@ -259,8 +276,16 @@ class Solution(Rich):
         require_number(points, "diagram: points", at_least=2)
         s, cells = self.grid.parameters(beam), self.grid.cells_of(beam)
         at = s[:-1, None] + np.linspace(0.0, 1.0, int(points)) * np.diff(s)[:, None]
-        forces = self._along(self._kept[n], int(points))[cells]
+        forces = self._kept.forces(n, self.between, int(points))[cells]
         return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
+
+    def find_cell_forces(self, scheme: Scheme, forces: CellForces | None) -> None:
+        """Take note of the scheme, and of how forces of cells follow from what is kept."""
+        self.scheme, self._kept.cell_forces = scheme, forces
+
+    def last_forces(self) -> tuple[Array, Array | None]:
+        """``cell_number`` of loops.h in the last step, and the configuration at its beginning."""
+        return self._kept.numbers(self._kept[-1]), self._kept[-1].before
 
     def strains(self, beam: Member, n: int = -1) -> Array:
         """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
@@ -279,7 +304,7 @@ class Solution(Rich):
         Raises:
             SceneError: The scene is elastic.
         """
-        return self._kept.material(n, self.grid.cells_of(beam))
+        return self._kept.material(n, self.grid.cells_of(beam), self.between)
 
     def material_at(self, place: Place) -> Material:
         """Material states in the cell at a place at all kept times; arrays begin with (n+1,).
@@ -290,7 +315,7 @@ class Solution(Rich):
         Raises:
             SceneError: The scene is elastic, or the beam of the place is not in it.
         """
-        forces, jump, plastic, energy = self._kept.material_at(place)
+        forces, jump, plastic, energy = self._kept.material_at(place, self.between)
         hinge = self.grid.hinge_at(place)
         if hinge is not None:
             of_hinge = self.connector(hinge)

@@ -24,7 +24,9 @@ from ufl_beam.version import version
 FORMAT = "solution of ufl_beam, 2"
 """The number grows whenever the meaning of files changes."""
 
-NAMED = {"seconds": float, "time_error": float, "open_ledger": str, "warnings": str}
+NAMED = {
+    "seconds": float, "time_error": float, "between": float, "open_ledger": str, "warnings": str,
+}  # fmt: skip
 """Attributes that are saved as they are, and their types."""
 
 TIME_FUNCTIONS = ("time", "held", "motion", "force", "numbers")

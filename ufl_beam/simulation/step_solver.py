@@ -20,7 +20,6 @@ from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.csr import as_slice
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
-from ufl_beam.model.constraint_checks import no_number
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
@@ -171,32 +170,19 @@ class StepSolver:
         """Solve a step from a guess; the tangent of the last step does if that was like it."""
         past = now.prediction
         step = step._replace(q_before=past.q_before, ratio=step.dt / past.last_dt)
-        try:
-            guess, like_last = self._together(self._predict, now, step), past.like_last(step.dt)
-            loads = self._equation.load_forces()
-            solve = partial(self.newton.solve, loads=loads, like_last=like_last)
-            if self._openings is None:
-                q1 = solve(guess)
-            else:
-                q1 = self._openings.solve(guess, solve, partial(self._equation.begin, step))
-        except StepFailed:
-            try:
-                self._together(self._require_numbers, step)
-            except StepFailed as better:
-                raise better from None
-            raise
+        guess, like_last = self._together(self._predict, now, step), past.like_last(step.dt)
+        loads = self._equation.load_forces()
+        solve = partial(self.newton.solve, loads=loads, like_last=like_last)
+        if self._openings is None:
+            q1 = solve(guess)
+        else:
+            q1 = self._openings.solve(guess, solve, partial(self._equation.begin, step))
         return self._trial(step, q1)
 
     def _require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a law of this process gives energy."""
         for one in self._judged:
             one.require_dissipation(q1)
-
-    def _require_numbers(self, step: Step) -> None:
-        """Raise :class:`StepFailed` if a time function is no finite number in a step."""
-        scene = self._equation.share.grid.scene
-        if said := no_number(scene, (step.load_time, step.motion_time)):
-            raise StepFailed(said)
 
     def _trial(self, step: Step, q1: Array) -> Trial:
         """Return the result ``q1`` of a step, in the axes of the supports, if it can be trusted."""

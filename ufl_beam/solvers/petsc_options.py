@@ -55,12 +55,15 @@ def take_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
             options[name] = value
         snes.setFromOptions()
         # PETSc may have given those of before 3.24 their new names.
-        return [name for name in chosen if name in database() and not _used(name)]
+        unused = [name for name in chosen if name in database() and not _used(name)]
     finally:
         for name in {**chosen, **database()}:
             del options[name]
         for name, value in before.items():
             options[name] = value
+    for name in before.keys() - {*unused}:
+        options.hasName(name)  # or PETSc, at its end, would call it unused
+    return unused
 
 
 def _used(name: str) -> bool:

@@ -9,12 +9,14 @@ what several processes add to one degree of freedom is summed by the solver.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Phases, TimeFunctions
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
@@ -34,6 +36,10 @@ class Term(ABC):
     def phases(self, times: TimeFunctions) -> Phases | None:
         """C loops of the methods below for steps without Python; None where a term has not all."""
         return None
+
+    def in_cells(self) -> Sequence[InCells]:
+        """Forces on the nodes of cells; none if all act between nodes that joints may share."""
+        return ()
 
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -11,7 +12,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, on_demand
-from ufl_beam.compiled.c_library import Loop, ffi, loop
+from ufl_beam.compiled.c_library import Loop, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
@@ -22,6 +23,7 @@ from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
+from ufl_beam.terms.in_cells import InCells, mass_times
 from ufl_beam.terms.phases import Phases, TimeFunctions, entering
 from ufl_beam.terms.rates_in_c import RatesInC
 from ufl_beam.terms.static_tangents import StaticTangent
@@ -72,6 +74,10 @@ class ElasticBeams(OfForms, Cells):
         super().begin(step)
         if self._static is not None:
             self._static.begin(step)
+
+    def in_cells(self) -> Sequence[InCells]:
+        """The forces of the resultants, which both configurations of a step determine."""
+        return [InCells(self._force, lib.STRESS, self._order, q0=self._q0)]
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
@@ -127,13 +133,19 @@ class Inertia(OfMatrix):
     ) -> None:
         rotations = scheme.half_tangents(fields.share.rotations())
         self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
-        self.ledger = ledger
+        self._fields, self.ledger = fields, ledger
         if scheme.slips:
             ledger.lost["numerical"] += 0.0
         self.scheme = scheme
         self.v = self.v_before = v
         self.more: tuple[Array, ...] = ()
         self._dt = self.last_dt = math.inf
+
+    def in_cells(self) -> Sequence[InCells]:
+        """The mass of the beams times the accelerations of the step."""
+        of = self._fields.element
+        form = self._fields.hot_kernel(mass_times(of), of.q1)
+        return [InCells(form, lib.DENSITY, self._fields.order, self._times.rate)]
 
     @property
     def M(self) -> Csr:

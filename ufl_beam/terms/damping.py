@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
@@ -11,7 +12,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import loop, struct
+from ufl_beam.compiled.c_library import lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains, mass_matrix
@@ -26,6 +27,7 @@ from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
+from ufl_beam.terms.in_cells import InCells, mass_times
 from ufl_beam.terms.phases import Phases, TimeFunctions, knowing
 from ufl_beam.terms.rates_in_c import RatesInC
 
@@ -93,6 +95,14 @@ def _reference_stiffness(of: Element) -> ufl.Form:
     return virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
 
 
+@stated
+def _stiffness_times(of: Element) -> ufl.Form:
+    """The reference stiffness times a vector, the unknown q1."""
+    rest = of.configuration()
+    e, w_e = (virtual_strain(rest, w, of.axis) for w in (of.q1, of.w))
+    return virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
+
+
 class RayleighForces(OfMatrix):
     """A constant matrix times the velocity of the step, P(92)."""
 
@@ -101,12 +111,23 @@ class RayleighForces(OfMatrix):
     def __init__(
         self, damping: Rayleigh, fields: Fields, A: Csr, ledger: Ledger, inertia: Inertia
     ) -> None:
+        self._damping, self._fields = damping, fields
         C, M = fields.matrix(), mass_matrix(fields)
         K = fields.assembled(_reference_stiffness(fields.element))
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
         rotations = inertia.scheme.half_tangents(fields.share.rotations())
         self._times = StepProduct(C, rotations, A, fields.share.scratch)
         self._ledger, self._inertia = ledger, inertia
+
+    def in_cells(self) -> Sequence[InCells]:
+        """Both matrices of the beams times the velocities of the step."""
+        fields, damping, of = self._fields, self._damping, self._fields.element
+        form, mass = (fields.hot_kernel(f(of), of.q1) for f in (_stiffness_times, mass_times))
+        at = fields.order, self._times.rate
+        return [
+            InCells(form, lib.STRESS, *at, damping.stiffness),
+            InCells(mass, lib.DENSITY, *at, damping.mass),
+        ]
 
     def phases(self, times: TimeFunctions) -> Phases | None:
         """Loops over the matrix and the velocities."""

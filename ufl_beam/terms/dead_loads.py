@@ -9,13 +9,11 @@ from functools import singledispatch
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring
-from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
@@ -36,9 +34,15 @@ class DeadLoads(LoadTerm):
         super().__init__(share, scheme, ledger)
         # Loads of one time function are one vector; functions need not be hashable.
         vectors: dict[int, tuple[Load, Array]] = {}
+        in_cells: dict[int, Array] = {}
         for load in loads:
-            _, vector = vectors.setdefault(id(load.time), (load, np.zeros(share.size)))
+            key = id(load.time)
+            _, vector = vectors.setdefault(key, (load, np.zeros(share.size)))
             _add_forces(load, share, vector)
+            if (along := _along_beams(load, share)) is not None:
+                in_cells[key] = in_cells.get(key, 0.0) + along
+        for key, along in in_cells.items():
+            np.add.at(vectors[key][1], share.cell_dofs, along)
         whole = [vector for _, vector in vectors.values()]
         # A process may own degrees of freedom that others load.
         self.dofs = np.flatnonzero(share.added(np.any(whole, axis=0) * 1.0)).astype(np.int32)
@@ -51,20 +55,32 @@ class DeadLoads(LoadTerm):
         self._force = np.broadcast_to(0.0, share.size)  # which takes no room
         self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs)
         self._factors: list[float] = []
+        # Parts of the vectors that act: now, at the end of the step, at that of the last one, and in
+        # the equation of that.
+        self._parts: Array = np.zeros((4, len(vectors)))
+        self._along = [in_cells.get(key) for key in vectors]
+
+    def loads_in_cells(self) -> Any:
+        """``loads_in_cells`` of loops.h; null if nothing acts along beams."""
+        if not any(along is not None for along in self._along):
+            return ffi.NULL
+        along = [ffi.NULL if one is None else doubles(one) for one in self._along]
+        c = struct(
+            "loads_in_cells", vectors=len(along), vector=ffi.new("double *[]", along),
+            latest=self._parts[0], accepted=self._parts[3],
+        )  # fmt: skip
+        return ffi.gc(c, lambda _, kept=(c, along): None)  # solutions outlive the term
 
     def begin(self, step: Step) -> None:
-        """The loads of the step; nothing is to do for those that stay.
-
-        Raises:
-            StepFailed: A time function is not finite.
-        """
+        """The loads of the step; nothing is to do for those that stay."""
         factors = self._factors_at(step.load_time)
         if factors == self._factors and step.fraction == step.at == 1:
             return
-        if not all(map(math.isfinite, factors)):  # perhaps with no loaded place in this process
-            raise StepFailed("a load is no finite number")
         self._acts = self._end = self._times(factors)
         self._factors = factors
+        now, end, before, _ = self._parts
+        end[:] = before + step.fraction * (factors - before) if step.fraction < 1 else factors
+        now[:] = before + step.at * (end - before) if step.at < 1 else end
         if step.fraction < 1 or step.at < 1:
             change = step.fraction * (self._end - self._before)
             self._end = self._before + change
@@ -84,6 +100,7 @@ class DeadLoads(LoadTerm):
         c = self.steps_in_c = struct(
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=len(owners),
             force=forces[0], end=forces[1], before=forces[2],
+            parts=[doubles(part) for part in self._parts[:3]],
             factors=np.empty(len(owners)), factor=times.in_c(owners),
             vector=ffi.new("double *[]", [doubles(vector) for _, vector in self._vectors]),
             work=self._ledger.supplied.pointer("loads"),
@@ -106,7 +123,8 @@ class DeadLoads(LoadTerm):
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
-        self._before = self._times(self._factors_at(t))
+        factors = self._factors_at(t)
+        self._before, self._parts[:3] = self._times(factors), factors
         return self._whole(self._before)
 
     def _factors_at(self, t: float) -> list[float]:
@@ -132,6 +150,7 @@ class DeadLoads(LoadTerm):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the work of the loads, if there are any."""
+        self._parts[2] = self._parts[1]
         if any(self._factors) or self._before is not self._acts:
             work = float(self._acting(self._before, self._acts) @ s[self.dofs])
             self._ledger.supplied["loads"] += work
@@ -142,6 +161,8 @@ class DeadLoads(LoadTerm):
         self._before = memory.added("dead loads", self._whole(self._before))[self.dofs]
         self._acts = self._end = self._before
         self._factors = []
+        for k, part in enumerate(self._parts[2]):
+            self._parts[2, k] = memory.number(f"part of dead loads {k}", part)
 
 
 @singledispatch
@@ -161,28 +182,29 @@ def _(load: PointLoad, share: Share, forces: Array) -> None:
 
 @_add_forces.register
 def _(load: LineLoad, share: Share, forces: Array) -> None:
-    here = [beam is load.beam for beam in share.grid.scene.beams]
-    forces += _along_beams(np.outer(here, [*load.force, load.moment]), share)
+    """All of it acts along a beam."""
 
 
 @_add_forces.register
 def _(load: Gravity, share: Share, forces: Array) -> None:
     scene = share.grid.scene
-    rhoA = [beam.section.rhoA for beam in scene.beams]
-    weight = _along_beams(np.outer(rhoA, [*load.acceleration, 0.0]), share)
     heavy = [(one.place, one.mass) for one in scene.masses]
     heavy += [(one.middle, one.mass) for one in scene.bodies]
     for place, mass in heavy:
         g_x, g_y = load.acceleration
-        _add_forces(PointLoad(place, force=(mass * g_x, mass * g_y)), share, weight)
-    forces += weight
+        _add_forces(PointLoad(place, force=(mass * g_x, mass * g_y)), share, forces)
 
 
-def _along_beams(per_beam: npt.NDArray[Any], share: Share) -> Array:
-    """Nodal forces of line loads (num_beams, 3): two nodes of a cell bear a half of it each."""
+def _along_beams(load: Load, share: Share) -> Array | None:
+    """Forces on the nodes of cells with factor one; none if the load acts at a place."""
     grid = share.grid
+    if isinstance(load, LineLoad):
+        here = [beam is load.beam for beam in grid.scene.beams]
+        per_beam = np.outer(here, [*load.force, load.moment])
+    elif isinstance(load, Gravity):
+        per_beam = np.outer([b.section.rhoA for b in grid.scene.beams], [*load.acceleration, 0.0])
+    else:
+        return None
     loads = per_beam[grid.beam_of_cell[share.cells]] * share.cell_lengths()[:, None]
     first, *between, last = grid.mesh.parts
-    forces = np.zeros(share.size)
-    np.add.at(forces, share.cell_dofs, np.kron(loads, [first, last, *between]))
-    return forces
+    return np.kron(loads, [first, last, *between])

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, MutableMapping, Sequence
+from collections.abc import Iterator, Mapping, MutableMapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -109,9 +109,9 @@ class Entries(dict[str, Array]):
         )
 
 
-@dataclass(frozen=True)
-class Energy(Rich):
-    """Energy ledger of a run: energy in the scene, work supplied, losses.
+@dataclass(frozen=True, eq=False)
+class Energy(Mapping[str, Array], Rich):
+    """Energy ledger of a run: energy in the scene, work supplied, losses; a mapping of all entries.
 
     Attributes:
         state: Arrays by name, "kinetic", "stored", and potentials of a user; each (n+1,); J.
@@ -122,6 +122,8 @@ class Energy(Rich):
         >>> ledger = solution.energy
         >>> print(sorted(ledger.state), sorted(ledger.supplied))
         ['kinetic', 'stored'] ['loads']
+        >>> "stored" in ledger, [*ledger]
+        (True, ['stored', 'kinetic', 'loads'])
         >>> bool(ledger.worst < 1e-9)  # largest imbalance over the energy that went through
         True
     """
@@ -129,6 +131,8 @@ class Energy(Rich):
     state: dict[str, Array]
     supplied: dict[str, Array]
     lost: dict[str, Array]
+
+    __eq__, __hash__ = object.__eq__, object.__hash__  # arrays are not compared
 
     def __post_init__(self) -> None:
         names = [name for part in self._parts for name in part]
@@ -138,6 +142,13 @@ class Energy(Rich):
     def __getitem__(self, name: str) -> Array:
         """Entry ``name``; (n+1,); J.  Entries of effects that the scene lacks do not exist."""
         return next((part for part in self._parts if name in part), self.state)[name]
+
+    def __iter__(self) -> Iterator[str]:
+        """Names of the entries: state, supplied, lost."""
+        return (name for part in self._parts for name in part)
+
+    def __len__(self) -> int:
+        return sum(map(len, self._parts))
 
     @property
     def _parts(self) -> tuple[dict[str, Array], ...]:

@@ -63,7 +63,8 @@ class FollowerLoads(LoadTerm):
         return self._whole(self._forces[0])
 
     def begin(self, step: Step) -> None:
-        """The sizes of the loads in the step."""
+        """The sizes of the loads in the step; a failed one leaves no forces behind."""
+        self._forces[0] = self._forces[1]
         now, end, before = self._sizes
         end[:] = before + step.fraction * (self._sizes_at(step.load_time) - before)
         now[:] = before + step.at * (end - before)

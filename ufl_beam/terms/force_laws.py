@@ -3,13 +3,14 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_returned, shorten
+from ufl_beam.errors import NoNumber, SceneError, require_returned, shorten
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.force_laws import ForceLaw
@@ -76,10 +77,14 @@ class Asked:
             value = self._law(motion, rate, **{name: self._known[name] for name in self._asked})
             if state.size:
                 value, state = self._pair(value)
-        if isinstance(value, float):
+        if isinstance(value, float) and math.isfinite(value) and not self.state.size:
             return value, state
-        at = f"motion = {motion:.6g}, rate = {rate:.6g}"
-        return require_returned(value, f"{self._link}: the function", at), state
+        at = f"motion = {motion:.6g}, rate = {rate:.6g}, t = {self._known['t']:.9g} s"
+        force = require_returned(value, f"{self._link}: the function", at)
+        for number in (force, *map(float, state)):
+            if not math.isfinite(number):  # a shorter step may not come there
+                raise NoNumber(f"{self._link}: the function returned {number} at {at}")
+        return force, state
 
     def _pair(self, returned: Any) -> tuple[Any, Array]:
         try:
@@ -97,7 +102,9 @@ class Asked:
         if self._stored is None:
             return 0.0
         value = self._stored(motion, **dict.fromkeys(self._asked_by_stored, self.state.copy()))
-        return require_returned(value, f"{self._link}: the energy", f"motion = {motion:.6g}")
+        t = f", t = {self._known['t']:.9g} s" if self._known else ""
+        at = f"motion = {motion:.6g}{t}"
+        return require_returned(value, f"{self._link}: the energy", at, finite=True)
 
     # -- the law around an iterate -------------------------------------------------------------
 

@@ -8,13 +8,14 @@ from collections.abc import Sequence
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, loop
+from ufl_beam.compiled.c_library import Loop, lib, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import CellForm
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Phases, TimeFunctions, beginning, entering
 
 
@@ -28,6 +29,7 @@ class OfForms(Term):
         tangent: CellForm | None = None,
     ) -> None:  # fmt: skip
         self._q0, self._q1 = fields.element.q0, fields.element.q1
+        self._order = fields.order
         if tangent is None:
             self._force, self._tangent = fields.force_and_tangent(work, self._q1, A)
         else:
@@ -57,6 +59,10 @@ class OfForms(Term):
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
         return loop("add_cells", self._force.cells), loop("add_cells", self._tangent.cells)
+
+    def in_cells(self) -> Sequence[InCells]:
+        """The forces of the form."""
+        return [InCells(self._force, lib.STRESS, self._order)]
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces to the residual."""

@@ -11,7 +11,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.errors import StepFailed
+from ufl_beam.errors import NoNumber
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
@@ -60,7 +60,7 @@ class Guides(Links):
         ])  # fmt: skip
         if not np.isfinite(found).all():
             place = self.links[int(np.argmin(np.isfinite(found)))].b
-            raise StepFailed(f"{place} is where no nearest point of its guide curve was found")
+            raise NoNumber(f"{place} is where no nearest point of its guide curve was found")
         self._s = found
         t = np.array([tangent(c, float(found[k]), step) for k, (c, step) in enumerate(curves)])
         return np.array([c(s) for (c, _), s in zip(curves, found, strict=True)], np.float64), t
@@ -114,6 +114,13 @@ class Guides(Links):
         """Distances from the curves; m."""
         self._s = self._s0.copy()
         return self._frames(q)[0]
+
+    def _kept_motion(self, q: Array) -> Array:
+        """Distances in an accepted state; NaN at the end of a curve, where the next step fails."""
+        try:
+            return self.motion(q)
+        except NoNumber:
+            return np.full(len(self.links), np.nan)
 
     def begin(self, step: Step) -> None:
         """Begin at the points of the last step."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.compiled_points import CompiledPoints
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import STIFF, SearchFlags
 from ufl_beam.terms.phases import Phases, TimeFunctions, beginning
@@ -140,6 +142,10 @@ class InelasticBeams(Cells, ABC):
         self._respond(q1)
         grid = self._fields.share.grid
         self.points.require_dissipation(lambda cell: grid.describe_cell(self._cells[cell]))
+
+    def in_cells(self) -> Sequence[InCells]:
+        """The forces of the resultants."""
+        return [InCells(self._force, lib.STRESS, self._fields.order)]
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""

@@ -4,11 +4,13 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Sequence
 
 import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
@@ -19,6 +21,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.in_cells import InCells, mass_times
 
 
 class LoadTerm(Term):
@@ -82,7 +85,10 @@ class FrameForces(LoadTerm):
         S.data *= frame.rate**2
         G.data *= 2 * frame.rate if has_inertia(scheme) else 0.0
         self._S, self._G, self._pull, self._turn = S.data, G.data, Product(S), Product(G)
-        self._from_centre = _positions(fields, frame.about)
+        self._from_centre, self._fields = _positions(fields, frame.about), fields
+        self._rate, self._double = frame.rate**2, 2 * frame.rate * has_inertia(scheme)
+        self._accelerations = np.zeros(share.size)
+        self._place = ffi.new("double *[1]", [doubles(self._accelerations)])
         self._A, self._share_of_end, self._grown = A, scheme.load_weight, 0.0
 
     def begin(self, step: Step) -> None:
@@ -91,16 +97,35 @@ class FrameForces(LoadTerm):
         growth = step.fraction * (1.0 - self._grown)
         self._growth, self._growth_at_end = self._grown + step.at * growth, self._grown + growth
 
+    def in_cells(self) -> Sequence[InCells]:
+        """The mass of the beams times the accelerations of the frame."""
+        of = self._fields.element
+        form = self._fields.hot_kernel(mass_times(of), of.q1)
+        return [InCells(form, lib.DENSITY, self._fields.order, self._place)]
+
+    def _put_accelerations(self, x: Array, growth: float, change: Array | float = 0.0) -> None:
+        """Note the accelerations at places ``x``, which move by ``change`` in the step."""
+        a: Array = -growth * self._rate * x
+        a[self._fields.share.rotations()] = 0.0
+        if self._double and isinstance(change, np.ndarray):
+            u, v = self._fields.share.translations()
+            a[u] -= self._double * change[v] / self._dt
+            a[v] += self._double * change[u] / self._dt
+        ffi.memmove(self._place[0], doubles(a), a.nbytes)
+
     def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The forces at ``q``; take that state as one that is in equilibrium with them."""
         self._grown = 1.0
+        self._put_accelerations(self._from_centre + q, 1.0)
         self._force = self._before = self._pull(self._from_centre + q)
         return self._force
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract centrifugal and Coriolis forces from the residual."""
         q: Array = self._q0 + self._share_of_end * (q1 - self._q0)
-        self._force = self._growth * self._pull(self._from_centre + q)
+        x: Array = self._from_centre + q
+        self._put_accelerations(x, self._growth, q1 - self._q0)
+        self._force = self._growth * self._pull(x)
         r -= self._force
         r += self._turn(q1 - self._q0) / self._dt
 

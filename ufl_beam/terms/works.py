@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -14,7 +14,7 @@ import ufl
 from ufl.algorithms import expand_derivatives
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, ffi, loop
+from ufl_beam.compiled.c_library import Loop, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import CellForm
 from ufl_beam.discretization.function_spaces import Fields, element_of
@@ -25,6 +25,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.phases import weight_of_before
 from ufl_beam.terms.work_forms import GROWTH, Statement, statement
@@ -49,7 +50,7 @@ class Acting(ABC):
     ) -> None:
         self._work, self._stated, self._fields, self._A = work, stated, fields, A
         self._name, self._ledger, self._acting = work.name, ledger, scheme.acting
-        self._size = fields.share.size
+        self._size, self.order = fields.share.size, fields.order
         with _named(work):
             self.residual = self._kernel(stated.residual)
             self._kernels = [self.residual]
@@ -284,6 +285,10 @@ class Works(LoadTerm):
         """Save the forces of works that depend on the motion of the last step."""
         for one in self._parts:
             one.pass_on(memory)
+
+    def in_cells(self) -> Sequence[InCells]:
+        """The forces of each work."""
+        return [InCells(one.residual, lib.WORK, one.order) for one in self._parts]
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the forces from the residual."""

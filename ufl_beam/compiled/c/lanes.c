@@ -99,6 +99,8 @@ static void add_in_lanes(const cells *c, const double *q, double *b)
     x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
     memset(e, 0, sizeof e);
     tabulate(e, w, constants, x);
+    if (c->each) memcpy(c->each + (size_t)first * ENTRIES, e, sizeof e);
+    if (!b) continue;
     if (some == LANES) add_batch(c, e, first, LANES, b);
     else add_batch(c, e, first, some, b);
   }

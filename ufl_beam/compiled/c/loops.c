@@ -26,7 +26,7 @@ static inline void put_in_cell(const cells *c, int cell, int at, int number, con
   for (int i = 0; i < number; ++i) w[i * c->lanes] = values[i];
 }
 
-/* Add the form at the unknowns q to a vector, or to the entries of a matrix. */
+/* Add the form at the unknowns q to a vector, or to the entries of a matrix; or to none. */
 void add_cells(void *self, const double *q, double *b)
 {
   const cells *c = self;
@@ -47,6 +47,8 @@ void add_cells(void *self, const double *q, double *b)
     memset(e, 0, c->rows * sizeof *e);
     x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
     CALL(c->tabulate, e, w, c->constants, x);
+    if (c->each) memcpy(c->each + first, e, c->rows * sizeof *e);
+    if (!b) continue;
     if (c->row)
       for (int i = 0; i < c->rows; ++i) b[c->row[first + i]] += e[i];
     else if (c->pattern) {
@@ -340,7 +342,7 @@ static inline double half_tangent(const step_product *p, int k, double x)
 void add_step_force(void *self, const double *q, double *r)
 {
   const step_product *p = self;
-  double *s = p->space;
+  double *s = p->rate;
   for (int i = 0; i < p->size; ++i) s[i] = q[i] - p->q0[i];
   for (int k = 0; k < p->rotations; ++k) {
     double *x = s + p->rotation[k];

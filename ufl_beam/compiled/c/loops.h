@@ -50,6 +50,7 @@ struct cells {
   const int32_t *has; /* number of the pattern of each batch */
   int in_rows; /* number of the patterns, the first ones, whose rows stand side by side */
   int is_functional;
+  double *each; /* entries of all cells in the latest evaluation, in batches; or none */
 };
 
 /* Strains whose forces the tangents of a static step have, see static_tangents.py. */
@@ -97,6 +98,7 @@ typedef struct {
   const int32_t *far;    /* if that is not enough, this */
   double factor, back;
   const double *v, *q0;
+  double *rate;          /* factor s - back v in the latest force, s being the step of the nodes */
   double *space;
   double *turn, *half; /* increments of the rotations asked for last, and tangents of their halves */
 } step_product;
@@ -126,6 +128,48 @@ void give_back_memory(void);
 double norm(int rows, const double *w, const double *f);
 double norm_of_some(int rows, const int32_t *at, const double *w, const double *f);
 double largest_motion(int rows, const double *w, const double *q);
+
+/* -- forces in cells --------------------------------------------------------------------------- */
+
+/* What is known of the forces of a cell in the equation of a step, see cell_forces.py. */
+enum cell_number {
+  START_X, START_Y, START_M, END_X, END_Y, END_M, COUPLE, SKEW_X, SKEW_Y, CELL_NUMBERS
+};
+
+/* Forces on nodes of cells: by stresses; by a work of a user; along all of a cell. */
+enum force_kind { STRESS, WORK, DENSITY };
+
+/* A form whose entries are forces on nodes of cells; `latest` and `accepted` are these, or, if it is
+ * linear in a vector, that vector: in the latest residual and in that of the accepted step. Entries that
+ * depend on nothing but configurations are computed when they are asked for. */
+typedef struct {
+  const cells *form; /* that is linear, if C evaluates it; or none */
+  double **latest, *accepted; /* latest: or none; also if another form has the same vector */
+  double *const *vector;
+  double *const *entries; /* of the accepted step, in batches */
+  double factor;
+  int kind, number, lanes;
+  const int32_t *cell; /* numbers of its cells; or none where these are all */
+} force_in_cells;
+
+/* Vectors of loads on nodes of cells, which factors multiply. */
+typedef struct {
+  int vectors;
+  const double *const *vector; /* degrees of freedom of each cell; or none */
+  const double *latest;        /* factors */
+  double *accepted;
+} loads_in_cells;
+
+typedef struct {
+  int cells, nodes, forces; /* nodes: of a cell */
+  force_in_cells *force;
+  const loads_in_cells *loads; /* or none */
+  const double *from_middle;   /* of the nodes of a cell, as a part of it */
+  const double *given;         /* what there is of the state before the first step; then none */
+} cell_forces;
+
+void accept_cell_forces(cell_forces *c);
+void find_cell_forces(const cell_forces *c, double *out);
 
 /* -- material points --------------------------------------------------------------------------- */
 
@@ -529,6 +573,7 @@ typedef struct {
   const time_function *factor;
   double *factors; /* of the latest step; not numbers before the first */
   double *force, *end, *before;
+  double *parts[3]; /* of the vectors in these */
   double norm, weight_of_before;
   int acts; /* whether a force, now or before, is not zero */
   double *work; /* entry of the ledger */
@@ -669,6 +714,7 @@ typedef struct {
   time_step step;
   int kinds, width; /* of numbers that are kept; of a row */
   const kept_numbers *kept;
+  cell_forces *cell_forces;
 } march;
 
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s);
@@ -699,4 +745,5 @@ void change_of_form(void *self, const double *q1, energy_change *sum);
 void change_of_points(void *self, const double *q1, energy_change *sum);
 void change_of_couplings(void *self, const double *q1, energy_change *sum);
 double value_at(const time_function *f, double t);
+void keep_state(const march *m, double *row);
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows);

@@ -115,6 +115,11 @@ void begin_dead_loads(void *self, const time_step *step, const double *q1, const
     if (factor != l->factors[k]) l->factors[k] = factor, same = 0;
   }
   if (same) return;
+  for (int k = 0; k < l->vectors; ++k) {
+    const double before = l->parts[2][k], change = step->fraction * (l->factors[k] - before);
+    l->parts[1][k] = whole ? l->factors[k] : before + change;
+    l->parts[0][k] = step->at == 1 ? l->parts[1][k] : before + step->at * change;
+  }
   l->changed = 1, l->acts = 0;
   for (int i = 0; i < l->size; ++i) l->end[i] = l->factors[0] * l->vector[0][i];
   for (int k = 1; k < l->vectors; ++k)
@@ -133,6 +138,7 @@ void begin_dead_loads(void *self, const time_step *step, const double *q1, const
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   dead_loads *l = self;
+  memcpy(l->parts[2], l->parts[1], l->vectors * sizeof *l->parts[2]);
   if (!l->acts) return;
   const double a = l->weight_of_before;
   double work = 0;
@@ -555,6 +561,7 @@ static int take_step(march *m, double t1)
     if (!followed(m)) return 0;
     memcpy(m->path->force, m->equation->inner_force, m->size * sizeof *m->path->force);
   }
+  accept_cell_forces(m->cell_forces);
   run(&m->accept, &m->step, m->x, m->s);
   accept_supports(m);
   memset(m->state, 0, m->states * sizeof *m->state);
@@ -577,7 +584,7 @@ static double seconds_now(void)
 }
 
 /* What is kept of the state, into a row of zeros. */
-static void keep(const march *m, double *row)
+void keep_state(const march *m, double *row)
 {
   for (int k = 0; k < m->kinds; ++k) {
     const kept_numbers *n = m->kept + k;
@@ -600,7 +607,7 @@ int take_steps(march *m, int steps, const double *ends, double seconds, int keep
       m->failed = 1;
       return k;
     }
-    if (keeps) keep(m, rows + (size_t)k * m->width);
+    if (keeps) keep_state(m, rows + (size_t)k * m->width);
     if (steps > 1 && seconds_now() > end) return k + 1;
   }
   return steps;

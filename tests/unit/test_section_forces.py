@@ -1,0 +1,346 @@
+# SPDX-License-Identifier: MIT
+"""Section forces are in equilibrium with all that acts on a scene, in the equation of each step."""
+
+import math
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+SECTION = ub.Section(EA=1e6, GA=4e5, EI=2e3, rhoA=3.0, rhoI=0.02)
+ROUND_OFF = 1e-13  # of the largest force: sums of some ten numbers, some of them cancel
+SOLVED = 1e-8  # part of the largest value that the tolerance of the solver, 1e-10, leaves at most
+
+DYNAMIC = [
+    ub.Midpoint(), ub.Midpoint(alpha=0.1, beta=0.1), ub.DecayingMidpoint(), ub.PrintedMidpoint(),
+    ub.GeneralizedAlpha(), ub.Newmark(gamma=0.6, beta=0.4),
+]  # fmt: skip
+SCHEMES = [ub.Static(), ub.ExactStatic(), ub.ExactStatic(theta=0.5), *DYNAMIC]
+
+
+def growing(t):
+    return t
+
+
+def virtual(a, b):
+    return ub.VirtualWork(
+        "wind", lambda w, v, f, t: (-f * t - 0.1 * v[1]) * w[1] + 0.1 * f * t * w[2],
+        numbers={"f": 30.0}, beams=[a],
+    )  # fmt: skip
+
+
+def heat(a, b):
+    density = lambda q, axis, M: -M * axis.d(q[2]) - 5 * M * axis.d(q[0])  # noqa: E731
+    return ub.Potential("heat", density, numbers={"M": 5.0})
+
+
+ACTIONS = {
+    "points": {},
+    "weight": {"loads": lambda a, b: ub.Gravity(acceleration=(1.0, -9.8))},
+    "line": {"loads": lambda a, b: ub.LineLoad(b, force=(5, -30), moment=2.0, time=growing)},
+    "frame": {"loads": lambda a, b: ub.RotatingFrame(rate=3.0)},
+    "virtual work": {"works": virtual},
+    "potential": {"works": heat},
+    "Rayleigh": {"damping": lambda a, b: ub.Rayleigh(mass=0.5, stiffness=1e-3)},
+    "Kelvin-Voigt": {"damping": lambda a, b: ub.KelvinVoigt(1e-3)},
+}
+KINDS = {
+    "elastic": SECTION,
+    "yielding": ub.Section(
+        EA=1e6, GA=4e5, EI=2e3, rhoA=3.0, rhoI=0.02, bending=ub.Hardening(limit=0.1, modulus=200.0)
+    ),
+    "opening": ub.Section(
+        EA=1e6, GA=4e5, EI=2e3, rhoA=3.0, rhoI=0.02,
+        hinge=ub.Softening(limit=0.2, energy=1.0),
+    ),
+}  # fmt: skip
+
+
+def two_beams(actions="points", kind="elastic"):
+    """Two clamped beams, joined by a pin whose force is known; and the pin."""
+    a = ub.Beam((0, 0), (1, 0.4), KINDS[kind], cells=3, name="a")
+    b = ub.Beam((1, 0.4), (2, 0), SECTION, cells=4, name="b")
+    acts = {field: [make(a, b)] for field, make in ACTIONS[actions].items()}
+    push = ub.PointLoad(a.at(2 / 3), force=(3.0, -20.0), moment=1.0, time=growing)
+    joint = ub.Revolute(a.end, b.start, measured=True)
+    scene = ub.Scene(
+        [a, b], joints=[joint], supports=[ub.Clamped(a.start), ub.Clamped(b.end)],
+        damping=acts.get("damping", ()), works=acts.get("works", ()),
+        loads=[push, *acts.get("loads", ())],
+    )  # fmt: skip
+    return scene, joint
+
+
+def require_equilibrium(run, joint, states):
+    """Compare ends of diagrams with reactions, and with the force of a pin.
+
+    Clamps do not turn the axes of the diagram at an end, but where a section has a hinge there.
+    """
+    scene = run.scene
+    a, b = scene.beams
+    diagrams = {beam: [run.diagram(beam, n, points=2) for n in states] for beam in (a, b)}
+    size = max(np.abs(run.reaction(support)[states]).max() for support in scene.supports)
+    assert size > 0.1
+    for beam, support, at, sign in ((a, scene.supports[0], 0, -1), (b, scene.supports[1], -1, 1)):
+        ends = np.array([[d.N[at], d.V[at], d.M[at]] for d in diagrams[beam]])
+        (x, y), (X, Y) = beam.start.point, beam.end.point
+        t = np.array([X - x, Y - y]) / math.hypot(X - x, Y - y)
+        plane = ends[:, :1] * t + ends[:, 1:2] * (-t[1], t[0])
+        found = sign * np.column_stack([plane, ends[:, 2]])
+        reactions = run.reaction(support)[states]
+        if scene.hinges:
+            found, reactions = (
+                np.column_stack([np.linalg.norm(x[:, :2], axis=1), x[:, 2]])
+                for x in (found, reactions)
+            )
+        # What acts at a clamp is its reaction; between it and a hinge there is the residual.
+        assert np.abs(found - reactions).max() < (SOLVED if scene.hinges else ROUND_OFF) * size
+    pull = np.linalg.norm(run.joint(joint).force[states], axis=1)
+    for beam, at in ((a, -1), (b, 0)):
+        ends = np.array([[np.hypot(d.N[at], d.V[at]), d.M[at]] for d in diagrams[beam]])
+        assert np.abs(ends - np.column_stack([pull, 0 * pull])).max() < SOLVED * size
+
+
+@pytest.mark.parametrize("actions", ACTIONS)
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_ends_of_beams_bear_what_supports_and_joints_do(actions, scheme):
+    scene, joint = two_beams(actions)
+    refused = actions == "frame" and scheme in DYNAMIC[4:] or actions == "Rayleigh" and (
+        scheme not in DYNAMIC
+    )
+    if refused:
+        pytest.skip("the scheme refuses it")
+    run = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.01, progress=False)
+    require_equilibrium(run, joint, np.arange(1, len(run)))
+
+
+@pytest.mark.filterwarnings("ignore:a. the hinge of the section opened")
+@pytest.mark.parametrize(
+    ("kind", "scheme"),
+    [(kind, scheme) for kind in ("yielding", "opening") for scheme in (SCHEMES[0], *SCHEMES[3:9:2])],
+    ids=str,
+)
+def test_cells_that_yield_or_break(kind, scheme):
+    scene, joint = two_beams("weight" if scheme.dynamic else "line", kind)
+    run = ub.simulate(scene, scheme, t=(0, 0.2), dt=0.01, progress=False)
+    material = run.material(scene.beams[0])
+    assert (material.plastic if kind == "yielding" else material.hinge).any()
+    require_equilibrium(run, joint, np.arange(1, len(run)))
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.ExactStatic(theta=0.5)], ids=str)
+def test_thinned_saved_and_continued(scheme, shared_path):
+    """Steps that are not kept change nothing; files and runs that go on have the same numbers."""
+    scene, joint = two_beams("weight")
+    times = {"dt": 0.01, "progress": False}
+    whole = ub.simulate(scene, scheme, t=(0, 0.12), **times)
+    some = ub.simulate(scene, scheme, t=(0, 0.12), every=3, **times)
+    most = ub.simulate(scene, scheme, t=(0, 0.12), most=3, **times)
+    for run in (some, most):
+        require_equilibrium(run, joint, np.arange(1, len(run)))
+        for n, t in enumerate(run.times):
+            k = int(np.argmin(np.abs(whole.times - t)))
+            for beam in scene.beams:
+                one, other = run.diagram(beam, n), whole.diagram(beam, k)
+                assert np.abs(np.subtract(one, other)).max() < SOLVED * 100
+    some.save(shared_path / "some.h5")
+    loaded = ub.load(shared_path / "some.h5")
+    more = ub.simulate(scene, scheme, t=(0.12, 0.13), start=whole, **times)
+    for beam, same in zip(scene.beams, loaded.scene.beams, strict=True):
+        for n in range(len(some)):
+            assert np.array_equal(loaded.diagram(same, n), some.diagram(beam, n))
+            assert np.array_equal(loaded.section_forces(same, n), some.section_forces(beam, n))
+        if scheme.dynamic:  # of the last step
+            assert np.array_equal(more.diagram(beam, 0), whole.diagram(beam))
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(), ub.DecayingMidpoint()], ids=str)
+def test_as_in_the_reference_path(scheme):
+    scene, joint = two_beams("virtual work", "yielding")
+    options = {"t": (0, 0.1), "dt": 0.02, "progress": False}
+    run = ub.simulate(scene, scheme, **options)
+    other = ub.simulate(scene, scheme, newton=ub.Newton(reference=True), **options)
+    require_equilibrium(other, joint, np.arange(1, len(other)))
+    for beam in scene.beams:
+        one, two = run.diagram(beam), other.diagram(beam)
+        assert np.abs(np.subtract(one, two)).max() < 1e-7 * np.abs(one.N).max()
+
+
+def test_paths():
+    scene, joint = two_beams("line")
+    path = ub.follow(scene, ub.LoadControl(0.05), steps=4)
+    require_equilibrium(path, joint, np.arange(1, len(path)))
+
+
+def test_of_a_simulation():
+    """What recorders ask for is what solutions have."""
+    scene, _ = two_beams("virtual work")
+    simulation = ub.Simulation(scene, ub.Midpoint())
+    for n in range(4):
+        simulation.step_to(0.01 * (n + 1))
+        simulation.keep()
+        forces, k = simulation.section_forces(), 0
+        ends = simulation.forces_along(np.array([0.0, 1.0]))
+        for beam in scene.beams:
+            of_beam = simulation.solution.section_forces(beam)
+            diagram = simulation.solution.diagram(beam, points=2)
+            here = slice(k, k := k + len(of_beam))
+            assert np.array_equal(forces[here], of_beam)
+            assert np.array_equal(ends[here].reshape(-1, 3).T, diagram[1:])
+    simulation.close()
+
+
+# -- closed forms ----------------------------------------------------------------------------------
+
+STIFF = ub.Section(EA=1e11, GA=1e11, EI=1e10, rhoA=100.0, rhoI=1.0)
+
+
+def static(cells, degree, **more):
+    beam = ub.Beam((0, 0), (6, 0), STIFF, cells=cells)
+    supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
+    made = {field: [make(beam) for make in makes] for field, makes in more.items()}
+    scene = ub.Scene([beam], supports=supports, **made)
+    options = {"t": (0, 1), "dt": 1.0, "progress": False, "mesh": ub.Mesh(degree=degree)}
+    return ub.simulate(scene, ub.Static(), **options).diagram(beam)
+
+
+def close(found, exact, part=1e-7):  # deflections change 1e-8 of them
+    np.testing.assert_allclose(found, exact, atol=part * np.max(np.abs(exact)), rtol=0)
+
+
+@pytest.mark.parametrize(("cells", "degree"), [(1, 1), (4, 1), (1, 2), (3, 2), (1, 3), (2, 3)])
+def test_a_hydrostatic_load_by_a_work(cells, degree):
+    """[closed] p = w x/l: V = w (x² - l²/3)/(2 l), M = w x (l² - x²)/(6 l)."""
+    water = lambda b: ub.VirtualWork("water", lambda w, axis, f: -f * axis.x[0] / 6 * w[1], numbers={"f": 1e4})  # noqa: E731
+    s, N, V, M = static(cells, degree, works=[water])
+    x = 6.0 * s
+    close(V, 1e4 * (x**2 - 12.0) / 12)
+    close(M, 1e4 * x * (36.0 - x**2) / 36)
+    assert np.abs(N).max() < 1e-3 * np.abs(V).max()
+
+
+@pytest.mark.parametrize("degree", [1, 3])
+def test_a_couple_by_a_work(degree):
+    """[closed] V = -m, as ends are free of moments; M = 0 everywhere."""
+    couple = lambda b: ub.VirtualWork("couple", lambda w, m: m * w[2], numbers={"m": 1e3})  # noqa: E731
+    _, _, V, M = static(3, degree, works=[couple])
+    close(V, -1e3)
+    assert np.abs(M).max() < 1e-6 * 1e3
+
+
+@pytest.mark.parametrize("degree", [1, 2, 3])
+def test_a_thermal_gradient_by_a_potential(degree):
+    """[closed] -EI κ all along the clamped beam, 0 in the simple one."""
+    heat = lambda b: ub.Potential("heat", lambda q, axis, M: -M * axis.d(q[2]), numbers={"M": 54e3})  # noqa: E731
+    _, _, V, M = static(4, degree, works=[heat])
+    assert np.abs(M).max() < 1e-6 * 54e3
+    beam = ub.Beam((0, 0), (6, 0), STIFF, cells=4)
+    supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
+    scene = ub.Scene([beam], supports=supports, works=[heat(beam)])
+    options = {"t": (0, 1), "dt": 1.0, "progress": False, "mesh": ub.Mesh(degree=degree)}
+    run = ub.simulate(scene, ub.Static(), **options)
+    close(run.diagram(beam).M, -54e3)
+    assert np.abs(run.diagram(beam).V).max() < 1e-6 * 54e3
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.GeneralizedAlpha()], ids=str)
+def test_a_spinning_rod(scheme):
+    """[closed] N = rhoA ω² (l²/4 - x²)/2, x from the middle; steps of 0.02 rad err by its square."""
+    rod = ub.Beam((-1, 0), (1, 0), ub.Section(EA=1e8, GA=1e8, EI=1e6, rhoA=2.0, rhoI=1e-3), cells=4)
+    spin = ub.Velocity([rod], angular=2.0)
+    # The stretch begins with ωy = 0: parameters that damp its vibration
+    start = ub.Scene([rod], initial=[spin], damping=[ub.KelvinVoigt(1e-3)])
+    run = ub.simulate(start, scheme, t=(0, 4), dt=0.01, progress=False)
+    s, N, V, M = run.diagram(rod)
+    exact = 2.0 * 4.0 * (1 - (2 * s - 1) ** 2) / 2
+    close(N, exact, 2e-3)
+    assert max(np.abs(V).max(), np.abs(M).max()) < 2e-3 * 4.0
+
+
+def test_section_forces_of_places():
+    """They are those of the diagram there; at a vertex of the cell before it."""
+    scene, _ = two_beams("weight")
+    run = ub.simulate(scene, ub.Midpoint(), t=(0, 0.05), dt=0.01, progress=False)
+    beam = scene.beams[1]  # four cells, nine points each
+    for s, point in ((0.0, 0), (0.125, 4), (0.25, 8), (0.28125, 10), (1.0, 35)):
+        found = run.section_forces_at(beam.at(s))
+        for n in range(len(run)):
+            exact = np.array(run.diagram(beam, n)[1:])[:, point]
+            assert np.abs(found[n] - exact).max() <= 1e-12 * max(1.0, np.abs(exact).max())
+
+
+# -- supports at one node --------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()], ids=str)
+@pytest.mark.parametrize("along", [(1, 0), (1, 1), (-2, 1)])
+@pytest.mark.parametrize("turns_first", [False, True])
+def test_supports_at_one_node_have_what_they_hold(scheme, along, turns_first):
+    """[closed] The force of a roller is across it, the other support bears the moment alone."""
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
+    roller, turning = ub.Roller(beam.end, along=along), ub.Prescribed(beam.end, psi=0.0)
+    clamp, both = ub.Clamped(beam.start), [roller, turning]
+    scene = ub.Scene(
+        [beam], supports=[clamp, *(reversed(both) if turns_first else both)],
+        loads=[ub.LineLoad(beam, force=(0.0, -1.0))],
+    )  # fmt: skip
+    simulation = ub.Simulation(scene, scheme)
+    simulation.keep()
+    for n in range(4):
+        simulation.step_to(0.01 * (n + 1))
+        simulation.keep()
+    run = simulation.solution
+    of_roller, of_turning = run.reaction(roller)[-1], run.reaction(turning)[-1]
+    assert abs(of_roller @ (*along, 0.0)) < ROUND_OFF
+    assert of_roller[2] == 0.0
+    assert np.array_equal(of_turning[:2], (0.0, 0.0))
+    assert abs(of_turning[2]) > 1e-3
+    assert simulation.press(turning) == 0.0
+    assert simulation.press(roller) == pytest.approx(np.hypot(*of_roller[:2]), rel=1e-15)
+    d = run.diagram(beam, points=2)
+    end = np.array([d.N[-1], d.V[-1], d.M[-1]])  # the end does not turn
+    # Across the roller, and along it nothing but the residual
+    assert np.abs(of_roller + of_turning - end).max() < 1e-9
+    if scheme == ub.Static():
+        total = sum(run.reaction(support)[-1, :2] for support in scene.supports)
+        assert total == pytest.approx((0.0, 1.0), abs=1e-9)
+    simulation.close()
+
+
+def test_supports_of_places_that_a_joint_puts_together():
+    """Places that a joint makes one node are one node: u and v are of one support, ψ of another."""
+    a = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="a")
+    b = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="b")
+    pin, hold = ub.Pinned(a.end), ub.Prescribed(b.start, psi=0.0)
+    scene = ub.Scene(
+        [a, b], joints=[ub.Rigid(a.end, b.start)], supports=[ub.Pinned(a.start), pin, hold],
+        loads=[ub.PointLoad(b.end, force=(0.0, -1.0))],
+    )  # fmt: skip
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    # [closed] b is a cantilever: 1 N, 1 N m
+    assert run.reaction(pin)[-1] == pytest.approx((0, 1, 0), abs=1e-6)
+    assert run.reaction(hold)[-1] == pytest.approx((0, 0, 1), abs=1e-6)
+    grounded = ub.Scene(
+        [a], joints=[ub.Revolute(ub.ground(0, 0), a.start)],
+        supports=[ub.Prescribed(a.start, psi=0.0)], loads=[ub.PointLoad(a.end, force=(0, -1.0))],
+    )  # fmt: skip
+    run = ub.simulate(grounded, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    # [closed] The ground bears the force, not the support
+    assert run.reaction(grounded.supports[0])[-1] == pytest.approx((0, 0, 1), abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "held"),
+    [
+        (lambda p: ub.Pinned(p), lambda p: ub.Roller(p), "v"),
+        (lambda p: ub.Roller(p, along=(1, 1)), lambda p: ub.Roller(p, along=(-1, 1)), "u"),
+        (lambda p: ub.Roller(p, along=(1, 2)), lambda p: ub.Prescribed(p, u=0.0), "u"),
+        (lambda p: ub.Prescribed(p, psi=0.1), lambda p: ub.Clamped(p), "psi"),
+    ],
+)
+def test_two_supports_that_hold_the_same_are_refused(one, other, held):
+    a = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="a")
+    b = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="b")
+    with pytest.raises(ub.SceneError, match=f"supports in conflict: .* both hold {held}; remove"):
+        ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)], supports=[one(a.end), other(b.start)])
