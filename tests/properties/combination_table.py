@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """All checks of many combinations: outcomes, and a table of how often each applied and passed."""
 
+import contextlib
+import io
 import tempfile
 import time
 import warnings
@@ -50,7 +52,8 @@ def table_of(seeds, names):
     warnings.simplefilter("error", RuntimeWarning)  # as in tests
     counts = {name: Counter() for name in ("run", *names)}
     for seed in seeds:
-        with tempfile.TemporaryDirectory() as folder:
+        quiet = contextlib.redirect_stdout(io.StringIO())  # what resumed runs say
+        with tempfile.TemporaryDirectory() as folder, quiet:
             found = outcome_of(draw(seed), Path(folder), names)
         for name, words in {"run": "passed", **found}.items():
             known = words in ("passed", "not applicable", "refused")

@@ -48,6 +48,42 @@ def equilibrium(case):
     assert not wrong, wrong
 
 
+@check
+def jumps(case):
+    """In all schemes N, V, M jump at no vertex where nothing is, and are zero at free ends.
+
+    Where only a support is, they are its reaction.  Axes turn at corners and hinges; so forces are
+    compared by their size.
+    """
+    only(not case.exact.failure, "a step fails")
+    scene, solution = case.exact.names["scene"], case.exact.solution
+    attached, supports = {}, {}
+    for owner, place in scene.attachments():
+        if isinstance(place, ub.Place) and not isinstance(owner, ub.LineLoad | ub.VirtualWork):
+            attached.setdefault((place.beam, round(place.s, 9)), []).append(owner)
+    for support in scene.supports:
+        supports[support.place.beam, round(support.place.s, 9)] = support
+    wrong, size = {}, 0.0
+    for n in {1, len(solution) // 2, len(solution) - 1}:
+        for beam in scene.beams:
+            s, N, V, M = solution.diagram(beam, n, points=2)
+            forces = np.column_stack([np.hypot(N, V), M])
+            size = max(size, np.abs(forces).max())
+            for i in range(0, len(s) + 1, 2):
+                sides = forces[max(i - 1, 0) : i + 1]
+                at = beam, round(float(s[min(i, len(s) - 1)]), 9)
+                owners = attached.get(at, [])
+                if at in supports and len(owners) == 1 and len(sides) == 1:
+                    x, y, moment = solution.reaction(supports[at])[n]
+                    sides = np.vstack([np.abs(sides), [math.hypot(x, y), abs(moment)]])
+                elif owners:
+                    continue
+                jump = np.abs(np.diff(sides, axis=0) if len(sides) == 2 else sides).max()
+                wrong[f"{beam.name} at {at[1]}, state {n}"] = float(jump)
+    wrong = {name: jump / size for name, jump in wrong.items() if jump > FORCES * size}
+    assert not wrong, wrong
+
+
 # -- dynamics ----------------------------------------------------------------------------------
 
 
@@ -159,11 +195,14 @@ IN_TIME = ("Controller", "state=", "Perzyna", "DuvautLions", "Dashpot", "KelvinV
 def path(case):
     """`follow` with equal steps of the load factor passes the states of `Static`.
 
-    Where a step was cut, or loads stay as they are, there are no common factors any more.
+    Where a step was cut, or loads stay as they are, there are no common factors any more.  Loads
+    that act at the factor 0 come alone on a path, and with others in the first step of `Static`;
+    what has a history remembers that.
     """
     words = case.combination
     only(words.has("scheme = ub.Static(") and not words.has(*IN_TIME), "in time")
     only(words.base != "column" and not case.exact.failure, "no equilibrium")
+    only(words.elastic or not words.has("RotatingFrame", "Work(", "warming"), "loads at factor 0")
     names, expected = case.combination.make(), case.exact.solution
     step, end = expected.times[1], expected.times[-1]
     only(expected.parts == len(expected) - 1, "a step was cut")

@@ -85,13 +85,27 @@ def test_every_feature_and_scheme_is_drawn():
 @pytest.mark.serial
 @pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 @pytest.mark.parametrize(
-    "seed", [pytest.param(n, marks=pytest.mark.slow if n >= FEW else ()) for n in range(NUMBER)]
+    "seed",
+    [*range(FEW), *(pytest.param(n, marks=pytest.mark.slow, id=f"all-{n}") for n in range(NUMBER))],
 )
 def test_combination(seed, tmp_path):
     combination = draw(seed)
     found = outcome_of(combination, tmp_path, CHECKS)
     flags = {name: words for name, words in found.items() if words not in KNOWN}
     assert not flags, f"{flags}\n{combination.source}"
+
+
+@pytest.mark.serial
+@pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
+@pytest.mark.parametrize(
+    ("seed", "checks"), [(4, ["momentum", "jumps"]), (7, ["jumps"]), (26, ["equilibrium"])]
+)
+def test_a_mistake_is_found(seed, checks, tmp_path, monkeypatch):
+    """Reactions that are wrong by a part in a million are flagged."""
+    right = ub.Solution.reaction
+    monkeypatch.setattr(ub.Solution, "reaction", lambda *of: (1 + 1e-6) * right(*of))
+    found = outcome_of(draw(seed), tmp_path, checks)
+    assert all(words.startswith("AssertionError") for words in found.values()), found
 
 
 @pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
