@@ -110,9 +110,10 @@ def judges_dissipation(law: MaterialLaw) -> bool:
     """Return whether the entry "plastic" of a law is its own dissipation, whatever the step.
 
     So it is if the law states it, and if energies are quadratic.  Else the entry has an error of
-    the rule by which works are integrated, of either sign.
+    the rule by which works are integrated, of either sign.  An active law may give energy.
     """
-    return type(law).dissipation is not MaterialLaw.dissipation or has_quadratic_energies(law)
+    stated = type(law).dissipation is not MaterialLaw.dissipation
+    return not getattr(law, "active", False) and (stated or has_quadratic_energies(law))
 
 
 def has_quadratic_energies(law: MaterialLaw) -> bool:

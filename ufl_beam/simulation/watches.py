@@ -7,6 +7,7 @@ energy than there is, and the force of a function must not change its direction 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -184,6 +185,8 @@ class ForceWatch:
     def judge(self, q: Array, t: float, dt: float) -> Iterator[str]:
         """Judge the forces in the step to an accepted state; yield warnings, one a connector."""
         values, fresh = self._controllers.values, self._controllers.fresh
+        if math.isinf(dt):  # a path has no time
+            return
         of_laws = np.concatenate([one.force(q) for one in self._couplings])
         moved = np.abs(np.concatenate([one.rate for one in self._couplings])) * dt
         force = np.array([values.get(x, λ) for x, λ in zip(self._links, of_laws, strict=True)])
