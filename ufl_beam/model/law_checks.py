@@ -124,9 +124,8 @@ def judges_dissipation(law: MaterialLaw) -> bool:
     So it is if the law states it, and if energies are quadratic.  Else the entry has an error of
     the rule by which works are integrated, of either sign.  An active law may give energy.
     """
-    if law.active:
-        return False
-    return type(law).dissipation is not MaterialLaw.dissipation or has_quadratic_energies(law)
+    stated = type(law).dissipation is not MaterialLaw.dissipation
+    return not law.active and (stated or has_quadratic_energies(law))
 
 
 def has_quadratic_energies(law: MaterialLaw) -> bool:

@@ -187,6 +187,8 @@ class ForceWatch:
         if dt == math.inf:
             return  # a path has no time in which a force could alternate
         values, fresh = self._controllers.values, self._controllers.fresh
+        if math.isinf(dt):  # a path has no time
+            return
         of_laws = np.concatenate([one.force(q) for one in self._couplings])
         moved = np.abs(np.concatenate([one.rate for one in self._couplings])) * dt
         force = np.array([values.get(x, λ) for x, λ in zip(self._links, of_laws, strict=True)])
