@@ -126,7 +126,6 @@ class Solution(Rich):
         return {**counts, **above("history/", self.history()), **above("internal/", self.internal)}
 
     def _take(self, content: Content) -> None:
-        """Take over what :meth:`_content` gave."""
         require_arrays(content, {"counts": (2,), "history/every": (1,)})
         self.resume(below("history/", content))
         self.internal = below("internal/", content)
