@@ -40,7 +40,7 @@ def run(scene, scheme, dt):
 
 
 def in_steps(values, scheme):
-    """What acts in the steps of an elastic run."""
+    """What acts in the steps of an elastic run, from values at their ends."""
     return (1 - scheme.theta) * values[:-1] + scheme.theta * values[1:]
 
 
@@ -49,7 +49,7 @@ def largest_moment(scheme, dt):
     """Largest moment that acts in a step of a run in which the hinges stay closed; N m."""
     beam, scene = pushed(ub.Softening(FOREVER, FOREVER))
     solution = run(scene, scheme, dt)
-    M = np.array([solution.section_forces(beam, n)[:, 2] for n in range(len(solution))])
+    M = EI * np.array([solution.strains(beam, n)[:, 2] for n in range(len(solution))])
     return np.abs(in_steps(M, scheme)).max()
 
 
