@@ -7,7 +7,8 @@ Run on an idle machine::
 
 Both commits are checked out in a temporary directory.  Each round runs a benchmark in one and then
 in the other, in the next round the other way round.  A ratio is taken within a round, and the table
-has the median over the rounds.  No record is written.
+has the median over the rounds.  A line after it names the cases that one commit lacks, and those
+that are slower: by more than 5 % in the median, and in each round.  No record is written.
 """
 
 import argparse
@@ -37,24 +38,38 @@ def times(records):
     return found
 
 
+SLOWER = 1.05
+"""Median ratio above which a case is slower, if all its ratios are above one."""
+
+
 def table(rounds):
-    """Markdown table of pairs of :func:`times`, a pair for each round."""
+    """Markdown table of pairs of :func:`times`, a pair for each round, and a line of conclusions.
+
+    A case that one of the commits lacks in any round is missing.
+    """
     lines = ["| case | time | other | this | this / other | range |", "|---|---|--:|--:|--:|--:|"]
-    for title, name in rounds[0][0]:
-        pairs = [
-            (other[title, name], this[title, name])
-            for other, this in rounds
-            if (title, name) in other and (title, name) in this
-        ]
-        if not pairs:
-            continue  # a case that one of the commits lacks
+    cases = dict.fromkeys(case for pair in rounds for times in pair for case in times)
+    missing, slower = [], []
+    for case in cases:
+        title, name = case
+        if not all(case in times for pair in rounds for times in pair):
+            missing.append(f"{title}, {name}")
+            continue
+        pairs = [(other[case], this[case]) for other, this in rounds]
         other, this = (statistics.median(one) for one in zip(*pairs, strict=True))
         ratios = [this / other for other, this in pairs]
+        ratio = statistics.median(ratios)
+        if ratio > SLOWER and min(ratios) > 1.0:
+            slower.append(f"{title}, {name}")
         lines.append(
-            f"| {title} | {name} | {other:.4g} | {this:.4g} | {statistics.median(ratios):.2f} "
+            f"| {title} | {name} | {other:.4g} | {this:.4g} | {ratio:.2f} "
             f"| {min(ratios):.2f} to {max(ratios):.2f} |"
         )
-    return "\n".join(lines)
+    ends = (
+        f"{len(found)} {of}{''.join(f'; {case}' for case in found)}"
+        for found, of in ((missing, "missing"), (slower, f"slower by more than {SLOWER - 1:.0%}"))
+    )
+    return "\n".join([*lines, "", f"{len(cases)} cases: {', '.join(ends)}"])
 
 
 def check_out(repository, commit, place):
@@ -102,7 +117,7 @@ def main():
     parser.add_argument("--this", default="HEAD", help="commit that is compared")
     default = ["bench_step", "bench_inelastic", "bench_nothing"]
     parser.add_argument("--only", nargs="*", default=default, help="names of benchmarks")
-    parser.add_argument("--rounds", type=int, default=3)
+    parser.add_argument("--rounds", type=int, default=7)
     options, arguments = parser.parse_known_args()
     parts = options.other, options.this, options.only or default, options.rounds, arguments
     for line in compare(HERE, *parts):

@@ -37,8 +37,19 @@ def test_ratios_are_taken_within_a_round():
     key = "beam", "us_per_step"
     lines = compare.table([({key: a, ("gone", "us_per_step"): a}, {key: b}) for a, b in rounds])
     assert lines.splitlines()[2:] == [
-        "| beam | us_per_step | 10 | 10 | 0.50 | 0.50 to 4.00 |"
-    ]  # what only one of them has is left out
+        "| beam | us_per_step | 10 | 10 | 0.50 | 0.50 to 4.00 |",
+        "",
+        "2 cases: 1 missing; gone, us_per_step, 0 slower by more than 5%",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("times", "slower"), [([10.7, 10.6, 10.1], 1), ([10.7, 10.6, 9.9], 0), ([10.4, 10.4, 11], 0)]
+)
+def test_a_case_is_slower_in_the_median_and_in_each_round(times, slower):
+    key = "beam", "us_per_step"
+    found = compare.table([({key: 10.0}, {key: time}) for time in times])
+    assert f", {slower} slower" in found
 
 
 def test_two_commits_are_run_in_turn(tmp_path):
