@@ -125,8 +125,7 @@ class Simulation(StateView):
             # The initial state is taken as one in equilibrium with the loads.
             loaded = together(lambda: [load.carry_on(t0, self.q) for load in self.loads])
         if start is not None:
-            same = start.scene is scene and start.times[-1] == t0
-            parts.take_over(self.q, internal, same=same)
+            parts.take_over(self.q, internal, same=start.scene is scene and start.times[-1] == t0)
         for term in self.terms:
             term.add_state(self.q)
         for coupling in parts.couplings if start is None else ():
@@ -144,8 +143,8 @@ class Simulation(StateView):
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
-        in_python = self._copies or self.asked or not share.alone
-        self._in_c = None if in_python else self._steps_in_c(parts)
+        in_c = not (self._copies or self.asked) and share.alone
+        self._in_c = self._steps_in_c(parts) if in_c else None
 
     # -- stepping ------------------------------------------------------------------------------
 
