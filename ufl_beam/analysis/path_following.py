@@ -204,13 +204,13 @@ def _require_driven(scene: Scene, t0: float) -> None:
         if isinstance(link.law, Coulomb):
             raise SceneError(
                 f"{link}: dry friction sticks or slides in steps of time, and a path has none; use "
-                "simulate(scene, Static(), ...), or a Spring that yields with a Hardening of modulus 0"
+                "simulate(scene, Static(), ...), or a Spring that yields"
             )
     for work in scene.works:
         if "v" in work.asked:
             raise SceneError(
-                f"{work}: it depends on the velocity v, and a path has no time; leave v out, or use "
-                "simulate(scene, Static(), ...)"
+                f"{work}: it depends on the velocity v, and a path has no time; leave v out, or "
+                "use simulate(scene, Static(), ...)"
             )
     times = (t0 + 1e-3, t0 + 1.0, t0 - 1e-3, t0 - 1.0)
     driven = any("t" in work.asked for work in scene.works)

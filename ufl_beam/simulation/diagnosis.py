@@ -46,8 +46,8 @@ NOT_HELD = (
 """What is said of a run of statics whose first step fails where a motion without strain is free."""
 
 WEAK = 0.1
-"""Part of the least stiffness in the first state that is left near a limit load: in 1/4096 of a step
-before it, it is the root of that."""
+"""Part of the least stiffness in the first state that is left near a limit load: the root of 1/4096
+where it is as far away as the smallest part of a step."""
 
 ROOM = 10.0
 """Largest imbalance of an exact ledger over the tolerance of the solver."""
@@ -103,14 +103,16 @@ def no_equilibrium(
     )  # fmt: skip
 
 
-def require_held(equation: StepEquation, newton: Solver, q1: Array, loose: str) -> None:
+def require_held(equation: StepEquation, newton: Solver, q1: Array, loose: str) -> str:
     """Raise :class:`SceneError` if loads do not hold a motion without strain in an equilibrium.
 
-    It is described by ``loose``.  All processes call it together.
+    It is described by ``loose``; what is loose now, nothing, is returned.  The tangent is regular
+    then, and needs no stiffness against idle motions.  All processes call it together.
     """
+    newton.forget_idle()
     share, grid = equation.share, equation.share.grid
     if not equation.respond_at(q1):
-        return
+        return ""
     K, free = free_matrix(share, equation.A, equation.supports.dofs)
     lengths = np.full(grid.size, grid.scene.size)
     lengths[grid.rotations] = 1.0
@@ -121,6 +123,7 @@ def require_held(equation: StepEquation, newton: Solver, q1: Array, loose: str) 
     forces = np.linalg.norm((K @ x) * moves[free] * lengths[free])
     if forces <= HELD * newton.convergence.scale() * grid.scene.size * motion:
         raise SceneError(f"{loose}The loads do not hold it either. {INSTEAD}")
+    return ""
 
 
 def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:
