@@ -270,9 +270,9 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     They are vibrations about the undeformed, unloaded scene, or about the last state of a solution:
     with its section forces, the stiffness of its loads and of a :class:`RotatingFrame`, and the
     elastic stiffness of yielded material.  If only loads hold the scene, as its weight holds a
-    pendulum, they are vibrations about the equilibrium with these.  Nothing yields or opens
-    further, and hinges that bear no moment any more are joints.  Sticking friction is a constraint,
-    sliding friction and controllers are ignored.
+    pendulum, the equilibrium with these.  Nothing yields or opens further, and hinges that bear no
+    moment any more are joints.  Sticking friction is a constraint, sliding friction and controllers
+    are ignored.
 
     Without damping they are eigenvalues of K x = ω² M x.  With damping, Coriolis or follower forces
     they are those of (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that

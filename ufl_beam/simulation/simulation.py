@@ -119,9 +119,8 @@ class Simulation(StateView):
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
         self.equation, self.terms = parts.equation, parts.equation.terms
 
-        self.t, self.parts, self.left = t0, 0, [0, 0]
+        self.t, self.parts, self.left, self.q = t0, 0, [0, 0], q[share.dofs]
         self._begun_at: Array | None = None  # of the state before the first step
-        self.q = q[share.dofs]
         weights, in_motion = self.equation.weights, has_inertia(scheme)
         self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
         self._continues = start is not None
@@ -259,9 +258,7 @@ class Simulation(StateView):
     def _accept(self, trial: Trial) -> None:
         step, q1, s = trial
         if self._loose:
-            require_held(self.equation, self.solver, q1, self._loose)
-            self._loose = ""
-            self.solver.forget_idle()  # tangents are regular from now on
+            self._loose = require_held(self.equation, self.solver, q1, self._loose)
         if self._branch is not None:
             self._branch.accept(self.equation.force)
         self.cell_forces.accept()
