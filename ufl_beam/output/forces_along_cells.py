@@ -10,14 +10,20 @@ cell, as far as it is known: its resultant, its couple, and how it is distribute
 from __future__ import annotations
 
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
+import ufl
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Complex, Index
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.function_spaces import Element
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.mechanics.kinematics import split
+from ufl_beam.model.mesh_options import Mesh
 
 MIDDLE: Array = np.array([0.5])
 """The middle of a cell, as a part of it."""
@@ -36,11 +42,11 @@ class ForcesAlongCells:
     def __init__(self, grid: Grid, between: float) -> None:
         mesh, nodes = grid.mesh, grid.nodes_of_cells
         start, end, *inner = range(nodes.shape[1])
-        self._mesh, self._between, self._along = mesh, between, [start, *inner, end]
+        self._mesh, self.between, self._along = mesh, between, [start, *inner, end]
         self._works = bool(grid.scene.works)
         self._places: Complex = grid.points[nodes[:, self._along]] @ (1, 1j)
         self._angles: Array = np.angle(self._places[:, -1] - self._places[:, 0])
-        self._turns = _turns(grid, self._angles)
+        self.turns = _turns(grid, self._angles)
 
     def __call__(
         self, cells: Cells, parts: Array, numbers: Array, q: Array, before: Array | None
@@ -58,7 +64,7 @@ class ForcesAlongCells:
             (N, V, M); (num_cells, points, 3).
         """
         if before is not None:
-            q = (1 - self._between) * before + self._between * q
+            q = (1 - self.between) * before + self.between * q
         q = q[:, :, self._along]
         x = self._places[cells] + q[:, 0] + 1j * q[:, 1]
         forces, moments = numbers[[lib.START_X, lib.END_X]] + 1j * numbers[
@@ -85,10 +91,93 @@ class ForcesAlongCells:
         lever = (x @ self._mesh.slopes(before_point).T).conj() * force(before_point)
         lever = parts * (np.imag(lever).reshape(len(x), len(parts), -1) @ weights)
         M = -moments[0][:, None] - lever - np.multiply.outer(couple, parts)
-        turns = self._turns[cells] @ np.array([1 - parts, parts])
+        turns = self.turns[cells] @ np.array([1 - parts, parts])
         angles = self._angles[cells, None] + turns + q[:, 2] @ self._mesh.weights(parts).T
         F = force(parts) * np.exp(-1j * angles)
         return np.stack([F.real, F.imag, M], axis=2)
+
+
+class AlongCells(NamedTuple):
+    """Form of the section forces in points of cells, with what it depends on besides configurations.
+
+    Attributes:
+        numbers: Forces of the cells, the first ones of ``cell_number`` of loops.h.
+        turns: Angles from the cells to the axis at their ends.
+        first: How many numbers: at both ends of cells, what is between them does not matter.
+    """
+
+    form: ufl.Form
+    numbers: fem.Function
+    turns: fem.Function
+    first: int
+
+
+@stated
+def along_cells(of: Element, parts: tuple[float, ...], works: bool) -> AlongCells:
+    """State what :class:`ForcesAlongCells` computes, in a configuration q1; entries (N, V, M)."""
+    axis, h = of.axis, of.axis.h
+    between = set(parts) > {0.0, 1.0}
+    first = lib.CELL_NUMBERS if between else lib.COUPLE
+    numbers, turns, values = (of.in_cells(n) for n in (first, 2, 3 * len(parts)))
+    points, weights, _ = _rule(element_mesh(of))
+
+    def vector(x: int, y: int) -> tuple[Expr, Expr]:
+        """Two of the numbers as a vector in the axes of the cell."""
+        a = ufl.as_vector([numbers[x], numbers[y]])
+        return ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
+
+    def times(a: Any, x: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
+        return a * x[0], a * x[1]
+
+    def plus(x: tuple[Expr, Expr], y: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
+        return x[0] + y[0], x[1] + y[1]
+
+    def cross(x: tuple[Expr, Expr], y: tuple[Expr, Expr]) -> Expr:
+        return x[0] * y[1] - x[1] * y[0]
+
+    start, end = vector(lib.START_X, lib.START_Y), vector(lib.END_X, lib.END_Y)
+    at_start, at_end = numbers[lib.START_M], numbers[lib.END_M]
+    all_of_it, couple, skew = times(-1.0, plus(start, end)), 0.0, (0.0, 0.0)
+    if between:
+        couple, skew = -numbers[lib.COUPLE], times(-6.0, vector(lib.SKEW_X, lib.SKEW_Y))
+    u, _ = split(of.q1)
+    nodes = [axis.at_nodes(x) for x in (ufl.dot(u, axis.t0), ufl.dot(u, axis.n0), of.q1[2])]
+
+    def way(part: float) -> tuple[Expr, Expr]:
+        """Derivative of the place by the part."""
+        slopes = [float(x) for x in element_mesh(of).slopes(part)]
+        x, y = (sum(a * b for a, b in zip(slopes, of_nodes, strict=True)) for of_nodes in nodes[:2])
+        return h + x, y
+
+    def force(part: float, skew: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
+        linear = plus(times(-1.0, start), times(-part, all_of_it))
+        return plus(linear, times(part * (1 - part), skew))
+
+    pairs = [(float(a), float(b)) for a, b in zip(points, weights, strict=True)]
+    missed = at_start + at_end + couple + sum(b * cross(way(a), force(a, skew)) for a, b in pairs)
+    if works:
+        x, y = (sum(6 * b * a * (1 - a) * way(a)[i] for a, b in pairs) for i in (0, 1))
+        skew = plus(skew, times(6 * missed / (x**2 + y**2), (y, -x)))
+    else:
+        couple = couple - missed
+    found = []
+    for part in parts:
+        M, (x, y) = at_end, end
+        if part < 1:
+            levers = sum(b * cross(way(a * part), force(a * part, skew)) for a, b in pairs)
+            M, (x, y) = -at_start - part * (levers + couple), force(part, skew)
+        weight = [float(x) for x in element_mesh(of).weights(part)]
+        turn = (1 - part) * turns[0] + part * turns[1]
+        ψ = sum(a * b for a, b in zip(weight, nodes[2], strict=True)) + turn
+        c, s = ufl.cos(ψ), ufl.sin(ψ)
+        found += [c * x + s * y, c * y - s * x, M]
+    z = ufl.TestFunction(values.function_space)
+    return AlongCells(ufl.dot(ufl.as_vector(found), z) / h * of.dx(1), numbers, turns, first)
+
+
+def element_mesh(of: Element) -> Mesh:
+    """The mesh of one cell of an element."""
+    return Mesh(degree=of.degree)
 
 
 @cache

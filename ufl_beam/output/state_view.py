@@ -25,6 +25,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
+from ufl_beam.output.watches import Watch
 from ufl_beam.parameter import Parameter
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
@@ -237,6 +238,10 @@ class StateView(ABC):
         numbers = self.cell_forces(self.q, self.q_before)
         here = self._along(self.share.cells, parts, numbers, q, before)
         return self.share.gather_cells(here)
+
+    def watch(self, parts: Array) -> Watch | None:
+        """Begin to take in extremes after each step in C, or return None if that cannot be."""
+        return None
 
     @cached_property
     def _along(self) -> ForcesAlongCells:

@@ -12,6 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Snapshots
 from ufl_beam.collective_errors import Agreement
+from ufl_beam.discretization.function_spaces import CompiledFields
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
@@ -21,6 +22,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.state_view import StateView
+from ufl_beam.output.watches import Watch
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import Assembly, assemble
@@ -151,6 +153,7 @@ class Simulation(StateView):
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
+        self._watches: list[Watch] = []
         self._describe(self.solution)
         in_python = self._copies or self.asked or not share.alone
         self._in_c = None if in_python else self._steps_in_c(parts)
@@ -167,6 +170,7 @@ class Simulation(StateView):
         self._end[0] = t1
         if self._in_c is None or not self._in_c.take(self, self._end):
             self._step_in_python(t1)
+            self._observe()
 
     def _step_in_python(self, t1: float) -> None:
         fresh = self.parts == 0 and not self._continues
@@ -202,6 +206,7 @@ class Simulation(StateView):
         if self._in_c is not None and (taken := self._in_c.take(self, ends, keep=keep)):
             return taken
         self._step_in_python(float(ends[0]))
+        self._observe()
         if keep:
             self.keep()
         return 1
@@ -213,6 +218,19 @@ class Simulation(StateView):
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
             parts.openings, LARGEST_TURN, fresh, self.support_dofs, parts.cell_forces, self.begun,
         )  # fmt: skip
+
+    def watch(self, parts: Array) -> Watch | None:
+        """Begin to take in extremes after each step in C, or return None if that cannot be."""
+        if not (self.share.alone and isinstance(self.fields, CompiledFields)):
+            return None
+        self._watches.append(one := Watch(self.fields, self.cell_forces, self._along, parts))
+        if self._in_c is not None:
+            self._in_c.watch(self._watches)
+        return one
+
+    def _observe(self) -> None:
+        for one in self._watches:
+            one.take(self.parts, self.t, self.q, self.q_before)
 
     def take_back(self) -> None:
         """Take the state back from C: what follows is in Python."""

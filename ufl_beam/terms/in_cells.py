@@ -117,15 +117,28 @@ class CellForces:
         ``q`` and ``before`` are the configurations at the end and at the beginning of the step.
         """
         for one, each, entries in self._of_ends:
-            each[0] = doubles(entries)
+            latest, each[0] = each[0], doubles(entries)
             one.form.set(one.q0, before)
             one.form.add(np.ascontiguousarray(q), self._space)
-            each[0] = ffi.NULL
+            each[0] = latest
         for form, c in self._linear:
             form.add(np.frombuffer(ffi.buffer(c.vector[0], self._space.nbytes)), self._space)
         out: Array = np.empty((lib.CELL_NUMBERS, self.c.cells))
-        lib.find_cell_forces(self.c, doubles(out))
+        lib.find_cell_forces(self.c, 0, doubles(out))
         return out
+
+    def in_order(self, lanes: int) -> bool:
+        """Return whether all forms have all cells, in batches of so many."""
+        return all(not c.cell and c.lanes == lanes for c in self._forces)
+
+    def keep_latest(self) -> None:
+        """Keep all entries of the latest residual from now on, for who asks after each step."""
+        of_ends = (c for c in self._forces if not c.latest and not c.vector)
+        for c, (_, each, entries) in zip(of_ends, self._of_ends, strict=True):
+            if not c.tee:
+                latest = np.zeros(entries.shape)
+                self._alive.append(latest)
+                c.tee, each[0] = each, doubles(latest)
 
     # -- what solutions keep -------------------------------------------------------------------
 
