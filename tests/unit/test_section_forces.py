@@ -106,8 +106,8 @@ def require_equilibrium(run, joint, states):
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 def test_ends_of_beams_bear_what_supports_and_joints_do(actions, scheme):
     scene, joint = two_beams(actions)
-    refused = actions == "frame" and scheme in DYNAMIC[4:] or actions == "Rayleigh" and (
-        scheme not in DYNAMIC
+    refused = (actions == "frame" and scheme in DYNAMIC[4:]) or (
+        actions == "Rayleigh" and (scheme not in DYNAMIC)
     )
     if refused:
         pytest.skip("the scheme refuses it")
@@ -118,7 +118,11 @@ def test_ends_of_beams_bear_what_supports_and_joints_do(actions, scheme):
 @pytest.mark.filterwarnings("ignore:a. the hinge of the section opened")
 @pytest.mark.parametrize(
     ("kind", "scheme"),
-    [(kind, scheme) for kind in ("yielding", "opening") for scheme in (SCHEMES[0], *SCHEMES[3:9:2])],
+    [
+        (kind, scheme)
+        for kind in ("yielding", "opening")
+        for scheme in (SCHEMES[0], *SCHEMES[3:9:2])
+    ],
     ids=str,
 )
 def test_cells_that_yield_or_break(kind, scheme):
@@ -212,7 +216,9 @@ def close(found, exact, part=1e-7):  # deflections change 1e-8 of them
 @pytest.mark.parametrize(("cells", "degree"), [(1, 1), (4, 1), (1, 2), (3, 2), (1, 3), (2, 3)])
 def test_a_hydrostatic_load_by_a_work(cells, degree):
     """[closed] p = w x/l: V = w (x² - l²/3)/(2 l), M = w x (l² - x²)/(6 l)."""
-    water = lambda b: ub.VirtualWork("water", lambda w, axis, f: -f * axis.x[0] / 6 * w[1], numbers={"f": 1e4})  # noqa: E731
+    water = lambda b: ub.VirtualWork(
+        "water", lambda w, axis, f: -f * axis.x[0] / 6 * w[1], numbers={"f": 1e4}
+    )  # noqa: E731
     s, N, V, M = static(cells, degree, works=[water])
     x = 6.0 * s
     close(V, 1e4 * (x**2 - 12.0) / 12)

@@ -237,6 +237,16 @@ def mass_form(of: Element) -> ufl.Form:
     return ufl.derivative(momentum, v, ufl.TrialFunction(of.space))  # P(67)
 
 
+@stated
+def _mass_times(of: Element) -> ufl.Form:
+    return ufl.action(mass_form(of), of.q1)
+
+
+def mass_kernel(fields: Fields) -> CellForm:
+    """Mass of the beams times a vector, the unknown q1."""
+    return fields.hot_kernel(_mass_times(fields.element), fields.element.q1)
+
+
 def mass_matrix(fields: Fields) -> Csr:
     """Mass of the beams, the point masses and the bodies."""
     share, M = fields.share, fields.assembled(mass_form(fields.element))

@@ -2,7 +2,7 @@
 """Section forces along cells, by equilibrium of each cell in the equation of a step.
 
 At both ends of a cell they are its forces on the nodes there: of stresses, inertia, damping, loads and
-works, see :mod:`ufl_beam.terms.in_cells`.  So they are in equilibrium with supports, joints and what
+works, see :mod:`ufl_beam.terms.cell_forces`.  So they are in equilibrium with supports, joints and what
 else acts at nodes, to the residual of the step.  Between the ends they change by what acts along the
 cell, as far as it is known: its resultant, its couple, and how it is distributed.
 """
@@ -67,9 +67,10 @@ class ForcesAlongCells:
             q = (1 - self.between) * before + self.between * q
         q = q[:, :, self._along]
         x = self._places[cells] + q[:, 0] + 1j * q[:, 1]
-        forces, moments = numbers[[lib.START_X, lib.END_X]] + 1j * numbers[
-            [lib.START_Y, lib.END_Y]
-        ], numbers[[lib.START_M, lib.END_M]]
+        forces, moments = (
+            numbers[[lib.START_X, lib.END_X]] + 1j * numbers[[lib.START_Y, lib.END_Y]],
+            numbers[[lib.START_M, lib.END_M]],
+        )
         all_of_it, couple = -forces.sum(axis=0), -numbers[lib.COUPLE]
         skew = -6 * (numbers[lib.SKEW_X] + 1j * numbers[lib.SKEW_Y])
         points, weights, slopes = _rule(self._mesh)
@@ -89,7 +90,7 @@ class ForcesAlongCells:
             couple -= missed
         before_point = np.multiply.outer(parts, points).ravel()
         lever = (x @ self._mesh.slopes(before_point).T).conj() * force(before_point)
-        lever = parts * (np.imag(lever).reshape(len(x), len(parts), -1) @ weights)
+        lever = parts * (np.imag(lever).reshape(len(x), len(parts), len(points)) @ weights)
         M = -moments[0][:, None] - lever - np.multiply.outer(couple, parts)
         turns = self.turns[cells] @ np.array([1 - parts, parts])
         angles = self._angles[cells, None] + turns + q[:, 2] @ self._mesh.weights(parts).T

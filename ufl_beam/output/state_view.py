@@ -29,8 +29,8 @@ from ufl_beam.output.watches import Watch
 from ufl_beam.parameter import Parameter
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import FORCE, Links
 from ufl_beam.terms.supports import Supports

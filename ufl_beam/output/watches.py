@@ -12,7 +12,7 @@ from ufl_beam.compiled.c_library import doubles, lib, struct
 from ufl_beam.compiled.simd_kernels import in_batches
 from ufl_beam.discretization.function_spaces import CompiledFields, Fields
 from ufl_beam.output.forces_along_cells import ForcesAlongCells, along_cells
-from ufl_beam.terms.in_cells import CellForces
+from ufl_beam.terms.cell_forces import CellForces
 
 EXTENT = ("low", "high", "time_low", "time_high")
 """Fields of ``extent`` of loops.h."""
@@ -37,7 +37,9 @@ class Watch:
         self._kernel.put(stated.numbers, np.zeros(stated.first))
         _, self._lanes, spare = self._kernel.keep_entries()
         self._cells, self._points, self._forces = len(along.turns), len(parts), cell_forces
-        self._extents = [dict(zip(EXTENT, np.zeros((4, n)), strict=True)) for n in (spare.size, size)]
+        self._extents = [
+            dict(zip(EXTENT, np.zeros((4, n)), strict=True)) for n in (spare.size, size)
+        ]
         cell_forces.keep_latest()
         self.c = struct(
             "watch", forces=cell_forces.c, along=self._kernel.cells, between=along.between,

@@ -205,7 +205,10 @@ def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[
     zeros = axis[first] + part[:, None] * (axis[first + 1] - axis[first])
     places = np.insert(np.arange(len(values)), first + 1, first)
     axis, tips = (np.insert(points, first + 1, zeros, axis=0) for points in (axis, tips))
-    values, diagram = np.insert(values, first + 1, 0.0), np.insert(diagram, first + 1, diagram[first])
+    values, diagram = (
+        np.insert(values, first + 1, 0.0),
+        np.insert(diagram, first + 1, diagram[first]),
+    )
     signs = np.where(diagram[:-1] == diagram[1:], np.sign(values[:-1] + values[1:]), 0.0)
     ends = np.flatnonzero(np.diff(signs, append=np.nan))
     for begin, end in zip([0, *(ends[:-1] + 1)], ends, strict=True):

@@ -22,10 +22,10 @@ from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.equation import note_exception
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.follower_loads import FollowerLoads
-from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import Openings

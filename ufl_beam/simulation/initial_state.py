@@ -111,7 +111,9 @@ def last_forces(
     if start is None or start.scheme != scheme or not same_unknowns(start.grid, share.grid):
         return None, None
     cells, before = start.last_forces()
-    return np.ascontiguousarray(cells[:, share.cells]), None if before is None else before[share.dofs]
+    return np.ascontiguousarray(cells[:, share.cells]), None if before is None else before[
+        share.dofs
+    ]
 
 
 def _initial_velocity(grid: Grid) -> Array:

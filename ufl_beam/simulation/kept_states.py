@@ -29,7 +29,7 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import above, below
 from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
-from ufl_beam.terms.in_cells import CellForces
+from ufl_beam.terms.cell_forces import CellForces
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""

@@ -38,8 +38,8 @@ from ufl_beam.simulation.force_diagrams import Diagram
 from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
 from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, text_of
+from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Energy
-from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.links import FORCE
 
 

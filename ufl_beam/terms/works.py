@@ -265,7 +265,7 @@ class Works(LoadTerm):
 
     def in_cells(self) -> Sequence[InCells]:
         """The forces of each work."""
-        return [InCells(one.residual, lib.WORK, one.order) for one in self._parts]
+        return [InCells(lambda f=one.residual: f, lib.WORK, one.order) for one in self._parts]
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the forces from the residual."""
