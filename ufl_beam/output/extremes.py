@@ -65,8 +65,8 @@ class Extent(NamedTuple):
 class Extremes(Recorder):
     """Recorder of the extremes of section forces along all cells and of motions of all nodes.
 
-    Each step counts, whatever the solution keeps; memory does not grow.  Section forces are those of
-    diagrams in equally spaced points of each cell, both ends included.
+    Each step counts, whatever the solution keeps; memory does not grow.  Section forces are those
+    of diagrams in equally spaced points of each cell, both ends included.
 
     Args:
         points: Number of points of a cell, at least 2.
@@ -84,7 +84,7 @@ class Extremes(Recorder):
 
     def __init__(self, points: int = 2) -> None:
         require_number(points, "Extremes: points", at_least=2)
-        self._parts = np.linspace(0.0, 1.0, int(points))
+        self._parts = np.arange(int(points)) / (int(points) - 1)
         self._watch: Watch | None = None
         self._taken: list[Extent] = []
 

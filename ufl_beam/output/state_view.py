@@ -234,9 +234,9 @@ class StateView(ABC):
     def forces_along(self, parts: Array) -> Array:
         """(N, V, M) at parts of all cells, from 0 to 1; (num_cells, len(parts), 3); N, N, N m."""
         dofs, before = self._dofs_along, self.q_before if self.begun else None
-        q, before = (None if x is None else x[dofs] for x in (self.q, before))
+        begun = None if before is None else before[dofs]
         numbers = self.cell_forces(self.q, self.q_before)
-        here = self._along(self.share.cells, parts, numbers, q, before)
+        here = self._along(self.share.cells, parts, numbers, self.q[dofs], begun)
         return self.share.gather_cells(here)
 
     def watch(self, parts: Array) -> Watch | None:

@@ -142,7 +142,7 @@ class Simulation(StateView):
         self.cell_forces, self.between = parts.cell_forces, float(scheme.average(0.0, 1.0))
         if not self.reactions_known:
             together(add_forces_at_rest, self.beams, scheme, self.q, np.zeros(share.size))
-            forces, before = last_forces(share, scheme, start)
+            forces, before = last_forces(grid, share, scheme, start)
             self.cell_forces.begin(forces)
             self._begun_at = before
         self.begun = self.between < 1 or self.cell_forces.asks_for_before
@@ -223,7 +223,7 @@ class Simulation(StateView):
         """Begin to take in extremes after each step in C, or return None if that cannot be."""
         if not (self.share.alone and isinstance(self.fields, CompiledFields)):
             return None
-        self._watches.append(one := Watch(self.fields, self.cell_forces, self._along, parts))
+        self._watches.append(one := Watch(self.share, self.cell_forces, self._along, parts))
         if self._in_c is not None:
             self._in_c.watch(self._watches)
         return one
@@ -340,9 +340,10 @@ class Simulation(StateView):
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
-        in_c = self._in_c
-        ahead = in_c is not None and in_c.ahead
-        now = in_c.now(self) if ahead else Snapshots.of(self.gather())
+        if self._in_c is not None and self._in_c.ahead:
+            now = self._in_c.now(self)
+        else:
+            now = Snapshots.of(self.gather())
         self.solution.keep(now, self.parts, self.iterations)
 
     def end(self) -> None:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Forces on the nodes of cells in the equation of a step, and in the accepted state.
 
-At a node, the forces of all cells, and of all that acts there, add up to the residual.  So what they
-are at both ends of a cell are its section forces there, in equilibrium with supports and joints.
+At a node, the forces of all cells, and of all that acts there, add up to the residual.  So those at
+both ends of a cell are its section forces there, in equilibrium with supports and joints.
 """
 
 from __future__ import annotations
@@ -69,8 +69,8 @@ class CellForces:
         self.asks_for_before = any(form.uses(q0) for form, q0, *_ in self._of_ends)
         first, *between, last = share.grid.mesh.nodes - 0.5
         self.c = fill(
-            ffi.new("cell_forces *"), cells=len(share.cells), nodes=2 + len(between), force=self._forces,
-            forces=len(parts), loads=loads, from_middle=np.array([first, last, *between]),
+            ffi.new("cell_forces *"), cells=len(share.cells), nodes=2 + len(between),
+            forces=len(parts), force=self._forces, loads=loads, from_middle=np.array([first, last, *between]),
         )  # fmt: skip
 
     def accept(self) -> None:
@@ -131,7 +131,7 @@ class CellForces:
     # -- what solutions keep -------------------------------------------------------------------
 
     def record(self) -> Array | None:
-        """Copy of all that the forces follow from besides configurations; None if they are given."""
+        """Copy what the forces follow from besides configurations; None if they are given."""
         if self.c.given:
             return None
         arrays = [np.frombuffer(ffi.buffer(place[0], 8 * n)) for place, n in self.kept]

@@ -19,7 +19,7 @@ class InCells(NamedTuple):
         vector: If the form is linear, and nothing else evaluates it: place of the address of the
             vector that it is evaluated at.
         factor: Factor of the forces.
-        q0: If the form depends on nothing but the configurations at both ends of the step: the first.
+        q0: If the form depends on the configurations at both ends of the step alone: the first.
     """
 
     form: Callable[[], Any]
