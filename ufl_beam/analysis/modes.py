@@ -36,7 +36,8 @@ from ufl_beam.rich_display import Rich
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.beams import elastic_forms
-from ufl_beam.terms.in_cells import CellForces, InCells
+from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.in_cells import InCells
 
 MOST_TITLES = 4  # modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
@@ -116,7 +117,7 @@ class Shapes(Rich, ABC):
         share = Share(self.grid, MPI.COMM_SELF)
         fields, r = CompiledFields(share), np.zeros(share.size)
         form = fields.hot_kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
-        of_cells, found = CellForces(share, [InCells(form, lib.STRESS, fields.order)]), []
+        of_cells, found = CellForces(share, [InCells(lambda: form, lib.STRESS, fields.order)]), []
         for q in np.ascontiguousarray(states):
             form.add(q, r)
             of_cells.accept()
