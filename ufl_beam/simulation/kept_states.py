@@ -14,8 +14,8 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Blocks, Index, Snapshot, Snapshots
-from ufl_beam.compiled.csr import Product
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import (
     CompiledFields,

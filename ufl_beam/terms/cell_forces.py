@@ -68,9 +68,10 @@ class CellForces:
             self.kept.append((ffi.addressof(loads, "accepted"), loads.vectors))
         self.asks_for_before = any(form.uses(q0) for form, q0, *_ in self._of_ends)
         first, *between, last = share.grid.mesh.nodes - 0.5
+        from_middle = np.array([first, last, *between])
         self.c = fill(
             ffi.new("cell_forces *"), cells=len(share.cells), nodes=2 + len(between),
-            forces=len(parts), force=self._forces, loads=loads, from_middle=np.array([first, last, *between]),
+            forces=len(parts), force=self._forces, loads=loads, from_middle=from_middle,
         )  # fmt: skip
 
     def accept(self) -> None:
