@@ -70,7 +70,8 @@ class CellForces:
         first, *between, last = share.grid.mesh.nodes - 0.5
         self.c = fill(
             ffi.new("cell_forces *"), cells=len(share.cells), nodes=2 + len(between),
-            forces=len(parts), force=self._forces, loads=loads, from_middle=np.array([first, last, *between]),
+            forces=len(parts), force=self._forces, loads=loads,
+            from_middle=np.array([first, last, *between]),
         )  # fmt: skip
 
     def accept(self) -> None:
