@@ -19,7 +19,7 @@ import ufl_beam as ub
 from ufl_beam.plotting import films, symbols
 from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT
 from ufl_beam.plotting.scene_layout import Stage
-from ufl_beam.plotting.style import decimal_prefix, number, with_unit
+from ufl_beam.plotting.style import BLUE, RED, decimal_prefix, number, with_unit
 from ufl_beam.plotting.symbols import EDGE, FILLED, support_direction
 
 FIRST = MPI.COMM_WORLD.rank == 0
@@ -335,7 +335,8 @@ def test_extremes_of_beams_of_one_cell():
 
 def test_envelopes_are_two_diagrams():
     """Each area has ordinates of one of both, across the axis: none leads from one to the other."""
-    beam = ub.Beam((0, 0), (6, 0), scenes.SLENDER, cells=8)
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e4, rhoA=1.0, rhoI=0.01)
+    beam = ub.Beam((0, 0), (6, 0), section, cells=8)
     shake = ub.LineLoad(beam, force=(0.0, 1.0), time=lambda t: math.sin(7 * t))
     supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
     scene = ub.Scene([beam], supports=supports, loads=[shake])
