@@ -93,11 +93,11 @@ def split(case):
         whole = case.run(**equal)
         first = case.run(t=(t0, at), names=names, **equal)
         second = case.run(t=(at, t1), start=first.solution, names=names, **equal)
-        if first.solution.parts + second.solution.parts == whole.solution.parts:
-            assert_near(differences(first, whole, slice(0, k + 1)))
-            assert_near(differences(second, whole, slice(k, None)))
-            return
-    raise AssertionError("one of the runs cuts steps")
+        if has_cut(whole, first, second) and parts < 16:
+            continue
+        assert_near(differences(first, whole, slice(0, k + 1)))
+        assert_near(differences(second, whole, slice(k, None)))
+        return
 
 
 @check
@@ -233,15 +233,29 @@ def assert_agree(case, tolerance=SAME, **changes):
     """
     only(not case.exact.failure, "a step fails")
     for parts in (1, 4, 16):
-        dt = case.exact.names["dt"]
-        more = {"dt": dt / parts} if parts > 1 else {}
-        expected = case.run(newton=ub.Newton(rtol=DIGITS), **more) if more else case.exact
-        found = case.run(**{"newton": ub.Newton(rtol=DIGITS), **more, **changes})
-        if found.solution.parts == expected.solution.parts:
-            assert not found.failure, found.failure
-            return assert_near(differences(found, expected), tolerance)
-        only(case.equal_steps, "last digits decide on the steps")
-    raise AssertionError(f"{found.solution.parts} and {expected.solution.parts} parts of steps")
+        more = {"newton": ub.Newton(rtol=DIGITS)}
+        if parts > 1:
+            only(case.equal_steps, "last digits decide on the steps")
+            more["dt"] = case.exact.names["dt"] / parts
+        expected = case.run(**more) if parts > 1 else case.exact
+        found = case.run(**{**more, **changes})
+        if has_cut(expected, found) and not are_near(found, expected, tolerance):
+            continue
+        assert not found.failure, found.failure
+        return assert_near(differences(found, expected), tolerance)
+    raise AssertionError("steps are cut, however small")
+
+
+def has_cut(*runs):
+    """Whether one of the runs has cut a step."""
+    return any(run.failure or run.solution.parts > len(run.solution) - 1 for run in runs)
+
+
+def are_near(one, other, tolerance):
+    """Whether runs to the same time agree."""
+    if len(one.solution) != len(other.solution):
+        return False
+    return max(differences(one, other).values()) <= tolerance
 
 
 @check
