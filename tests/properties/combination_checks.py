@@ -91,6 +91,7 @@ def split(case):
         at = t0 + (t1 - t0) * k / n
         equal = {"dt": (t1 - t0) / n * (1 + 1e-10), "newton": ub.Newton(rtol=DIGITS)}
         whole = case.run(**equal)
+        only(not whole.failure, "longer steps leap over a limit load")
         first = case.run(t=(t0, at), names=names, **equal)
         second = case.run(t=(at, t1), start=first.solution, names=names, **equal)
         if has_cut(whole, first, second) and parts < 16:
@@ -238,6 +239,7 @@ def assert_agree(case, tolerance=SAME, **changes):
             only(case.equal_steps, "last digits decide on the steps")
             more["dt"] = case.exact.names["dt"] / parts
         expected = case.run(**more) if parts > 1 else case.exact
+        only(not expected.failure, "longer steps leap over a limit load")
         found = case.run(**{**more, **changes})
         if has_cut(expected, found) and not are_near(found, expected, tolerance):
             continue
