@@ -54,7 +54,7 @@ class Snapshot(NamedTuple):
     material: Array  # numbers of the cells that can yield or break, and their material; (m, 7)
     connections: Array  # columns of ``Connection`` for all links; (num_links, 5)
     cells: Array  # ``cell_number`` of loops.h of all cells, (9, num_cells), or a record, (k,)
-    before: Array | None  # q at the beginning of the step, where its equation is not that of its end
+    before: Array | None  # q at the beginning of the step, if forces depend on it
 
 
 class Snapshots(NamedTuple):

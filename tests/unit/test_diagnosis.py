@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Words for what fails: what nothing holds, what gives way, why Newton's method stopped."""
 
+import re
+
 import numpy as np
 import pytest
 from scipy.sparse import csc_array, diags_array
@@ -154,3 +156,45 @@ def test_perfectly_plastic_cells_in_a_row():
     run = ub.simulate(hardens, ub.Static(), t=(0, 1), dt=0.25, progress=False)
     # N; the weakest cell bears about 300 MPa on 4 cm²
     assert 0.8 < run.reaction(pulled)[-1, 0] / 120e3 < 1.2
+
+
+NEAR_A_LIMIT = "a limit load or a bifurcation is near.*follow the path through it with ub.follow"
+
+
+def test_collapse_by_its_weight_is_a_limit_load():
+    """P-Delta: the spring at the foot of a column hardens by 20 N m, the weight takes 50 N m.
+
+    It yields at 5 N m = H l + P v: before, v = 5/100 (and 1.7 % of bending), so H = 2.5 N of 8.
+    """
+    column = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e7, GA=1e7, EI=1e3), cells=4)
+    loads = [
+        ub.PointLoad(column.end, force=(0, -50)),
+        ub.PointLoad(column.end, force=(8, 0), time=lambda t: t),
+    ]
+    foot = ub.ground(0, 0)
+    turn = ub.Turn(foot, column.start, ub.Spring(100.0, ub.Hardening(5.0, modulus=20.0)))
+    scene = ub.Scene([column], [ub.Revolute(foot, column.start)], [], loads, connectors=[turn])
+    error = failure(scene, t=(0, 1), dt=0.1)
+    assert error.time == pytest.approx(2.5 / 8, rel=0.05)
+    assert re.search(NEAR_A_LIMIT, str(error))
+    path = ub.follow(scene, ub.ArcLength(0.02), steps=40)
+    assert path.factor.max() == pytest.approx(error.time, rel=1e-3)
+
+
+def test_snap_through_is_a_limit_load():
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e9, depth=0.1)
+    left = ub.Beam((-4, 0), (0, 1), section, cells=1)
+    right = ub.Beam((0, 1), (4, 0), section, cells=1)
+    load = ub.PointLoad(left.end, force=(0, -4e4), time=lambda t: t)
+    supports = [ub.Pinned(left.start), ub.Pinned(right.end)]
+    scene = ub.Scene([left, right], [ub.Revolute(left.end, right.start)], supports, [load])
+    assert re.search(NEAR_A_LIMIT, str(failure(scene, t=(0, 1), dt=0.1)))
+
+
+def test_what_is_far_from_a_limit_load_is_not_called_one():
+    """A single iteration is too little for a large deflection."""
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4)
+    load = ub.PointLoad(beam.end, force=(0, 1e5), time=lambda t: 1.0)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    error = failure(scene, t=(0, 1), dt=0.5, newton=ub.Newton(max_iterations=1))
+    assert "limit load or a bifurcation is near" not in str(error)

@@ -168,7 +168,9 @@ def test_functions_follow_the_state(reference):
     of_left, of_roof = (np.abs(view.jump.x.array[view.cell_tags.find(n)]) for n in (0, 1))
     assert of_left.max() > 0  # embedded
     assert of_roof.max() > 0  # of zero length
-    assert np.array_equal(view.forces.x.array.reshape(-1, 3), simulation.section_forces()[view.cells])
+    assert np.array_equal(
+        view.forces.x.array.reshape(-1, 3), simulation.section_forces()[view.cells]
+    )
     simulation.close()
 
 

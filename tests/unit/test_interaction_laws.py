@@ -104,8 +104,7 @@ def test_a_column_under_axial_force(reference):
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn], loads=[press])
     newton = ub.Newton(reference=reference)
     run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.05, newton=newton, progress=False)
-    M = run.section_forces_at(beam.end)[-1, 2]
-    N = run.section_forces_at(beam.end)[-1, 0]
+    N, _, M = run.material_at(beam.end).forces[-1]
     assert LAW.excess(N, M) == pytest.approx(0.0, abs=1e-9)
     # The force turns with the axis, by 0.2 rad in the middle.
     assert pytest.approx(MP * (1 - (N / NP) ** 2), rel=0.02) == M

@@ -49,7 +49,8 @@ def largest_moment(scheme, dt):
     """Largest moment that acts in a step of a run in which the hinges stay closed; N m."""
     beam, scene = pushed(ub.Softening(FOREVER, FOREVER))
     solution = run(scene, scheme, dt)
-    M = EI * np.array([solution.strains(beam, n)[:, 2] for n in range(len(solution))])
+    K = np.array([solution.strains(beam, n)[:, 2] for n in range(len(solution))])
+    M = beam.section.EI * K  # that hinges know of
     return np.abs(in_steps(M, scheme)).max()
 
 

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import ufl
 
 import ufl_beam as ub
 from ufl_beam.analysis.critical_points import Direction
@@ -506,6 +507,26 @@ def test_controllers_need_time():
     )  # fmt: skip
     with pytest.raises(ub.SceneError, match="a path has none"):
         ub.follow(scene, ub.LoadControl(1.0))
+
+
+def test_what_needs_steps_in_time_is_refused():
+    """Dry friction and works with velocities; dampers have no effect, as paths are quasi-static."""
+    left, scene = truss()
+    parts = {"beams": scene.beams, "joints": scene.joints, "supports": scene.supports}
+    rubs = ub.Slide(ub.ground(0, 0), left, ub.Coulomb(5.0), axis=(0, 1))
+    drag = ub.VirtualWork("drag", lambda v, w, axis: -ufl.dot(v, w))
+    for more, said in (
+        ({"connectors": [rubs]}, r"Slide.*dry friction sticks or slides .* a path has none"),
+        ({"works": [drag]}, r"'drag'.*depends on the velocity v, and a path has no time"),
+    ):
+        with pytest.raises(ub.SceneError, match=said):
+            ub.follow(ub.Scene(**parts, loads=scene.loads, **more), ub.LoadControl(0.1))
+    damper = ub.Slide(ub.ground(0, 0), left, ub.Damper(1e5), axis=(0, 1))
+    damped = ub.Scene(**parts, loads=scene.loads, connectors=[damper])
+    one, other = (ub.follow(s, ub.LoadControl(0.1), steps=3) for s in (scene, damped))
+    np.testing.assert_allclose(
+        one.displacement(left), other.displacement(left), rtol=1e-9, atol=1e-12
+    )
 
 
 def test_loads_that_stop_growing():

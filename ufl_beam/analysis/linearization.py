@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 import warnings
-from contextlib import suppress
+from contextlib import closing, suppress
 from dataclasses import replace
 from functools import partial
 from typing import TypeVar
@@ -27,7 +27,6 @@ from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.time_functions import value_at
-from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers import eigensolvers
@@ -69,9 +68,11 @@ def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | 
             "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
         )
     if scene.loads and require_no_mechanism(scene):
-        with suppress(SceneError):  # where it is not held, loads do not count either
-            run = simulate(scene, Static(), t=(0.0, 1.0), dt=1.0, mesh=mesh, progress=False)
-            return scene, run
+        simulation = Simulation(scene, Static(), mesh=mesh)
+        # Where they do not hold it, loads do not count either.
+        with suppress(SceneError), closing(simulation):
+            simulation.step_to(1.0)
+            return scene, simulation.snapshot()
     return replace(scene, loads=()), None
 
 

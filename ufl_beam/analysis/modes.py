@@ -36,7 +36,8 @@ from ufl_beam.rich_display import Rich
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.beams import elastic_forms
-from ufl_beam.terms.in_cells import CellForces, InCells
+from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.in_cells import InCells
 
 MOST_TITLES = 4  # modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
@@ -116,7 +117,7 @@ class Shapes(Rich, ABC):
         share = Share(self.grid, MPI.COMM_SELF)
         fields, r = CompiledFields(share), np.zeros(share.size)
         form = fields.hot_kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
-        of_cells, found = CellForces(share, [InCells(form, lib.STRESS, fields.order)]), []
+        of_cells, found = CellForces(share, [InCells(lambda: form, lib.STRESS, fields.order)]), []
         for q in np.ascontiguousarray(states):
             form.add(q, r)
             of_cells.accept()
@@ -270,9 +271,9 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     They are vibrations about the undeformed, unloaded scene, or about the last state of a solution:
     with its section forces, the stiffness of its loads and of a :class:`RotatingFrame`, and the
     elastic stiffness of yielded material.  If only loads hold the scene, as its weight holds a
-    pendulum, they are vibrations about the equilibrium with these.  Nothing yields or opens
-    further, and hinges that bear no moment any more are joints.  Sticking friction is a constraint,
-    sliding friction and controllers are ignored.
+    pendulum, the equilibrium with these.  Nothing yields or opens further, and hinges that bear no
+    moment any more are joints.  Sticking friction is a constraint, sliding friction and controllers
+    are ignored.
 
     Without damping they are eigenvalues of K x = ω² M x.  With damping, Coriolis or follower forces
     they are those of (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that

@@ -24,7 +24,7 @@ from ufl_beam.errors import (
     require_switch,
 )
 from ufl_beam.mechanics.classical import Static
-from ufl_beam.model.connector_laws import Controller
+from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import Content, above, below, require_arrays
@@ -206,6 +206,17 @@ def _require_driven(scene: Scene, t0: float) -> None:
     for link in scene.links:
         if isinstance(link.law, Controller):
             raise SceneError(f"{link}: a controller acts in time, and a path has none")
+        if isinstance(link.law, Coulomb):
+            raise SceneError(
+                f"{link}: dry friction sticks or slides in steps of time, and a path has none; use "
+                "simulate(scene, Static(), ...), or a Spring that yields"
+            )
+    for work in scene.works:
+        if "v" in work.asked:
+            raise SceneError(
+                f"{work}: it depends on the velocity v, and a path has no time; leave v out, or "
+                "use simulate(scene, Static(), ...)"
+            )
     times = (t0 + 1e-3, t0 + 1.0, t0 - 1e-3, t0 - 1.0)
     driven = any("t" in work.asked for work in scene.works)
     if not driven and not any(f(t) != f(t0) for _, f in scene.time_functions() for t in times):

@@ -24,8 +24,8 @@ from ufl_beam.dolfinx_compat import VERSIONS
 T = TypeVar("T")
 
 SOURCES = (
-    "loops", "cell_forces", "material_points", "rigid_plastic", "connectors", "elimination", "fronts", "newton",
-    "prediction", "march",
+    "loops", "material_points", "rigid_plastic", "connectors", "elimination", "fronts", "newton",
+    "cell_forces", "prediction", "march",
 )  # fmt: skip
 """Files of C beside this one; they are one translation unit."""
 

@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from functools import cached_property
+from typing import Any
 
 from petsc4py import PETSc
 

@@ -33,6 +33,7 @@ class Element:
     are stated on the cells of a scene.
 
     Attributes:
+        degree: Polynomial degree of configurations.
         axis: Undeformed axis at the points of ``dx(1)``, in UFL.
         anywhere: That at the points of any rule.
         space: Configurations (u_x, u_y, ψ).
@@ -43,7 +44,7 @@ class Element:
     """
 
     def __init__(self, mesh: Mesh, cells: meshes.Mesh | None = None) -> None:
-        self._degree, self._lumped = mesh.degree, mesh.lumped
+        self.degree, self._lumped = mesh.degree, mesh.lumped
         one_cell = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]])
         self._cell = cells or line_mesh(*one_cell)
         line = basix.ufl.element("Lagrange", "interval", mesh.degree)
@@ -62,9 +63,9 @@ class Element:
         """A new configuration (u_x, u_y, ψ)."""
         return fem.Function(self.space)
 
-    def in_cells(self) -> fem.Function:
-        """A new function with a value in each cell."""
-        return fem.Function(fem.functionspace(self._cell, ("DG", 0)))
+    def in_cells(self, *shape: int) -> fem.Function:
+        """A new function with a value, or values of a shape, in each cell."""
+        return fem.Function(fem.functionspace(self._cell, ("DG", 0, shape)))
 
     def at_points(self, *shape: int) -> fem.Function:
         """A new function with values of a shape in the points of ``dx(1)``."""
@@ -92,7 +93,7 @@ class Element:
         return ufl.Measure("dx", domain=self._cell, metadata=rule)
 
     def _rule(self, degree: int) -> int:
-        return degree + 2 * (self._degree - 1)
+        return degree + 2 * (self.degree - 1)
 
 
 def element_of(mesh: Mesh) -> Element:
@@ -234,6 +235,16 @@ def mass_form(of: Element) -> ufl.Form:
     v = of.configuration()
     momentum = ufl.derivative(kinetic_energy(v, of.inertia) * of.dx_of_mass(), v, of.w)
     return ufl.derivative(momentum, v, ufl.TrialFunction(of.space))  # P(67)
+
+
+@stated
+def _mass_times(of: Element) -> ufl.Form:
+    return ufl.action(mass_form(of), of.q1)
+
+
+def mass_kernel(fields: Fields) -> CellForm:
+    """Mass of the beams times a vector, the unknown q1."""
+    return fields.hot_kernel(_mass_times(fields.element), fields.element.q1)
 
 
 def mass_matrix(fields: Fields) -> Csr:

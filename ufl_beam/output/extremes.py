@@ -9,12 +9,13 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import require_arrays
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
+from ufl_beam.output.watches import Watch
 
 
 class Extent(NamedTuple):
@@ -63,42 +64,82 @@ class Extent(NamedTuple):
 
 
 class Extremes(Recorder):
-    """Recorder of the extremes of section forces in all cells and of motions of all nodes.
+    """Recorder of the extremes of section forces along all cells and of motions of all nodes.
 
-    Each step counts, whatever the solution keeps; memory does not grow.
+    Each step counts, whatever the solution keeps; memory does not grow.  Section forces are those
+    of diagrams in equally spaced points of each cell, both ends included.
+
+    Args:
+        points: Number of points of a cell, at least 2.
+
+    Raises:
+        SceneError: ``points`` is less than 2.
 
     Example:
         >>> extremes = ub.Extremes()
         >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
-        >>> print(extremes.section_forces(beam).low[:, 2].round(-3))  # least M in the cells; N m
-        [-175000. -125000.  -75000.  -25000.]
+        >>> M = extremes.section_forces(beam).low[:, 2]  # N m
+        >>> print(M.round(-3))  # at both ends of the four cells
+        [-200000. -150000. -150000. -100000. -100000.  -50000.  -50000.       0.]
     """
+
+    def __init__(self, points: int = 2) -> None:
+        require_number(points, "Extremes: points", at_least=2)
+        self._parts = np.arange(int(points)) / (int(points) - 1)
+        self._watch: Watch | None = None
+        self._taken: list[Extent] = []
 
     def open(self, simulation: StateView) -> None:
         """Begin with the initial state."""
         self._grid: Grid = simulation.grid
-        self._forces, self._q = (Extent.around(x, simulation.t) for x in _state(simulation))
+        self._watch = simulation.watch(self._parts)
+        if self._watch is None:
+            self._taken = [Extent.around(x, simulation.t) for x in self._state(simulation)]
+        self.write(simulation)
+
+    @property
+    def by_itself(self) -> bool:
+        """True if steps are taken in without a call of :meth:`write`."""
+        return self._watch is not None
 
     def write(self, simulation: StateView) -> None:
         """Take in the state of a step."""
-        for extent, values in zip((self._forces, self._q), _state(simulation), strict=True):
+        if self._watch is not None:
+            self._watch.take(simulation.parts, simulation.t, simulation.q, simulation.q_before)
+            return
+        for extent, values in zip(self._taken, self._state(simulation), strict=True):
             extent.widen(values, simulation.t)
+
+    def _state(self, simulation: StateView) -> tuple[Array, Array]:
+        """Section forces of all cells, and the configuration, the same on every process."""
+        return simulation.forces_along(self._parts), simulation.share.gather(simulation.q)
+
+    @property
+    def _extents(self) -> list[Extent]:
+        """Those of forces and of motions."""
+        if self._watch is not None:
+            return [Extent(*of) for of in self._watch.extents()]
+        return self._taken
 
     def state(self) -> State:
         """Return the extremes so far, by name."""
-        extents = ("forces", self._forces), ("q", self._q)
+        extents = zip(("forces", "q"), self._extents, strict=True)
         return {f"{of} {name}": x for of, extent in extents for name, x in extent._asdict().items()}
 
     def resume(self, simulation: StateView, state: State) -> None:
         """Go on after a :meth:`state`."""
         self._grid = simulation.grid
-        for what, values in zip(("forces", "q"), _state(simulation), strict=True):
+        shapes = (len(self._grid.cells), len(self._parts), 3), (self._grid.size,)
+        for what, shape in zip(("forces", "q"), shapes, strict=True):
             names = (f"{what} {name}" for name in Extent._fields)
-            require_arrays(state, dict.fromkeys(names, values.shape))
-        self._forces, self._q = (
+            require_arrays(state, dict.fromkeys(names, shape))
+        self._taken = [
             Extent(*(state[f"{what} {name}"].copy() for name in Extent._fields))
             for what in ("forces", "q")
-        )
+        ]
+        self._watch = simulation.watch(self._parts)
+        if self._watch is not None:
+            self._watch.begin(simulation.parts, self._taken)
 
     @property
     def grid(self) -> Grid:
@@ -112,13 +153,15 @@ class Extremes(Recorder):
         return self._grid
 
     def section_forces(self, beam: Member) -> Extent:
-        """Return extremes of (N, V, M) in the cells of a beam; (num_cells, 3); N, N, N m.
+        """Return extremes of (N, V, M) in points of the cells of a beam, N, N, N m.
+
+        They are in the order of a :class:`Diagram` with as many points; (num_cells points, 3).
 
         Raises:
             SceneError: The beam is not in the scene, or nothing was run.
         """
         cells = self.grid.cells_of(beam)
-        return self._forces.of(cells)
+        return Extent(*(x.reshape(-1, 3) for x in self._extents[0].of(cells)))
 
     def displacement(self, one: Member | Body) -> Extent:
         """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
@@ -127,9 +170,4 @@ class Extremes(Recorder):
             SceneError: It is not in the scene, or nothing was run.
         """
         dofs = self.grid.nodes_of(one)[1]
-        return self._q.of(dofs)
-
-
-def _state(simulation: StateView) -> tuple[Array, Array]:
-    """Section forces of all cells, and the configuration, the same on every process."""
-    return simulation.section_forces(), simulation.share.gather(simulation.q)
+        return self._extents[1].of(dofs)

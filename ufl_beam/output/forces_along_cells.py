@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
 """Section forces along cells, by equilibrium of each cell in the equation of a step.
 
-At both ends of a cell they are its forces on the nodes there: of stresses, inertia, damping, loads and
-works, see :mod:`ufl_beam.terms.in_cells`.  So they are in equilibrium with supports, joints and what
-else acts at nodes, to the residual of the step.  Between the ends they change by what acts along the
-cell, as far as it is known: its resultant, its couple, and how it is distributed.
+At both ends of a cell they are its forces on the nodes there: of stresses, inertia, damping, loads
+and works, see :mod:`ufl_beam.terms.cell_forces`.  So they are in equilibrium with supports, joints
+and what else acts at nodes, to the residual of the step.  Between the ends they change by what acts
+along the cell: its resultant, its couple, and how it is distributed, as far as that is known.
 """
 
 from __future__ import annotations
@@ -13,13 +13,11 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Complex, Index
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.dof_numbering import Grid
 
-MIDDLE: Array = np.array([0.5])
+MIDDLE: Array = np.full(1, 0.5)
 """The middle of a cell, as a part of it."""
 
 Cells = Index | slice
@@ -33,17 +31,23 @@ class ForcesAlongCells:
         between: Part of a step at whose configuration its forces are in equilibrium.
     """
 
-    def __init__(self, grid: Grid, between: float) -> None:
+    def __init__(self, grid: Any, between: float) -> None:
         mesh, nodes = grid.mesh, grid.nodes_of_cells
         start, end, *inner = range(nodes.shape[1])
-        self._mesh, self._between, self._along = mesh, between, [start, *inner, end]
+        self._mesh, self.between, self._along = mesh, between, [start, *inner, end]
         self._works = bool(grid.scene.works)
-        self._places: Complex = grid.points[nodes[:, self._along]] @ (1, 1j)
-        self._angles: Array = np.angle(self._places[:, -1] - self._places[:, 0])
-        self._turns = _turns(grid, self._angles)
+        places = grid.points[nodes[:, self._along]]
+        self._places: Complex = places[..., 0] + 1j * places[..., 1]
+        self._angles = np.asarray(np.angle(self._places[:, -1] - self._places[:, 0]), np.float64)
+        self.turns = _turns(grid, self._angles)
 
     def __call__(
-        self, cells: Cells, parts: Array, numbers: Array, q: Array, before: Array | None
+        self,
+        cells: Cells,
+        parts: Array,
+        numbers: Array,
+        q: Array,
+        before: Array | None,
     ) -> Array:
         """Compute them at parts of cells, from 0 at the start to 1 at the end; N, N, N m.
 
@@ -58,15 +62,14 @@ class ForcesAlongCells:
             (N, V, M); (num_cells, points, 3).
         """
         if before is not None:
-            q = (1 - self._between) * before + self._between * q
+            q = (1 - self.between) * before + self.between * q
         q = q[:, :, self._along]
         x = self._places[cells] + q[:, 0] + 1j * q[:, 1]
-        forces, moments = numbers[[lib.START_X, lib.END_X]] + 1j * numbers[
-            [lib.START_Y, lib.END_Y]
-        ], numbers[[lib.START_M, lib.END_M]]
+        forces = numbers[[lib.START_X, lib.END_X]] + 1j * numbers[[lib.START_Y, lib.END_Y]]
+        moments = numbers[[lib.START_M, lib.END_M]]
         all_of_it, couple = -forces.sum(axis=0), -numbers[lib.COUPLE]
         skew = -6 * (numbers[lib.SKEW_X] + 1j * numbers[lib.SKEW_Y])
-        points, weights, slopes = _rule(self._mesh)
+        points, weights, slopes = gauss_rule(self._mesh)
         ways = x @ slopes.T  # derivatives of the place by the part, in points of the rule
 
         def force(at: Array) -> Complex:
@@ -74,7 +77,7 @@ class ForcesAlongCells:
             linear = -forces[0][:, None] - np.multiply.outer(all_of_it, at)
             return np.asarray(linear + np.multiply.outer(skew, at * (1 - at)))
 
-        # What the moments at both ends say besides: couples, or how works are distributed across.
+        # What moments at both ends say besides: couples, or how works are distributed across.
         missed = moments.sum(axis=0) + couple + np.imag(ways.conj() * force(points)) @ weights
         if self._works:
             way = 6 * (ways * (points * (1 - points))) @ weights
@@ -83,22 +86,22 @@ class ForcesAlongCells:
             couple -= missed
         before_point = np.multiply.outer(parts, points).ravel()
         lever = (x @ self._mesh.slopes(before_point).T).conj() * force(before_point)
-        lever = parts * (np.imag(lever).reshape(len(x), len(parts), -1) @ weights)
+        lever = parts * (np.imag(lever).reshape(len(x), len(parts), len(points)) @ weights)
         M = -moments[0][:, None] - lever - np.multiply.outer(couple, parts)
-        turns = self._turns[cells] @ np.array([1 - parts, parts])
+        turns = self.turns[cells] @ np.array([1 - parts, parts])
         angles = self._angles[cells, None] + turns + q[:, 2] @ self._mesh.weights(parts).T
         F = force(parts) * np.exp(-1j * angles)
         return np.stack([F.real, F.imag, M], axis=2)
 
 
 @cache
-def _rule(mesh: Any) -> tuple[Array, Array, Array]:
-    """Points of Gauss's rule on a cell, their weights, and slopes there; exact for all integrals."""
+def gauss_rule(mesh: Any) -> tuple[Array, Array, Array]:
+    """Points of Gauss's rule on a cell, their weights, and slopes there; exact for all here."""
     points, weights = np.polynomial.legendre.leggauss(3)
     return (1 + points) / 2, weights / 2, mesh.slopes((1 + points) / 2)
 
 
-def _turns(grid: Grid, angles: Array) -> Array:
+def _turns(grid: Any, angles: Array) -> Array:
     """Angles to the smooth axis of a curved beam from both ends of its cells; (num_cells, 2); rad.
 
     Vertices halve the angle between two cells, but at corners of the beam; it is linear in a cell.

@@ -34,6 +34,11 @@ class Recorder(ABC):
         return f"<{' '.join([type(self).__name__, *map(str, self.files)])}>"
 
     @property
+    def by_itself(self) -> bool:
+        """True if it needs no call of :meth:`write` after steps, once it is open."""
+        return False
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """Files that it writes: two outputs of a run must not share one."""
         return ()

@@ -26,11 +26,12 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
 from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
+from ufl_beam.output.watches import Watch
 from ufl_beam.parameter import Parameter
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import FORCE, Links
 from ufl_beam.terms.supports import Supports
@@ -243,10 +244,14 @@ class StateView(ABC):
     def forces_along(self, parts: Array) -> Array:
         """(N, V, M) at parts of all cells, from 0 to 1; (num_cells, len(parts), 3); N, N, N m."""
         dofs, before = self._dofs_along, self.q_before if self.begun else None
-        q, before = (None if x is None else x[dofs] for x in (self.q, before))
+        begun = None if before is None else before[dofs]
         numbers = self.cell_forces(self.q, self.q_before)
-        here = self._along(self.share.cells, parts, numbers, q, before)
+        here = self._along(self.share.cells, parts, numbers, self.q[dofs], begun)
         return self.share.gather_cells(here)
+
+    def watch(self, parts: Array) -> Watch | None:
+        """Begin to take in extremes after each step in C, or return None if that cannot be."""
+        return None
 
     @cached_property
     def _along(self) -> ForcesAlongCells:

@@ -137,7 +137,7 @@ def plot_extremes(
 ) -> Figure:
     """Draw the envelope of a section force on the frame: maxima red, minima blue.
 
-    As in :func:`plot`, on the undeformed axis; the values of each cell may be of different times.
+    As in :func:`plot`, on the undeformed axis; the values of each point may be of different times.
 
     Args:
         solution: Of the run that the extremes were recorded in.
@@ -158,7 +158,7 @@ def plot_extremes(
     index = list(style.RESULTANTS).index(what)
     reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
     diagrams = [
-        (beam, np.repeat(values[:, index, None], 2, axis=1))  # constant in each cell
+        (beam, values[:, index].reshape(len(solution.grid.cells_of(beam)), -1))
         for beam, found in reached
         for values in (found.high, found.low)
     ]

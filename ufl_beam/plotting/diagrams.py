@@ -123,17 +123,20 @@ def _draw_diagrams(
     largest = float(np.abs(found).max())
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
     values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
-    axis, left = _along(solution, cells, nodes, found.shape[1])
+    # A beam may have several diagrams, which do not meet.
+    diagram = np.repeat(np.arange(len(diagrams)), [len(of_cells) for _, of_cells in diagrams])
+    axis, left = _along(solution, cells, diagram, nodes, found.shape[1])
     up = scale * values[:, None] * left
     rows: list[Array] = []
     outlines: defaultdict[str, list[Array]] = defaultdict(list)
-    beams = np.repeat(solution.grid.beam_of_cell[cells], found.shape[1])
-    for area in _areas(axis, axis + up, values, beams):
+    diagram = np.repeat(diagram, found.shape[1])
+    for area in _areas(axis, axis + up, values, diagram):
         outlines[RED if area.peak > 0 else BLUE].append(area.outline)
         rows.append(np.array([area.peak, *axis[area.place], *up[area.place]]))
     if what != "N" and len(diagrams) <= MANY:
-        for first in np.flatnonzero(np.diff(beams, prepend=-1)):
-            last = first + np.count_nonzero(beams == beams[first]) - 1
+        firsts = {beam: k for k, (beam, _) in reversed([*enumerate(diagrams)])}
+        for k in firsts.values():
+            first, *_, last = np.flatnonzero(diagram == k)
             low, high = (first + last) // 2, (first + last + 1) // 2
             _draw_direction(axes, (axis[low] + axis[high]) / 2, left[high])
     for color, group in outlines.items():
@@ -165,15 +168,20 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
     ]  # fmt: skip
 
 
-def _along(solution: Solution, cells: Index, nodes: Array, points: int) -> tuple[Array, Array]:
-    """Points of the axes as drawn and unit vectors to their left; both (num_cells points, 2)."""
+def _along(
+    solution: Solution, cells: Index, diagram: Index, nodes: Array, points: int
+) -> tuple[Array, Array]:
+    """Points of the axes as drawn and unit vectors to their left; both (num_cells points, 2).
+
+    ``diagram`` is the number of that of each cell.
+    """
     mesh, parts = solution.grid.mesh, np.linspace(0.0, 1.0, points)
     start, end, *between = solution.grid.nodes_of_cells[cells].T
     chains = nodes[np.column_stack([start, *between, end])]
     ahead = unit_vectors(mesh.slopes(parts) @ chains)
     # Ordinates at corners between cells of a beam halve the angle, and lean towards it in both.
-    beams, lean = solution.grid.beam_of_cell[cells], np.zeros((len(chains), 2, 2))
-    k = np.flatnonzero(beams[:-1] == beams[1:])
+    lean = np.zeros((len(chains), 2, 2))
+    k = np.flatnonzero(diagram[:-1] == diagram[1:])
     half = unit_vectors(ahead[k, -1] + ahead[k + 1, 0])
     lean[k, 1], lean[k + 1, 0] = half - ahead[k, -1], half - ahead[k + 1, 0]
     ahead = ahead + np.column_stack([1.0 - parts, parts]) @ lean
@@ -189,16 +197,19 @@ class Area(NamedTuple):
     place: int  # number of the point of the peak; of equal ones that in the middle
 
 
-def _areas(axis: Array, tips: Array, values: Array, beams: Index) -> Iterator[Area]:
-    """Divide diagrams of beams where the sign changes."""
+def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[Area]:
+    """Divide diagrams, whose numbers are ``diagram``, where the sign changes."""
     # There both areas end in a point of the axis.
-    first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (beams[:-1] == beams[1:]))
+    first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
     part = values[first] / (values[first] - values[first + 1])
     zeros = axis[first] + part[:, None] * (axis[first + 1] - axis[first])
     places = np.insert(np.arange(len(values)), first + 1, first)
     axis, tips = (np.insert(points, first + 1, zeros, axis=0) for points in (axis, tips))
-    values, beams = np.insert(values, first + 1, 0.0), np.insert(beams, first + 1, beams[first])
-    signs = np.where(beams[:-1] == beams[1:], np.sign(values[:-1] + values[1:]), 0.0)
+    values, diagram = (
+        np.insert(values, first + 1, 0.0),
+        np.insert(diagram, first + 1, diagram[first]),
+    )
+    signs = np.where(diagram[:-1] == diagram[1:], np.sign(values[:-1] + values[1:]), 0.0)
     ends = np.flatnonzero(np.diff(signs, append=np.nan))
     for begin, end in zip([0, *(ends[:-1] + 1)], ends, strict=True):
         if (sign := signs[begin]) != 0.0:

@@ -26,6 +26,7 @@ from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import BEFORE, ElasticBeams, Inertia
+from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import Couplings, couplings
 from ufl_beam.terms.damping import SecondDifferences, damping_forces
@@ -33,7 +34,6 @@ from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.follower_loads import FollowerLoads
 from ufl_beam.terms.guide_curves import guides
-from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.inelastic_cells import inelastic_cells
 from ufl_beam.terms.links import Links

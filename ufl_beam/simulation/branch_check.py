@@ -59,7 +59,8 @@ class StaticPath:
         self._beams, self._couplings = beams, couplings
         self._rotations = share.rotations()
         self.force: Array = np.zeros(share.size)
-        add_forces_at_rest(beams, scheme, q, self.force)  # connectors have theirs among the unknowns
+        # Connectors have theirs among the unknowns.
+        add_forces_at_rest(beams, scheme, q, self.force)
         begins = scheme.step(t0, t0 + 1.0, t0 + 1.0, q)._replace(load_time=t0, motion_time=t0)
         for coupling in couplings:
             coupling.begin(begins)

@@ -14,6 +14,7 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memo
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.output.watches import Watch
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.prediction import Prediction
@@ -21,10 +22,10 @@ from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.equation import note_exception
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.follower_loads import FollowerLoads
-from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import Openings
@@ -127,6 +128,7 @@ class CompiledSteps:
             changes = [one.change for one in phases if one.change is not None]
             fill(self.c, path=path.in_c(changes))
         self._alive: list[Any] = []
+        self._watches: Sequence[Watch] = ()
         for name in ("begin", "accept", "add_state"):
             self._list(getattr(self.c, name), [x for one in phases for x in getattr(one, name)])
         inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
@@ -177,6 +179,8 @@ class CompiledSteps:
         if taken:
             state.t = c.t
             state.parts += taken
+            for one in self._watches:
+                one.seen = state.parts
             self._lend(state)
             self._solver.iterations += c.iterations
             c.iterations = 0
@@ -193,6 +197,12 @@ class CompiledSteps:
             self.hand_back(state)
             self._raise()
         return taken
+
+    def watch(self, watches: Sequence[Watch]) -> None:
+        """Let these take in the state after each step."""
+        self._watches = watches
+        of_c = ffi.new("watch *[]", [one.c for one in watches])
+        fill(self.c, watches=len(watches), watch=of_c)
 
     def q_before(self) -> Array:
         """The configuration at the beginning of the last step, a new array."""

@@ -9,6 +9,7 @@ from mpi4py import MPI
 
 import numpy as np
 import numpy.typing as npt
+from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
@@ -18,6 +19,7 @@ from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.model.material_laws import Hardening
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
 from ufl_beam.terms.base import KINDS
@@ -43,6 +45,10 @@ NOT_HELD = (
     f"near that in which the run begins. Begin there. {INSTEAD}. In the first step: "
 )
 """What is said of a run of statics whose first step fails where a motion without strain is free."""
+
+WEAK = 0.1
+"""Part of the least stiffness in the first state that is left near a limit load: the root of 1/4096
+where it is as far away as the smallest part of a step."""
 
 ROOM = 10.0
 """Largest imbalance of an exact ledger over the tolerance of the solver."""
@@ -91,8 +97,9 @@ def no_equilibrium(
     if end != t:
         where = f"after {named.at(t, '.9g')}, even with {named.over(end - t)}"
     # Where a function has no value there is no tangent to look at.
-    known = not isinstance(failure, NoNumber)
-    why = _singularity(equation, solution.grid, q0, q1) if known else ""
+    why, at = "", (solution, q0, q1)
+    if not isinstance(failure, NoNumber):
+        why = _singularity(equation, solution.grid, q0, q1) or _near_limit(equation, *at)
     said = f"{failure} ({sizes})" if sizes else str(failure)
     return ConvergenceError(
         f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=t, dt=end - t,
@@ -100,14 +107,16 @@ def no_equilibrium(
     )  # fmt: skip
 
 
-def require_held(equation: StepEquation, newton: Solver, q1: Array, loose: str) -> None:
+def require_held(equation: StepEquation, newton: Solver, q1: Array, loose: str) -> str:
     """Raise :class:`SceneError` if loads do not hold a motion without strain in an equilibrium.
 
-    It is described by ``loose``.  All processes call it together.
+    It is described by ``loose``; what is loose now, nothing, is returned.  The tangent is regular
+    then, and needs no stiffness against idle motions.  All processes call it together.
     """
+    newton.forget_idle()
     share, grid = equation.share, equation.share.grid
     if not equation.respond_at(q1):
-        return
+        return ""
     K, free = free_matrix(share, equation.A, equation.supports.dofs)
     lengths = np.full(grid.size, grid.scene.size)
     lengths[grid.rotations] = 1.0
@@ -118,6 +127,7 @@ def require_held(equation: StepEquation, newton: Solver, q1: Array, loose: str) 
     forces = np.linalg.norm((K @ x) * moves[free] * lengths[free])
     if forces <= HELD * newton.convergence.scale() * grid.scene.size * motion:
         raise SceneError(f"{loose}The loads do not hold it either. {INSTEAD}")
+    return ""
 
 
 def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:
@@ -151,15 +161,48 @@ def _singularity(equation: StepEquation, grid: Grid, q0: Array, q1: Array) -> st
     """
     if said := _singularity_at(equation, grid, q1):
         return said
-    share, size = equation.share, grid.scene.size
+    near = _near(equation, q0, q1)
+    if near is q0 or not equation.respond_at(near):
+        return ""
+    return _singularity_at(equation, grid, near)
+
+
+def _near_limit(equation: StepEquation, solution: Solution, q0: Array, q1: Array) -> str:
+    """Say that a limit load or bifurcation is near the state ``q0`` of a static run; else empty.
+
+    There the least stiffness is a small part of that in the first state, or the tangent has other
+    signs, perhaps only a little beyond, where what yields has less stiffness.
+    """
+    if not len(equation.force) or not len(solution):
+        return ""
+    signs, least = [], []
+    for q in (solution.q[0][equation.share.dofs], q0, _near(equation, q0, q1)):
+        if not np.isfinite(q).all() or not equation.respond_at(q):
+            return ""
+        K, free = free_matrix(equation.share, equation.A, equation.supports.dofs)
+        if not len(free):
+            return ""
+        try:
+            signs.append(Factorisation(csr_array(K)).negative)
+            least.append(null_vector(K)[0])
+        except (SingularMatrix, np.linalg.LinAlgError, RuntimeError):
+            return ""
+    if len(set(signs)) == 1 and least[1] > WEAK * least[0]:
+        return ""
+    return (
+        "a limit load or a bifurcation is near, where the tangent stiffness is singular; follow "
+        "the path through it with ub.follow(scene, ub.ArcLength(...))"
+    )
+
+
+def _near(equation: StepEquation, q0: Array, q1: Array) -> Array:
+    """A state on the way from ``q0`` to ``q1``, at most :data:`NEAR` away."""
+    share, size = equation.share, equation.share.grid.scene.size
     way = np.abs(q1 - q0)
     way[share.multipliers()] = 0.0
     way[share.rotations()] *= size
     far = share.largest(float(way.max(initial=0.0))) / size
-    if not 0 < far < np.inf:
-        return ""
-    near = q0 + min(1.0, NEAR / far) * (q1 - q0)
-    return _singularity_at(equation, grid, near) if equation.respond_at(near) else ""
+    return np.asarray(q0 + min(1.0, NEAR / far) * (q1 - q0)) if 0 < far < np.inf else q0
 
 
 def _singularity_at(equation: StepEquation, grid: Grid, q: Array) -> str:

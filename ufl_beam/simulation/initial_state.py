@@ -113,16 +113,18 @@ def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, Sta
 
 
 def last_forces(
-    share: Share, scheme: Scheme, start: Solution | None
+    grid: Grid, share: Share, scheme: Scheme, start: Solution | None
 ) -> tuple[Array | None, Array | None]:
     """Forces of cells in the last step of ``start``, and the local configuration at its beginning.
 
     None without a start, with other cells, and after steps of another scheme.
     """
-    if start is None or start.scheme != scheme or not same_unknowns(start.grid, share.grid):
+    if start is None or start.scheme != scheme or not same_unknowns(start.grid, grid):
         return None, None
     cells, before = start.last_forces()
-    return np.ascontiguousarray(cells[:, share.cells]), None if before is None else before[share.dofs]
+    return np.ascontiguousarray(cells[:, share.cells]), None if before is None else before[
+        share.dofs
+    ]
 
 
 def _initial_velocity(grid: Grid) -> Array:

@@ -14,8 +14,8 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Blocks, Index, Snapshot, Snapshots
-from ufl_beam.compiled.csr import Product
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import (
     CompiledFields,
@@ -30,7 +30,6 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import above, below, require_arrays
 from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
-from ufl_beam.terms.in_cells import CellForces
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
@@ -59,14 +58,14 @@ class KeptStates:
     """States that were kept; methods with a number ``n`` give results of all cells in the n-th.
 
     Attributes:
-        cell_forces: Forces of cells, of whose records the states have some; None if of none.
+        of_record: Method of :class:`CellForces`, if states have its records.
     """
 
     def __init__(self, grid: Grid) -> None:
         self._grid = grid
         self._blocks: list[Snapshots] = []
         self._ends: list[int] = []  # number of states up to the end of each block
-        self.cell_forces: CellForces | None = None
+        self.of_record: Callable[[Array, Array, Array], Array] | None = None
         self._rule: tuple[float, ForcesAlongCells] | None = None
         self._latest: tuple[int, Snapshot] | None = None  # state that was asked for last
         self._computed: tuple[Snapshot, float, int, Array] | None = None  # forces asked for last
@@ -150,10 +149,10 @@ class KeptStates:
         """``cell_number`` of loops.h for all cells; (9, num_cells); N, N m."""
         if state.cells.ndim == 2:
             return state.cells
-        if self.cell_forces is None:
+        if self.of_record is None:
             raise SceneError("section forces: these states were kept without them")
         before = state.q if state.before is None else state.before
-        return self.cell_forces.of_record(state.cells, state.q, before)
+        return self.of_record(state.cells, state.q, before)
 
     @property
     def before(self) -> Blocks:
@@ -245,7 +244,7 @@ class KeptStates:
     @cached_property
     def _dofs(self) -> Index:
         """Degrees of freedom (u, v, ψ) of the nodes of all cells; (num_cells, 3, degree + 1)."""
-        return self._grid.dofs[self._grid.nodes_of_cells].transpose(0, 2, 1)
+        return np.asarray(self._grid.dofs[self._grid.nodes_of_cells].transpose(0, 2, 1))
 
     def _along(self, between: float) -> ForcesAlongCells:
         if self._rule is None or self._rule[0] != between:

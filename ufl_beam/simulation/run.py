@@ -188,7 +188,7 @@ def simulate(
                 simulation.together(recorder.open, simulation)
             simulation.keep()
         with progress_bar(progress, comm, total=1.0, bar_format=BAR) as bar:
-            quiet = not recorders and keeper is None
+            quiet = keeper is None and all(one.by_itself for one in recorders)
             while not pace.finished:
                 if quiet and solution.every == 1 and most == sys.maxsize:
                     pace.advance(sys.maxsize, keep=True)

@@ -13,6 +13,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Snapshots
 from ufl_beam.collective_errors import Agreement
+from ufl_beam.discretization.function_spaces import CompiledFields
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
@@ -22,6 +23,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.state_view import StateView
+from ufl_beam.output.watches import Watch
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import Assembly, assemble
@@ -119,9 +121,8 @@ class Simulation(StateView):
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
         self.equation, self.terms = parts.equation, parts.equation.terms
 
-        self.t, self.parts, self.left = t0, 0, [0, 0]
+        self.t, self.parts, self.left, self.q = t0, 0, [0, 0], q[share.dofs]
         self._begun_at: Array | None = None  # of the state before the first step
-        self.q = q[share.dofs]
         weights, in_motion = self.equation.weights, has_inertia(scheme)
         self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
         self._continues = start is not None
@@ -146,7 +147,7 @@ class Simulation(StateView):
         if not self.reactions_known:
             together(add_forces_at_rest, self.beams, scheme, self.q, np.zeros(share.size))
         goes_on = goes_on or not self.reactions_known
-        forces, before = last_forces(share, scheme, start) if goes_on else (None, None)
+        forces, before = last_forces(grid, share, scheme, start) if goes_on else (None, None)
         if forces is not None or not self.reactions_known:
             self.cell_forces.begin(forces)
             self._begun_at = before
@@ -158,6 +159,7 @@ class Simulation(StateView):
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
+        self._watches: list[Watch] = []
         self._describe(self.solution)
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
         in_python = self._copies or self.asked or self._loose or not share.alone
@@ -175,6 +177,7 @@ class Simulation(StateView):
         self._end[0] = t1
         if self._in_c is None or not self._in_c.take(self, self._end):
             self._step_in_python(t1)
+            self._observe()
 
     def _step_in_python(self, t1: float) -> None:
         fresh = self.parts == 0 and not self._continues
@@ -212,6 +215,7 @@ class Simulation(StateView):
         if self._in_c is not None and (taken := self._in_c.take(self, ends, keep=keep)):
             return taken
         self._step_in_python(float(ends[0]))
+        self._observe()
         if keep:
             self.keep()
         return 1
@@ -223,6 +227,19 @@ class Simulation(StateView):
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
             parts.openings, LARGEST_TURN, fresh, self.support_dofs, parts.cell_forces, self.begun,
         )  # fmt: skip
+
+    def watch(self, parts: Array) -> Watch | None:
+        """Begin to take in extremes after each step in C, or return None if that cannot be."""
+        if not (self.share.alone and isinstance(self.fields, CompiledFields)):
+            return None
+        self._watches.append(one := Watch(self.share, self.cell_forces, self._along, parts))
+        if self._in_c is not None:
+            self._in_c.watch(self._watches)
+        return one
+
+    def _observe(self) -> None:
+        for one in self._watches:
+            one.take(self.parts, self.t, self.q, self.q_before)
 
     def take_back(self) -> None:
         """Take the state back from C: what follows is in Python."""
@@ -259,9 +276,7 @@ class Simulation(StateView):
     def _accept(self, trial: Trial) -> None:
         step, q1, s = trial
         if self._loose:
-            require_held(self.equation, self.solver, q1, self._loose)
-            self._loose = ""
-            self.solver.forget_idle()  # tangents are regular from now on
+            self._loose = require_held(self.equation, self.solver, q1, self._loose)
         if self._branch is not None:
             self._branch.accept(self.equation.force)
         self.cell_forces.accept()
@@ -346,9 +361,10 @@ class Simulation(StateView):
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
-        in_c = self._in_c
-        ahead = in_c is not None and in_c.ahead
-        now = in_c.now(self) if ahead else Snapshots.of(self.gather())
+        if self._in_c is not None and self._in_c.ahead:
+            now = self._in_c.now(self)
+        else:
+            now = Snapshots.of(self.gather())
         self.solution.keep(now, self.parts, self.iterations)
 
     def end(self) -> None:

@@ -39,8 +39,8 @@ from ufl_beam.simulation.force_diagrams import Diagram
 from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened
 from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, require_same, text_of
+from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Energy
-from ufl_beam.terms.in_cells import CellForces
 from ufl_beam.terms.links import FORCE
 
 
@@ -224,8 +224,7 @@ class Solution(Rich):
     def reaction(self, support: Support) -> Array:
         """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
 
-        They are of the components of motion that it holds; another support at the same node has its
-        own.
+        It is that of the components of motion that the support holds.
 
         In statics the first row is what the initial state bears: nothing in the undeformed scene,
         for loads act from the first step on; with ``start=`` the reactions of its equilibrium.  In
@@ -240,17 +239,14 @@ class Solution(Rich):
         return self._kept.reactions[:, number]
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
-        """(N, V, M) in the middle of the cells of a beam, as :meth:`diagram` has it, at a kept time.
-
-        (num_cells, 3); N, N, N m.
-        """
-        return self._kept.forces(n, self.between)[self.grid.cells_of(beam), 0]
+        """(N, V, M) of :meth:`diagram` in the middle of the cells; (num_cells, 3); N, N, N m."""
+        forces = self._kept.forces(n, self.between)
+        return np.asarray(forces[self.grid.cells_of(beam), 0])
 
     def section_forces_at(self, place: Place) -> Array:
         """(N, V, M) at a place, as :meth:`diagram` has it; (n+1, 3); N, N, N m.
 
-        At a vertex they are those at the end of the cell before it, at the start of a beam those at the
-        start of the first one.
+        At a vertex they are those at the end of the cell before it.
 
         Raises:
             SceneError: The beam of the place is not in the scene.
@@ -260,14 +256,12 @@ class Solution(Rich):
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
         """Section forces along a beam, by equilibrium of its cells, at the n-th kept time.
 
-        At the ends of the cells they are those of the equation of the step that ends there, with
-        stresses, inertia, damping, loads and works: the same as :meth:`reaction` at a support, and as
-        forces of joints.  Between them V is linear and M parabolic under a uniform load.  ``points``
-        are those of each cell, equally spaced, both ends included.
+        They belong to the equation of the step that ends at that time, with inertia, damping, loads
+        and works: at a support they are its :meth:`reaction`.  ``points`` are those of each cell,
+        equally spaced, both ends included; V is linear between them under a uniform load.
 
-        The initial state of a static run bears nothing unless it has a ``start=``.  That of a dynamic
-        one has the last step of ``start=``, or the forces of its strains, as its accelerations are not
-        known.
+        The initial state of a static run bears nothing unless it has a ``start=``.  That of a
+        dynamic one has the forces of the last step of ``start=``, or those of its strains.
 
         Raises:
             SceneError: The beam is not in the scene, or ``points`` is less than 2.
@@ -280,10 +274,11 @@ class Solution(Rich):
 
     def find_cell_forces(self, scheme: Scheme, forces: CellForces | None) -> None:
         """Take note of the scheme, and of how forces of cells follow from what is kept."""
-        self.scheme, self._kept.cell_forces = scheme, forces
+        self.scheme = scheme
+        self._kept.of_record = None if forces is None else forces.of_record
 
     def last_forces(self) -> tuple[Array, Array | None]:
-        """``cell_number`` of loops.h in the last step, and the configuration at its beginning."""
+        """``cell_number`` of loops.h in the last step; the configuration at its beginning."""
         return self._kept.numbers(self._kept[-1]), self._kept[-1].before
 
     def strains(self, beam: Member, n: int = -1) -> Array:

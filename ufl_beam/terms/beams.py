@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array, on_demand
 from ufl_beam.compiled.c_library import Loop, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel, mass_matrix
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
@@ -23,7 +23,7 @@ from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
-from ufl_beam.terms.in_cells import InCells, mass_times
+from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Phases, TimeFunctions, entering
 from ufl_beam.terms.rates_in_c import RatesInC
 from ufl_beam.terms.static_tangents import StaticTangent
@@ -77,7 +77,7 @@ class ElasticBeams(OfForms, Cells):
 
     def in_cells(self) -> Sequence[InCells]:
         """The forces of the resultants, which both configurations of a step determine."""
-        return [InCells(self._force, lib.STRESS, self._order, q0=self._q0)]
+        return [InCells(lambda: self._force, lib.STRESS, self._order, q0=self._q0)]
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
@@ -143,8 +143,7 @@ class Inertia(OfMatrix):
 
     def in_cells(self) -> Sequence[InCells]:
         """The mass of the beams times the accelerations of the step."""
-        of = self._fields.element
-        form = self._fields.hot_kernel(mass_times(of), of.q1)
+        form = partial(mass_kernel, self._fields)
         return [InCells(form, lib.DENSITY, self._fields.order, self._times.rate)]
 
     @property

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -14,8 +15,14 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, Fields, Strains, mass_matrix
+from ufl_beam.discretization.compiled_forms import CellForm, stated
+from ufl_beam.discretization.function_spaces import (
+    Element,
+    Fields,
+    Strains,
+    mass_kernel,
+    mass_matrix,
+)
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
@@ -27,7 +34,7 @@ from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
-from ufl_beam.terms.in_cells import InCells, mass_times
+from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Phases, TimeFunctions, knowing
 from ufl_beam.terms.rates_in_c import RatesInC
 
@@ -122,11 +129,14 @@ class RayleighForces(OfMatrix):
     def in_cells(self) -> Sequence[InCells]:
         """Both matrices of the beams times the velocities of the step."""
         fields, damping, of = self._fields, self._damping, self._fields.element
-        form, mass = (fields.hot_kernel(f(of), of.q1) for f in (_stiffness_times, mass_times))
         at = fields.order, self._times.rate
+
+        def stiffness() -> CellForm:
+            return fields.hot_kernel(_stiffness_times(of), of.q1)
+
         return [
-            InCells(form, lib.STRESS, *at, damping.stiffness),
-            InCells(mass, lib.DENSITY, *at, damping.mass),
+            InCells(stiffness, lib.STRESS, *at, damping.stiffness),
+            InCells(partial(mass_kernel, fields), lib.DENSITY, *at, damping.mass),
         ]
 
     def phases(self, times: TimeFunctions) -> Phases | None:

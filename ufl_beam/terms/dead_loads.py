@@ -55,8 +55,8 @@ class DeadLoads(LoadTerm):
         self._force = np.broadcast_to(0.0, share.size)  # which takes no room
         self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs)
         self._factors: list[float] = []
-        # Parts of the vectors that act: now, at the end of the step, at that of the last one, and in
-        # the equation of that.
+        # Parts of the vectors that act: now, at the end of the step, at that of the last one, and
+        # in its equation.
         self._parts: Array = np.zeros((4, len(vectors)))
         self._along = [in_cells.get(key) for key in vectors]
 

@@ -62,7 +62,7 @@ class OfForms(Term):
 
     def in_cells(self) -> Sequence[InCells]:
         """The forces of the form."""
-        return [InCells(self._force, lib.STRESS, self._order)]
+        return [InCells(lambda: self._force, lib.STRESS, self._order)]
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the forces to the residual."""

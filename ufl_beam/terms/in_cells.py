@@ -1,157 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""Forces on the nodes of cells in the equation of a step, and in the accepted state.
-
-At a node, the forces of all cells, and of all that acts there, add up to the residual.  So what they
-are at both ends of a cell are its section forces there, in equilibrium with supports and joints.
-"""
+"""Forces on the nodes of cells, as terms state them; see cell_forces.py."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
-import numpy as np
-import ufl
-
-from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
-from ufl_beam.discretization.compiled_forms import CellForm, stated
-from ufl_beam.discretization.function_spaces import Element, mass_form
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
-from ufl_beam.dolfinx_compat import fem
+from ufl_beam.arrays import Index
 
 
 class InCells(NamedTuple):
     """Forces on the nodes of cells.
 
     Attributes:
-        form: Its entries are the forces; those of the latest evaluation count.
+        form: Makes the form whose entries are the forces; those of its latest evaluation count.
         kind: ``force_kind`` of loops.h.
         order: Positions in ``share.cells`` of its cells.
-        vector: If the form is linear: place of the address of the vector that it is evaluated at.
+        vector: If the form is linear, and nothing else evaluates it: place of the address of the
+            vector that it is evaluated at.
         factor: Factor of the forces.
-        q0: If the form depends on nothing but the configurations at both ends of the step: the first.
+        q0: If the form depends on the configurations at both ends of the step alone: the first.
     """
 
-    form: CellForm
+    form: Callable[[], Any]
     kind: int
     order: Index
     vector: Any = None
     factor: float = 1.0
-    q0: fem.Function | None = None
-
-
-@stated
-def mass_times(of: Element) -> ufl.Form:
-    """Mass of the beams times a vector, the unknown q1."""
-    return ufl.action(mass_form(of), of.q1)
-
-
-class CellForces:
-    """Forces of the cells of a process in the equation of the accepted step.
-
-    Attributes:
-        c: ``cell_forces`` of loops.h.
-        asks_for_before: Whether they depend on the configuration at the beginning of the step.
-        kept: Places of arrays that the forces follow from, besides configurations, and their sizes.
-    """
-
-    def __init__(self, share: Share, parts: Sequence[InCells], loads: Any = ffi.NULL) -> None:
-        self._share, self._space = share, np.zeros(share.size)
-        self._alive: list[Any] = [parts]
-        self._linear, self._of_ends = list[tuple[CellForm, Any]](), list[tuple[InCells, Any, Any]]()
-        self.kept: list[tuple[Any, int]] = []
-        self._forces = ffi.new("force_in_cells[]", len(parts))
-        vectors: dict[Any, Any] = {}  # places of them, and of those of the accepted step
-        for c, one in zip(self._forces, parts, strict=True):
-            each, lanes, other = one.form.keep_entries()
-            c.kind, c.factor, c.number, c.lanes = one.kind, one.factor, len(one.order), lanes
-            if not np.array_equal(one.order, np.arange(len(share.cells))):
-                order = one.order.astype(np.int32)
-                c.cell = integers(order)
-                self._alive.append(order)
-            accepted = ffi.addressof(c, "accepted")
-            c.entries = accepted
-            if one.q0 is not None:
-                each[0] = ffi.NULL
-                self._of_ends.append((one, each, other))
-            elif one.vector is None:
-                c.latest = each
-                self.kept.append((accepted, other.size))
-            else:
-                other = np.zeros(share.size)
-                if one.vector not in vectors:
-                    c.latest, vectors[one.vector] = one.vector, accepted
-                    self.kept.append((accepted, share.size))
-                c.vector, c.entries, c.form = vectors[one.vector], each, one.form.cells
-                if c.form == ffi.NULL:
-                    self._linear.append((one.form, c))
-            c.accepted = doubles(other)
-            self._alive.append((each, other))
-        if loads != ffi.NULL:
-            self.kept.append((ffi.addressof(loads, "accepted"), loads.vectors))
-        self.asks_for_before = any(one.form.uses(one.q0) for one, *_ in self._of_ends)
-        first, *between, last = share.grid.mesh.nodes - 0.5
-        self.c = fill(
-            ffi.new("cell_forces *"), cells=len(share.cells), nodes=2 + len(between), force=self._forces,
-            forces=len(parts), loads=loads, from_middle=np.array([first, last, *between]),
-        )  # fmt: skip
-
-    def accept(self) -> None:
-        """Take the forces of the latest residual as those of the accepted step."""
-        lib.accept_cell_forces(self.c)
-
-    def begin(self, numbers: Array | None) -> None:
-        """Begin with given numbers, else with the stresses of the latest residual and no more."""
-        if numbers is not None:
-            fill(self.c, given=numbers)
-            return
-        for c in self._forces:
-            if c.kind == lib.STRESS and c.latest:
-                c.accepted, c.latest[0] = c.latest[0], c.accepted
-
-    def __call__(self, q: Array, before: Array) -> Array:
-        """Compute ``cell_number`` of loops.h for the cells of this process; (9, num_cells).
-
-        ``q`` and ``before`` are the configurations at the end and at the beginning of the step.
-        """
-        for one, each, entries in self._of_ends:
-            each[0] = doubles(entries)
-            one.form.set(one.q0, before)
-            one.form.add(np.ascontiguousarray(q), self._space)
-            each[0] = ffi.NULL
-        for form, c in self._linear:
-            form.add(np.frombuffer(ffi.buffer(c.vector[0], self._space.nbytes)), self._space)
-        out: Array = np.empty((lib.CELL_NUMBERS, self.c.cells))
-        lib.find_cell_forces(self.c, doubles(out))
-        return out
-
-    # -- what solutions keep -------------------------------------------------------------------
-
-    def record(self) -> Array | None:
-        """Copy of all that the forces follow from besides configurations; None if they are given."""
-        if self.c.given:
-            return None
-        arrays = [np.frombuffer(ffi.buffer(place[0], 8 * n)) for place, n in self.kept]
-        return np.concatenate(arrays) if arrays else np.zeros(0)
-
-    def of_record(self, record: Array, q: Array, before: Array) -> Array:
-        """The numbers of a :meth:`record`, as a call returns them."""
-        given, now, at = self.c.given, [place[0] for place, _ in self.kept], 0
-        record = np.array(record)
-        try:
-            self.c.given = ffi.NULL
-            for place, n in self.kept:
-                place[0] = doubles(record[at : at + n])
-                at += n
-            return self(q, before)
-        finally:
-            self.c.given = given
-            for (place, _), old in zip(self.kept, now, strict=True):
-                place[0] = old
-
-    def remember(self, memory: Memory, q: Array, before: Array) -> None:
-        """Save or restore the forces of the accepted step."""
-        numbers = memory.rows("forces of cells", self._share.cells, self(q, before).T)
-        fill(self.c, given=np.ascontiguousarray(numbers.T))
+    q0: Any = None

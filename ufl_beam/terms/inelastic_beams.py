@@ -145,7 +145,7 @@ class InelasticBeams(Cells, ABC):
 
     def in_cells(self) -> Sequence[InCells]:
         """The forces of the resultants."""
-        return [InCells(self._force, lib.STRESS, self._fields.order)]
+        return [InCells(lambda: self._force, lib.STRESS, self._fields.order)]
 
     def change(self, q1: Array) -> float:
         """Energy that cells of this process store and dissipate in the step to ``q1``; J."""

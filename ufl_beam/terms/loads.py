@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 import ufl
@@ -13,7 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, Fields, mass_matrix
+from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel, mass_matrix
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving
 from ufl_beam.mechanics.kinematics import split, turn
@@ -21,7 +22,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.in_cells import InCells, mass_times
+from ufl_beam.terms.in_cells import InCells
 
 
 class LoadTerm(Term):
@@ -99,8 +100,7 @@ class FrameForces(LoadTerm):
 
     def in_cells(self) -> Sequence[InCells]:
         """The mass of the beams times the accelerations of the frame."""
-        of = self._fields.element
-        form = self._fields.hot_kernel(mass_times(of), of.q1)
+        form = partial(mass_kernel, self._fields)
         return [InCells(form, lib.DENSITY, self._fields.order, self._place)]
 
     def _put_accelerations(self, x: Array, growth: float, change: Array | float = 0.0) -> None:

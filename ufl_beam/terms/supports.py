@@ -195,7 +195,7 @@ class Supports:
         self.pivots[:] = memory.at_dofs("pivots", pivots)[self._held]
 
     def all_reactions(self, size: int) -> Array:
-        """The reactions as a vector of all local degrees of freedom, in the axes of the supports."""
+        """The reactions at all local degrees of freedom, in the axes of the supports."""
         r = np.zeros(size)
         r[self._held] = self.reactions
         return r

@@ -87,6 +87,10 @@ class Acting(ABC):
                     if kernel.uses(function):
                         kernel.put(function, np.array([value]))
 
+    def form_of_forces(self) -> CellForm:
+        """The form of the residual."""
+        return self.residual
+
     def force(self, q1: Array) -> Array:
         """Forces on the nodes at the end of the step; a new array."""
         r = np.zeros(self._size)
@@ -288,7 +292,7 @@ class Works(LoadTerm):
 
     def in_cells(self) -> Sequence[InCells]:
         """The forces of each work."""
-        return [InCells(one.residual, lib.WORK, one.order) for one in self._parts]
+        return [InCells(one.form_of_forces, lib.WORK, one.order) for one in self._parts]
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract the forces from the residual."""

@@ -18,10 +18,10 @@ void accept_cell_forces(cell_forces *c)
 /* out += factor times the numbers that forces on the nodes of some cells mean, one batch of them. */
 static inline void add_numbers(const cell_forces *c, const int nodes, const int lanes, int some,
                                int kind, double factor, const double *e, const int32_t *cell,
-                               double *out)
+                               size_t row, double *out)
 {
 #define NODE(i, k) e[((i) * nodes + (k)) * lanes + l]
-#define OUT(i) out[(size_t)(i) * c->cells + (cell ? cell[l] : l)]
+#define OUT(i) out[(i) * row + (cell ? cell[l] : l)]
   for (int i = 0; i < 3; ++i)
     for (int l = 0; l < some; ++l) {
       OUT(START_X + i) += factor * NODE(i, 0);
@@ -40,17 +40,26 @@ static inline void add_numbers(const cell_forces *c, const int nodes, const int 
 #undef OUT
 }
 
-/* The same of all cells of a form, whose forces are in batches. */
-static void add_all(const cell_forces *c, int lanes, int number, int kind, double factor,
-                    const double *e, const int32_t *cell, double *out)
+/* Where the numbers of cells are: `row` from one number to the next; where cells are in batches, as many
+ * as `lanes`, `batch` from one cell's batch to the next over that; else 1. `first` of them are asked for. */
+typedef struct {
+  double *out;
+  size_t row, batch;
+  int first;
+} places;
+
+/* The same of some cells of a form, whose forces are in batches. */
+static void add_some(const cell_forces *c, int lanes, int number, int kind, double factor,
+                     const double *e, const int32_t *cell, places p)
 {
+  if (p.first <= COUPLE) kind = STRESS;
   for (int first = 0; first < number; first += lanes) {
     const int some = number - first < lanes ? number - first : lanes, nodes = c->nodes;
     const double *batch = e + (size_t)first * 3 * nodes;
     const int32_t *of = cell ? cell + first : 0;
-    double *to = cell ? out : out + first;
+    double *to = cell ? p.out : p.out + first * p.batch;
 #define ADD(nodes, lanes, some, of) \
-  add_numbers(c, nodes, lanes, some, kind, factor, batch, of, to)
+  add_numbers(c, nodes, lanes, some, kind, factor, batch, of, p.row, to)
     if (nodes == 2 && lanes == 8 && some == 8 && !of) ADD(2, 8, 8, 0);
     else if (nodes == 2 && lanes == 4 && some == 4 && !of) ADD(2, 4, 4, 0);
     else ADD(nodes, lanes, some, of);
@@ -58,21 +67,99 @@ static void add_all(const cell_forces *c, int lanes, int number, int kind, doubl
   }
 }
 
+/* Numbers of `number` cells from the first on, or of all; `now` says that the latest residual is that of
+ * the accepted step. */
+static void add_forms(const cell_forces *c, int now, int first, int number, places p)
+{
+  const int lanes = (int)(p.row == (size_t)c->cells ? 1 : p.row);
+  for (int k = 0; k < c->forces; ++k) {
+    const force_in_cells *f = c->force + k;
+    const int whole = f->cell || number == c->cells;
+    const double *e = now && f->tee ? *f->tee : *f->entries;
+    if (f->form) {
+      cells some = whole ? *f->form : some_cells(f->form, first);
+      add_cells(&some, *f->vector, 0);
+    } else if (!whole)
+      e += (size_t)first * 3 * c->nodes;
+    add_some(c, f->lanes, whole ? f->number : number, f->kind, f->factor, e, f->cell, p);
+  }
+  for (int k = 0; c->loads && k < c->loads->vectors; ++k)
+    for (int i = 0; c->loads->vector[k] && c->loads->accepted[k] != 0 && i < number; ++i) {
+      places one = p; /* loads are in no batches */
+      one.out = p.out + (i - i % lanes) * p.batch + i % lanes;
+      add_some(c, 1, 1, DENSITY, -c->loads->accepted[k],
+               c->loads->vector[k] + (size_t)(first + i) * 3 * c->nodes, 0, one);
+    }
+}
+
 /* CELL_NUMBERS of all cells: the first number of each, then the second ones, and so on. */
-void find_cell_forces(const cell_forces *c, double *out)
+void find_cell_forces(const cell_forces *c, int now, double *out)
 {
   const size_t size = (size_t)CELL_NUMBERS * c->cells * sizeof *out;
+  const places p = {out, c->cells, 1, CELL_NUMBERS};
   if (c->given) {
     memcpy(out, c->given, size);
     return;
   }
   memset(out, 0, size);
-  for (int k = 0; k < c->forces; ++k) {
-    const force_in_cells *f = c->force + k;
-    if (f->form) add_cells((void *)f->form, *f->vector, 0);
-    add_all(c, f->lanes, f->number, f->kind, f->factor, *f->entries, f->cell, out);
+  add_forms(c, now, 0, c->cells, p);
+}
+
+/* Take numbers of a time where they are beyond a limit, with a sign. */
+static void go_beyond(int number, double sign, const double *restrict x, double t,
+                      double *restrict limit, double *restrict when)
+{
+  enum { NEIGHBOURS = 64 }; /* few are beyond, or most: all of a moving scene */
+  for (int first = 0; first < number; first += NEIGHBOURS) {
+    const int last = first + NEIGHBOURS < number ? first + NEIGHBOURS : number;
+    int beyond = 0;
+#pragma omp simd reduction(| : beyond)
+    for (int i = first; i < last; ++i) beyond |= sign * x[i] > sign * limit[i];
+    if (!beyond) continue;
+#pragma omp simd
+    for (int i = first; i < last; ++i) {
+      const int is = sign * x[i] > sign * limit[i];
+      when[i] = is ? t : when[i];
+      limit[i] = is ? x[i] : limit[i];
+    }
   }
-  for (int k = 0; c->loads && k < c->loads->vectors; ++k)
-    if (c->loads->vector[k] && c->loads->accepted[k] != 0)
-      add_all(c, 1, c->cells, DENSITY, -c->loads->accepted[k], c->loads->vector[k], 0, out);
+}
+
+/* Extend ranges, from `begin` on, by numbers of a time. */
+static void widen(const extent *e, size_t begin, int number, const double *x, double t)
+{
+  go_beyond(number, -1, x, t, e->low + begin, e->time_low + begin);
+  go_beyond(number, 1, x, t, e->high + begin, e->time_high + begin);
+}
+
+/* Take in the state after a step; see find_cell_forces. Some cells after the other, so that the processor
+ * keeps at hand what belongs to the next step. */
+void watch_step(const watch *w, int now, double t, const double *before, const double *q)
+{
+  const cells *c = w->along;
+  const int n = c->lanes, in_order = w->in_order && !w->forces->given;
+  const double b = w->between;
+  const double *at = q;
+  if (b != 1) {
+    combine(w->of_motion.size, 1 - b, before, b, q, w->q);
+    at = w->q;
+  }
+  if (!in_order) find_cell_forces(w->forces, now, w->numbers);
+  for (int first = 0; first < c->number; first += SOME) {
+    cells some = some_cells(c, first);
+    const places p = {some.w + w->at_numbers * n, n, c->width, w->first};
+    const int all = (some.number + n - 1) / n * n;
+    if (in_order) {
+      for (int k = 0; k < all; k += n)
+        memset(p.out + k * p.batch, 0, w->first * n * sizeof *p.out);
+      add_forms(w->forces, now, first, some.number, p);
+    } else
+      for (int k = 0; k < some.number; ++k)
+        for (int i = 0; i < w->first; ++i)
+          p.out[(k - k % n) * p.batch + i * n + k % n] =
+            w->numbers[(size_t)i * c->number + first + k];
+    add_cells(&some, at, 0);
+    widen(&w->of_forces, (size_t)first * c->rows, all * c->rows, c->each, t);
+  }
+  widen(&w->of_motion, 0, w->of_motion.size, q, t);
 }

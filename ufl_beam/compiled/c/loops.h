@@ -147,6 +147,7 @@ typedef struct {
   double **latest, *accepted; /* latest: or none; also if another form has the same vector */
   double *const *vector;
   double *const *entries; /* of the accepted step, in batches */
+  double *const *tee;     /* the same in the latest residual; or none */
   double factor;
   int kind, number, lanes;
   const int32_t *cell; /* numbers of its cells; or none where these are all */
@@ -169,7 +170,26 @@ typedef struct {
 } cell_forces;
 
 void accept_cell_forces(cell_forces *c);
-void find_cell_forces(const cell_forces *c, double *out);
+void find_cell_forces(const cell_forces *c, int now, double *out);
+
+/* Least and largest of some numbers so far, and when they were reached first. */
+typedef struct {
+  int size;
+  double *low, *high, *time_low, *time_high;
+} extent;
+
+/* Extremes of section forces in points of the cells, and of motions, see extremes.py. */
+typedef struct {
+  const cell_forces *forces;
+  const cells *along;       /* form of the section forces, which it keeps */
+  int at_numbers, first;    /* where it has the first of CELL_NUMBERS, and how many */
+  int in_order;             /* whether all forms have all cells, in batches as this one */
+  double between, *q;       /* part of a step at whose configuration they are; space for that */
+  double *numbers;          /* space */
+  extent of_forces, of_motion;
+} watch;
+
+void watch_step(const watch *w, int now, double t, const double *before, const double *q);
 
 /* -- material points --------------------------------------------------------------------------- */
 
@@ -715,6 +735,8 @@ typedef struct {
   int kinds, width; /* of numbers that are kept; of a row */
   const kept_numbers *kept;
   cell_forces *cell_forces;
+  int watches;
+  const watch *const *watch;
 } march;
 
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s);

@@ -573,6 +573,7 @@ static int take_step(march *m, double t1)
   memcpy(m->q, m->x, m->size * sizeof *m->q);
   m->t = t1;
   m->iterations += m->tried;
+  for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, t1, p->q_before, m->q);
   return 1;
 }
 

@@ -1,0 +1,159 @@
+# SPDX-License-Identifier: MIT
+"""Forces on the nodes of cells in the equation of a step, and in the accepted state.
+
+At a node, the forces of all cells, and of all that acts there, add up to the residual.  So those at
+both ends of a cell are its section forces there, in equilibrium with supports and joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
+from ufl_beam.discretization.compiled_forms import CellForm
+from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.terms.in_cells import InCells
+
+
+class CellForces:
+    """Forces of the cells of a process in the equation of the accepted step.
+
+    Attributes:
+        c: ``cell_forces`` of loops.h.
+        asks_for_before: Whether they depend on the configuration at the beginning of the step.
+        kept: Places of arrays that the forces follow from, besides configurations, and their sizes.
+    """
+
+    def __init__(self, share: Share, parts: Sequence[InCells], loads: Any = ffi.NULL) -> None:
+        self._share, self._space = share, np.zeros(share.size)
+        self._alive: list[Any] = [parts]
+        self._unmade, self._linear = list[tuple[InCells, Any]](), list[tuple[CellForm, Any]]()
+        self._of_ends: list[tuple[CellForm, fem.Function, Any, Array]] = []
+        self.kept: list[tuple[Any, int]] = []
+        self._forces = ffi.new("force_in_cells[]", len(parts))
+        vectors: dict[Any, Any] = {}  # places of them, and of those of the accepted step
+        for c, one in zip(self._forces, parts, strict=True):
+            c.kind, c.factor, c.number = one.kind, one.factor, len(one.order)
+            if not np.array_equal(one.order, np.arange(len(share.cells))):
+                order = one.order.astype(np.int32)
+                c.cell = integers(order)
+                self._alive.append(order)
+            accepted, other = ffi.addressof(c, "accepted"), np.zeros(share.size)
+            if one.vector is not None:
+                if one.vector not in vectors:
+                    c.latest, vectors[one.vector] = one.vector, accepted
+                    self.kept.append((accepted, share.size))
+                c.vector = vectors[one.vector]
+                self._unmade.append((one, c))
+            else:
+                form = one.form()
+                each, c.lanes, other = form.keep_entries()
+                c.entries = accepted
+                self._alive.append(each)
+                if one.q0 is None:
+                    c.latest = each
+                    self.kept.append((accepted, other.size))
+                else:
+                    each[0] = ffi.NULL
+                    self._of_ends.append((form, one.q0, each, other))
+            c.accepted = doubles(other)
+            self._alive.append(other)
+        if loads != ffi.NULL:
+            self.kept.append((ffi.addressof(loads, "accepted"), loads.vectors))
+        self.asks_for_before = any(form.uses(q0) for form, q0, *_ in self._of_ends)
+        first, *between, last = share.grid.mesh.nodes - 0.5
+        from_middle = np.array([first, last, *between])
+        self.c = fill(
+            ffi.new("cell_forces *"), cells=len(share.cells), nodes=2 + len(between),
+            forces=len(parts), force=self._forces, loads=loads, from_middle=from_middle,
+        )  # fmt: skip
+
+    def accept(self) -> None:
+        """Take the forces of the latest residual as those of the accepted step."""
+        lib.accept_cell_forces(self.c)
+
+    def begin(self, numbers: Array | None) -> None:
+        """Begin with given numbers, else with the stresses of the latest residual and no more."""
+        if numbers is not None:
+            fill(self.c, given=numbers)
+            return
+        for c in self._forces:
+            if c.kind == lib.STRESS and c.latest:
+                c.accepted, c.latest[0] = c.latest[0], c.accepted
+
+    def __call__(self, q: Array, before: Array) -> Array:
+        """Compute ``cell_number`` of loops.h for the cells of this process; (9, num_cells).
+
+        ``q`` and ``before`` are the configurations at the end and at the beginning of the step.
+        """
+        self._make()
+        for of_ends, q0, each, entries in self._of_ends:
+            latest, each[0] = each[0], doubles(entries)
+            of_ends.set(q0, before)
+            of_ends.add(np.ascontiguousarray(q), self._space)
+            each[0] = latest
+        for form, c in self._linear:
+            form.add(np.frombuffer(ffi.buffer(c.vector[0], self._space.nbytes)), self._space)
+        out: Array = np.empty((lib.CELL_NUMBERS, self.c.cells))
+        lib.find_cell_forces(self.c, 0, doubles(out))
+        return out
+
+    def _make(self) -> None:
+        """Make the forms that nothing but this asks for, once."""
+        for one, c in self._unmade:
+            form = one.form()
+            each, c.lanes, _ = form.keep_entries()
+            c.entries, c.form = each, form.cells
+            if c.form == ffi.NULL:
+                self._linear.append((form, c))
+            self._alive.append((form, each))
+        self._unmade = []
+
+    def in_order(self, lanes: int) -> bool:
+        """Return whether all forms have all cells, in batches of so many."""
+        return all(not c.cell and c.lanes == lanes for c in self._forces)
+
+    def keep_latest(self) -> None:
+        """Keep all entries of the latest residual from now on, for who asks after each step."""
+        self._make()
+        of_ends = (c for c in self._forces if not c.latest and not c.vector)
+        for c, (*_, each, entries) in zip(of_ends, self._of_ends, strict=True):
+            if not c.tee:
+                latest = np.zeros(entries.shape)
+                self._alive.append(latest)
+                c.tee, each[0] = each, doubles(latest)
+
+    # -- what solutions keep -------------------------------------------------------------------
+
+    def record(self) -> Array | None:
+        """Copy what the forces follow from besides configurations; None if they are given."""
+        if self.c.given:
+            return None
+        arrays = [np.frombuffer(ffi.buffer(place[0], 8 * n)) for place, n in self.kept]
+        return np.concatenate(arrays) if arrays else np.zeros(0)
+
+    def of_record(self, record: Array, q: Array, before: Array) -> Array:
+        """The numbers of a :meth:`record`, as a call returns them."""
+        given, now, at = self.c.given, [place[0] for place, _ in self.kept], 0
+        record = np.array(record)
+        try:
+            self.c.given = ffi.NULL
+            for place, n in self.kept:
+                place[0] = doubles(record[at : at + n])
+                at += n
+            return self(q, before)
+        finally:
+            self.c.given = given
+            for (place, _), old in zip(self.kept, now, strict=True):
+                place[0] = old
+
+    def remember(self, memory: Memory, q: Array, before: Array) -> None:
+        """Save or restore the forces of the accepted step."""
+        numbers = memory.rows("forces of cells", self._share.cells, self(q, before).T)
+        fill(self.c, given=np.ascontiguousarray(numbers.T))
