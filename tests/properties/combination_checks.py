@@ -91,13 +91,14 @@ def split(case):
         at = t0 + (t1 - t0) * k / n
         equal = {"dt": (t1 - t0) / n * (1 + 1e-10), "newton": ub.Newton(rtol=DIGITS)}
         whole = case.run(**equal)
+        only(not whole.failure, "longer steps leap over a limit load")
         first = case.run(t=(t0, at), names=names, **equal)
         second = case.run(t=(at, t1), start=first.solution, names=names, **equal)
-        if first.solution.parts + second.solution.parts == whole.solution.parts:
-            assert_near(differences(first, whole, slice(0, k + 1)))
-            assert_near(differences(second, whole, slice(k, None)))
-            return
-    raise AssertionError("one of the runs cuts steps")
+        if has_cut(whole, first, second) and parts < 16:
+            continue
+        assert_near(differences(first, whole, slice(0, k + 1)))
+        assert_near(differences(second, whole, slice(k, None)))
+        return
 
 
 @check
@@ -169,11 +170,16 @@ def recorders(case):
     end = run.solution.displacement(run.names["b0"].end)
     if len(rows) == len(end):  # parts of a failed step are not kept
         assert (rows[:, 1:4] == end).all()
+    only(run.solution.parts == len(run.solution) - 1, "a step was cut; parts are not kept")
     for beam in run.names["scene"].beams:
-        moved = extremes.displacement(beam)
-        nodes = run.solution.q[:, run.solution.grid.nodes_of(beam)[1]]
-        assert (moved.high == nodes.max(axis=0)).all() or run.failure
-        assert (moved.low == nodes.min(axis=0)).all() or run.failure
+        kept = run.solution.q[:, run.solution.grid.nodes_of(beam)[1]]
+        drawn = [run.solution.diagram(beam, n, points=2)[1:] for n in range(len(kept))]
+        forces = np.array(drawn).transpose(0, 2, 1)
+        moved, borne = extremes.displacement(beam), extremes.section_forces(beam)
+        for found, states in ((moved, kept), (borne, forces)):
+            size = np.abs(states).max()  # round-off: C adds in another order than NumPy
+            assert difference(found.high, states.max(axis=0), size) < 1e-12
+            assert difference(found.low, states.min(axis=0), size) < 1e-12
 
 
 def recorders_of(case, names, folder):
@@ -233,15 +239,30 @@ def assert_agree(case, tolerance=SAME, **changes):
     """
     only(not case.exact.failure, "a step fails")
     for parts in (1, 4, 16):
-        dt = case.exact.names["dt"]
-        more = {"dt": dt / parts} if parts > 1 else {}
-        expected = case.run(newton=ub.Newton(rtol=DIGITS), **more) if more else case.exact
-        found = case.run(**{"newton": ub.Newton(rtol=DIGITS), **more, **changes})
-        if found.solution.parts == expected.solution.parts:
-            assert not found.failure, found.failure
-            return assert_near(differences(found, expected), tolerance)
-        only(case.equal_steps, "last digits decide on the steps")
-    raise AssertionError(f"{found.solution.parts} and {expected.solution.parts} parts of steps")
+        more = {"newton": ub.Newton(rtol=DIGITS)}
+        if parts > 1:
+            only(case.equal_steps, "last digits decide on the steps")
+            more["dt"] = case.exact.names["dt"] / parts
+        expected = case.run(**more) if parts > 1 else case.exact
+        only(not expected.failure, "longer steps leap over a limit load")
+        found = case.run(**{**more, **changes})
+        if has_cut(expected, found) and not are_near(found, expected, tolerance):
+            continue
+        assert not found.failure, found.failure
+        return assert_near(differences(found, expected), tolerance)
+    raise AssertionError("steps are cut, however small")
+
+
+def has_cut(*runs):
+    """Whether one of the runs has cut a step."""
+    return any(run.failure or run.solution.parts > len(run.solution) - 1 for run in runs)
+
+
+def are_near(one, other, tolerance):
+    """Whether runs to the same time agree."""
+    if len(one.solution) != len(other.solution):
+        return False
+    return max(differences(one, other).values()) <= tolerance
 
 
 @check
