@@ -335,9 +335,10 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
     """
     size = scene.size
     laws: list[tuple[object, MaterialLaw, Array, Array]] = [
-        (link, link.law.law, np.array([link.law.stiffness]), np.array([1.0 if link.turns else size]))
-        for link in scene.connectors if isinstance(link.law, Spring) and link.law.law is not None
-    ]  # fmt: skip
+        (link, spring.law, np.array([spring.stiffness]), np.array([1.0 if link.turns else size]))
+        for link in scene.connectors
+        if isinstance(spring := link.law, Spring) and spring.law is not None
+    ]
     for beam in scene.beams:
         if (layout := beam.section.layout(None)) is not None:
             first = np.cumsum([0, *(n for _, n in layout.laws)])
