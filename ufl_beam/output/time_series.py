@@ -156,8 +156,8 @@ class XDMF(TimeSeries):
     """Time series for ParaView: all fields of a step on one data set of lines.
 
     At points ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
-    ``velocity`` (m/s) and ``angular velocity`` (rad/s).  In the middle of cells ``N`` (N), ``V`` (N)
-    and ``M`` (N m); where something yields or breaks, also the ``jump`` of the hinge (rad) and the
+    ``velocity`` (m/s) and ``angular velocity`` (rad/s).  In the middle of cells ``N``, ``V``
+    (N) and ``M`` (N m); where something yields or breaks, also the ``jump`` of the hinge (rad) and the
     ``dissipated energy`` (J).  ``part`` is 0 in beams; 1 in lines from the centre of each body to
     its points; 2 along links and springs, where N is the force of what pulls along its line.
 
