@@ -342,12 +342,12 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
     for beam in scene.beams:
         if (layout := beam.section.layout(None)) is not None:
             first = np.cumsum([0, *(n for _, n in layout.laws)])
-            stiffness, strains = (
+            stiffness, of_points = (
                 np.reshape(x, (len(layout.weights), -1))
                 for x in (layout.stiffness, np.abs(layout.strains) @ [1.0, 1.0, 1.0 / size])
             )
             laws += [
-                (beam.name, law, stiffness[k], strains[k])
+                (beam.name, law, stiffness[k], of_points[k])
                 for (law, _), k in zip(layout.laws, first[:-1], strict=True)
             ]
     for owner, law, C, strains in laws:

@@ -76,7 +76,7 @@ class Controllers:
         sampled = [i for i, link in enumerate(self.values) if _sample(link)]
         held[sampled, 1:3] = self._samples
         rows = memory.known_rows("asked", self._numbers, held)
-        self.values.update(zip(self.values, rows[:, 0].tolist(), strict=True))
+        self.values.update(zip(self.values, map(float, rows[:, 0]), strict=True))
         if np.all(rows[:, 3] == t):
             self._samples[:] = rows[sampled, 1:3]
 
