@@ -450,7 +450,7 @@ def test_a_recorder_of_extremes_changes_nothing():
 
 
 def test_the_envelope_of_a_clamped_beam():
-    """[closed] w l²/12 at the clamps in the first order, where means of eight cells say 2/3 of it."""
+    """[closed] w l²/12 at the clamps but for the mesh; means of eight cells say 2/3 of it."""
     beam = ub.Beam((0, 0), (6, 0), STIFF, cells=8)
     supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
     load = ub.LineLoad(beam, force=(0, -1e4), time=growing)
