@@ -192,7 +192,7 @@ figure.savefig(output / "fatigue_storm.png")
 slope_3 = ub.SNCurve(range=71e6, cycles=2e6, slope=3.0)
 foot = spots["windward foot"]
 moments = storm.section_forces_at(left.start)
-stress = foot.stress(moments[:, 0], moments[:, 1], moments[:, 2] + moments[:, 1] * storey / 8)
+stress = foot.stress(moments[:, 0], moments[:, 1], moments[:, 2])
 σ = stress.std()
 counted = fatigue.cycles(foot)
 narrow = counted.count.sum() * (2 * math.sqrt(2) * σ / 71e6) ** 3 * math.gamma(2.5) / 2e6

@@ -207,7 +207,7 @@ with ub.picture((9, 4.8)) as loops:
         ends = np.stack(
             [
                 solution.displacement(place)[:, 0] / length,
-                solution.section_forces_at(place)[:, 0] / side**2,
+                solution.material_at(place).forces[:, 0] / side**2,
             ]
         )
         strain, σ = ((ends[:, 1:] + ends[:, :-1]) / 2)[:, : 5 * 100]

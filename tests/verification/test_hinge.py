@@ -121,7 +121,7 @@ def test_tip_load(law, cells, h):
     at = [16, 32, 48]
     hinge = solution.material_at(beam.start)
     np.testing.assert_allclose(solution.reaction(push)[at, 1], F, rtol=1e-6)
-    np.testing.assert_allclose(solution.section_forces_at(beam.start)[at, 2], M, rtol=1e-6)
+    np.testing.assert_allclose(hinge.forces[at, 2], M, rtol=1e-6)
     np.testing.assert_allclose(hinge.jump[at], openings, rtol=1e-6)
     assert_no_gain(solution.energy)
 
@@ -155,7 +155,8 @@ def test_large_rotations(law):
     clamp = ub.Clamped(beam.start)
     scene = beam.scene(supports=[clamp, push])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / 64, progress=False)
-    hinge, M = solution.material_at(beam.start), solution.section_forces_at(beam.start)[:, 2]
+    hinge = solution.material_at(beam.start)
+    M = hinge.forces[:, 2]
     opens = hinge.jump > 0
     assert opens.sum() > 50
     np.testing.assert_allclose(M[opens], moment(law, hinge.jump[opens]), rtol=1e-9)
@@ -218,7 +219,8 @@ def test_cycles(law, scheme):
     table = ub.Table([0, 1, 2, 3, 4, 5, 6], 0.02 * np.array([0, 1.5, -0.5, -2, 0.5, 2, 8]))
     rho = 0.01 if scheme.dynamic else 0.0
     beam, solution = turned(law(M_U, energy), table, scheme, dt=1 / 100, end=6, rho=rho)
-    hinge, M = solution.material_at(beam.start), solution.section_forces_at(beam.start)[:, 2]
+    hinge = solution.material_at(beam.start)
+    M = hinge.forces[:, 2]
     lost = solution.energy.lost["hinges"]
     assert lost.max() <= energy * (1 + 1e-12)
     assert lost[-1] > 0.9 * energy
@@ -342,7 +344,8 @@ def test_no_snap_back(law, scheme):
     yields = M_U * LENGTH / EI
     energy = steepest(law, 0.8)
     beam, solution = turned(law(M_U, energy), lambda t: 4 * yields * t, scheme, dt=1 / 400, cells=4)
-    hinge, M = solution.material_at(beam.start), solution.section_forces_at(beam.start)[:, 2]
+    hinge = solution.material_at(beam.start)
+    M = hinge.forces[:, 2]
     tolerance = 1e-8 if scheme == ub.Static() else 0.05
     np.testing.assert_allclose(
         M[hinge.jump > 0], moment(law, hinge.jump, energy=energy)[hinge.jump > 0],

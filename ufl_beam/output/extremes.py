@@ -110,6 +110,10 @@ class Extremes(Recorder):
         for extent, values in zip(self._taken, self._state(simulation), strict=True):
             extent.widen(values, simulation.t)
 
+    def close(self) -> None:
+        """End the record; what was reached stays."""
+        self._taken, self._watch = self._extents, None
+
     def _state(self, simulation: StateView) -> tuple[Array, Array]:
         """Section forces of all cells, and the configuration, the same on every process."""
         return simulation.forces_along(self._parts), simulation.share.gather(simulation.q)

@@ -279,9 +279,9 @@ class Simulation(StateView):
             self._loose = require_held(self.equation, self.solver, q1, self._loose)
         if self._branch is not None:
             self._branch.accept(self.equation.force)
-        self.cell_forces.accept()
         for term in self.terms:
             term.accept(q1, s)
+        self.cell_forces.accept()
         self.supports.enter(s)
         self.supports.accept(s)
         self.prediction.accept(self.q, q1, step.dt)

@@ -88,7 +88,7 @@ class FrameForces(LoadTerm):
         self._S, self._G, self._pull, self._turn = S.data, G.data, Product(S), Product(G)
         self._from_centre, self._fields = _positions(fields, frame.about), fields
         self._rate, self._double = frame.rate**2, 2 * frame.rate * has_inertia(scheme)
-        self._accelerations = np.zeros(share.size)
+        self._translations, self._accelerations = share.translations(), np.zeros(share.size)
         self._place = ffi.new("double *[1]", [doubles(self._accelerations)])
         self._A, self._share_of_end, self._grown = A, scheme.load_weight, 0.0
 
@@ -108,7 +108,7 @@ class FrameForces(LoadTerm):
         a: Array = -growth * self._rate * x
         a[self._fields.share.rotations()] = 0.0
         if self._double and isinstance(change, np.ndarray):
-            u, v = self._fields.share.translations()
+            u, v = self._translations
             a[u] -= self._double * change[v] / self._dt
             a[v] += self._double * change[u] / self._dt
         ffi.memmove(self._place[0], doubles(a), a.nbytes)
@@ -123,9 +123,7 @@ class FrameForces(LoadTerm):
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract centrifugal and Coriolis forces from the residual."""
         q: Array = self._q0 + self._share_of_end * (q1 - self._q0)
-        x: Array = self._from_centre + q
-        self._put_accelerations(x, self._growth, q1 - self._q0)
-        self._force = self._growth * self._pull(x)
+        self._force = self._growth * self._pull(self._from_centre + q)
         r -= self._force
         r += self._turn(q1 - self._q0) / self._dt
 
@@ -138,6 +136,9 @@ class FrameForces(LoadTerm):
         """Enter the work of the centrifugal forces, and take how much of them acts."""
         self._ledger.supplied["loads"] += float(self._acting(self._before, self._force) @ s)
         self._before, self._grown = self._force, self._growth_at_end
+        change: Array = q1 - self._q0
+        x: Array = self._from_centre + self._q0 + self._share_of_end * change
+        self._put_accelerations(x, self._growth, change)
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step, and how much of them acts."""
