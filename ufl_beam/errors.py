@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import math
 import numbers
 import os
@@ -155,7 +156,8 @@ class TradeoffError(RuntimeError):
 def warn(message: str) -> None:
     """Issue a :class:`ModelWarning` that points at the line of the user's script."""
     level, frame = 1, sys._getframe()
-    library = (PACKAGE, "<string>")  # <string>: methods that ``dataclass`` writes
+    # <string>: methods that ``dataclass`` writes; and decorators of the library
+    library = (PACKAGE, "<string>", contextlib.__file__)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(library):
         level, frame = level + 1, frame.f_back
     warnings.warn(message, ModelWarning, stacklevel=level)

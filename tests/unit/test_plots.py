@@ -19,7 +19,7 @@ import ufl_beam as ub
 from ufl_beam.plotting import films, symbols
 from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT
 from ufl_beam.plotting.scene_layout import Stage
-from ufl_beam.plotting.style import decimal_prefix, number, with_unit
+from ufl_beam.plotting.style import BLUE, RED, decimal_prefix, number, with_unit
 from ufl_beam.plotting.symbols import EDGE, FILLED, support_direction
 
 FIRST = MPI.COMM_WORLD.rank == 0
@@ -331,6 +331,41 @@ def test_extremes_of_beams_of_one_cell():
     times = {"t": (0, 1), "dt": 1, "progress": False}
     run = ub.simulate(scene, ub.Static(), record=extremes, **times)
     assert len(areas_of(ub.plot_extremes(run, extremes, "V"))) == 1
+
+
+def test_envelopes_are_two_diagrams():
+    """Each area has ordinates of one of both, across the axis: none leads from one to the other."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e4, rhoA=1.0, rhoI=0.01)
+    beam = ub.Beam((0, 0), (6, 0), section, cells=8)
+    shake = ub.LineLoad(beam, force=(0.0, 1.0), time=lambda t: math.sin(7 * t))
+    supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
+    scene = ub.Scene([beam], supports=supports, loads=[shake])
+    extremes = ub.Extremes()
+    times = {"t": (0, 1), "dt": 0.05, "progress": False}
+    run = ub.simulate(scene, ub.Midpoint(), record=extremes, **times)
+    found = extremes.section_forces(beam)
+    axes = ub.plot_extremes(run, extremes, "V").axes[0]
+    x = 6 * run.diagram(beam, points=2).s
+    scale = None
+    drawn = [area for color in (RED, BLUE) for area in outlines_of(axes, color)]
+    assert drawn
+    for outline in drawn:
+        tips = outline[np.abs(outline[:, 1]) > 1e-12]
+        for at, ordinate in tips:
+            near = np.isclose(x, at)
+            assert near.any()
+            values = np.concatenate([found.low[near, 1], found.high[near, 1]])
+            scale = scale or ordinate / values[np.argmax(values * np.sign(ordinate))]
+            assert np.isclose(scale * values, ordinate, rtol=1e-9).any()
+        # From the lowest to the largest x along the tips, and back along the axis
+        assert (np.diff(tips[:, 0]) >= 0).all()
+
+
+def outlines_of(axes, color):
+    return [
+        path.vertices[:-1]
+        for one in axes.collections if one.get_gid() == color for path in one.get_paths()
+    ]  # fmt: skip
 
 
 def test_no_diagram_where_there_is_no_force(swing):

@@ -64,8 +64,9 @@ def test_a_work_with_velocities_acts_in_statics_as_dampers_do(scheme):
 
 def test_a_static_run_warns_of_a_work_with_velocities():
     scene = pushed(works=[drag(1.0)])
-    with pytest.warns(ub.ModelWarning, match=r"'wind' takes v, which is \(q1 - q0\)/dt"):
+    with pytest.warns(ub.ModelWarning, match=r"'wind' takes v, which is \(q1 - q0\)/dt") as told:
         ub.simulate(scene, ub.Static(), t=(0, 0.1), dt=0.1, **QUIET)
+    assert told[0].filename == __file__
     ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1, **QUIET)  # warnings are errors here
     push = ub.VirtualWork("push", lambda q, w: (1 + q[1]) * w[1])
     ub.simulate(pushed(works=[push]), ub.Static(), t=(0, 0.1), dt=0.1, **QUIET)

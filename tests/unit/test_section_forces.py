@@ -360,3 +360,89 @@ def test_two_supports_that_hold_the_same_are_refused(one, other, held):
     b = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="b")
     with pytest.raises(ub.SceneError, match=f"supports in conflict: .* both hold {held}; remove"):
         ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)], supports=[one(a.end), other(b.start)])
+
+
+# -- extremes --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("points", [2, 3])
+@pytest.mark.parametrize("actions", ["line", "virtual work", "frame"])
+@pytest.mark.parametrize("kind", ["elastic", "yielding"])
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(), ub.GeneralizedAlpha()], ids=str)
+def test_extremes_are_those_of_the_diagrams_of_all_steps(scheme, actions, kind, points):
+    """In C, in Python, and where a step is taken by each; motions to the last digit."""
+    if actions == "frame" and scheme == ub.GeneralizedAlpha():
+        pytest.skip("the scheme refuses it")
+    scene, _ = two_beams(actions, kind)
+    require_extremes(scene, scheme, points)
+
+
+def require_extremes(scene, scheme, points, **options):
+    extremes = ub.Extremes(points)
+    times = {"t": (0, 0.4), "dt": 0.02, "progress": False, **options}
+    run = ub.simulate(scene, scheme, record=extremes, **times)
+    assert len(run) == 21
+    for beam in scene.beams:
+        kept = range(len(run))
+        values = np.array([np.transpose(run.diagram(beam, n, points=points)[1:]) for n in kept])
+        found, size = extremes.section_forces(beam), np.abs(values).max()
+        assert found.low.shape == values.shape[1:]
+        assert np.abs(found.low - values.min(axis=0)).max() < ROUND_OFF * size
+        assert np.abs(found.high - values.max(axis=0)).max() < ROUND_OFF * size
+        for extreme, when in ((found.low, found.time_low), (found.high, found.time_high)):
+            at = np.abs(run.times - when[..., None]).argmin(axis=-1)
+            reached = np.take_along_axis(values, at[None], axis=0)[0]
+            assert np.abs(reached - extreme).max() < ROUND_OFF * size
+        motion = run.q[:, run.grid.nodes_of(beam)[1]]
+        assert np.array_equal(extremes.displacement(beam).low, motion.min(axis=0))
+        assert np.array_equal(extremes.displacement(beam).high, motion.max(axis=0))
+
+
+@pytest.mark.parametrize("cells", [4, 8, 16, 19, 150])
+@pytest.mark.parametrize("degree", [1, 3])
+def test_extremes_of_any_number_of_cells(cells, degree):
+    """Batches that are full and not, and more cells than C takes in at once."""
+    beam = ub.Beam.arc((0, 0), 2.0, (0.0, 1.0), SECTION, cells=cells)
+    load = ub.LineLoad(beam, force=(1.0, -3.0), moment=0.2, time=lambda t: math.sin(9 * t))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load, ub.Gravity()])
+    require_extremes(scene, ub.Midpoint(), 3, mesh=ub.Mesh(degree=degree))
+    require_extremes(scene, ub.Static(), 2, mesh=ub.Mesh(degree=degree))
+
+
+def test_extremes_of_paths_and_of_the_reference_path():
+    scene, _ = two_beams("line")
+    extremes = ub.Extremes()
+    path = ub.follow(scene, ub.LoadControl(0.05), steps=4, record=extremes)
+    beam = scene.beams[0]
+    M = np.array([path.diagram(beam, n, points=2).M for n in range(len(path))])
+    found = extremes.section_forces(beam)
+    assert np.abs(found.low[:, 2] - M.min(axis=0)).max() < ROUND_OFF * np.abs(M).max()
+    require_extremes(scene, ub.Midpoint(), 2, newton=ub.Newton(reference=True))
+
+
+def test_a_recorder_of_extremes_changes_nothing():
+    """Nor does it bring Python into the steps."""
+    scene, _ = two_beams("weight")
+    times = {"t": (0, 0.4), "dt": 0.01, "progress": False}
+    alone = ub.simulate(scene, ub.Midpoint(), **times)
+    watched = ub.simulate(scene, ub.Midpoint(), record=[ub.Extremes(), ub.Extremes(3)], **times)
+    assert np.array_equal(alone.q, watched.q)
+    assert np.array_equal(alone.v, watched.v)
+    with pytest.raises(ub.SceneError, match="Extremes: points = 1 "):
+        ub.Extremes(1)
+
+
+def test_the_envelope_of_a_clamped_beam():
+    """[closed] w l²/12 at the clamps; the means of eight cells are 2/3 of it there."""
+    beam = ub.Beam((0, 0), (6, 0), STIFF, cells=8)
+    supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
+    load = ub.LineLoad(beam, force=(0, -1e4), time=growing)
+    scene = ub.Scene([beam], supports=supports, loads=[load])
+    extremes = ub.Extremes()
+    options = {"t": (0, 1), "dt": 0.25, "record": extremes, "progress": False}
+    run = ub.simulate(scene, ub.Static(), **options)
+    found = extremes.section_forces(beam)
+    # Linear cells err by h²/l², 1/64 [closed]; the reaction has the same error
+    assert found.low[0, 2] == pytest.approx(-run.reaction(supports[0])[-1, 2], rel=1e-12)
+    assert found.low[:, 2].min() == pytest.approx(-30e3 * (1 - 1 / 64), rel=1e-6)
+    assert found.high[:, 2].max() == pytest.approx(15e3 * (1 + 2 / 64), rel=1e-6)

@@ -33,6 +33,9 @@ from ufl_beam.model.supports import Support
 INSTEAD = "Add supports or joints, or run dynamics (Midpoint)"
 """What to do where statics has no unique answer."""
 
+LAST_DIGITS = 1e-12
+"""Strain, or motion over the size of the scene, whose stress is round-off."""
+
 DENSE = 90
 """Up to this number of unknowns the null space comes from a dense decomposition."""
 
@@ -330,20 +333,25 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
 
     The undeformed scene is no state of equilibrium then; ``what`` begins with it.
     """
-    laws: list[tuple[object, MaterialLaw, tuple[float, ...]]] = [
-        (link, link.law.law, (link.law.stiffness,))
-        for link in scene.connectors if isinstance(link.law, Spring) and link.law.law is not None
-    ]  # fmt: skip
+    size = scene.size
+    laws: list[tuple[object, MaterialLaw, Array, Array]] = [
+        (link, spring.law, np.array([spring.stiffness]), np.array([1.0 if link.turns else size]))
+        for link in scene.connectors
+        if isinstance(spring := link.law, Spring) and spring.law is not None
+    ]
     for beam in scene.beams:
         if (layout := beam.section.layout(None)) is not None:
             first = np.cumsum([0, *(n for _, n in layout.laws)])
-            of_points = np.reshape(layout.stiffness, (len(layout.weights), -1))
+            stiffness, strains = (
+                np.reshape(x, (len(layout.weights), -1))
+                for x in (layout.stiffness, np.abs(layout.strains) @ [1.0, 1.0, 1.0 / size])
+            )
             laws += [
-                (beam.name, law, tuple(of_points[k]))
+                (beam.name, law, stiffness[k], strains[k])
                 for (law, _), k in zip(layout.laws, first[:-1], strict=True)
             ]
-    for owner, law, C in laws:
-        if law.stressed(C):
+    for owner, law, C, strains in laws:
+        if law.stressed(tuple(C), tuple(LAST_DIGITS * strains)):
             raise SceneError(
                 f"{what}: {type(law).__name__} of {owner} bears a stress at no strain, so that "
                 f"the undeformed scene is not in equilibrium; {instead}"

@@ -52,7 +52,7 @@ class PointLoad(LoadAtPlace):
         >>> loaded = ub.Scene([beam], supports=scene.supports, loads=[load])
         >>> run = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=0.5)
         >>> print(run.section_forces_at(beam.start)[1].round())  # N, V, M at t = 0.5 s
-        [    312. -100000. -174990.]
+        [      0. -100000. -199989.]
     """
 
     __repr__ = one_line

@@ -138,11 +138,12 @@ class MaterialLaw(ABC):
         """True if laws of this class may bear a stress at no strain; numbers do not matter."""
         return _prestressed(type(self), tuple(vars(self)))
 
-    def stressed(self, C: tuple[Values, ...]) -> bool:
-        """Return whether the law with its numbers bears a stress at no strain."""
+    def stressed(self, C: tuple[Values, ...], least: tuple[Values, ...]) -> bool:
+        """Return whether the law bears more stress at no strain than ``C`` times ``least``."""
         numbers = self.numbers(self.as_argument(C))
         known = {n: 1.0 if hasattr(x, "draw") else x for n, x in numbers.items()}
-        return _bears(self.of(self.as_argument(C), known))
+        stresses = _at_no_strain(self.of(self.as_argument(C), known))
+        return any(np.any(abs(σ) > c * e) for σ, c, e in zip(stresses, C, least, strict=True))
 
     @property
     def must_dissipate(self) -> bool:
@@ -163,13 +164,15 @@ def _prestressed(kind: type[MaterialLaw], numbers: tuple[str, ...]) -> bool:
     """Whether a law whose numbers have nothing in common bears a stress at no strain."""
     law = object.__new__(kind)
     vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(numbers)})
-    return _bears(law.of(law.as_argument(tuple(1.0 for _ in law.resultants or "x")), {}))
+    one = law.as_argument(tuple(1.0 for _ in law.resultants or "x"))
+    return any(np.any(σ != 0) for σ in _at_no_strain(law.of(one, {})))
 
 
-def _bears(law: MaterialLaw) -> bool:
+def _at_no_strain(law: MaterialLaw) -> tuple[Values, ...]:
+    """Stresses at no strain."""
     none = law.as_argument(tuple(np.zeros(1) for _ in law.resultants or "x"))
     with np.errstate(all="ignore"):
         stress = law.stress(
             none, State({n: np.full(1, float(x)) for n, x in law.variables.items()})
         )
-    return any(bool(np.any(σ != 0)) for σ in law.as_tuple(stress))
+    return law.as_tuple(stress)

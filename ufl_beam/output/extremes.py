@@ -79,8 +79,8 @@ class Extremes(Recorder):
         >>> extremes = ub.Extremes()
         >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
         >>> M = extremes.section_forces(beam).low[:, 2]  # N m
-        >>> print(M.round(-3))  # at both ends of the four cells
-        [-200000. -150000. -150000. -100000. -100000.  -50000.  -50000.       0.]
+        >>> print(M[:6].round(-3))  # at both ends of three of the four cells
+        [-195000. -146000. -146000.  -98000.  -98000.  -49000.]
     """
 
     def __init__(self, points: int = 2) -> None:

@@ -156,10 +156,10 @@ class XDMF(TimeSeries):
     """Time series for ParaView: all fields of a step on one data set of lines.
 
     At points ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
-    ``velocity`` (m/s) and ``angular velocity`` (rad/s).  In cells ``N``, ``V`` (N), ``M`` (N m);
-    where something yields or breaks, also the ``jump`` of the hinge (rad) and the ``dissipated
-    energy`` (J).  ``part`` is 0 in beams; 1 in lines from the centre of each body to its points; 2
-    along links and springs, where N is the force of what pulls along its line.
+    ``velocity`` (m/s) and ``angular velocity`` (rad/s).  In the middle of cells ``N``, ``V``
+    (N) and ``M`` (N m); where something yields or breaks, also the ``jump`` of the hinge (rad) and
+    the ``dissipated energy`` (J).  ``part`` is 0 in beams; 1 in lines from the centre of each body
+    to its points; 2 along links and springs, where N is the force of what pulls along its line.
 
     The file is valid and has all complete steps at any moment, also after a kill.  A step costs the
     same however many there are.  On a path the time is the load factor.

@@ -78,27 +78,25 @@ class Solids:
         return np.array([[*low, -half], [*high, half]])
 
     def values(self, n: int) -> Array:
-        """Values of the colours in all cells or, of rotations, at all vertices of beams."""
+        """Values of the colours at both ends of all cells; (num_cells, 2)."""
         solution, grid = self.solution, self.solution.grid
         if self.color == "rotation":
-            return np.asarray(solution.q[n][grid.dofs[: grid.cells.max(initial=-1) + 1, 2]])
+            return np.asarray(solution.q[n][grid.dofs[grid.cells, 2]])
         index = list(RESULTANTS).index(self.color)
-        forces = [solution.section_forces(beam, n)[:, index] for beam in solution.scene.beams]
-        return np.concatenate([np.empty(0), *forces])
+        beams = solution.scene.beams
+        forces = [solution.diagram(beam, n, points=2)[1 + index] for beam in beams]
+        return np.concatenate([np.empty(0), *forces]).reshape(-1, 2)
 
     def beams(self, n: int, pose: Pose, factor: float) -> Any:
         """Make a hexahedron for each cell of the beams, with values that are the colours."""
         from pyvista import CellType, UnstructuredGrid
 
         corners = 4 * self.solution.grid.cells[:, :, None] + np.arange(4)  # of start and end
+        points = self._corners(n, pose.nodes)[corners.ravel()]  # of each cell: colours may jump
         mesh = UnstructuredGrid(
-            {CellType.HEXAHEDRON: corners.reshape(-1, 8)}, self._corners(n, pose.nodes)
+            {CellType.HEXAHEDRON: np.arange(len(points)).reshape(-1, 8)}, points
         )
-        values = self.values(n) / factor
-        if self.color == "rotation":
-            mesh.point_data["values"] = np.repeat(values, 4)
-        else:
-            mesh.cell_data["values"] = values
+        mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
         return mesh
 
     def _corners(self, n: int, nodes: Array) -> Array:

@@ -21,7 +21,7 @@ class Diagram(NamedTuple):
     Example:
         >>> diagram = solution.diagram(beam, points=2)  # at both ends of the four cells
         >>> print(diagram.s[:4], diagram.M[:4].round(-3))
-        [0.   0.25 0.25 0.5 ] [-200000. -150000. -150000. -100000.]
+        [0.   0.25 0.25 0.5 ] [-195000. -146000. -146000.  -98000.]
     """
 
     s: Array

@@ -70,7 +70,7 @@ class Solution(Rich):
         >>> print((1e3 * solution.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad, at t = 1 s
         [ -0.1 -18.9 -14.3]
         >>> print(solution.section_forces(beam)[:, 2].round(-3))  # M in the cells; N m
-        [-175000. -125000.  -75000.  -25000.]
+        [-171000. -122000.  -73000.  -24000.]
         >>> print(solution.reaction(scene.supports[0])[-1, 1:].round(-4))  # N, N m
         [100000. 200000.]
     """

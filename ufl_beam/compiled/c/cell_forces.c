@@ -40,12 +40,12 @@ static inline void add_numbers(const cell_forces *c, const int nodes, const int 
 #undef OUT
 }
 
-/* Where the numbers of cells are: `row` from one number to the next; where cells are in batches, as many
- * as `lanes`, `batch` from one cell's batch to the next over that; else 1. `first` of them are asked for. */
+/* Where the numbers of cells are, in batches of `lanes`: `row` from one number to the next, `batch` from a
+ * batch to the next over its cells. `first` of them are asked for. */
 typedef struct {
   double *out;
   size_t row, batch;
-  int first;
+  int lanes, first;
 } places;
 
 /* The same of some cells of a form, whose forces are in batches. */
@@ -71,7 +71,7 @@ static void add_some(const cell_forces *c, int lanes, int number, int kind, doub
  * the accepted step. */
 static void add_forms(const cell_forces *c, int now, int first, int number, places p)
 {
-  const int lanes = (int)(p.row == (size_t)c->cells ? 1 : p.row);
+  const int lanes = p.lanes;
   for (int k = 0; k < c->forces; ++k) {
     const force_in_cells *f = c->force + k;
     const int whole = f->cell || number == c->cells;
@@ -96,7 +96,7 @@ static void add_forms(const cell_forces *c, int now, int first, int number, plac
 void find_cell_forces(const cell_forces *c, int now, double *out)
 {
   const size_t size = (size_t)CELL_NUMBERS * c->cells * sizeof *out;
-  const places p = {out, c->cells, 1, CELL_NUMBERS};
+  const places p = {out, c->cells, 1, 1, CELL_NUMBERS};
   if (c->given) {
     memcpy(out, c->given, size);
     return;
@@ -147,7 +147,7 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
   if (!in_order) find_cell_forces(w->forces, now, w->numbers);
   for (int first = 0; first < c->number; first += SOME) {
     cells some = some_cells(c, first);
-    const places p = {some.w + w->at_numbers * n, n, c->width, w->first};
+    const places p = {some.w + w->at_numbers * n, n, c->width, n, w->first};
     const int all = (some.number + n - 1) / n * n;
     if (in_order) {
       for (int k = 0; k < all; k += n)

@@ -133,8 +133,8 @@ static double own_dissipation(const points *p, const double *w)
 {
   double s[2];
   ask(p->own, w, 2, s);
-  const double part = s[0] / s[1];
-  return isfinite(part) ? part : 0;
+  const double share = s[0] / s[1];
+  return isfinite(share) ? share : 0;
 }
 
 /* Number of the point that gives most energy in the latest response, or -1; see Points. */
@@ -143,8 +143,8 @@ int gives_energy(const points *p)
   double least = -NO_ENERGY;
   int worst = -1;
   for (int i = 0; p->own && i < p->cells * p->of_cell; ++i) {
-    const double part = own_dissipation(p, p->w + i * p->width);
-    if (part < least) least = part, worst = i;
+    const double share = own_dissipation(p, p->w + i * p->width);
+    if (share < least) least = share, worst = i;
   }
   return worst;
 }
