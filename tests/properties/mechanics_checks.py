@@ -152,9 +152,9 @@ def modes(case):
     """
     words = case.combination
     only(words.has("scheme = ub.Static(") and words.elastic, "not elastic, or no equilibrium at T")
-    only(not case.whole.failure, "a step fails")
+    only(not case.exact.failure, "a step fails")
     only(not words.has("Prescribed", "Motor", "Actuator", "VirtualWork", "'field'"), "driven")
-    names, state = case.whole.names, case.whole.solution
+    names, state = case.exact.names, case.exact.solution
     scene, t0 = names["scene"], state.times[-1]
     held = [
         load if isinstance(load, ub.RotatingFrame)
