@@ -102,6 +102,13 @@ class Snapshots(NamedTuple):
                 yield None if field is None else of(field)
 
 
+class Later(NamedTuple):
+    """States that are made of what was kept of them once somebody asks."""
+
+    t: Array
+    make: Callable[[], Snapshots]
+
+
 class Blocks:
     """An array in blocks, one below the other; indices select from all of it what is asked for."""
 

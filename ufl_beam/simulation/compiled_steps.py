@@ -9,7 +9,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index, Snapshots
+from ufl_beam.arrays import Array, Index, Later, Snapshots
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.tangents import Tangents
@@ -208,14 +208,15 @@ class CompiledSteps:
         """The configuration at the beginning of the last step, a new array."""
         return self._copy(self.c.prediction.q_before)
 
-    def now(self, state: Stepping) -> Snapshots:
+    def now(self, state: Stepping) -> Later:
         """The state that C has."""
         kept = self._rows or self._kept(state.q)
         rows = np.zeros((2, kept.width))
         if self._begun:
-            rows[0, kept.q] = self.q_before()
+            ffi.memmove(doubles(rows[0, kept.q]), self.c.prediction.q_before, self._bytes)
         lib.keep_state(self.c, doubles(rows[1]))
-        return kept.states(np.array([self.c.t]), rows, self._begun)
+        t = np.array([self.c.t])
+        return Later(t, partial(kept.states, t, rows, self._begun))
 
     def _begins(self, state: Stepping) -> bool:
         """Return whether the next step is like those that follow."""

@@ -13,7 +13,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Blocks, Index, Snapshot, Snapshots
+from ufl_beam.arrays import Array, Blocks, Index, Later, Snapshot, Snapshots
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
@@ -63,17 +63,26 @@ class KeptStates:
 
     def __init__(self, grid: Grid) -> None:
         self._grid = grid
-        self._blocks: list[Snapshots] = []
+        self._made: list[Snapshots] = []
+        self._later: list[Snapshots | Later] = []  # that come after those
         self._ends: list[int] = []  # number of states up to the end of each block
         self.of_record: Callable[[Array, Array, Array], Array] | None = None
         self._rule: tuple[float, ForcesAlongCells] | None = None
         self._latest: tuple[int, Snapshot] | None = None  # state that was asked for last
         self._computed: tuple[Snapshot, float, int, Array] | None = None  # forces asked for last
 
-    def append(self, states: Snapshots) -> None:
+    @property
+    def _blocks(self) -> list[Snapshots]:
+        """All states."""
+        for one in self._later:
+            self._made.append(one.make() if isinstance(one, Later) else one)
+        self._later.clear()
+        return self._made
+
+    def append(self, states: Snapshots | Later) -> None:
         """Append states that come after those here."""
         if len(states.t):
-            self._blocks.append(states)
+            self._later.append(states)
             self._ends.append(len(self) + len(states.t))
 
     def part(self, first: int, last: int) -> KeptStates:
@@ -92,7 +101,7 @@ class KeptStates:
         """Forget every other state; the first one stays."""
         first = [end - len(block.t) for end, block in zip(self._ends, self._blocks, strict=True)]
         blocks = [b.some(slice(k % 2, None, 2)) for k, b in zip(first, self._blocks, strict=True)]
-        self._blocks, self._ends, self._latest = [], [], None
+        self._made, self._later, self._ends, self._latest = [], [], [], None
         for block in blocks:
             self.append(block)
 
@@ -207,12 +216,14 @@ class KeptStates:
         nothing: dict[str, Array] = {
             name: np.zeros([max(length, 0) for length in shape]) for name, shape in shapes.items()
         }
+        # Files of earlier versions have no forces of cells.
+        shapes["cells"] = n, lib.CELL_NUMBERS, len(grid.cells)
+        nothing["cells"] = np.broadcast_to(np.nan, shapes["cells"])
         found = {**nothing, **{name: values for name, values in arrays.items() if len(values)}}
         ledger = tuple(below(f"{kind}: ", found) for kind in LEDGER)
-        self._blocks, self._ends, self._latest = [], [], None
+        self._made, self._later, self._ends, self._latest = [], [], [], None
         if n:
-            shapes |= {"q": (n, grid.size), "cells": (n, lib.CELL_NUMBERS, len(grid.cells))}
-            shapes |= {"v": (n, grid.size)} if "v" in found else {}
+            shapes |= {"q": (n, grid.size)} | ({"v": (n, grid.size)} if "v" in found else {})
             shapes |= {"before": (-1, grid.size)} if "before" in found else {}
             require_arrays(found, shapes)
             if 1 == len(found.get("before", ())) < n:

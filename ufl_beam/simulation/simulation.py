@@ -11,7 +11,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Snapshots
+from ufl_beam.arrays import Array, Later, Snapshots
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.discretization.function_spaces import CompiledFields
 from ufl_beam.discretization.model_warnings import warn_of_jumps
@@ -362,7 +362,7 @@ class Simulation(StateView):
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
         if self._in_c is not None and self._in_c.ahead:
-            now = self._in_c.now(self)
+            now: Later | Snapshots = self._in_c.now(self)
         else:
             now = Snapshots.of(self.gather())
         self.solution.keep(now, self.parts, self.iterations)

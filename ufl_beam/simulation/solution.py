@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Snapshots
+from ufl_beam.arrays import Array, Later, Snapshots
 from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
@@ -87,7 +87,7 @@ class Solution(Rich):
         self.between, self.scheme = 1.0, None
         self._kept = KeptStates(grid)
 
-    def keep(self, states: Snapshots, parts: int, iterations: int) -> None:
+    def keep(self, states: Snapshots | Later, parts: int, iterations: int) -> None:
         """Append states of a run, up to the last of which so many were done."""
         self._kept.append(states)
         self.parts, self.iterations = parts, iterations
