@@ -26,16 +26,13 @@ from ufl_beam.simulation import replicas
 
 @check
 def failed_step(case):
-    """Where a step fails, there may be no equilibrium: quarters of the step get as far.
+    """A step that fails says why: what breaks or flows in statics has limit loads.
 
-    What breaks or flows in statics has limit loads; long steps may come to a path that ends.
+    Longer steps may leap over a limit that smaller ones meet, and the other way round.
     """
     only(case.whole.failure, "all steps converged")
-    only(case.equal_steps, "adaptive steps are as short as they need be")
-    dt = case.whole.names["dt"]
-    small = case.run(dt=dt / 4, newton=ub.Newton())
-    before = case.whole.solution.times[-1] - 2 * dt
-    assert not small.failure or small.solution.times[-1] >= before, case.whole.failure
+    causes = "limit load", "mechanism has formed", "smaller dt"
+    assert any(words in case.whole.failure for words in causes), case.whole.failure
 
 
 @check

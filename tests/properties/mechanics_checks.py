@@ -147,7 +147,7 @@ def modes(case):
     """Modes about a static state are those of the motion after a small step of a load.
 
     With s dt = 2 (z - 1)/(z + 1) in the midpoint rule, all states lie in the span of zⁿ of all
-    modes.  Ten are taken: the first left out has about 1/100 of the first amplitude, squared
+    modes.  Twenty are taken: those left out have less than 1/100 of the first amplitude, squared
     frequencies growing as n⁴ in beams and as n² in bars.
     """
     words = case.combination
@@ -162,7 +162,7 @@ def modes(case):
         for load in scene.loads
     ]  # fmt: skip
     still = replace(scene, loads=held)
-    shapes = ub.modes(still, 10, at=state)
+    shapes = ub.modes(still, 20, at=state)
     period = 2 * math.pi / shapes.omega[0]
     place = max((b.at(s) for b in scene.beams for s in (0.5, 1.0)), key=lambda p: _way(shapes, p))
     push = ub.PointLoad(place, force=1e-5 * 100 * np.array([0.6, 0.8]), time=lambda t: 1.0)
