@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+from ufl_beam.arrays import Later
 from tests.unit.laws_of_ones_own import Dashpot, PowerLaw
 from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
 from ufl_beam.simulation.solution import Solution
@@ -77,6 +78,7 @@ def falling(after, entry="plastic"):
     keep = Solution.keep
 
     def keep_less(self, states, parts, iterations):
+        states = states.make() if isinstance(states, Later) else states
         late = states.t > after
         states.entries[2][entry][late] -= FALL
         states.material[late, 0:1, 5 if entry == "plastic" else 6] -= FALL
