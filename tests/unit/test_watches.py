@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.arrays import Later
 from tests.unit.laws_of_ones_own import Dashpot, PowerLaw
+from ufl_beam.arrays import Later
 from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms import connector_laws
