@@ -10,6 +10,8 @@ from typing import Any
 
 from petsc4py import PETSc
 
+import numpy as np
+
 from ufl_beam.arrays import Array
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import ffi, fill, give_back_memory, lib, loop, opaque, petsc
@@ -155,6 +157,7 @@ class Solver:
 
     # -- the calls -----------------------------------------------------------------------------
 
+    @np.errstate(over="ignore", invalid="ignore")  # of iterates that diverge
     def solve(self, guess: Array, loads: list[Array], like_last: bool = False) -> Array:
         """Find the configuration from ``guess``; local values, ghosts included; a new array.
 
