@@ -2,9 +2,11 @@
 """Viscous forces in static runs, and the ledger of a run that another one goes on from."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from laws_of_ones_own import Dashpot
 
 import ufl_beam as ub
 
@@ -145,3 +147,39 @@ def test_the_work_of_drag_in_the_first_step_of_a_moving_scene():
     scene = ub.Scene([bar], initial=[flying], works=[drag(0.1)])
     run = ub.simulate(scene, ub.Newmark(), t=(0, 0.02), dt=0.01, **QUIET)
     assert np.diff(run.energy["wind"]) == pytest.approx(-0.1 * 2.0**2 * 0.01, rel=5e-3)
+
+
+def test_a_pin_with_friction_sticks_in_two_runs_where_it_sticks_in_one():
+    """The force of the guess, which differs after `start=`, does not choose between branches.
+
+    Found by a random combination: the pin sticks at t = 0.0808 s in a run from the beginning.
+    """
+    section = ub.Section(EA=1e4, GA=4e3, EI=100.0, rhoA=1.0, rhoI=0.01)
+    creeps = replace(section, bending=Dashpot(6.368))
+    left = ub.Beam((0.0, 0.0), (0.1, 1.0), creeps, cells=4)
+    roof = ub.Beam((0.1, 1.0), (1.0, 1.1), section, cells=2)
+    right = ub.Beam((1.0, 1.1), (1.1, 0.0), section, cells=3)
+    pin = ub.Revolute(left.end, roof.start, measured=True)
+    rubs = ub.Turn(left.end, roof.start, ub.Coulomb(0.1168, coefficient=0.02, joint=pin))
+    stiffens = ub.ForceLaw(lambda motion, rate: 123 * motion + 2329 * motion**3)
+    spring = ub.Turn(ub.ground(0, 0), roof.at(0.5), stiffens)
+    loads = [
+        ub.PointLoad(roof.end, (-6.136, 5.109), time=ub.Table([0, 0.05, 0.15], [0, 0.703, 1])),
+        ub.FollowerLoad(roof.end, (3.027, -7.783), moment=-1.204),
+        ub.PointLoad(roof.at(0.5), moment=-3.415, time=ub.ramp(0.06103)),
+    ]
+    scene = ub.Scene(
+        [left, roof, right], [pin, ub.Rigid(roof.end, right.start)],
+        [ub.Clamped(left.start), ub.Pinned(right.end)], loads, connectors=[spring, rubs],
+    )  # fmt: skip
+    tight = ub.Newton(rtol=1e-12)
+
+    def states(t, **more):
+        return ub.simulate(scene, ub.Midpoint(), t=t, dt=0.15 / 13, newton=tight, **more)
+
+    whole, middle = states((0.0, 0.15)), 0.15 * 6 / 13
+    first = states((0.0, middle))
+    second = states((middle, 0.15), start=first)
+    force = whole.connector(rubs).force
+    assert np.ptp(force[6:]) > 0.1  # N m; it sticks and slides
+    np.testing.assert_allclose(second.connector(rubs).force, force[6:], atol=1e-8)

@@ -181,6 +181,7 @@ class _Rubbing(Response):
         """Slip as before the step; an attempt that failed tells nothing."""
         self._slip = self._accepted
         self._against = np.zeros(len(self._links), dtype=bool)
+        self._guessed = True
 
     def accept(self, e1: Array, work: float) -> None:
         super().accept(e1, work)
@@ -193,7 +194,10 @@ class _Rubbing(Response):
         back = ~stuck & (self._slip * step < -self._tiny)
         over = stuck & (np.abs(λ) > self._limit * (1 + 1e-12))
         # Coming to rest must not give energy; if it did, the place is held at once in this step.
-        self._against |= stuck & (λ * self._way < 0)
+        # The force of the guess does not decide this: it belongs to another motion.
+        if not self._guessed:
+            self._against |= stuck & (λ * self._way < 0)
+        self._guessed = False
         self._slip = np.where(back, 0.0, np.where(over, np.sign(λ), self._slip))
         sticks = (self._slip == 0) & (self._limit > 0)
         rest = self._e0 + np.where(self._against, 0.0, self._way)
