@@ -38,6 +38,9 @@ extern "Python" void add_in_python(void *self, const double *q, double *out);
 extern "Python" double missed_in_python(void *self, const double *q, const double *r, double scale,
                                         double moved);
 extern "Python" double time_in_python(void *handle, double t);
+extern "Python" void phase_in_python(void *handle, const time_step *step, const double *q1,
+                                     const double *s);
+extern "Python" void change_in_python(void *handle, const double *q1, energy_change *sum);
 extern "Python" int numbers_in_python(void *handle, scheme_numbers *numbers);
 extern "Python" int open_in_python(void *handle, int times);
 extern "Python" void close_in_python(void *handle);

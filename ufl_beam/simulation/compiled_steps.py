@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Any, NamedTuple, Protocol
 
@@ -29,7 +29,7 @@ from ufl_beam.terms.follower_loads import FollowerLoads
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import Openings
-from ufl_beam.terms.phases import Phases, TimeFunctions
+from ufl_beam.terms.phases import Phases, Callbacks
 from ufl_beam.terms.rates_in_c import V
 
 ROOM = 2**20
@@ -68,6 +68,12 @@ class Stepping(Protocol):
     def solution(self) -> Keeping:
         """States that were kept."""
 
+    def ask(self) -> None:
+        """Ask controllers and friction for their forces and limits in the next step."""
+
+    def judge(self, q1: Array, t: float, dt: float) -> None:
+        """Warn of forces that alternate."""
+
 
 class CompiledSteps:
     """Steps of a scene in C; see march.c.
@@ -82,13 +88,14 @@ class CompiledSteps:
     def __init__(
         self, equation: StepEquation, solver: Solver, ledger: Ledger, inertia: Inertia | None,
         path: StaticPath | None, openings: Openings | None, largest_turn: float,
-        phases: list[Phases], times: TimeFunctions, whole: tuple[float, float, float],
+        phases: list[Phases], callbacks: Callbacks, whole: tuple[float, float, float],
         turns: tuple[bool, bool], applies_loads: bool, support_dofs: Index, cell_forces: CellForces,
-        begun: bool,
+        begun: bool, asked: tuple[bool, bool, Callable[[float, float], float] | None],
     ) -> None:  # fmt: skip
         self._equation, self._solver, self._inertia, self._path = equation, solver, inertia, path
-        self._phases, self._times, self.ahead = phases, times, False
+        self._phases, self._callbacks, self.ahead = phases, callbacks, False
         self._applies_loads, self._begun = applies_loads, begun
+        asks, watches, stops = asked
         share = equation.share
         self._space, rotations = np.zeros((2, share.size)), share.rotations()
         limited, half_tangents = (rotations[: len(rotations) * has] for has in turns)
@@ -106,7 +113,7 @@ class CompiledSteps:
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
             loads=dead, follower_loads=following,
-            supports=equation.supports.in_c(times),
+            supports=equation.supports.in_c(callbacks),
             states=len(ledger.state), state=ledger.state.numbers, cell_forces=cell_forces.c,
         )  # fmt: skip
         over = [
@@ -127,10 +134,30 @@ class CompiledSteps:
         if path is not None:
             changes = [one.change for one in phases if one.change is not None]
             fill(self.c, path=path.in_c(changes))
+        callbacks.march = self.c
+        self._loads = [x for x in equation.loads if type(x) not in kinds]
+        self._state: Stepping | None = None  # while C takes steps
+        of = {
+            name: [x for one in phases for x in getattr(one, name)]
+            for name in ("begin", "accept", "add_state")
+        }
+        if asks or watches or callbacks.used:
+            # What may raise comes first, before loops of C have accepted anything.
+            first = [one for one in of["accept"] if one[0] == lib.phase_in_python]
+            others = [one for one in of["accept"] if one[0] != lib.phase_in_python]
+            of["accept"] = [callbacks.phase(callbacks.note_end), *first, *others]
+            of["begin"].insert(0, callbacks.phase(callbacks.note_beginning))
+            of["begin"].append(callbacks.phase(self._note_loads))
+        if stops is not None:
+            fill(self.c, stop=lib.time_in_python, stops=callbacks.handle(partial(self._stop, stops)))
+        if asks:
+            of["begin"].insert(0, callbacks.phase(self._ask))
+        if watches:
+            of["add_state"].append(callbacks.phase(self._judge))
         self._alive: list[Any] = []
         self._watches: Sequence[Watch] = ()
-        for name in ("begin", "accept", "add_state"):
-            self._list(getattr(self.c, name), [x for one in phases for x in getattr(one, name)])
+        for name, loops in of.items():
+            self._list(getattr(self.c, name), loops)
         inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
         links = [one for one in equation.terms if isinstance(one, Links)]
         scene = share.grid.scene
@@ -175,10 +202,12 @@ class CompiledSteps:
             rows[0, kept.q] = state.q
         if not self.ahead:
             self._hand_over(state)
+        self._state = state
         taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows[1:])))
-        if taken:
+        self._state = None
+        if c.parts:
             state.t = c.t
-            state.parts += taken
+            state.parts += c.parts
             for one in self._watches:
                 one.seen = state.parts
             self._lend(state)
@@ -197,6 +226,27 @@ class CompiledSteps:
             self.hand_back(state)
             self._raise()
         return taken
+
+    def _ask(self, *_: Any) -> None:
+        """Let controllers and friction ask the scene, which has the state of C."""
+        if self._state is not None:
+            self._state.t = self.c.t
+            self._lend(self._state)
+            self._state.ask()
+
+    def _stop(self, stops: Callable[[float, float], float], t: float) -> float:
+        """The next time up to ``t`` at which a controller takes a sample."""
+        return stops(self.c.t, t)
+
+    def _note_loads(self, *_: Any) -> None:
+        """Take the sizes of loads that have no loops, for the scale of convergence."""
+        sizes = [self._solver.convergence.size(one.force) for one in self._loads]
+        self.c.loads_in_python = sum(sizes)
+
+    def _judge(self, step: Any, q1: Any, s: Any) -> None:
+        """Watch forces of functions of the user."""
+        if self._state is not None:
+            self._state.judge(self._callbacks.end, step.t1, step.t1 - step.t0)
 
     def watch(self, watches: Sequence[Watch]) -> None:
         """Let these take in the state after each step."""
@@ -261,7 +311,7 @@ class CompiledSteps:
 
     def _raise(self) -> None:
         """Raise what a function of a user has raised; Python tries a failed step once more."""
-        error, self._times.error = self._times.error or self._equation.error, None
+        error, self._callbacks.error = self._callbacks.error or self._equation.error, None
         self._equation.error = None
         if error is not None and not isinstance(error, StepFailed):
             raise error
@@ -271,22 +321,22 @@ def compiled_steps(
     scheme: Scheme, equation: StepEquation, solver: Solver, ledger: Ledger,
     inertia: Inertia | None, path: StaticPath | None, openings: Openings | None,
     largest_turn: float, applies_loads: bool, support_dofs: Index, cell_forces: CellForces,
-    begun: bool,
+    begun: bool, asked: tuple[bool, bool, Callable[[float, float], float] | None],
 ) -> CompiledSteps | None:  # fmt: skip
     """Make the steps of a scene in C, if all that takes part in them has loops there."""
     known: Any = scheme
     whole, turns = _whole_steps(known), _nodal_step(known)
     if not (solver.in_c and whole and turns):
         return None
-    times, phases = TimeFunctions(), list[Phases]()
+    callbacks, phases = Callbacks(equation.share.size), list[Phases]()
     for term in equation.terms:
-        of_term = term.phases(times)
+        of_term: Phases | None = term.phases(callbacks)
         if of_term is None:
             return None
         phases.append(of_term)
     return CompiledSteps(
-        equation, solver, ledger, inertia, path, openings, largest_turn, phases, times, whole,
-        turns, applies_loads, support_dofs, cell_forces, begun,
+        equation, solver, ledger, inertia, path, openings, largest_turn, phases, callbacks,
+        whole, turns, applies_loads, support_dofs, cell_forces, begun, asked,
     )  # fmt: skip
 
 

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
@@ -52,6 +53,11 @@ class Controllers:
         first = t if math.isnan(self._samples[i, 0]) else float(self._samples[i, 0])
         sample = _sample(self._sampled[i])
         return first, math.floor((t - first + _rounding(sample, t, first)) / sample)
+
+    @property
+    def stops(self) -> Callable[[float, float], float] | None:
+        """:meth:`next_sample`; None if no controller has a sample time."""
+        return self.next_sample if self._sampled else None
 
     def next_sample(self, t: float, end: float) -> float:
         """Return the next sample time after ``t``, or ``end`` if that comes first; s."""

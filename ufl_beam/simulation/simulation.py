@@ -162,7 +162,7 @@ class Simulation(StateView):
         self._watches: list[Watch] = []
         self._describe(self.solution)
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
-        in_python = self._copies or self.asked or self._loose or not share.alone
+        in_python = self._copies or self._loose or not share.alone
         self._in_c = None if in_python else self._steps_in_c(parts)
 
     # -- stepping ------------------------------------------------------------------------------
@@ -226,6 +226,7 @@ class Simulation(StateView):
         return compiled_steps(
             self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
             parts.openings, LARGEST_TURN, fresh, self.support_dofs, parts.cell_forces, self.begun,
+            (bool(self.asked), bool(self._watch), self.controllers.stops),
         )  # fmt: skip
 
     def watch(self, parts: Array) -> Watch | None:
@@ -292,7 +293,7 @@ class Simulation(StateView):
         for term in self.terms:
             term.add_state(q1)
         if self._watch:
-            self.warn(self._watch.judge(q1, step.t1, step.dt), here=not self.share.alone)
+            self.judge(q1, step.t1, step.dt)
 
     def warn(self, found: Iterable[str], *, here: bool = False) -> None:
         """Warn, and note in the solution, of what it does not say; by one process or ``here``."""
@@ -301,6 +302,10 @@ class Simulation(StateView):
                 self.solution.warnings += f"{said}\n"
                 if here or self.comm.rank == 0:
                     warn(said)
+
+    def judge(self, q1: Array, t: float, dt: float) -> None:
+        """Warn of forces of users' functions that alternate in steps to ``q1`` at ``t``."""
+        self.warn(self._watch.judge(q1, t, dt), here=not self.share.alone)
 
     @property
     def q_before(self) -> Array:  # type: ignore[override]

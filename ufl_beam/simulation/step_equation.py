@@ -47,7 +47,7 @@ class StepEquation(Equation):
         force = np.zeros(0 if in_motion else share.size)
         super().__init__(A, share.weights(), force, supports.dofs)
         self.share, self.supports, self._search = share, supports, search
-        self._beams, self._couplings, self._loads = beams, couplings, loads
+        self._beams, self._couplings, self.loads = beams, couplings, loads
         self.inner: list[InternalForces] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]
@@ -63,7 +63,7 @@ class StepEquation(Equation):
 
     def load_forces(self) -> list[Array]:
         """Vectors of the loads in the present step; new arrays where they have changed."""
-        return [load.force for load in self._loads]
+        return [load.force for load in self.loads]
 
     def residual(self, x: Array, r: Array) -> None:
         """Write the local part of the residual at ``x`` into ``r``."""
@@ -211,7 +211,7 @@ class StepEquation(Equation):
     def tangent_change(self, q: Array, u: Array) -> Array:
         """Derivative along ``u`` of the latest tangent of :meth:`linearise`, at ``q``; entries."""
         self.A.data.fill(0.0)
-        for one in (*self.inner, *self._loads):
+        for one in (*self.inner, *self.loads):
             one.add_tangent_change(q, u)
         return self.A.data.copy()
 
@@ -236,7 +236,7 @@ class StepEquation(Equation):
             works[1, i, j] = sum(one.work_of_change(q, u, x, y) for one in self._beams)
         for k, work in enumerate(works):
             self.A.data.fill(0.0)
-            for one in (*self._couplings, *self._loads):
+            for one in (*self._couplings, *self.loads):
                 if k == 0:
                     one.add_tangent(q)
                 else:

@@ -17,7 +17,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.in_cells import InCells
-from ufl_beam.terms.phases import Phases, TimeFunctions
+from ufl_beam.terms.phases import Callbacks, Phases
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
@@ -33,9 +33,12 @@ class Term(ABC):
         """Return C loops of residual and tangent with data; None where Python evaluates them."""
         return None
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
-        """C loops of the methods below for steps without Python; None where a term has not all."""
-        return None
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """C functions of the methods below; where a term has no loops, they call the methods."""
+        return Phases(
+            [callbacks.begin(self.begin)], [callbacks.accept(self.accept)],
+            [callbacks.add_state(self.add_state)],
+        )  # fmt: skip
 
     def in_cells(self) -> Sequence[InCells]:
         """Forces on the nodes of cells; none if all act between nodes that joints may share."""
@@ -75,6 +78,14 @@ class InternalForces(Term):
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """C functions of the methods."""
+        return super().phases(callbacks)._replace(change=callbacks.change(self.energy_change))
+
+    def energy_change(self, q1: Array) -> tuple[float, float, float]:
+        """Numbers of ``energy_change`` of loops.h for the step to ``q1``; J."""
+        return self.change(q1), 0.0, 0.0
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""

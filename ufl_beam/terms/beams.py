@@ -24,7 +24,7 @@ from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_ine
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.in_cells import InCells
-from ufl_beam.terms.phases import Phases, TimeFunctions, entering
+from ufl_beam.terms.phases import Callbacks, Phases, entering
 from ufl_beam.terms.rates_in_c import RatesInC
 from ufl_beam.terms.static_tangents import StaticTangent
 from ufl_beam.terms.tangent_derivatives import Cells
@@ -89,7 +89,7 @@ class ElasticBeams(OfForms, Cells):
         force, tangent = super().loops()
         return force, self._static.loop() if self._static else tangent
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells."""
         begin, accept = self._loops_of_step()
         if self._static is not None:
@@ -151,7 +151,7 @@ class Inertia(OfMatrix):
         """The mass matrix; a new one."""
         return self._times.matrix()
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases | None:  # type: ignore[override]
         """Loops over the matrix and the velocities."""
         rates = self.in_c
         if rates is None:

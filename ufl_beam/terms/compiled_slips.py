@@ -15,7 +15,7 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.material_laws import Hardening, SofteningLaw
 from ufl_beam.terms.connector_responses import Rows
-from ufl_beam.terms.phases import TimeFunctions
+from ufl_beam.terms.phases import Callbacks
 from ufl_beam.terms.rigid_plastic import INPUTS, RigidPlasticResponse, slip
 
 
@@ -50,7 +50,7 @@ class CompiledSlips(RigidPlasticResponse):
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
 
-    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
         """The laws, and what they enter."""
         ledger = self._ledger
         entries = {"hinges": ledger.lost.pointer("hinges")}

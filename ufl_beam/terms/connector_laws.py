@@ -24,7 +24,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.connector_responses import Response, Rows, Setting, respond
-from ufl_beam.terms.phases import TimeFunctions
+from ufl_beam.terms.phases import Callbacks
 
 CREEP = 1e-12
 """Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
@@ -38,7 +38,7 @@ class _Held(Response):
 
     steady = True
 
-    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
         return {}
 
     def rows(self, e1: Array, λ: Array) -> Rows:
@@ -51,9 +51,9 @@ class _Driven(Response):
     steady = True
     _part, _entry, _sign = "supplied", "motors", -1.0
 
-    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
         motors = zip(self._laws, self._links, strict=True)
-        wanted = times.in_c([(law.motion, link) for law, link in motors])
+        wanted = callbacks.of_time([(law.motion, link) for law, link in motors])
         return {"wanted_motion": wanted, **self._entry_in_steps()}
 
     def begin(self, e0: Array, step: Step) -> None:
@@ -113,9 +113,9 @@ class _Pushed(_Given):
 
     _entry = "loads"
 
-    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
         actuators = zip(self._laws, self._links, strict=True)
-        wanted = times.in_c([(law.force, link) for law, link in actuators])
+        wanted = callbacks.of_time([(law.force, link) for law, link in actuators])
         ends = {"end": self._end, "reached": self._reached}
         return {"wanted_force": wanted, **ends, **self._entry_in_steps()}
 
@@ -140,7 +140,7 @@ class _Damped(Response):
     steady = True
     _entry = "damping"
 
-    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
         return {"viscosity": self._numbers("viscosity"), **self._entry_in_steps()}
 
     def rows(self, e1: Array, λ: Array) -> Rows:

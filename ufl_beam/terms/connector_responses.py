@@ -19,7 +19,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import Openable, SearchFlags
-from ufl_beam.terms.phases import TimeFunctions
+from ufl_beam.terms.phases import Callbacks
 
 Rows = tuple[Any, Any, Any]
 """α, β, γ of some connectors: arrays or numbers."""
@@ -65,7 +65,7 @@ class Response(ABC):
     def _prepare(self, law: Any) -> None:
         """Prepare the response; called once."""
 
-    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
         """Fields of ``coupling_term`` of loops.h for steps without Python; None where they need it.
 
         Names of entries of the ledger are those of ``inelastic_term``.

@@ -25,7 +25,7 @@ from ufl_beam.terms import connector_laws, force_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_forms import connector_forms
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.phases import Phases, TimeFunctions, beginning
+from ufl_beam.terms.phases import Callbacks, Phases, beginning
 
 LAWS = (connector_laws, force_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
@@ -231,11 +231,11 @@ class CompiledCouplings(Couplings):
             return None
         return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over what is held, driven, pushed or damped, springs and rigid-plastic ones."""
         response = self.response
-        if (of_law := response.in_steps(times)) is None:
-            return None
+        if (of_law := response.in_steps(callbacks)) is None:
+            return super().phases(callbacks)
         fields = {name for name, _ in ffi.typeof("coupling_term").fields}
         mine = {name: x for name, x in of_law.items() if name in fields}
         points = struct("inelastic_term", **{k: x for k, x in of_law.items() if k not in fields})

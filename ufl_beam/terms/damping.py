@@ -35,7 +35,7 @@ from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.in_cells import InCells
-from ufl_beam.terms.phases import Phases, TimeFunctions, knowing
+from ufl_beam.terms.phases import Callbacks, Phases, knowing
 from ufl_beam.terms.rates_in_c import RatesInC
 
 
@@ -78,7 +78,7 @@ class KelvinVoigtForces(OfForms):
         super().__init__(work, [lost], fields, A, ledger)
         self._time, self._dt = damping.time, np.zeros(1)
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells; the step is a number of the forms."""
         begin, accept = self._loops_of_step()
         c = struct(
@@ -139,7 +139,7 @@ class RayleighForces(OfMatrix):
             InCells(partial(mass_kernel, fields), lib.DENSITY, *at, damping.mass),
         ]
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases | None:  # type: ignore[override]
         """Loops over the matrix and the velocities."""
         rates = self._inertia.in_c
         if rates is None:
@@ -204,7 +204,7 @@ class SecondDifferences(OfForms):
         self._e, self._change = np.zeros((2, *self._strains.shape))
         self._dt, self._last_dt = math.inf, np.full(1, math.inf)
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells and their strains."""
         begin, accept = self._loops_of_step()
         c = struct(

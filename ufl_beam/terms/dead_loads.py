@@ -20,7 +20,7 @@ from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.phases import Phases, TimeFunctions, weight_of_before
+from ufl_beam.terms.phases import Callbacks, Phases, weight_of_before
 
 
 class DeadLoads(LoadTerm):
@@ -93,7 +93,7 @@ class DeadLoads(LoadTerm):
         """C loop that subtracts the load vector; no tangent."""
         return loop("subtract_vector", self._in_c), None
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the vectors."""
         owners = [(load.time, load) for load, _ in self._vectors]
         forces = np.zeros((3, len(self.dofs)))  # now, at the end of the step, before
@@ -101,7 +101,7 @@ class DeadLoads(LoadTerm):
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=len(owners),
             force=forces[0], end=forces[1], before=forces[2],
             parts=[doubles(part) for part in self._parts[:3]],
-            factors=np.empty(len(owners)), factor=times.in_c(owners),
+            factors=np.empty(len(owners)), factor=callbacks.of_time(owners),
             vector=ffi.new("double *[]", [doubles(vector) for _, vector in self._vectors]),
             work=self._ledger.supplied.pointer("loads"),
             weight_of_before=weight_of_before(self._acting),

@@ -17,7 +17,7 @@ from ufl_beam.model.loads import FollowerLoad
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.phases import Phases, TimeFunctions, weight_of_before
+from ufl_beam.terms.phases import Callbacks, Phases, weight_of_before
 
 
 class FollowerLoads(LoadTerm):
@@ -75,9 +75,9 @@ class FollowerLoads(LoadTerm):
         c = self.steps_in_c
         return loop("subtract_follower_loads", c), loop("add_tangent_of_follower_loads", c)
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the loads."""
-        c = fill(self.steps_in_c, factor=times.in_c([(load.time, load) for load in self._loads]))
+        c = fill(self.steps_in_c, factor=callbacks.of_time([(load.time, load) for load in self._loads]))
         c.work = self._ledger.supplied.pointer("loads")
         begin, accept = (loop(f"{name}_follower_loads", c) for name in ("begin", "accept"))
         return Phases([begin], [accept])

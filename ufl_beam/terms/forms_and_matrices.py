@@ -16,7 +16,7 @@ from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.in_cells import InCells
-from ufl_beam.terms.phases import Phases, TimeFunctions, beginning, entering
+from ufl_beam.terms.phases import Callbacks, Phases, beginning, entering
 
 
 class OfForms(Term):
@@ -41,7 +41,7 @@ class OfForms(Term):
         if losses:
             ledger.lost[self._entry] += 0.0
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells."""
         return Phases(*self._loops_of_step())
 

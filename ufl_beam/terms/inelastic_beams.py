@@ -27,7 +27,7 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import STIFF, SearchFlags
-from ufl_beam.terms.phases import Phases, TimeFunctions, beginning
+from ufl_beam.terms.phases import Callbacks, Phases, beginning
 from ufl_beam.terms.point_equations import inputs
 from ufl_beam.terms.static_tangents import PredictedStrains
 from ufl_beam.terms.tangent_derivatives import Cells
@@ -288,7 +288,7 @@ class CompiledInelasticBeams(InelasticBeams):
         functions = ("add_inelastic_force", "add_inelastic_tangent")
         return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
 
-    def phases(self, times: TimeFunctions) -> Phases | None:
+    def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the points."""
         c = struct(
             "inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger)

@@ -101,6 +101,10 @@ class Links(InternalForces):
         if (borne := self.response.borne()) is not None:
             q[self._forces_at] = self._before[:] = borne
 
+    def energy_change(self, q1: Array) -> tuple[float, float, float]:
+        """Energy that connectors take, and the sum of the sizes of their works; J."""
+        return 0.0, self.change(q1), self.effort(q1)
+
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
         return 0.0

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.dolfinx_compat import fem
+from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.time_functions import ALWAYS, Table, TimeFunction, steady, value_at
 
 
@@ -35,19 +37,26 @@ class Phases(NamedTuple):
     admits: Loop | None = None
 
 
-class TimeFunctions:
-    """Functions of time as C asks for them.
+class Callbacks:
+    """Python functions that C calls while it takes steps.
 
     Attributes:
-        error: First exception of a function of a user that C has called.
+        error: First exception that one of them has raised.
+        used: Whether a term has phases that are methods.
+        march: ``march`` of loops.h, once there is one.
     """
 
     error: BaseException | None = None
+    used = False
+    march: Any = None
 
-    def __init__(self) -> None:
-        self._alive = list[Any]()
+    def __init__(self, size: int) -> None:
+        self._alive, self._bytes = list[Any](), 8 * size
+        # What terms are told of the step that C takes; they know a configuration by its identity.
+        self._step: Step | None = None
+        self._q0, self._q1, self._s = (np.full(size, math.nan) for _ in range(3))
 
-    def in_c(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
+    def of_time(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
         """``time_function`` of loops.h for functions of time with their owners, see value_at."""
         of_time = ffi.new("time_function[]", len(functions))
         for place, (function, owner) in zip(of_time, functions, strict=True):
@@ -58,23 +67,85 @@ class TimeFunctions:
                 place.points, (place.t, place.y) = len(points[0]), map(doubles, points)
                 self._alive += points
             else:
-                handle = ffi.new_handle((function, owner, self))
-                place.ask, place.handle = lib.time_in_python, handle
-                self._alive.append(handle)
+                place.ask = lib.time_in_python
+                place.handle = self.handle(partial(value_at, function, owner=owner))
         return of_time
+
+    def begin(self, function: Callable[[Step], None]) -> Loop:
+        """Phase of C that calls ``function(step)`` when a step begins."""
+        self.used = True
+        return self.phase(lambda *_: function(self._step))  # type: ignore[arg-type]
+
+    def accept(self, function: Callable[[Array, Array], None]) -> Loop:
+        """Phase of C that calls ``function(q1, s)`` when a step is accepted."""
+        return self.phase(lambda *_: function(self._q1, self._s))
+
+    def add_state(self, function: Callable[[Array], None]) -> Loop:
+        """Phase of C that calls ``function(q1)`` for the accepted state."""
+        return self.phase(lambda *_: function(self._q1))
+
+    def change(self, function: Callable[[Array], tuple[float, float, float]]) -> Loop:
+        """C function that adds the ``energy_change`` of loops.h which ``function(q1)`` returns."""
+        return lib.change_in_python, self.handle(lambda q1: function(self._copy(q1)))
+
+    def phase(self, function: Callable[[Any, Any, Any], None]) -> Loop:
+        """Phase of C that calls ``function(step, q1, s)`` with pointers."""
+        return lib.phase_in_python, self.handle(function)
+
+    def note_beginning(self, step: Any, q1: Any, s: Any) -> None:
+        """Make the step that terms are told of."""
+        if not np.array_equal(before := self._copy(step.q0), self._q1):
+            self._q1 = before
+        self._q0 = self._q1
+        numbers = step.load_time, step.motion_time, step.fraction, step.at
+        q_before = self._copy(step.q_before)
+        self._step = Step(step.t0, step.t1, self._q0, *numbers, q_before, step.ratio)
+
+    def note_end(self, step: Any, q1: Any, s: Any) -> None:
+        """Copy the end of the step for terms."""
+        self._q1, self._s = self._copy(q1), self._copy(s)
+
+    @property
+    def end(self) -> Array:
+        """The end of the step."""
+        return self._q1
+
+    def _copy(self, vector: Any) -> Array:
+        return np.frombuffer(ffi.buffer(vector, self._bytes)).copy()
+
+    def handle(self, function: Callable[..., Any]) -> Any:
+        """Handle of a function that C calls."""
+        self._alive.append(ffi.new_handle((self, function)))
+        return self._alive[-1]
 
 
 def _note(kind: type, error: BaseException, traceback: Any) -> None:
     """Note an exception in a callback; an interrupt may come before its first line has run."""
-    _, _, of_scene = ffi.from_handle(traceback.tb_frame.f_locals["handle"])
-    of_scene.error = of_scene.error or error.with_traceback(traceback)
+    callbacks, _ = ffi.from_handle(traceback.tb_frame.f_locals["handle"])
+    callbacks.error = callbacks.error or error.with_traceback(traceback)
+    if callbacks.march is not None:
+        callbacks.march.raised = 1
 
 
 @ffi.def_extern(error=math.nan, onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
 def time_in_python(handle: Any, t: float) -> float:
     """Callback of C, declared in c_library.py."""
-    function, owner, _ = ffi.from_handle(handle)
-    return value_at(function, t, owner)
+    return float(ffi.from_handle(handle)[1](t=t))
+
+
+@ffi.def_extern(onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+def phase_in_python(handle: Any, step: Any, q1: Any, s: Any) -> None:
+    """Callback of C, declared in c_library.py."""
+    ffi.from_handle(handle)[1](step, q1, s)
+
+
+@ffi.def_extern(onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+def change_in_python(handle: Any, q1: Any, found: Any) -> None:
+    """Callback of C, declared in c_library.py."""
+    in_beams, in_connectors, effort = ffi.from_handle(handle)[1](q1)
+    found.in_beams += in_beams
+    found.in_connectors += in_connectors
+    found.effort += effort
 
 
 def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:

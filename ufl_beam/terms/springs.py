@@ -15,7 +15,7 @@ from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Hardening
 from ufl_beam.terms.connector_responses import Response, Rows, respond
 from ufl_beam.terms.material_points import Points, expect_entries
-from ufl_beam.terms.phases import TimeFunctions
+from ufl_beam.terms.phases import Callbacks
 from ufl_beam.terms.point_equations import inputs
 
 
@@ -44,7 +44,7 @@ class _Sprung(Response):
         self.in_c = self.points.in_c
         self.openable = self.points if self.points.softens else None
 
-    def in_steps(self, times: TimeFunctions) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
         return self.points.in_steps(self._setting.ledger)
 
     def _at(self, e: Array) -> Array:

@@ -18,7 +18,7 @@ from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.supports import Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.phases import TimeFunctions, weight_of_before
+from ufl_beam.terms.phases import Callbacks, weight_of_before
 
 
 class TurnedAxes:
@@ -124,13 +124,13 @@ class Supports:
             target = value_at(motion, step.motion_time, support)
             x[dof] = x0[dof] + step.fraction * (target - x0[dof])
 
-    def in_c(self, times: TimeFunctions) -> Any:
+    def in_c(self, callbacks: Callbacks) -> Any:
         """``moving_supports`` of loops.h: what they prescribe in steps without Python."""
         moves = [(motion, support) for _, motion, support in self._motions]
         entry = self._ledger.supplied.pointer("supports") if self.work else ffi.NULL
         return struct(
             "moving_supports", held=len(self.dofs), hold=self.dofs.astype(np.int32),
-            moving=len(moves), dof=self.moving.astype(np.int32), motion=times.in_c(moves),
+            moving=len(moves), dof=self.moving.astype(np.int32), motion=callbacks.of_time(moves),
             reactions=self.reactions, before=self._before, work=entry,
             weight_of_before=weight_of_before(self._acting),
         )  # fmt: skip

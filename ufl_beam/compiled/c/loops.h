@@ -730,6 +730,9 @@ typedef struct {
   int states;
   double *state;      /* entries of the ledger that a state has, one after the other */
   int iterations, failed; /* in the latest call; whether its last step failed */
+  int parts;              /* in the latest call: steps, and parts of those that stop on the way */
+  double (*stop)(void *handle, double t); /* the next time at which a step must stop; or none */
+  void *stops;
   int tried;              /* iterations of the step */
   time_step step;
   int kinds, width; /* of numbers that are kept; of a row */
@@ -737,6 +740,8 @@ typedef struct {
   cell_forces *cell_forces;
   int watches;
   const watch *const *watch;
+  int raised; /* whether a function of Python that takes part in a step has raised something */
+  double loads_in_python; /* size of loads that have no loop */
 } march;
 
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s);

@@ -479,7 +479,7 @@ static int solve(march *m)
     m->loads->norm = norm_of_some(m->loads->size, m->loads->dof, e->weight, m->loads->force);
     m->loads->changed = 0;
   }
-  e->loads = m->loads ? m->loads->norm : 0;
+  e->loads = m->loads_in_python + (m->loads ? m->loads->norm : 0);
   const follower_loads *f = m->follower_loads;
   if (f) e->loads += norm_of_some(f->size, f->dof, e->weight, f->force);
   if (!m->search) return iterate(m);
@@ -553,6 +553,7 @@ static int take_step(march *m, double t1)
   m->step.q0 = m->q, m->step.q_before = p->q_before, m->step.ratio = m->step.dt / p->dt;
   if (m->rates && !find_numbers(m->rates, m->step.dt)) return 0;
   run(&m->begin, &m->step, 0, 0);
+  if (m->raised) return 0;
   guess(m);
   if (!solve(m) || !measure(m)) return 0;
   for (int k = 0; k < m->admissions; ++k)
@@ -561,8 +562,9 @@ static int take_step(march *m, double t1)
     if (!followed(m)) return 0;
     memcpy(m->path->force, m->equation->inner_force, m->size * sizeof *m->path->force);
   }
-  accept_cell_forces(m->cell_forces);
   run(&m->accept, &m->step, m->x, m->s);
+  if (m->raised) return 0;
+  accept_cell_forces(m->cell_forces);
   accept_supports(m);
   memset(m->state, 0, m->states * sizeof *m->state);
   run(&m->add_state, &m->step, m->x, m->s);
@@ -602,12 +604,16 @@ void keep_state(const march *m, double *row)
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
 {
   const double end = steps > 1 ? seconds_now() + seconds : 0;
-  m->failed = 0;
+  m->failed = m->raised = m->parts = 0;
   for (int k = 0; k < steps; ++k) {
-    if (!take_step(m, ends[k])) {
-      m->failed = 1;
-      return k;
-    }
+    do {
+      const double stop = m->stop ? fmin(m->stop(m->stops, ends[k]), ends[k]) : ends[k];
+      if (!take_step(m, stop)) {
+        m->failed = 1;
+        return k;
+      }
+      ++m->parts;
+    } while (m->t != ends[k]);
     if (keeps) keep_state(m, rows + (size_t)k * m->width);
     if (steps > 1 && seconds_now() > end) return k + 1;
   }
