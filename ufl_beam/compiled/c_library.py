@@ -42,8 +42,15 @@ extern "Python" void phase_in_python(void *handle, const time_step *step, const 
                                      const double *s);
 extern "Python" void change_in_python(void *handle, const double *q1, energy_change *sum);
 extern "Python" int numbers_in_python(void *handle, scheme_numbers *numbers);
-extern "Python" int open_in_python(void *handle, int times);
-extern "Python" void close_in_python(void *handle);
+extern "Python" double agree_in_python(void *handle, int how, double here);
+extern "Python" int solve_in_python(void *handle, int anew);
+extern "Python" void find_conjugates_in_python(void *handle, const double *q);
+extern "Python" int find_idle_in_python(void *handle);
+extern "Python" int forget_idle_in_python(void *handle);
+extern "Python" void arrive_in_python(void *handle, const double *x);
+extern "Python" int change_of_border_in_python(void *handle, const double *x);
+extern "Python" int border_is_met_in_python(void *handle);
+extern "Python" void run_in_python(void *handle);
 """
 
 

@@ -393,6 +393,10 @@ typedef struct {
   int (*VecRestoreArrayRead)(void *vec, const double **values);
   int (*VecGetArray)(void *vec, double **values);
   int (*VecRestoreArray)(void *vec, double **values);
+  int (*VecGhostUpdateBegin)(void *vec, int insert_mode, int scatter_mode);
+  int (*VecGhostUpdateEnd)(void *vec, int insert_mode, int scatter_mode);
+  int (*VecGhostGetLocalForm)(void *vec, void **local);
+  int (*VecGhostRestoreLocalForm)(void *vec, void **local);
   int (*VecLockGet)(void *vec, petsc_int *state);
   int (*VecLockReadPop)(void *vec);
   int (*PetscObjectStateGet)(void *object, int64_t *state);
@@ -412,10 +416,14 @@ typedef struct {
   int (*SNESShellSetSolve)(void *snes, int (*solve)(void *, void *));
   int (*SNESSetIterationNumber)(void *snes, petsc_int number);
   int (*SNESSolve)(void *snes, void *b, void *x);
+  int (*SNESMonitor)(void *snes, petsc_int iteration, double norm);
+  int (*SNESGetConvergedReason)(void *snes, int *reason);
   int (*SNESSetConvergedReason)(void *snes, int reason);
 } petsc_functions;
 
 extern petsc_functions petsc;
+
+enum { INSERT_VALUES = 1, ADD_VALUES = 2, FORWARD = 0, REVERSE = 1 }; /* of InsertMode, ScatterMode */
 
 enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU says so of a singular matrix */
 
@@ -426,9 +434,42 @@ typedef struct {
   void *self;
 } demand;
 
-/* The equation of a step, and how far its solution is. */
+/* Displacement of a place in axes of a support at an angle, whose cosine and sine are c and s; entries of
+ * the tangent in the rows, and in the columns, of both of its degrees of freedom. */
 typedef struct {
-  int size, inner, forces, stiffnesses;
+  int i, j, in_rows, in_columns;
+  double c, s;
+  const int32_t *row_i, *row_j, *column_i, *column_j;
+} turned_axes;
+
+/* Numbers of processes that share a scene: their sum, the root of the sum of their squares, the largest. */
+enum agreement { TOTAL, HYPOT, LARGEST };
+
+/* What a function of a user has raised: a failure of the step, or something else, which ends the run. */
+enum raised { NOTHING, STEP_FAILED, OTHER };
+
+/* Whose forces tangents of static steps have, see static_tangents.py: first those before the step, then
+ * those that the last iteration predicted, or those at the iterate; or always these. */
+enum tangents { PREDICTED, FIRST, EXACT };
+
+/* The equation of a path's control, and its unknown t, see path_corrector.py. */
+typedef struct {
+  void *handle;
+  double *t;
+  void (*arrive)(void *handle, const double *x);  /* take note of an iterate, before its residual */
+  int (*change)(void *handle, const double *x);   /* find the change of an iteration; 1 if it fails */
+  int (*met)(void *handle);
+} border;
+
+/* Functions that begin a step again: forget what iterates have tried. */
+typedef struct {
+  void (*run)(void *self);
+  void *self;
+} again;
+
+/* The equation of a step, and how far its solution is. Unknowns and residuals are in the axes of supports. */
+typedef struct {
+  int size, owned, inner, forces, stiffnesses; /* owned: degrees of freedom, the first ones */
   const call *force;     /* parts of the residual, the inner forces first */
   const call *stiffness; /* parts of the tangent besides the next two */
   const step_product *product; /* or none */
@@ -440,6 +481,9 @@ typedef struct {
   int held, zeros; /* degrees of freedom and entries that supports hold */
   const int32_t *hold, *zero, *pivot; /* pivot: the entry of each that is held on the diagonal */
   double *reactions, *pivots;
+  int turned;
+  const turned_axes *axes;
+  double *plane; /* unknowns in the axes of the plane, if some are turned */
   int idle; /* motions that the tangent holds, their entries and stiffnesses, see null_vectors.py */
   const int32_t *idle_entry;
   const double *idle_stiffness;
@@ -448,9 +492,8 @@ typedef struct {
   const chains *chains;
   const fronts *fronts;  /* factors of what chains leave; or none: then PETSc has these */
   void *left, *factors, *left_f, *left_x; /* in PETSc: what chains leave, its factors, two vectors */
-  void *x;               /* in PETSc: the unknowns */
-  double *residual, *change;                  /* at an iterate, and what it is changed by; between
-                                               * solutions others use this */
+  void *snes, *x, *f, *y;                 /* in PETSc: the solver; unknowns, residual, change */
+  double *unknowns, *residual, *change;   /* local values of these; between solutions others use the last */
   double *found;         /* solution of what chains leave; in PETSc the entries of left_x */
   const double *weight;  /* see Solver */
   int least, most;                             /* iterations */
@@ -459,13 +502,31 @@ typedef struct {
   const double *lengths; /* see Solver */
   const uint8_t *moves;
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
-  int demands;
-  const demand *demand; /* of connectors */
+  int demands, demanding; /* demanding: whether there are any on any process */
+  const demand *demand; /* of connectors and points */
   double last, best, last_scale;
   int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
   int anew;                           /* no tangent is kept from step to step */
   double rate;                        /* of a modified Newton's method, by which residuals fall */
-  int iterations, reason;             /* of snes_newton, the latest */
+  int iterations, reason, total;      /* of the latest solution, and of all */
+  int careful;           /* whether changes are searched along */
+  int monitored;         /* PETSc's own method is asked for: by its options, or monitors */
+  int searches;          /* whether the search here is used all the same */
+  int error;             /* of PETSc */
+  int raised;            /* see enum raised */
+  const border *border;  /* or none */
+  int predictions;
+  predicted_strains *const *predicted;
+  int32_t *search;       /* flags of points that may open; or none */
+  int agains;
+  const again *again;
+  double *conjugate, *start, *aside; /* space: of a search; of a solution with stiffer tangents */
+  void *handle;
+  double (*agree)(void *handle, int how, double here); /* over processes; none if there is one */
+  int (*solve)(void *handle, int anew);                /* where there are several: the change */
+  void (*find_conjugates)(void *handle, const double *q);
+  int (*find_idle)(void *handle);
+  int (*forget_idle)(void *handle);
 } equation;
 
 /* Values of SNESConvergedReason. */
@@ -474,16 +535,17 @@ enum {
   SINGULAR = -3, TOO_MANY = -5, STALLED = -6, DIVERGED = -9
 };
 
-void note_inner_forces(equation *e, const double *r);
-void residual(equation *e, const double *q, double *r);
+double over_processes(const equation *e, enum agreement how, double here);
+void turn_axes(const equation *e, double *x, int way);
+int residual(equation *e, const double *x, double *r, void *f);
 void fill_tangent(const equation *e, const double *q);
-void assemble(equation *e, const double *q);
-void begin_newton(equation *e, int patience, int like_last);
+void hold_tangent(const equation *e);
 int factor_tangent(const equation *e, int *failed);
 int solve_tangent(const equation *e, int reduced);
+void find_motion(equation *e, const double *x);
 void find_round_off(const equation *e, const double *q, double *forces);
-int judge(equation *e, const double *q, int iteration, double residual, double scale,
-          double floor);
+void restart(const equation *e, enum tangents kind);
+int find_equilibrium(equation *e, const double *guess, int like_last);
 int snes_function(void *snes, void *x, void *f, void *self);
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self);
 int snes_newton(void *snes, void *x);
@@ -615,6 +677,7 @@ typedef struct {
   double *new_rate[MOST_RATES]; /* space, as many; of velocities perhaps that of those before */
   double last_dt;
   int after_any; /* whether numbers are the same after steps of any length */
+  int ready;     /* whether a step can begin */
   int known, oldest;
   scheme_numbers numbers[MOST_KNOWN];
   const scheme_numbers *now;   /* those of the step */
@@ -682,7 +745,7 @@ typedef struct {
   void *self;
 } admission_call;
 
-/* Checks of static steps, see StaticPath. */
+/* Checks of static steps, see branch_check.py; and what the latest one has found. */
 typedef struct {
   double slack, far, kink;
   const double *per_far; /* one over the size of the scene for displacements, one for rotations */
@@ -692,7 +755,21 @@ typedef struct {
   int accounts; /* parts of the ledger */
   double *const *account;
   const int32_t *entries;
+  double moves, work, stored; /* largest motion, as a part of `far`; J */
 } static_path;
+
+/* Places that open beyond a limit: points of cells or of springs, or rigid-plastic connectors. */
+typedef struct {
+  inelastic *cells;
+  points *points;
+  rigid_plastic *slips;
+  const int32_t *way_before; /* of these, after the last step */
+} openable;
+
+/* Why a step is not accepted. */
+enum failure {
+  SUCCEEDS, RAISED, NO_EQUILIBRIUM, APPLIED_TOO_FAST, TURNS_TOO_FAR, GIVES_ENERGY, LEAVES_MECHANISM, LEAPS
+};
 
 /* Numbers that are kept of each step: how many, from where and to where in a row of zeros.  They are
  * one after the other, or have places in both, where they are added. */
@@ -702,46 +779,48 @@ typedef struct {
   const int32_t *at, *to; /* places, or none */
 } kept_numbers;
 
-/* Steps of a scene. */
+/* The step of a scene: its state, and all that takes part. */
 typedef struct {
   equation *equation;
-  void *snes;
   int size;
-  double t, *q, *x, *s; /* x: the unknowns of Newton's method */
+  double t, *q, *x, *s; /* x: the end of the step in the axes of the plane; s: the step of the nodes */
+  double *guess, *found; /* found: space, where places may open */
   prediction *prediction;
   double load_weight, motion_weight, at; /* parts of the step; see step */
+  int in_parts;          /* whether parts of a step go in proportion to loads and motions at its end */
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;
-  double largest_turn; /* of a step; or infinite */
+  int limits_turn;
+  double turn, largest_turn; /* turn: the largest in the step */
   rates *rates;       /* in dynamics */
-  int admissions;     /* checks of laws */
+  int admissions, judges; /* checks of laws; whether there are any on any process */
   const admission_call *admission;
   static_path *path;  /* in statics */
   dead_loads *loads;  /* or none */
   const follower_loads *follower_loads; /* or none */
+  double loads_in_python; /* size of loads that have no loop, on all processes */
   moving_supports *supports;
-  int32_t *search;    /* flags of points that may open; or none */
-  int places;         /* that may open, and their largest excess, see points */
-  double *const *over;
-  int (*open)(void *handle, int times); /* lets places open that bear too much, see Openings.open */
-  void (*close)(void *handle);          /* see Openings.close */
-  void *openings;
+  int opens, places;  /* opens: whether something may open, on any process */
+  const openable *place;
   phases begin, accept, add_state;
   int states;
   double *state;      /* entries of the ledger that a state has, one after the other */
-  int iterations, failed; /* in the latest call; whether its last step failed */
-  int parts;              /* in the latest call: steps, and parts of those that stop on the way */
-  double (*stop)(void *handle, double t); /* the next time at which a step must stop; or none */
-  void *stops;
-  int tried;              /* iterations of the step */
   time_step step;
   int kinds, width; /* of numbers that are kept; of a row */
   const kept_numbers *kept;
   cell_forces *cell_forces;
   int watches;
   const watch *const *watch;
-  int raised; /* whether a function of Python that takes part in a step has raised something */
-  double loads_in_python; /* size of loads that have no loop */
+  int parts;              /* steps and parts of steps in the latest call */
+  int failure;            /* of the latest step; see enum failure */
+  double failed_end;      /* of the smallest part that was tried */
+  double (*stop)(void *handle, double t); /* the next time at which a step must stop; or none */
+  void (*prepare)(void *handle); /* takes from a trial step what else a scheme keeps; or none */
+  void *stops, *handle;
+  /* While loads that act from the beginning are applied: that time and the end of it; the largest turn of a
+   * node in a part; parts that are shorter by a factor may turn it further. */
+  int applies;
+  double begin_of_run, applied_by, applying_turn, short_part;
 } march;
 
 void begin_forms(void *self, const time_step *step, const double *q1, const double *s);
@@ -773,4 +852,8 @@ void change_of_points(void *self, const double *q1, energy_change *sum);
 void change_of_couplings(void *self, const double *q1, energy_change *sum);
 double value_at(const time_function *f, double t);
 void keep_state(const march *m, double *row);
+int solve_step(march *m, int hold);
+int attempt_step(march *m, double t1, double end);
+int accept_step(march *m);
+int go_to_time(march *m, double end);
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows);

@@ -441,141 +441,296 @@ int springs_dissipate(void *self, const double *q1)
 
 /* -- the step ------------------------------------------------------------------------------------ */
 
-/* A guess of the end of the step: as the last ones went on, and what supports give. */
+/* A step from the present time to t1, which is a part of one to `end`. */
+static int set_step(march *m, double t1, double end)
+{
+  time_step *step = &m->step;
+  const double t0 = m->t, dt = t1 - t0;
+  step->t0 = t0, step->t1 = t1, step->dt = dt, step->at = m->at;
+  step->q0 = m->q, step->q_before = m->prediction->q_before, step->ratio = dt / m->prediction->dt;
+  step->fraction = m->in_parts ? dt / (end - t0) : 1;
+  step->load_time = m->in_parts ? end : (1 - m->load_weight) * t0 + m->load_weight * t1;
+  step->motion_time = m->in_parts ? end : (1 - m->motion_weight) * t0 + m->motion_weight * t1;
+  if (m->applies) step->load_time = step->motion_time = m->begin_of_run;
+  return !m->rates || find_numbers(m->rates, dt);
+}
+
+/* Let all terms begin the step; whether no function of a user has raised anything. */
+static int begin_terms(march *m)
+{
+  run(&m->begin, &m->step, 0, 0);
+  return (int)over_processes(m->equation, LARGEST, m->equation->raised) == NOTHING;
+}
+
+/* A guess of the end of the step, in the axes of supports: as the last ones went on, and what supports
+ * give. */
 static void guess(march *m)
 {
   const moving_supports *p = m->supports;
-  predict(m->prediction, m->step.dt, m->q, m->x);
+  const equation *e = m->equation;
+  const double *q = m->q;
+  predict(m->prediction, m->step.dt, q, m->guess);
+  turn_axes(e, m->guess, 1);
+  if (p->moving && e->turned) {
+    memcpy(e->plane, q, m->size * sizeof *q);
+    turn_axes(e, e->plane, 1);
+    q = e->plane;
+  }
   for (int k = 0; k < p->moving; ++k) {
-    const double from = m->q[p->dof[k]], to = value_at(p->motion + k, m->step.motion_time);
-    m->x[p->dof[k]] = from + m->step.fraction * (to - from);
+    const int i = p->dof[k];
+    m->guess[i] = q[i] + m->step.fraction * (value_at(p->motion + k, m->step.motion_time) - q[i]);
   }
 }
 
-/* Whether Newton's method finds the end of the step from the unknowns that it has. */
-static int iterate(march *m)
+/* Size of the loads in the step, on all processes. */
+static double size_of_loads(march *m)
 {
-  equation *e = m->equation;
-  begin_newton(e, 2, m->rates && as_last(m->prediction, m->step.dt));
-  const int error = petsc.SNESSolve(m->snes, 0, e->x);
-  m->tried += e->iterations;
-  return !error && e->reason > 0;
-}
-
-/* Whether a place that is held closed bears too much. */
-static int must_open(const march *m)
-{
-  int over = 0;
-  for (int k = 0; k < m->places; ++k) over |= *m->over[k] != 0;
-  return over && m->search[OVER];
-}
-
-/* Whether the end of the step is found; what does not flow is held closed, but for what must open, as
- * Openings.solve has it. */
-static int solve(march *m)
-{
-  equation *e = m->equation;
-  if (m->loads && m->loads->changed) {
-    m->loads->norm = norm_of_some(m->loads->size, m->loads->dof, e->weight, m->loads->force);
-    m->loads->changed = 0;
-  }
-  e->loads = m->loads_in_python + (m->loads ? m->loads->norm : 0);
+  const equation *e = m->equation;
+  dead_loads *l = m->loads;
   const follower_loads *f = m->follower_loads;
-  if (f) e->loads += norm_of_some(f->size, f->dof, e->weight, f->force);
-  if (!m->search) return iterate(m);
-  memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
-  m->search[HOLD] = 1;
-  int found = iterate(m), opened = 0;
-  while (found && must_open(m)) found = m->open(m->openings, opened++) && iterate(m);
-  if (opened) m->close(m->openings);
-  memset(m->search, 0, SEARCH_FLAGS * sizeof *m->search);
-  return found;
+  double size = m->loads_in_python;
+  if (l && l->changed) {
+    l->norm = norm_of_some(l->size, l->dof, e->weight, l->force);
+    l->changed = 0;
+  }
+  if (l) size += over_processes(e, HYPOT, l->norm);
+  if (f) size += over_processes(e, HYPOT, norm_of_some(f->size, f->dof, e->weight, f->force));
+  return size;
 }
 
-/* The step of the nodes, and whether no node turns further than it may. */
+/* -- places that open: see openings.py ------------------------------------------------------------ */
+
+/* Held places open from the largest excess over their limit on, then from this part of it on, ...; so the
+ * number of solutions stays small where many open in a step. Of excesses that differ by less than TIE none
+ * is larger. */
+static const double FALL = 0.7, TIE = 1e-9;
+
+static double largest_excess(const march *m)
+{
+  double most = 0;
+  for (int k = 0; k < m->places; ++k) {
+    const openable *o = m->place + k;
+    if (o->cells) most = fmax(most, *o->cells->points->over);
+    else if (o->points) most = fmax(most, *o->points->over);
+    for (int i = 0; o->slips && i < o->slips->number; ++i) most = fmax(most, o->slips->excess[i]);
+  }
+  return most;
+}
+
+/* Let held places open from now on whose excess is so large. */
+static void open_places(march *m, double least)
+{
+  for (int k = 0; k < m->places; ++k) {
+    const openable *o = m->place + k;
+    const rigid_plastic *p = o->slips;
+    if (o->cells) {
+      release(o->cells->points, least);
+      for (int i = 0; i < o->cells->size; ++i) o->cells->latest[i] = NAN;
+    } else if (o->points)
+      release(o->points, least);
+    for (int i = 0; p && i < p->number; ++i)
+      if (p->excess[i] > 0 && p->excess[i] >= least) p->slipped[i] = RELEASED;
+  }
+}
+
+/* End a search: places that may have opened are closed again, until the step is accepted. */
+static void end_search(march *m, int opened)
+{
+  memset(m->equation->search, 0, SEARCH_FLAGS * sizeof(int32_t));
+  for (int k = 0; opened && k < m->places; ++k) {
+    const openable *o = m->place + k;
+    const points *p = o->cells ? o->cells->points : o->points;
+    for (int i = 0; p && i < p->cells * p->of_cell; ++i)
+      if (p->w[i * p->width + FLOWS] == RELEASED) p->w[i * p->width + FLOWS] = CLOSED;
+    for (int i = 0; o->slips && i < o->slips->number; ++i) o->slips->slipped[i] = abs(o->way_before[i]);
+  }
+}
+
+/* Find the end of the step from the guess; what does not flow is held closed, but for what must open. */
+static int solve(march *m, int hold)
+{
+  equation *e = m->equation;
+  const int like_last = m->rates && as_last(m->prediction, m->step.dt);
+  e->loads = size_of_loads(m);
+  if (!m->opens) return find_equilibrium(e, m->guess, like_last) > 0;
+  int opened = 0;
+  if (hold) {
+    memset(e->search, 0, SEARCH_FLAGS * sizeof *e->search);
+    e->search[HOLD] = 1;
+    int found = find_equilibrium(e, m->guess, like_last) > 0;
+    while (found) {
+      const double excess = e->search[OVER] || e->agree ? over_processes(e, LARGEST, largest_excess(m)) : 0;
+      if (excess == 0) break;
+      open_places(m, pow(FALL, opened++) * excess - TIE);
+      memcpy(m->found, e->unknowns, m->size * sizeof *m->found);
+      found = find_equilibrium(e, m->found, like_last) > 0;
+    }
+    const int over = over_processes(e, LARGEST, e->search[OVER]) > 0;
+    end_search(m, opened);
+    if (found || !over || e->raised == OTHER) return found;
+    if (!begin_terms(m)) return 0;
+  }
+  return find_equilibrium(e, m->guess, like_last) > 0;
+}
+
+/* -- whether a step can be trusted ------------------------------------------------------------------ */
+
+static int fails(march *m, enum failure why)
+{
+  m->failure = why;
+  return 0;
+}
+
+/* The end of the step in the axes of the plane, and the step of the nodes; whether no node turns further
+ * than it may. */
 static int measure(march *m)
 {
+  equation *e = m->equation;
+  double turn = 0;
+  if (e->turned) {
+    memcpy(m->x, e->unknowns, m->size * sizeof *m->x);
+    turn_axes(e, m->x, -1);
+  }
   for (int i = 0; i < m->size; ++i) m->s[i] = m->x[i] - m->q[i];
-  for (int k = 0; k < m->rotations; ++k)
-    if (!(fabs(m->s[m->rotation[k]]) <= m->largest_turn)) return 0;
+  for (int k = 0; k < m->rotations; ++k) turn = fmax(turn, fabs(m->s[m->rotation[k]]));
+  m->turn = over_processes(e, LARGEST, turn);
+  if (m->applies && m->turn > m->applying_turn && m->short_part * m->step.dt > m->applied_by - m->begin_of_run)
+    return fails(m, APPLIED_TOO_FAST);
+  if (m->limits_turn && !(m->turn <= m->largest_turn)) return fails(m, TURNS_TOO_FAR);
   for (int k = 0; k < m->half_tangents; ++k) {
-    double *turn = m->s + m->half_tangent[k];
-    *turn = 2 * tan(*turn / 2);
+    const int i = m->half_tangent[k];
+    m->s[i] = 2 * tan(m->s[i] / 2);
   }
   for (int k = 0; k < m->multipliers; ++k) m->s[m->multiplier[k]] = 0;
   return 1;
 }
 
-/* Whether the internal forces account for what the step stores and dissipates; see StaticPath. */
-static int followed(const march *m)
+/* Whether a static step was followed: no mechanism, and the internal forces account for what it stores and
+ * dissipates; see branch_check.py. */
+static int followed(march *m)
 {
-  const static_path *p = m->path;
+  static_path *p = m->path;
   equation *e = m->equation;
   const double a = p->weight_of_before;
   energy_change sum = {0};
   double far = 0, work = 0, through = 0, round_off = 0;
   for (int i = 0; i < m->size; ++i)
     if (!(fabs(m->s[i]) * p->per_far[i] <= far)) far = fabs(m->s[i]) * p->per_far[i];
-  if (!(far <= p->far)) return 0;
+  p->moves = over_processes(e, LARGEST, far);
+  if (!(p->moves <= p->far)) return fails(m, LEAVES_MECHANISM);
   if (isinf(p->slack)) return 1;
   for (int k = 0; k < p->terms; ++k) p->change[k].of(p->change[k].self, m->x, &sum);
   for (int i = 0; i < m->size; ++i)
     work += (a * p->force[i] + (1 - a) * e->inner_force[i]) * m->s[i];
-  e->moved = fmin(largest_motion(e->size, e->weight, m->x), e->scene);
-  find_round_off(e, m->x, e->space);
-  for (int i = 0; i < m->size; ++i) round_off += fabs(e->space[i] * m->s[i]);
+  find_motion(e, e->unknowns);
+  find_round_off(e, e->unknowns, e->space);
+  for (int i = 0; i < e->owned; ++i) round_off += fabs(e->space[i] * m->s[i]);
   for (int k = 0; k < p->accounts; ++k)
     for (int i = 0; i < p->entries[k]; ++i) through += fabs(p->account[k][i]);
-  const double change = sum.in_beams + sum.in_connectors;
-  const double size = fabs(work) + fabs(sum.in_beams) + sum.effort;
-  const double slack = p->slack * size + round_off + DBL_MIN;
-  return fabs(work - change) <= slack + p->kink * through;
+  const double in_beams = over_processes(e, TOTAL, sum.in_beams);
+  p->work = over_processes(e, TOTAL, work);
+  p->stored = in_beams + over_processes(e, TOTAL, sum.in_connectors);
+  /* A motor that stretches a spring gives what the spring takes; their sum measures nothing. Connectors
+   * count one by one, so that the size is the same on any number of processes. */
+  const double size = fabs(p->work) + fabs(in_beams) + over_processes(e, TOTAL, sum.effort);
+  const double slack = p->slack * size + over_processes(e, TOTAL, round_off) + DBL_MIN;
+  if (fabs(p->work - p->stored) <= slack + p->kink * over_processes(e, TOTAL, through)) return 1;
+  return fails(m, LEAPS);
+}
+
+/* Solve the step, whose terms have begun it, from the guess; whether its end can be trusted. */
+int solve_step(march *m, int hold)
+{
+  equation *e = m->equation;
+  int admitted = 1;
+  if (!solve(m, hold)) return fails(m, NO_EQUILIBRIUM);
+  if (!measure(m)) return 0;
+  for (int k = 0; k < m->admissions; ++k) admitted &= m->admission[k].of(m->admission[k].self, m->x);
+  if (m->judges && over_processes(e, LARGEST, !admitted) > 0) return fails(m, GIVES_ENERGY);
+  return !m->path || followed(m);
+}
+
+/* Largest number of parts that a step is cut into. */
+enum { MOST_PARTS = 4096 };
+
+/* Part of the first step after which accelerations are taken for those at the beginning. Shorter ones are
+ * nearer to it, but magnify the velocities of supports that do not begin with theirs. */
+static const double FIRST_TRIAL = 1. / 16;
+
+/* Solve the step to t1, which is a part of one to `end`; the state changes if it is accepted. */
+int attempt_step(march *m, double t1, double end)
+{
+  equation *e = m->equation;
+  e->raised = NOTHING;
+  if (m->rates && m->prepare && !m->rates->ready) {
+    const double first = m->t + FIRST_TRIAL * (t1 - m->t);
+    if (!set_step(m, first, t1) || !begin_terms(m)) return fails(m, RAISED);
+    guess(m);
+    if (!solve_step(m, 1)) return 0;
+    m->prepare(m->handle);
+  }
+  if (!set_step(m, t1, end) || !begin_terms(m)) return fails(m, RAISED);
+  guess(m);
+  return solve_step(m, 1);
 }
 
 static void accept_supports(march *m)
 {
   const moving_supports *p = m->supports;
   const double a = p->weight_of_before;
+  turn_axes(m->equation, m->s, 1);
   if (p->moving)
     for (int k = 0; k < p->held; ++k)
-      *p->work += (a * p->before[k] + (1 - a) * p->reactions[k]) * m->s[p->hold[k]];
+      if (p->hold[k] < m->equation->owned)
+        *p->work += (a * p->before[k] + (1 - a) * p->reactions[k]) * m->s[p->hold[k]];
   memcpy(p->before, p->reactions, p->held * sizeof *p->before);
 }
 
-static int take_step(march *m, double t1)
+/* Take the end of the step for the state; whether no function of a user has raised anything. */
+int accept_step(march *m)
 {
+  equation *e = m->equation;
   prediction *p = m->prediction;
-  const double t0 = m->t;
-  m->tried = 0;
-  m->step.t0 = t0, m->step.t1 = t1, m->step.dt = t1 - t0, m->step.fraction = 1, m->step.at = m->at;
-  m->step.load_time = (1 - m->load_weight) * t0 + m->load_weight * t1;
-  m->step.motion_time = (1 - m->motion_weight) * t0 + m->motion_weight * t1;
-  m->step.q0 = m->q, m->step.q_before = p->q_before, m->step.ratio = m->step.dt / p->dt;
-  if (m->rates && !find_numbers(m->rates, m->step.dt)) return 0;
-  run(&m->begin, &m->step, 0, 0);
-  if (m->raised) return 0;
-  guess(m);
-  if (!solve(m) || !measure(m)) return 0;
-  for (int k = 0; k < m->admissions; ++k)
-    if (!m->admission[k].of(m->admission[k].self, m->x)) return 0;
-  if (m->path) {
-    if (!followed(m)) return 0;
-    memcpy(m->path->force, m->equation->inner_force, m->size * sizeof *m->path->force);
-  }
   run(&m->accept, &m->step, m->x, m->s);
-  if (m->raised) return 0;
+  if (over_processes(e, LARGEST, e->raised) > 0) return fails(m, RAISED);
+  if (m->path) memcpy(m->path->force, e->inner_force, m->size * sizeof *m->path->force);
   accept_cell_forces(m->cell_forces);
   accept_supports(m);
   memset(m->state, 0, m->states * sizeof *m->state);
   run(&m->add_state, &m->step, m->x, m->s);
   enter_step(p, m->step.dt, m->q, m->x);
+  if (e->agree && m->rates) {
+    p->both = over_processes(e, TOTAL, p->both);
+    p->now = over_processes(e, TOTAL, p->now);
+    p->step = over_processes(e, TOTAL, p->step);
+  }
   compare_differences(p);
   double *spare = p->q_before;
   p->q_before = m->q, m->q = spare;
   memcpy(m->q, m->x, m->size * sizeof *m->q);
-  m->t = t1;
-  m->iterations += m->tried;
-  for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, t1, p->q_before, m->q);
+  m->t = m->step.t1;
+  ++m->parts;
+  for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, m->t, p->q_before, m->q);
+  return 1;
+}
+
+/* Go to a time at once or, where that fails, in parts; whether it is reached. */
+int go_to_time(march *m, double end)
+{
+  const double begin = m->t;
+  for (int done = 0, part = MOST_PARTS; done < MOST_PARTS;) {
+    const double t1 = done + part == MOST_PARTS ? end : begin + (end - begin) * (done + part) / MOST_PARTS;
+    if (attempt_step(m, t1, end)) {
+      if (!accept_step(m)) return 0;
+      done += part;
+      /* A part grows again where the larger one would begin anyway. */
+      if (done % (2 * part) == 0 && part < MOST_PARTS) part *= 2;
+    } else {
+      m->failed_end = t1;
+      if (part == 1 || m->equation->raised == OTHER || m->equation->error) return 0;
+      part /= 2;
+    }
+  }
   return 1;
 }
 
@@ -604,15 +759,12 @@ void keep_state(const march *m, double *row)
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
 {
   const double end = steps > 1 ? seconds_now() + seconds : 0;
-  m->failed = m->raised = m->parts = 0;
+  m->failure = SUCCEEDS;
+  m->parts = 0;
   for (int k = 0; k < steps; ++k) {
     do {
       const double stop = m->stop ? fmin(m->stop(m->stops, ends[k]), ends[k]) : ends[k];
-      if (!take_step(m, stop)) {
-        m->failed = 1;
-        return k;
-      }
-      ++m->parts;
+      if (!go_to_time(m, stop)) return k;
     } while (m->t != ends[k]);
     if (keeps) keep_state(m, rows + (size_t)k * m->width);
     if (steps > 1 && seconds_now() > end) return k + 1;

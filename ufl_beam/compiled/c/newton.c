@@ -4,24 +4,91 @@
  * What has no loop in C is a part all the same: a function that calls Python.
  */
 
+/* -- processes that share a scene -------------------------------------------------------------- */
+
+double over_processes(const equation *e, enum agreement how, double here)
+{
+  return e->agree ? e->agree(e->handle, how, here) : here;
+}
+
+/* Norm over the scene of forces, and moments over its size, at the degrees of freedom of this process. */
+static double norm_of(const equation *e, const double *forces)
+{
+  return over_processes(e, HYPOT, norm(e->size, e->weight, forces));
+}
+
+/* Values of a vector of PETSc that other processes own; or what this one has for them, added there. */
+static int update_ghosts(const equation *e, void *vector)
+{
+  if (!e->agree) return 0;
+  const int error = petsc.VecGhostUpdateBegin(vector, INSERT_VALUES, FORWARD);
+  return error ? error : petsc.VecGhostUpdateEnd(vector, INSERT_VALUES, FORWARD);
+}
+
+static int add_ghosts(const equation *e, void *vector)
+{
+  if (!e->agree) return 0;
+  const int error = petsc.VecGhostUpdateBegin(vector, ADD_VALUES, REVERSE);
+  return error ? error : petsc.VecGhostUpdateEnd(vector, ADD_VALUES, REVERSE);
+}
+
+/* What a function of a user has raised on any process, see `raised`. */
+static int raised_anywhere(const equation *e) { return (int)over_processes(e, LARGEST, e->raised); }
+
+/* -- supports at an angle ---------------------------------------------------------------------- */
+
+/* A vector in the axes of supports (way = 1), or from these in those of the plane (-1), in place. */
+void turn_axes(const equation *e, double *x, int way)
+{
+  for (int k = 0; k < e->turned; ++k) {
+    const turned_axes *t = e->axes + k;
+    const double a = x[t->i], b = x[t->j], s = way * t->s;
+    x[t->i] = t->c * a + s * b, x[t->j] = t->c * b - s * a;
+  }
+}
+
+/* Configuration in the axes of the plane. */
+static const double *in_plane(const equation *e, const double *x)
+{
+  if (!e->turned) return x;
+  memcpy(e->plane, x, e->size * sizeof *x);
+  turn_axes(e, e->plane, -1);
+  return e->plane;
+}
+
+static void turn_entries(double *data, int number, const int32_t *first, const int32_t *second, double c,
+                         double s)
+{
+  for (int k = 0; k < number; ++k) {
+    const double a = data[first[k]], b = data[second[k]];
+    data[first[k]] = c * a + s * b, data[second[k]] = c * b - s * a;
+  }
+}
+
+/* -- residual and tangent ---------------------------------------------------------------------- */
+
 /* What is asked of the internal forces, which r consists of so far. */
-void note_inner_forces(equation *e, const double *r)
+static void note_inner_forces(equation *e, const double *r)
 {
   e->inner_size = norm(e->size, e->weight, r);
   if (e->inner_force) memcpy(e->inner_force, r, e->size * sizeof *r);
 }
 
-/* The residual at q; what supports carry is noted and removed. */
-void residual(equation *e, const double *q, double *r)
+/* The residual r at x, which the vector f of PETSc has; what supports carry is noted and removed. */
+int residual(equation *e, const double *x, double *r, void *f)
 {
+  const double *q = in_plane(e, x);
   memset(r, 0, e->size * sizeof *r);
   for (int k = 0; k < e->inner; ++k) e->force[k].add(e->force[k].self, q, r);
   note_inner_forces(e, r);
   for (int k = e->inner; k < e->forces; ++k) e->force[k].add(e->force[k].self, q, r);
+  turn_axes(e, r, 1);
+  const int error = add_ghosts(e, f);
   for (int k = 0; k < e->held; ++k) {
     e->reactions[k] = r[e->hold[k]];
     r[e->hold[k]] = 0;
   }
+  return error;
 }
 
 /* Rows of the tangent with nothing in them but the product. */
@@ -47,7 +114,7 @@ static cells some_cells(const cells *c, int first)
   return some;
 }
 
-/* All parts of the tangent at q; rows are begun shortly before cells need them. */
+/* All parts of the tangent at q, in the axes of the plane; rows are begun shortly before cells need them. */
 void fill_tangent(const equation *e, const double *q)
 {
   int begun = 0;
@@ -66,18 +133,31 @@ void fill_tangent(const equation *e, const double *q)
     e->stiffness[k].add(e->stiffness[k].self, q, e->tangent);
 }
 
-/* The tangent at q. What stands on the diagonal has the right dimension and size for what is held;
- * where material that flows freely leaves nothing, or the digits of motions that fade, what stood there
- * before does as well. */
-void assemble(equation *e, const double *q)
+/* A tangent in the axes of supports, with what they hold held. What stands on the diagonal has the right
+ * dimension and size for that; where material that flows freely leaves nothing, or the digits of motions
+ * that fade, what stood there before does as well. */
+void hold_tangent(const equation *e)
 {
-  fill_tangent(e, q);
+  for (int k = 0; k < e->turned; ++k) {
+    const turned_axes *t = e->axes + k;
+    turn_entries(e->tangent, t->in_rows, t->row_i, t->row_j, t->c, t->s);
+    turn_entries(e->tangent, t->in_columns, t->column_i, t->column_j, t->c, t->s);
+  }
   for (int k = 0; k < e->held; ++k)
     if (isnormal(e->tangent[e->pivot[k]])) e->pivots[k] = e->tangent[e->pivot[k]];
   for (int k = 0; k < e->zeros; ++k) e->tangent[e->zero[k]] = 0;
   for (int k = 0; k < e->held; ++k) e->tangent[e->pivot[k]] = e->pivots[k];
+}
+
+/* The tangent at x. */
+static void assemble(const equation *e, const double *x)
+{
+  fill_tangent(e, in_plane(e, x));
+  hold_tangent(e);
   for (int k = 0; k < e->idle; ++k) e->tangent[e->idle_entry[k]] += e->idle_stiffness[k];
 }
+
+/* -- convergence ------------------------------------------------------------------------------- */
 
 /* Iterations that a tangent may still cost if it is kept: making one costs as much as two. */
 enum { MORE = 3 };
@@ -88,19 +168,24 @@ static const double SURE = 1e-4;
 /* Times the tolerance that are about as good, unless laws of connectors may be steep. */
 static const double CLOSE = 8;
 
-static int demands_met(const equation *e, const double *q, double scale)
+/* Whether laws of connectors and points are met by x and its residual, on all processes. */
+static int demands_met(const equation *e, const double *x, double scale)
 {
-  for (int k = 0; k < e->demands; ++k)
-    if (!(e->demand[k].missed(e->demand[k].self, q, e->residual, scale, e->moved) <= e->rtol))
-      return 0;
-  return 1;
+  if (!e->demanding) return 1;
+  const double *q = in_plane(e, x);
+  double most = 0;
+  for (int k = 0; k < e->demands; ++k) {
+    const double missed = e->demand[k].missed(e->demand[k].self, q, e->residual, scale, e->moved);
+    if (!(missed <= most)) most = isnan(missed) ? INFINITY : missed;
+  }
+  return over_processes(e, LARGEST, most) <= e->rtol;
 }
 
 /* Whether Newton's method has arrived, goes on, or goes nowhere.
  *
  * `floor` is several times the residual that the last digits of the unknowns make.
  */
-int judge(equation *e, const double *q, int iteration, double residual, double scale, double floor)
+static int judge(equation *e, const double *q, int iteration, double residual, double scale, double floor)
 {
   const double wanted = e->rtol * scale;
   /* Small loads beside large ones, such as those that make columns buckle, are lost in a guess that
@@ -114,7 +199,7 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
     /* A fraction of the last digit is luck; a few of them that Newton's method no longer halves are
      * all that can be had: it may go round between two such states for ever. With the tangent of the
      * iterate before that is no proof, but does close to what is wanted. */
-    const int close = residual <= CLOSE * wanted && !e->demands;
+    const int close = residual <= CLOSE * wanted && !e->demanding;
     const int stays = e->last / 2 < residual && residual <= floor && (!kept || close);
     if ((stays || residual <= floor / 80) && demands_met(e, q, scale)) return AT_ROUND_OFF;
     /* With that tangent, the residual falls by twice the last factor; works are to come out as with a
@@ -151,6 +236,28 @@ void find_round_off(const equation *e, const double *q, double *forces)
   }
 }
 
+/* Largest motion in an iterate on all processes, at most the size of the scene. */
+void find_motion(equation *e, const double *x)
+{
+  e->moved = fmin(over_processes(e, LARGEST, largest_motion(e->size, e->weight, x)), e->scene);
+}
+
+/* Whether, and why, to stop at an iterate x with the latest residual. */
+static int verdict(equation *e, const double *x, int iteration)
+{
+  const double now = norm_of(e, e->residual);
+  if (!isfinite(now)) return DIVERGED;
+  const double scale = e->loads + over_processes(e, HYPOT, e->inner_size);
+  const int nearly = iteration > 1 && now > e->rtol * scale;
+  double floor = 0;
+  if (nearly || e->demanding) find_motion(e, x);
+  if (nearly || (iteration > 1 && e->demanding)) {
+    find_round_off(e, x, e->space);
+    floor = 8 * norm_of(e, e->space);
+  }
+  return judge(e, x, iteration, now, scale, floor);
+}
+
 /* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. A
  * checkpoint does not have that: runs with one begin each step anew, so that they go on bit for bit. */
 void begin_newton(equation *e, int patience, int like_last)
@@ -165,19 +272,7 @@ petsc_functions petsc;
 
 #define TRY(call) do { int error = (call); if (error) return error; } while (0)
 
-/* -- what SNES calls --------------------------------------------------------------------------- */
-
-int snes_function(void *snes, void *x, void *f, void *self)
-{
-  equation *e = self;
-  const double *q;
-  double *r;
-  TRY(petsc.VecGetArrayRead(x, &q));
-  TRY(petsc.VecGetArray(f, &r));
-  residual(e, q, r);
-  TRY(petsc.VecRestoreArray(f, &r));
-  return petsc.VecRestoreArrayRead(x, &q);
-}
+/* -- the linear equation of an iteration ----------------------------------------------------------- */
 
 /* Tell PETSc that entries of a matrix have changed. */
 static int note_change(void *matrix)
@@ -185,42 +280,6 @@ static int note_change(void *matrix)
   int64_t state;
   TRY(petsc.PetscObjectStateGet(matrix, &state));
   return petsc.PetscObjectStateSet(matrix, state + 1);
-}
-
-int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
-{
-  equation *e = self;
-  const double *q;
-  if (e->near) return 0;
-  TRY(petsc.VecGetArrayRead(x, &q));
-  assemble(e, q);
-  TRY(note_change(P));
-  return petsc.VecRestoreArrayRead(x, &q);
-}
-
-/* What becomes of an iterate q. */
-static int verdict(equation *e, const double *q, int iteration)
-{
-  const double now = norm(e->size, e->weight, e->residual);
-  if (!isfinite(now)) return DIVERGED;
-  const double scale = e->loads + e->inner_size;
-  const int nearly = iteration > 1 && now > e->rtol * scale;
-  double floor = 0;
-  if (nearly || e->demands) e->moved = fmin(largest_motion(e->size, e->weight, q), e->scene);
-  if (nearly || (iteration > 1 && e->demands)) {
-    find_round_off(e, q, e->space);
-    floor = 8 * norm(e->size, e->weight, e->space);
-  }
-  return judge(e, q, iteration, now, scale, floor);
-}
-
-int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
-{
-  equation *e = self;
-  const double *q;
-  TRY(petsc.VecGetArrayRead(e->x, &q));
-  *reason = verdict(e, q, (int)iteration);
-  return petsc.VecRestoreArrayRead(e->x, &q);
 }
 
 /* Factors of the tangent, and what they make of the residual on the way; *failed if it is singular. */
@@ -251,38 +310,264 @@ int solve_tangent(const equation *e, int reduced)
   return 0;
 }
 
-/* Newton's method with full steps, as a solver of SNES: what its own does beside that takes as long
- * as all the rest where there are few unknowns. */
+/* The change of an iteration, with a new tangent if `anew`; *failed if that is singular. */
+static int find_change(equation *e, const double *x, int anew, int *failed)
+{
+  *failed = 0;
+  if (e->border) {
+    *failed = e->border->change(e->border->handle, x);
+    return 0;
+  }
+  if (anew) assemble(e, x);
+  if (e->agree) {
+    *failed = e->solve(e->handle, anew);
+    return 0;
+  }
+  if (anew) TRY(factor_tangent(e, failed));
+  return *failed ? 0 : solve_tangent(e, anew);
+}
+
+/* -- Newton's method --------------------------------------------------------------------------- */
+
+static int residual_at(equation *e, double *x)
+{
+  TRY(update_ghosts(e, e->x));
+  if (e->border) e->border->arrive(e->border->handle, x);
+  return residual(e, x, e->residual, e->f);
+}
+
+/* Residuals that a search may cost; part of the first work that it must come down to; its limits. */
+enum { EVALUATIONS = 4 };
+static const double PART = 0.5, LONGEST = 1, SHORTEST = 1e-12;
+
+/* Work of the latest residual on the conjugates. */
+static double work_of_residual(const equation *e)
+{
+  double sum = 0;
+  for (int i = 0; i < e->owned; ++i) sum += e->residual[i] * e->conjugate[i];
+  return over_processes(e, TOTAL, sum);
+}
+
+/* Go the part of the full change at which the residual does no work on it, found by secants.
+ *
+ * Forces that grow in an S, as in a point that yields one way or the other, send full steps from one
+ * branch to the other and back for ever. Work is the only product of residuals and steps that adds forces
+ * and moments, and it is the same in all units. Forces of connectors are unknowns of their own: the law
+ * of a connector, in the place of its force, does work on the change of its motion. */
+static int search(equation *e, double *x)
+{
+  TRY(update_ghosts(e, e->y));
+  e->find_conjugates(e->handle, in_plane(e, x)); /* which makes room for them, and for the start */
+  memcpy(e->start, x, e->size * sizeof *x);
+  double before = work_of_residual(e), last = 0, part = 1;
+  const double first = fabs(before);
+  for (int k = 1;; ++k) {
+    for (int i = 0; i < e->owned; ++i) x[i] = e->start[i] - part * e->change[i];
+    TRY(residual_at(e, x));
+    const double now = work_of_residual(e), slope = (now - before) / (part - last);
+    if (k == EVALUATIONS || !(fabs(now) > PART * first) || slope == 0) return 0;
+    double next = part - now / slope;
+    if (next < SHORTEST) next = part + now / slope;
+    if (!(SHORTEST <= next && next <= LONGEST)) return 0;
+    before = now, last = part, part = next;
+  }
+}
+
+/* Newton's method from the iterate x; why it ends is `reason`. */
+static int newton(equation *e, double *x)
+{
+  e->iterations = 0;
+  TRY(residual_at(e, x));
+  for (;;) {
+    if (e->monitored) TRY(petsc.SNESMonitor(e->snes, e->iterations, norm_of(e, e->residual)));
+    e->reason = verdict(e, x, e->iterations);
+    if (e->border && e->reason > 0 && !e->border->met(e->border->handle)) e->reason = ITERATING;
+    if (e->reason) return 0;
+    if (e->iterations == e->most) {
+      e->reason = TOO_MANY;
+      return 0;
+    }
+    int failed;
+    TRY(find_change(e, x, !e->near, &failed));
+    if (failed) {
+      e->reason = SINGULAR;
+      return 0;
+    }
+    if (e->careful) TRY(search(e, x));
+    else {
+      for (int i = 0; i < e->owned; ++i) x[i] -= e->change[i];
+      TRY(residual_at(e, x));
+    }
+    ++e->iterations;
+  }
+}
+
+/* -- what SNES calls --------------------------------------------------------------------------- */
+
+/* This method as a solver of SNES: what its own does beside that takes as long as all the rest where
+ * there are few unknowns. */
 int snes_newton(void *snes, void *x)
 {
   equation *e;
   double *q;
-  int iteration = 0, reason;
   TRY(petsc.SNESShellGetContext(snes, &e));
   TRY(petsc.VecGetArray(x, &q));
-  residual(e, q, e->residual);
-  while (!(reason = verdict(e, q, iteration))) {
-    if (iteration == e->most) {
-      reason = TOO_MANY;
-      break;
-    }
-    const int anew = !e->near;
-    if (anew) {
-      int failed = 0;
-      assemble(e, q);
-      TRY(factor_tangent(e, &failed));
-      if (failed) {
-        reason = SINGULAR;
-        break;
-      }
-    }
-    TRY(solve_tangent(e, anew));
-    for (int i = 0; i < e->size; ++i) q[i] -= e->change[i];
-    residual(e, q, e->residual);
-    ++iteration;
-  }
-  e->iterations = iteration, e->reason = reason;
+  TRY(newton(e, e->unknowns));
   TRY(petsc.VecRestoreArray(x, &q));
-  TRY(petsc.SNESSetIterationNumber(snes, iteration));
-  return petsc.SNESSetConvergedReason(snes, reason);
+  TRY(petsc.SNESSetIterationNumber(snes, e->iterations));
+  return petsc.SNESSetConvergedReason(snes, e->reason);
+}
+
+/* Local values of a vector, ghosts included. */
+static int open_vector(const equation *e, void *vector, void **local, double **values)
+{
+  *local = vector;
+  if (e->agree) TRY(petsc.VecGhostGetLocalForm(vector, local));
+  return petsc.VecGetArray(*local, values);
+}
+
+static int close_vector(const equation *e, void *vector, void **local, double **values)
+{
+  TRY(petsc.VecRestoreArray(*local, values));
+  return e->agree ? petsc.VecGhostRestoreLocalForm(vector, local) : 0;
+}
+
+int snes_function(void *snes, void *x, void *f, void *self)
+{
+  equation *e = self;
+  void *local_f, *local_x = x;
+  double *r;
+  const double *q;
+  TRY(update_ghosts(e, x));
+  if (e->agree) TRY(petsc.VecGhostGetLocalForm(x, &local_x));
+  TRY(petsc.VecGetArrayRead(local_x, &q));
+  TRY(open_vector(e, f, &local_f, &r));
+  TRY(residual(e, q, r, f));
+  TRY(close_vector(e, f, &local_f, &r));
+  TRY(petsc.VecRestoreArrayRead(local_x, &q));
+  return e->agree ? petsc.VecGhostRestoreLocalForm(x, &local_x) : 0;
+}
+
+int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
+{
+  equation *e = self;
+  void *local_x = x;
+  const double *q;
+  if (e->near) return 0;
+  TRY(update_ghosts(e, x));
+  if (e->agree) TRY(petsc.VecGhostGetLocalForm(x, &local_x));
+  TRY(petsc.VecGetArrayRead(local_x, &q));
+  assemble(e, q);
+  TRY(note_change(P));
+  TRY(petsc.VecRestoreArrayRead(local_x, &q));
+  return e->agree ? petsc.VecGhostRestoreLocalForm(x, &local_x) : 0;
+}
+
+int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
+{
+  equation *e = self;
+  *reason = e->reason = verdict(e, e->unknowns, e->iterations = (int)iteration);
+  return 0;
+}
+
+/* -- the equilibrium of a step ------------------------------------------------------------------ */
+
+/* Begin to iterate anew, with tangents of a kind. */
+void restart(const equation *e, enum tangents kind)
+{
+  for (int k = 0; k < e->predictions; ++k) {
+    predicted_strains *p = e->predicted[k];
+    p->begins = kind != EXACT, p->stale = 1, p->exact = kind != PREDICTED;
+  }
+}
+
+/* Take a guess for the unknowns. */
+static int go_to(equation *e, const double *guess, enum tangents kind)
+{
+  double *q;
+  TRY(petsc.VecGetArray(e->x, &q)); /* tells PETSc of the change */
+  if (guess != e->unknowns) memcpy(e->unknowns, guess, e->size * sizeof *guess);
+  TRY(petsc.VecRestoreArray(e->x, &q));
+  restart(e, kind);
+  return 0;
+}
+
+/* Let a vector be written again that PETSc keeps locked after a linear solution has failed. */
+static void unlock(void *vector)
+{
+  petsc_int locks = 0;
+  petsc.VecLockGet(vector, &locks);
+  while (locks-- > 0) petsc.VecLockReadPop(vector);
+}
+
+/* Iterations in a row without half the least residual that are one too many: of full steps, of steps that a
+ * search shortens or stiffer tangents make, and along paths. Those that wander longer find a solution by
+ * luck: the last digits of the data would decide. */
+enum { SHORT_PATIENCE = 2, LONG_PATIENCE = 10, PATIENCE_ALONG = 12 };
+
+/* Iterate from the unknowns; the reason to end is the return value. */
+static int iterate(equation *e, int patience, int like_last, int careful)
+{
+  const int by_petsc = e->monitored && !e->border && !(careful && e->searches);
+  begin_newton(e, patience, like_last);
+  e->careful = careful && !by_petsc;
+  const int error = by_petsc || !e->monitored ? petsc.SNESSolve(e->snes, 0, e->x) : newton(e, e->unknowns);
+  e->total += e->iterations;
+  if (error) {
+    if (error != OF_LIBRARY) e->error = error; /* KLU stops PETSc where it finds no pivot */
+    e->reason = SINGULAR;
+  } else if (by_petsc)
+    petsc.SNESGetConvergedReason(e->snes, &e->reason);
+  if (e->reason <= 0 && by_petsc) unlock(e->f);
+  return e->reason;
+}
+
+/* The same from a guess, with idle motions held if the tangent is singular; without any if that does not
+ * help. */
+static int iterate_from(equation *e, const double *guess, int patience, enum tangents kind, int like_last)
+{
+  const double start = e->border ? *e->border->t : 0;
+  enum { FRESH, HELD, FREE } motions = FRESH;
+  for (;;) {
+    if (e->border) *e->border->t = start;
+    go_to(e, guess, kind);
+    const int reason = iterate(e, patience, motions == FRESH && like_last, 0);
+    if (motions == FREE || reason > 0 || e->error || raised_anywhere(e) == OTHER) return reason;
+    if (reason == SINGULAR && e->find_idle(e->handle)) motions = HELD;
+    else if ((reason == SINGULAR || motions == HELD) && e->forget_idle(e->handle)) motions = FREE;
+    else return reason;
+  }
+}
+
+/* Stiffer tangents of points that do not open, or the true ones again; whether they differ. */
+static int stiffen(equation *e, int stiff)
+{
+  const int opened = over_processes(e, LARGEST, e->search && e->search[OPENED]) > 0;
+  if (e->search) e->search[STIFF] = stiff && opened;
+  for (int k = 0; stiff && k < e->agains; ++k) e->again[k].run(e->again[k].self);
+  return opened;
+}
+
+/* Find the unknowns at which the residual vanishes from a guess; the reason to end is the return value,
+ * positive if they are found. `like_last` says that the tangent of the last solution does for this one. */
+int find_equilibrium(equation *e, const double *guess, int like_last)
+{
+  e->error = 0;
+  if (e->border) return iterate_from(e, guess, PATIENCE_ALONG, FIRST, 0);
+  int reason = iterate_from(e, guess, SHORT_PATIENCE, PREDICTED, like_last);
+  if (reason == STALLED) {
+    restart(e, EXACT);
+    reason = iterate(e, LONG_PATIENCE, 0, 1);
+  }
+  if (reason > 0 || e->error || raised_anywhere(e) == OTHER || !stiffen(e, 1)) return reason;
+  /* Stiffer tangents come near, but slowly; then true ones. */
+  go_to(e, guess, PREDICTED);
+  const int slow = iterate(e, LONG_PATIENCE, 0, 0);
+  stiffen(e, 0);
+  if (slow != TOO_MANY && slow <= 0) return slow;
+  memcpy(e->aside, e->unknowns, e->size * sizeof *e->aside);
+  const int exact = iterate(e, SHORT_PATIENCE, 0, 0);
+  if (exact > 0) return exact;
+  go_to(e, e->aside, PREDICTED);
+  return slow;
 }
