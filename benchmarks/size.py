@@ -3,8 +3,8 @@
 
     python3 benchmarks/size.py [COMMIT ...]
 
-Counts the working tree, or each commit.  Blank lines, comments and docstrings count as lines; nested
-functions and methods count as functions.
+Counts the working tree, or each commit.  Blank lines, comments and docstrings count as lines,
+nested functions and methods as functions.
 """
 
 import ast

@@ -51,16 +51,15 @@ class PredictedStrains:
 
     def __init__(self, fields: Fields) -> None:
         form, self._about = _linear_strains(fields.element)
-        self._form: Any = fields.hot_kernel(form, fields.element.q1)
+        self._form = fields.hot_kernel(form, fields.element.q1)
         self._weights = fields.share.grid.mesh.point_weights.repeat(3)
         self._last, change = np.zeros((2, fields.share.size))
         shape = self._shape = len(fields.order), len(self._weights)
         self.c = struct(
             "predicted_strains", size=len(change), of_cell=shape[1], weight=self._weights,
             about=self._last, change=change, e=np.zeros(shape),
+            strains=self._form.cells, at_about=self._form.position(self._about),
         )  # fmt: skip
-        if self._form.cells:
-            fill(self.c, strains=self._form.cells, at_about=self._form.position(self._about))
 
     def begin(self, step: Step) -> None:
         """Begin a step, with exact tangents until :meth:`restart`."""
@@ -135,10 +134,9 @@ class StaticTangent:
 
     @cached_property
     def _in_c(self) -> Any:
-        kernel: Any = self.kernel
         return struct(
-            "static_tangent", predicted=self.predicted.c, tangent=kernel.cells,
-            at_e=kernel.position(self._e),
+            "static_tangent", predicted=self.predicted.c, tangent=self.kernel.cells,
+            at_e=self.kernel.position(self._e),
         )  # fmt: skip
 
     def loop(self) -> Loop:
