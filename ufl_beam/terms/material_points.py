@@ -1,26 +1,41 @@
 # SPDX-License-Identifier: MIT
 """Material points: return map, internal variables, stored and dissipated energies.
 
-The return map is a loop in C over the points, material_points.c, which calls the compiled laws.
+The laws are traced with UFL symbols: UFL derives the consistent tangents, by the implicit function
+theorem where a discontinuity opens, and FFCx compiles them.  The return map is a loop in C over the
+points, material_points.c, which calls the compiled laws.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import ufl
+from ufl.conditional import Condition
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import ffi, fill, lib, struct
-from ufl_beam.errors import StepFailed
+from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model import law_functions
+from ufl_beam.model.fibres import Kind, Layout
 from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, SearchFlags
-from ufl_beam.terms.point_equations import PointEquations, curved, inputs, prefixed, rows
-from ufl_beam.terms.point_forms import point_forms
+from ufl_beam.terms.point_equations import End, PointEquations, curved, inputs, prefixed, rows
+
+law_functions.where.register(Condition, ufl.conditional)
+law_functions.below.register(Expr, ufl.lt)
+law_functions.exp.register(Expr, ufl.exp)
+law_functions.sqrt.register(Expr, ufl.sqrt)
+law_functions.log.register(Expr, ufl.ln)
+law_functions.tanh.register(Expr, ufl.tanh)
 
 DIGITS = 16 * float(np.finfo(float).eps)
 """Round-off of dissipated energies, as a part of elastic ones of the strains."""
@@ -51,6 +66,76 @@ def releases(layout: Layout, scheme: Scheme) -> bool:
     """
     breaks = layout.softening is not None and scheme.theta < 1
     return breaks or (scheme.average(0.0, 1.0) != 1.0 and curved(layout.kind))
+
+
+class PointForms:
+    """Compiled laws: C functions from the inputs of a point to what the loops need.
+
+    The numbers of ``softening`` do not matter: they are inputs.
+
+    Attributes:
+        law: Stresses and their derivatives by strains; of a law that solves for its variables
+            residuals and their derivatives, then stresses and theirs, see solve_law in C.
+        resistance: That of the discontinuity, and its derivative by the growth.
+        end: ``point_output`` of loops.h, stresses, and changes of the variables.
+        own: What a law that must dissipate does by itself, and the size of that; or null.
+    """
+
+    def __init__(
+        self, inputs: tuple[str, ...], kind: Kind, softening: SofteningLaw | None, scheme: Scheme
+    ) -> None:
+        self._pointwise = pointwise = Pointwise(inputs)
+        self._equations = equations = PointEquations(kind, softening, scheme)
+        law = kind.law
+        self._strains = rows(law, "strain")
+        unknown = prefixed("new", law.variables) if law.solves else ()
+        free = {name: ufl.variable(pointwise.at[name]) for name in (*self._strains, *unknown)}
+        self._at = at = {**pointwise.at, **free}
+        try:
+            stress = tuple(map(ufl.as_ufl, equations.stress(at)))
+            answer = [*stress, *self._derivatives(stress, self._strains)]
+            if law.solves:
+                r = tuple(map(ufl.as_ufl, equations.residuals(at)))
+                by_both = [self._derivatives(r, names) for names in (unknown, self._strains)]
+                answer = [
+                    *r,
+                    *by_both[0],
+                    *by_both[1],
+                    *answer,
+                    *self._derivatives(stress, unknown),
+                ]
+            *numbers, stress, changes = equations.end(at)
+            self.own = ffi.NULL
+            if law.must_dissipate:
+                stored = ufl.as_ufl(equations.stored(at))
+                slopes = tuple(self._derivatives((stored,), unknown))
+                self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
+        except Exception as error:
+            raise SceneError(
+                f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
+                "written with + - * / ** and the functions of ub.law_functions"
+            ) from error
+        self.law = pointwise.compile(*answer)
+        end = in_order("point_output", dict(zip(End._fields, numbers, strict=False)))
+        self.end = pointwise.compile(*end, *stress, *changes)
+        self.resistance = ffi.NULL
+        if softening is not None:
+            a = ufl.variable(pointwise.at["growth"])
+            resistance = equations.resistance({**pointwise.at, "growth": a}, a)
+            self.resistance = pointwise.compile(resistance, ufl.diff(resistance, a))
+
+    @cached_property
+    def elastic(self) -> Any:
+        """Stresses and their derivatives by strains while the variables stay as they are."""
+        stress = tuple(map(ufl.as_ufl, self._equations.elastic_stress(self._at)))
+        return self._pointwise.compile(*stress, *self._derivatives(stress, self._strains))
+
+    def _derivatives(self, of: tuple[Expr, ...], by: tuple[str, ...]) -> list[Expr]:
+        """Derivatives, one row of each function."""
+        return [ufl.diff(f, self._at[name]) for f in of for name in by]
+
+
+_point_forms = stated(PointForms)
 
 
 class Points:
@@ -124,7 +209,7 @@ class Points:
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self.over = np.zeros(1)
 
-        self._forms = forms = point_forms(self.names, layout.kind, softening, scheme)
+        self._forms = forms = _point_forms(self.names, layout.kind, softening, scheme)
         self._dynamic = has_inertia(scheme)
         arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
