@@ -60,6 +60,9 @@ class InelasticBeams(Cells):
     The points answer the strains of an iterate with resultants r and their derivatives D; around
     it resultants are b + D e, linear in the strains e, from which UFL derives the tangent,
     material and geometric.  One loop in C evaluates points and forms.
+
+    Attributes:
+        over: Largest excess of a held point over its limit, as a part of it; (1,).
     """
 
     kind = "beams"
@@ -75,6 +78,7 @@ class InelasticBeams(Cells):
         share, lengths = fields.share, fields.share.cell_lengths()[fields.order]
         self.points = Points(layout, share.grid.keys(self._cells), lengths, scheme, search)
         self.points.predict()
+        self.over = self.points.over
 
         forms = inelastic_forms(fields.element, scheme)
         self._q0, self._q1 = fields.element.q0, fields.element.q1
@@ -107,14 +111,12 @@ class InelasticBeams(Cells):
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """The points, and two forms."""
-        functions = ("add_inelastic_force", "add_inelastic_tangent")
-        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
+        c = self._in_c
+        return loop("add_inelastic_force", c), loop("add_inelastic_tangent", c)
 
     def phases(self, times: TimeFunctions) -> Phases | None:
         """Loops over the points."""
-        c = struct(
-            "inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger)
-        )  # fmt: skip
+        c = struct("inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger))
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
         if self._predicted is not None:
             begin.append(self._predicted.beginning())
@@ -211,11 +213,6 @@ class InelasticBeams(Cells):
         return self._cells, self.points.kept[:, :3] - elastic, D
 
     # -- see openings.py -----------------------------------------------------------------------
-
-    @property
-    def over(self) -> Array:
-        """Largest excess of a held point over its limit, as a part of it; (1,)."""
-        return self.points.over
 
     def release(self, least: float) -> None:
         """Let held points open whose excess is so large."""

@@ -63,8 +63,8 @@ class PredictedStrains:
 
     def begin(self, step: Step) -> None:
         """Begin a step, with exact tangents until :meth:`restart`."""
-        self._q0, self._q_before = step.q0, step.q0 if step.q_before is None else step.q_before
-        fill(self.c, q0=self._q0, q_before=self._q_before, ratio=step.ratio)
+        self._q0, q_before = step.q0, step.q0 if step.q_before is None else step.q_before
+        fill(self.c, q0=self._q0, q_before=q_before, ratio=step.ratio)
         self.restart(Tangents.EXACT)
 
     def restart(self, tangents: Tangents) -> None:
@@ -73,14 +73,11 @@ class PredictedStrains:
         self.c.exact = tangents is not Tangents.PREDICTED
 
     def __call__(self, q: Array) -> Array:
-        """Strains at an iterate, in the order of the mesh, point after point; 1, 1, 1/m."""
+        """Strains of elastic cells, in the order of the mesh, point after point; 1, 1, 1/m."""
         if self.c.begins:
-            e, ratio = self._linear(self._q0, self._q0), self.c.ratio
-            return e + ratio * (e - self._linear(self._q_before, self._q_before)) if ratio else e
-        return self._linear(q if self.c.exact else self._last, q)
-
-    def _linear(self, about: Array, q: Array) -> Array:
-        """Strains at ``q`` that are linear about a configuration."""
+            about = q = self._q0
+        else:
+            about = q if self.c.exact else self._last
         e = np.zeros(self._shape)
         self._form.set(self._about, about)
         self._form.add(q - about, e)
