@@ -4,8 +4,7 @@
 import numpy as np
 
 from ufl_beam.model.fibres import Layout
-from ufl_beam.terms.compiled_points import CompiledPoints
-from ufl_beam.terms.point_equations import inputs
+from ufl_beam.terms.material_points import Points
 
 C, LENGTH = 200.0, 0.5
 
@@ -13,7 +12,7 @@ C, LENGTH = 200.0, 0.5
 class Bars:
     """Cells with one point each that the axial strain strains; all else has no stiffness."""
 
-    def __init__(self, cells, bulk, softening, scheme, *, C=C, length=LENGTH, by=CompiledPoints):
+    def __init__(self, cells, bulk, softening, scheme, *, C=C, length=LENGTH):
         layout = Layout(
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),
@@ -26,13 +25,8 @@ class Bars:
         )
         self.C, self.length, self.scheme, self.softening = C, length, scheme, softening
         self.numbers = layout.numbers([(0, k) for k in range(cells)])
-        self.points = by(
-            layout,
-            [(0, k) for k in range(cells)],
-            np.full(cells, length),
-            scheme,
-            np.zeros((cells, 1, len(inputs(layout)))),
-        )
+        keys = [(0, k) for k in range(cells)]
+        self.points = Points(layout, keys, np.full(cells, length), scheme)
         self.strain = np.zeros(cells)
 
     def __getitem__(self, name):

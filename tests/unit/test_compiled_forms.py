@@ -17,7 +17,7 @@ from ufl_beam.discretization import compiled_forms
 from ufl_beam.discretization.compiled_forms import patterns
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.dolfinx_forms import DolfinxFields
-from ufl_beam.discretization.function_spaces import CompiledFields
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, strain
@@ -211,7 +211,7 @@ def no_points(monkeypatch):
 
     forget_forms()
     monkeypatch.setattr("ufl_beam.terms.material_points.Points.__init__", refuse)
-    monkeypatch.setattr("ufl_beam.terms.compiled_points.PointForms.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.terms.material_points.PointForms.__init__", refuse)
     monkeypatch.setattr("ufl_beam.terms.inelastic_beams.InelasticBeams.__init__", refuse)
     monkeypatch.setattr("ufl_beam.model.material_laws.Softening.traction", refuse)
     monkeypatch.setattr("ufl_beam.terms.point_equations.PointEquations.__init__", refuse)
@@ -262,7 +262,7 @@ def fields_of_a_frame():
     a = ub.Beam((0, 0), (0, 2), SECTION, cells=3)
     b = ub.Beam((0, 2), (3, 1), SECTION, cells=4)
     scene = ub.Scene([a, b], joints=[ub.Revolute(a.end, b.start)])
-    return CompiledFields(Share(Grid(scene), MPI.COMM_SELF))
+    return Fields(Share(Grid(scene), MPI.COMM_SELF))
 
 
 def forms_of(q, axis, dx):
@@ -359,7 +359,7 @@ def test_energies_share_the_values_of_the_force(degree):
     energies = beams._stored, *beams._losses
     assert all(np.shares_memory(x._packed, beams._force._packed) for x in energies)
     simulation.step_to(0.01)
-    fields = CompiledFields(simulation.share)
+    fields = Fields(simulation.share)
     own = fields.kernel(elastic_forms(fields.element, scheme).stored, beams._q1)
     assert beams._stored.value(simulation.q) == pytest.approx(own.value(simulation.q), rel=1e-13)
 

@@ -12,8 +12,6 @@ from bars import LENGTH, Bars, C, histories
 from laws_of_ones_own import Eigenstrain, YieldingEigenstrain
 
 import ufl_beam as ub
-from ufl_beam.terms.compiled_points import CompiledPoints
-from ufl_beam.terms.reference_points import ReferencePoints
 
 L, EI, E0 = 8.0, 1e8, 1e-4
 STIFF = {"EA": 1e9, "GA": 1e9, "EI": EI, "rhoA": 100.0, "rhoI": 1.0}
@@ -161,15 +159,14 @@ def test_analyses_about_the_undeformed_scene_are_refused():
     assert ub.buckling(pushed, 1, at=at).factors == pytest.approx(factors, rel=1e-4)
 
 
-@pytest.mark.parametrize("by", [CompiledPoints, ReferencePoints])
 @pytest.mark.parametrize(
     "law", [Eigenstrain(0.01), YieldingEigenstrain(2.0, 20.0, 10.0, 0.5)], ids=["elastic", "yields"]
 )
 @pytest.mark.parametrize("scheme", [ub.ExactStatic(0.5), ub.ExactStatic(0.8), ub.ExactStatic(1.0)])
-def test_work_is_stored_or_dissipated_or_lost(scheme, law, by):
+def test_work_is_stored_or_dissipated_or_lost(scheme, law):
     """At points; what is dissipated is none, or what limit and viscosity take."""
     for k in range(4):
-        one, through = Bars(1, law, None, scheme, by=by), 0.0
+        one, through = Bars(1, law, None, scheme), 0.0
         one.points.refresh(np.zeros((1, 3)))
         stored = one.points.sums[3:5].sum()
         assert stored == pytest.approx(C * 0.01**2 / 2 * LENGTH)

@@ -5,12 +5,10 @@ import math
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars, C, histories
+from bars import LENGTH, Bars, C
 from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
-from ufl_beam.terms.compiled_points import CompiledPoints
-from ufl_beam.terms.reference_points import ReferencePoints
 
 MIDDLE = ub.ExactStatic(0.5)
 LAWS = {
@@ -112,24 +110,6 @@ def test_bouc_wen_against_integration(law):
         assert one["energy"][0] == pytest.approx(e, rel=2e-6)
     assert errors[1] < 1e-7
     assert errors[0] / errors[1] > 3.5  # second order, and more where errors change their sign
-
-
-@each_law
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_both_paths_agree(law, scheme):
-    """As in test_point_paths.py; with a crack on top as well."""
-    for softening in (None, ub.Softening(2.5, 0.3)):
-        of = (LAWS[law], softening, scheme)
-        paths = [Bars(500, *of, by=by) for by in (CompiledPoints, ReferencePoints)]
-        for strain in histories(500, steps=6, size=0.03):
-            (σ, D), (σ_ref, D_ref) = (some.respond(strain) for some in paths)
-            assert np.isfinite(σ).all()
-            assert np.abs(σ - σ_ref).max() < 1e-12 * C
-            assert np.abs(D - D_ref).max() <= 1e-7 * np.abs(D).max()
-            for some in paths:
-                some.step(strain)
-            states = [np.nan_to_num(some.points.state(), posinf=0.0) for some in paths]
-            assert np.abs(states[0] - states[1]).max() < 1e-11 * np.abs(states[0]).max()
 
 
 @each_law

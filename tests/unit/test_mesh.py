@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 
 import ufl_beam as ub
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import CompiledFields, mass_matrix
+from ufl_beam.discretization.function_spaces import Fields, mass_matrix
 from ufl_beam.discretization.partition import Share
 
 STEEL = ub.Section(EA=1e6, GA=4e5, EI=1e3, rhoA=2.0, rhoI=1e-3)  # N, N, N m2, kg/m, kg m
@@ -268,7 +268,7 @@ def test_lumped_mass_is_the_row_sum(degree):
 
     def mass(lumped):
         grid = Grid(scene, ub.Mesh(degree=degree, lumped=lumped))
-        M = mass_matrix(CompiledFields(Share(grid, MPI.COMM_SELF)))
+        M = mass_matrix(Fields(Share(grid, MPI.COMM_SELF)))
         return csr_array((M.data, M.indices, M.indptr)).toarray()
 
     full, lumped = mass(False), mass(True)

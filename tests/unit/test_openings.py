@@ -212,8 +212,8 @@ class Fuses:
         return self.bears - self.stiff * self.open.sum()
 
     @property
-    def excess(self):
-        return max(0.0, float(np.max(np.where(self.open, 0.0, self.stress - 1))))
+    def over(self):
+        return np.where(self.open, 0.0, self.stress - 1).clip(0.0)
 
     def release(self, least):
         self.open |= self.stress - 1 >= least
@@ -234,7 +234,7 @@ def search(bears, stiff, fails=lambda fuses: False):
             seen.append("free")
             return q
         seen.append(fuses.open.tolist())
-        search.flags[OVER] |= fuses.excess > 0
+        search.flags[OVER] |= fuses.over.max() > 0
         if fails(fuses):
             raise StepFailed("on purpose")
         return q + 1

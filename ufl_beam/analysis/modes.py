@@ -18,7 +18,7 @@ from ufl_beam.arrays import Array, Complex
 from ufl_beam.collective_errors import on_first
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import CompiledFields, SectionForces
+from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number, warn
@@ -115,7 +115,7 @@ class Shapes(Rich, ABC):
     def _cell_forces(self, states: Array) -> Array:
         """Forces of elastic cells in some configurations; (n, 9, num_cells)."""
         share = Share(self.grid, MPI.COMM_SELF)
-        fields, r = CompiledFields(share), np.zeros(share.size)
+        fields, r = Fields(share), np.zeros(share.size)
         form = fields.hot_kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
         of_cells, found = CellForces(share, [InCells(lambda: form, lib.STRESS, fields.order)]), []
         for q in np.ascontiguousarray(states):
@@ -144,7 +144,7 @@ class Shapes(Rich, ABC):
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
         share = Share(self.grid, MPI.COMM_SELF)
-        forces = SectionForces(CompiledFields(share))
+        forces = SectionForces(Fields(share))
         frames: list[Any] = [
             _Frame(self, share, forces, float(k), self._scaled(k, amplitude).real)
             for k in range(len(self))

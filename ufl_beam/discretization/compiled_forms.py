@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 from functools import cached_property, lru_cache
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar, cast
+from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
 
 import basix.ufl
 import numpy as np
@@ -94,47 +94,6 @@ def prepared(form: ufl.Form) -> Prepared:
         )
     tabulate = tabulator(compiled)
     return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
-
-
-class CellForm(Protocol):
-    """A form on cells of a scene, with values of its coefficients there.
-
-    If its test functions are those of the unknown's space, cells add to their degrees of freedom;
-    else each to entries of its own.
-    """
-
-    @property
-    def cells(self) -> Any:
-        """Argument of ``add_cells`` of loops.h; null of a form that C does not evaluate."""
-
-    def uses(self, function: fem.Function) -> bool:
-        """Return whether a function appears in the form."""
-
-    def set(self, function: fem.Function, q: Array) -> None:
-        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
-
-    def put(self, function: fem.Function, values: Array) -> None:
-        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
-
-    def share(self, other: Any) -> bool:
-        """Use the values of another form's coefficients, if it can and they are the same."""
-
-    def place(self, A: Csr) -> None:
-        """Let a bilinear form on the degrees of freedom of the cells add to ``A``."""
-
-    def add(self, q: Array, b: Array) -> None:
-        """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""
-
-    def value(self, q: Array) -> float:
-        """Return the value of the functional at the unknown ``q``."""
-
-    def keep_entries(self) -> tuple[Any, int, Array]:
-        """Keep the entries of all cells in each evaluation from now on.
-
-        Returns:
-            A place with the address of an array for them, which C may change; the number of cells
-            in a batch, see :func:`in_batches`; and a second such array.
-        """
 
 
 def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
@@ -299,7 +258,12 @@ class Kernel:
         self._change()
 
     def keep_entries(self) -> tuple[Any, int, Array]:
-        """See :meth:`CellForm.keep_entries`; nothing else of the kernel changes afterwards."""
+        """Keep the entries of all cells in each evaluation from now on; nothing else may change.
+
+        Returns:
+            A place with the address of an array for them, which C may change; the number of cells
+            in a batch, see :func:`in_batches`; and a second such array.
+        """
         batches = -(-len(self._dofs) // self._lanes)
         each, other = np.zeros((2, batches, self._entries, self._lanes))
         fill(self.cells, each=each)

@@ -6,7 +6,6 @@ Forms depend on nothing of a scene: they are stated on one cell, and compiled on
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from functools import cached_property
 
 import basix.ufl
@@ -16,7 +15,7 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
 from ufl_beam.compiled.simd_kernels import LANES, in_batches
-from ufl_beam.discretization.compiled_forms import CellForm, Kernel, stated, vectorise
+from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
@@ -112,12 +111,15 @@ def derivative(work: ufl.Form, q1: fem.Function) -> ufl.Form:
     return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
 
 
-class Fields(ABC):
+class Fields:
     """Cells of one process, or some of them: what forms of the element are evaluated on.
+
+    Loops in C evaluate forms, which are compiled once for all scenes.
 
     Attributes:
         cell_dofs: Local degrees of freedom of the cells; (num_cells, 3 (degree + 1)).
         order: Position in ``share.cells`` of each cell.
+        element: The element that forms are stated on.
     """
 
     def __init__(self, share: Share, part: Index | None = None) -> None:
@@ -127,77 +129,26 @@ class Fields(ABC):
         self.order: Index = everywhere if part is None else part
         self.cell_dofs = share.cell_dofs if whole else share.cell_dofs[self.order]
         self._matrix: Csr | None = None
-        self.element = self._element()
+        self.element = element_of(share.grid.mesh)
 
     def part(self, part: Index) -> Fields:
         """Some of the cells of the process; ``part`` are positions in ``share.cells``."""
-        return type(self)(self.share, part)
-
-    @abstractmethod
-    def _element(self) -> Element:
-        """The element that forms are stated on."""
-
-    @abstractmethod
-    def kernel(self, form: ufl.Form, unknown: fem.Function) -> CellForm:
-        """A form on the cells; ``unknown`` is the configuration that changes."""
-
-    @abstractmethod
-    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> CellForm:
-        """A form as :meth:`kernel` has it, for evaluation in each iteration."""
-
-    @abstractmethod
-    def force_and_tangent(
-        self, work: ufl.Form, q1: fem.Function, A: Csr
-    ) -> tuple[CellForm, CellForm]:
-        """A virtual work, and its derivative by ``q1`` that adds to ``A``."""
-
-    def matrix(self) -> Csr:
-        """A new matrix on the degrees of freedom of this process."""
-        if self._matrix is None:
-            share = self.share
-            couples = (share.cell_dofs, share.link_dofs, share.body_dofs)
-            self._matrix = coupling(share.size, *couples)
-            return self._matrix
-        return self._matrix.zeros_like()
-
-    def assembled(self, form: ufl.Form) -> Csr:
-        """A new matrix with a bilinear form of the undeformed scene."""
-        matrix = self.matrix()
-        kernel = self.kernel(form, self.element.q1)
-        kernel.place(matrix)
-        kernel.add(np.zeros(self.share.size), matrix.data)
-        return matrix
-
-    def of_sections(self, function: fem.Function) -> Array:
-        """Numbers of the sections of the cells, for a coefficient of the element."""
-        grid = self.share.grid
-        names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
-        sections, of_beam = grid.sections
-        numbers = [[getattr(section, name) for name in names] for section in sections]
-        beams = grid.beam_of_cell[self.share.cells[self.order]]
-        return np.array(numbers).reshape(-1, len(names))[of_beam[beams]]
-
-
-class CompiledFields(Fields):
-    """Cells on which loops in C evaluate forms that are compiled once for all scenes."""
-
-    def _element(self) -> Element:
-        return element_of(self.share.grid.mesh)
+        return Fields(self.share, part)
 
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
-        """A form on the cells, compiled."""
+        """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
         kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates())
         self._put_sections(kernel)
         return kernel
 
     def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
-        """Kernel that computes several cells at once."""
+        """Such a form for evaluation in each iteration: several cells at once."""
         (kernel,) = self._several_at_once(unknown, form)
         self._put_sections(kernel)
         return kernel
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
-        """Kernels that share the values of their coefficients."""
+        """Kernels of a virtual work and of its derivative, for ``A``, that share coefficients."""
         force, tangent = self._several_at_once(q1, work, derivative(work, q1))
         self._put_sections(force)
         if not tangent.share(force):
@@ -228,6 +179,32 @@ class CompiledFields(Fields):
     def _coordinates_in_lanes(self) -> Array:
         return in_batches(self._coordinates(), LANES)
 
+    def matrix(self) -> Csr:
+        """A new matrix on the degrees of freedom of this process."""
+        if self._matrix is None:
+            share = self.share
+            couples = (share.cell_dofs, share.link_dofs, share.body_dofs)
+            self._matrix = coupling(share.size, *couples)
+            return self._matrix
+        return self._matrix.zeros_like()
+
+    def assembled(self, form: ufl.Form) -> Csr:
+        """A new matrix with a bilinear form of the undeformed scene."""
+        matrix = self.matrix()
+        kernel = self.kernel(form, self.element.q1)
+        kernel.place(matrix)
+        kernel.add(np.zeros(self.share.size), matrix.data)
+        return matrix
+
+    def of_sections(self, function: fem.Function) -> Array:
+        """Numbers of the sections of the cells, for a coefficient of the element."""
+        grid = self.share.grid
+        names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
+        sections, of_beam = grid.sections
+        numbers = [[getattr(section, name) for name in names] for section in sections]
+        beams = grid.beam_of_cell[self.share.cells[self.order]]
+        return np.array(numbers).reshape(-1, len(names))[of_beam[beams]]
+
 
 @stated
 def mass_form(of: Element) -> ufl.Form:
@@ -242,7 +219,7 @@ def _mass_times(of: Element) -> ufl.Form:
     return ufl.action(mass_form(of), of.q1)
 
 
-def mass_kernel(fields: Fields) -> CellForm:
+def mass_kernel(fields: Fields) -> Kernel:
     """Mass of the beams times a vector, the unknown q1."""
     return fields.hot_kernel(_mass_times(fields.element), fields.element.q1)
 

@@ -12,7 +12,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dolfinx_forms import DolfinxFields, dofs_of_cells, integrated
-from ufl_beam.discretization.function_spaces import Strains, derivative, mass_form
+from ufl_beam.discretization.function_spaces import Fields, Strains, derivative, mass_form
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
@@ -279,7 +279,7 @@ class DolfinxView:
 
     @cached_property
     def _mean_strains(self) -> Strains:
-        return Strains(self._fields)
+        return Strains(Fields(self._of.share, self._fields.order))
 
     @cached_property
     def _jump(self) -> fem.Function:

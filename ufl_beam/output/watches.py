@@ -13,7 +13,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, lib, struct
 from ufl_beam.compiled.simd_kernels import in_batches
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import CompiledFields, Element
+from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.kinematics import split
@@ -119,7 +119,7 @@ class Watch:
     def __init__(
         self, share: Share, cell_forces: CellForces, along: ForcesAlongCells, parts: Array
     ) -> None:
-        fields, size = CompiledFields(share), share.size
+        fields, size = Fields(share), share.size
         works = bool(share.grid.scene.works)
         of = along_cells(fields.element, tuple(map(float, parts)), works)
         self._kernel = fields.hot_kernel(of.form, fields.element.q1)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -28,7 +27,7 @@ from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import BEFORE, ElasticBeams, Inertia
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.connector_responses import Setting
-from ufl_beam.terms.connectors import Couplings, couplings
+from ufl_beam.terms.connectors import couplings
 from ufl_beam.terms.damping import SecondDifferences, damping_forces
 from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
@@ -38,47 +37,17 @@ from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.inelastic_cells import inelastic_cells
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import FrameForces, LoadTerm
-from ufl_beam.terms.material_points import Points, expect_entries
+from ufl_beam.terms.material_points import expect_entries
 from ufl_beam.terms.openings import Openable, Openings, SearchFlags
-from ufl_beam.terms.rigid_plastic import RigidPlasticResponse
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 from ufl_beam.terms.works import Works
-
-
-class Evaluation(Protocol):
-    """Classes that evaluate forms and laws: those of evaluation.py."""
-
-    @property
-    def fields(self) -> type[Fields]:
-        """Class of the cells that forms are evaluated on."""
-
-    @property
-    def points(self) -> type[Points]:
-        """Class of the material points of springs and cells."""
-
-    @property
-    def inelastic(self) -> type[InelasticBeams]:
-        """Class of the cells with material points."""
-
-    @property
-    def couplings(self) -> type[Couplings]:
-        """Class of the connectors but for guides."""
-
-    @property
-    def slips(self) -> type[RigidPlasticResponse]:
-        """Class of the plastic hinges of zero length."""
-
-    @property
-    def in_c(self) -> bool:
-        """True if C may call the terms with no Python between them."""
 
 
 @dataclass(frozen=True)
 class Assembly:
     """Terms of a scene and what they share."""
 
-    fields: Fields  # on the cells of this process
     ledger: Ledger
     controllers: Controllers  # with their forces, and the limits of friction, in the step
     rates: dict[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
@@ -180,14 +149,12 @@ class Assembly:
         return path
 
 
-def assemble(
-    share: Share, scheme: Scheme, t0: float, v: Array, by: Evaluation, together: Agreement
-) -> Assembly:
+def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreement) -> Assembly:
     """Make the terms of a scene that begins at t0 (s).
 
     Supports stop the initial local velocities ``v`` in place.
     """
-    scene, ledger, fields, search = share.grid.scene, Ledger(), by.fields(share), SearchFlags()
+    scene, ledger, fields, search = share.grid.scene, Ledger(), Fields(share), SearchFlags()
     A = fields.matrix()
     setting = (scheme, A, ledger)
 
@@ -200,8 +167,7 @@ def assemble(
         part = np.flatnonzero(np.isin(share.cells, cells))
         if len(part):
             elastic[part] = False
-            of = (layout, *setting, search, by.points)
-            inelastic.append(by.inelastic(fields.part(part), *of))
+            inelastic.append(InelasticBeams(fields.part(part), layout, *setting, search))
     beams: list[Cells] = [*inelastic]
     loses = scheme.alpha or isinstance(scheme, DecayingMidpoint)
     if loses and sum(len(cells) for _, cells in groups) < len(share.grid.cells):
@@ -217,11 +183,10 @@ def assemble(
     controllers = Controllers(share)
     rates = dict(controllers.values)
     connectors = Setting(
-        controllers.values, rates, scene.size, scheme, ledger, friction_repeats(scene), search,
-        by.points, by.slips,
-    )  # fmt: skip
+        controllers.values, rates, scene.size, scheme, ledger, friction_repeats(scene), search
+    )
     of_links = share, connectors, A
-    coupled = together(lambda: [*couplings(*of_links, by.couplings), *guides(*of_links)])
+    coupled = together(lambda: [*couplings(*of_links), *guides(*of_links)])
     places = _openable(inelastic, coupled)
     openings = Openings(search, places, share) if share.largest(float(bool(places))) else None
 
@@ -239,10 +204,9 @@ def assemble(
         ledger.state["stored"] += 0.0
     parts = share, A, beams, coupled, loads, others, supports, search
     equation = StepEquation(*parts, in_motion=inertia is not None)
-    if by.in_c:
-        equation.leave_to_c()
+    equation.leave_to_c()
     return Assembly(
-        fields, ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
+        ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, openings, equation, _cell_forces(share, equation.terms),
     )  # fmt: skip
 

@@ -18,7 +18,6 @@ from ufl_beam.compiled.c_library import lib
 from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import (
-    CompiledFields,
     Fields,
     Strains,
     mass_matrix,
@@ -246,7 +245,7 @@ class KeptStates:
     @cached_property
     def _fields(self) -> Fields:
         """The whole scene on this process: what is computed afterwards needs no communication."""
-        return CompiledFields(Share(self._grid, MPI.COMM_SELF))
+        return Fields(Share(self._grid, MPI.COMM_SELF))
 
     @cached_property
     def _strains(self) -> Strains:

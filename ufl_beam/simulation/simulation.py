@@ -13,7 +13,6 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Later, Snapshots
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.discretization.function_spaces import CompiledFields
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
@@ -30,7 +29,6 @@ from ufl_beam.simulation.assembly import Assembly, assemble
 from ufl_beam.simulation.branch_check import add_forces_at_rest
 from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
 from ufl_beam.simulation.diagnosis import no_equilibrium, require_held
-from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.replicas import Copies, sharing
@@ -102,6 +100,11 @@ class Simulation(StateView):
         comm = communicator(comm, "comm")
         require_number(t0, "t0")
         newton = checked_newton(newton, comm)
+        if newton.reference:
+            raise SceneError(
+                "Newton(reference=True): a Simulation runs compiled code; only simulate() can call "
+                "the reference package instead"
+            )
         if not (isinstance(kind, type) and issubclass(kind, Solution)):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
         if start is not None:
@@ -113,9 +116,8 @@ class Simulation(StateView):
         self.together = together = Agreement(share.comm)
         self._copies = Copies(comm, share) if comm.size > share.comm.size else None
         q, v, internal = initial_state(grid, start)
-        by = REFERENCE if newton.reference else COMPILED
-        self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], by, together)
-        self.fields, self.ledger, self.controllers = parts.fields, parts.ledger, parts.controllers
+        self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], together)
+        self.ledger, self.controllers = parts.ledger, parts.controllers
         self.asked = parts.controllers.values
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
@@ -153,9 +155,8 @@ class Simulation(StateView):
             self._begun_at = before
         self.begun = self.between < 1 or self.cell_forces.asks_for_before
 
-        factors = by.factors(share, self.equation.A)
         self._steps = StepSolver(
-            scheme, self.equation, parts.openings, self._branch, newton, factors, together
+            scheme, self.equation, parts.openings, self._branch, newton, together
         )
         self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
@@ -231,7 +232,7 @@ class Simulation(StateView):
 
     def watch(self, parts: Array) -> Watch | None:
         """Begin to take in extremes after each step in C, or return None if that cannot be."""
-        if not (self.share.alone and isinstance(self.fields, CompiledFields)):
+        if not self.share.alone:
             return None
         self._watches.append(one := Watch(self.share, self.cell_forces, self._along, parts))
         if self._in_c is not None:

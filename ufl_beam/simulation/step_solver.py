@@ -25,11 +25,9 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.solvers.direct_solver import DirectSolver
 from ufl_beam.solvers.equation import Border
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
-from ufl_beam.solvers.static_condensation import ChainsFirst
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.openings import Openings
@@ -102,13 +100,12 @@ class StepSolver:
         openings: Openings | None,
         branch: StaticPath | None,
         newton: Newton,
-        factors: ChainsFirst | DirectSolver,
         together: Agreement,
     ) -> None:
         self._scheme, self._equation, self._openings = scheme, equation, openings
         self._branch, self._together, share = branch, together, equation.share
         least = LEAST_IN_MOTION if has_inertia(scheme) else LEAST_AT_REST
-        self.newton = Solver(share, equation, factors, newton, least, together)
+        self.newton = Solver(share, equation, newton, least, together)
         self._rotations, self._multipliers = share.rotations(), as_slice(share.multipliers())
         self._judged = [one for one in equation.inner if one.must_dissipate]
         self._judges = share.largest(float(len(self._judged))) > 0.0  # on some process

@@ -21,7 +21,6 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.solvers.bordered import BorderedNewton
 from ufl_beam.solvers.convergence import Convergence
-from ufl_beam.solvers.direct_solver import DirectSolver
 from ufl_beam.solvers.equation import Border, Equation, SnesCallbacks
 from ufl_beam.solvers.line_search import SearchingNewton
 from ufl_beam.solvers.newton_options import PREFIX, Newton
@@ -52,12 +51,12 @@ class Solver:
         self,
         share: Share,
         equation: Equation,
-        factors: ChainsFirst | DirectSolver,
         newton: Newton,
         least: int,
         agreement: Agreement,
     ) -> None:
         self._share, self._equation, self._newton = share, equation, newton
+        self._factors = ChainsFirst(share, equation.A)
         self._agreement, self._vectors = agreement, Vectors(share)
         self._x, self._f = self._vectors.new(), self._vectors.new()
         self._q, r = (self._vectors.view(one, writable=True) for one in (self._x, self._f))
@@ -66,7 +65,6 @@ class Solver:
         self._callbacks = SnesCallbacks(equation, self._vectors, self.convergence.test)
         self.in_c = equation.in_c and not self._chosen()
         self._matrix = self._make_matrix()
-        self._factors = factors
         self._ksp = PETSc.KSP().create(self._x.comm)
         self._ksp.setOptionsPrefix(PREFIX)
         self._ksp.setType("preonly")

@@ -14,7 +14,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
-from ufl_beam.discretization.compiled_forms import CellForm
+from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
@@ -33,8 +33,8 @@ class CellForces:
     def __init__(self, share: Share, parts: Sequence[InCells], loads: Any = ffi.NULL) -> None:
         self._share, self._space = share, np.zeros(share.size)
         self._alive: list[Any] = [parts]
-        self._unmade, self._linear = list[tuple[InCells, Any]](), list[tuple[CellForm, Any]]()
-        self._of_ends: list[tuple[CellForm, fem.Function, Any, Array]] = []
+        self._unmade = list[tuple[InCells, Any]]()
+        self._of_ends: list[tuple[Kernel, fem.Function, Any, Array]] = []
         self.kept: list[tuple[Any, int]] = []
         self._forces = ffi.new("force_in_cells[]", len(parts))
         vectors: dict[Any, Any] = {}  # places of them, and of those of the accepted step
@@ -98,8 +98,6 @@ class CellForces:
             of_ends.set(q0, before)
             of_ends.add(np.ascontiguousarray(q), self._space)
             each[0] = latest
-        for form, c in self._linear:
-            form.add(np.frombuffer(ffi.buffer(c.vector[0], self._space.nbytes)), self._space)
         out: Array = np.empty((lib.CELL_NUMBERS, self.c.cells))
         lib.find_cell_forces(self.c, 0, doubles(out))
         return out
@@ -110,8 +108,6 @@ class CellForces:
             form = one.form()
             each, c.lanes, _ = form.keep_entries()
             c.entries, c.form = each, form.cells
-            if c.form == ffi.NULL:
-                self._linear.append((form, c))
             self._alive.append((form, each))
         self._unmade = []
 

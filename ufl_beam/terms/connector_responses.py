@@ -8,7 +8,7 @@ held has a row about e, all other laws have one about λ, linear in e around the
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
@@ -35,8 +35,6 @@ class Setting(NamedTuple):
     ledger: Ledger
     friction_repeats: bool  # True if places that stick may hold what is held already
     search: SearchFlags  # of all points of the scene
-    points: Callable[..., Any]  # class of the material points of springs
-    slips: Callable[[Any, Sequence[Connector], Setting], Response]  # of rigid-plastic connectors
 
 
 class Response(ABC):
@@ -49,6 +47,7 @@ class Response(ABC):
     steady = False  # True if the rows stay the same during a step
     in_c: Mapping[str, Any] = {}  # data of laws evaluated in C, by names in ``couplings``, loops.h
     must_dissipate = False  # True if require_dissipation has to be called before a step is accepted
+    name_in_files = ""  # of the internal variables, if it is not that of the class
     stored = 0.0  # by rigid-plastic connectors; J
     openable: Openable | None = None  # connectors that open beyond a limit, if there are any
     _part, _entry, _sign = "lost", "", 1.0
@@ -104,10 +103,6 @@ class Response(ABC):
         """
         about_motion = np.array([link.holds for link in self._links]) & (rows[:, 1] != 1.0)
         return np.where(about_motion, 0.0, 1.0)
-
-    def factors(self) -> Array:
-        """Factors that rows about the force were divided by; (num_links,)."""
-        return np.ones(len(self._links))
 
     def motion(self, e: Array) -> Array:
         """Motions of the accepted state as solutions show them; ``e`` are those of the nodes.

@@ -15,7 +15,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import CellForm, stated
+from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import (
     Element,
     Fields,
@@ -131,7 +131,7 @@ class RayleighForces(OfMatrix):
         fields, damping, of = self._fields, self._damping, self._fields.element
         at = fields.order, self._times.rate
 
-        def stiffness() -> CellForm:
+        def stiffness() -> Kernel:
             return fields.hot_kernel(_stiffness_times(of), of.q1)
 
         return [

@@ -10,7 +10,7 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, lib, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import CellForm
+from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.base import Term
@@ -26,7 +26,7 @@ class OfForms(Term):
 
     def __init__(
         self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger,
-        tangent: CellForm | None = None,
+        tangent: Kernel | None = None,
     ) -> None:  # fmt: skip
         self._q0, self._q1 = fields.element.q0, fields.element.q1
         self._order = fields.order

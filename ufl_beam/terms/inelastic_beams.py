@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -13,7 +12,7 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
@@ -22,13 +21,11 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
-from ufl_beam.terms.compiled_points import CompiledPoints
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.material_points import Points
-from ufl_beam.terms.openings import STIFF, SearchFlags
+from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Callbacks, Phases, beginning
-from ufl_beam.terms.point_equations import inputs
 from ufl_beam.terms.static_tangents import PredictedStrains
 from ufl_beam.terms.tangent_derivatives import Cells
 
@@ -57,35 +54,31 @@ def inelastic_forms(of: Element, scheme: Scheme) -> InelasticForms:
     return InelasticForms(virtual_work(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
 
 
-class InelasticBeams(Cells, ABC):
-    """Resultants of cells with material points, working on the virtual strains.
+class InelasticBeams(Cells):
+    """Resultants of cells with material points, working on the virtual strains, P(34).
 
     The points answer the strains of an iterate with resultants r and their derivatives D; around
     it resultants are b + D e, linear in the strains e, from which UFL derives the tangent,
-    material and geometric.
+    material and geometric.  One loop in C evaluates points and forms.
+
+    Attributes:
+        over: Largest excess of a held point over its limit, as a part of it; (1,).
     """
 
     kind = "beams"
 
     def __init__(
         self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger,
-        search: SearchFlags, points: type[Points],
+        search: SearchFlags,
     ) -> None:  # fmt: skip
-        self._A, self._ledger = A, ledger
-        self._hinges, self._search = layout.hinges, search
+        self._A, self._ledger, self._hinges = A, ledger, layout.hinges
         self._predicted = None if has_inertia(scheme) else PredictedStrains(fields)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
-        cells, n = len(fields.order), len(layout.weights)
-        self._variables = np.zeros((cells, n, len(inputs(layout))))
-        self.points = points(
-            layout,
-            fields.share.grid.keys(self._cells),
-            fields.share.cell_lengths()[fields.order],
-            scheme,
-            self._variables,
-            search,
-        )
+        share, lengths = fields.share, fields.share.cell_lengths()[fields.order]
+        self.points = Points(layout, share.grid.keys(self._cells), lengths, scheme, search)
+        self.points.predict()
+        self.over = self.points.over
 
         forms = inelastic_forms(fields.element, scheme)
         self._q0, self._q1 = fields.element.q0, fields.element.q1
@@ -96,7 +89,46 @@ class InelasticBeams(Cells, ABC):
         self._tangent.place(A)
         self._q: Array = np.empty(0)
         self.must_dissipate = layout.kind.law.must_dissipate
-        self._prepare(forms)
+
+        self._latest: Array = np.full(share.size, np.nan)
+        self._in_c = struct(
+            "inelastic", size=share.size, latest=self._latest, points=self.points.c,
+            scene=share.grid.scene.size,
+            strains=self._strains.kernel.cells, force=self._force.cells,
+            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
+            at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
+        )  # fmt: skip
+        if self._predicted is not None:
+            forces, last_b, last_D = np.zeros((3, len(lengths), 9))
+            of_tangent = {"forces": forces, "last_b": last_b, "last_D": last_D}
+            fill(self._in_c, predicted=self._predicted.c, **of_tangent)
+
+    # -- in C ----------------------------------------------------------------------------------
+
+    def demand(self) -> Loop | None:
+        """C function of :meth:`missed`."""
+        return loop("missed_by_points", self._in_c) if self.points.c.line else None
+
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """The points, and two forms."""
+        c = self._in_c
+        return loop("add_inelastic_force", c), loop("add_inelastic_tangent", c)
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops over the points."""
+        c = struct("inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger))
+        begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
+        if self._predicted is not None:
+            begin.append(self._predicted.beginning())
+
+        def leave(q: Array) -> None:
+            self._q = q
+
+        ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
+        over = self.over if self.points.softens else None
+        change = loop("change_of_points", c)
+        admits = loop("points_dissipate", c) if self.must_dissipate else None
+        return Phases(begin, *ends, change, self._start_at, leave, over, admits)
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -108,7 +140,8 @@ class InelasticBeams(Cells, ABC):
         self.points.begin(step.dt)
         if self._predicted is not None:
             self._predicted.begin(step)
-        self._begin()
+        self._forget()
+        self.points.c.predicts = 0
 
     def restart(self, tangents: Tangents) -> None:
         """Begin to iterate anew, with tangents of this kind."""
@@ -121,21 +154,26 @@ class InelasticBeams(Cells, ABC):
             self._q = q0
             self.points.start(self._strains(q0))
 
-    @abstractmethod
-    def _prepare(self, forms: InelasticForms) -> None:
-        """Prepare the evaluation; called once."""
-
-    @abstractmethod
-    def _begin(self) -> None:
-        """Prepare a step."""
-
-    @abstractmethod
     def _respond(self, q1: Array) -> None:
         """Let the points answer the strains at ``q1``."""
+        lib.respond_at(self._in_c, doubles(q1))
 
-    @abstractmethod
     def _forget(self) -> None:
         """Forget the latest response: the points would answer otherwise now."""
+        self._latest.fill(np.nan)
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add the internal forces."""
+        lib.add_inelastic_force(self._in_c, doubles(q1), doubles(r))
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add the stiffness, material and geometric."""
+        lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))
+
+    def missed(self, q1: Array, scale: float) -> float:
+        """Largest force of a point at ``q1`` that is not that of its strain, over ``scale``."""
+        q = doubles(q1)
+        return float(lib.missed_by_points(self._in_c, q, q, scale, 0.0))
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
@@ -175,16 +213,6 @@ class InelasticBeams(Cells, ABC):
         return self._cells, self.points.kept[:, :3] - elastic, D
 
     # -- see openings.py -----------------------------------------------------------------------
-
-    @property
-    def over(self) -> Array:
-        """The :attr:`excess` in an array; (1,)."""
-        return self.points.over
-
-    @property
-    def excess(self) -> float:
-        """Largest excess of a held point over its limit, as a part of it."""
-        return self.points.excess
 
     def release(self, least: float) -> None:
         """Let held points open whose excess is so large."""
@@ -239,118 +267,3 @@ class InelasticBeams(Cells, ABC):
         _, here, there = np.intersect1d(self._cells, cells, return_indices=True)
         if len(here):
             self.points.restore(here, rows[there])
-
-
-class CompiledInelasticBeams(InelasticBeams):
-    """Cells whose points answer, and whose forms are evaluated, in one loop in C."""
-
-    points: CompiledPoints
-    _force: Kernel
-    _tangent: Kernel
-
-    def _prepare(self, forms: InelasticForms) -> None:
-        share = self._fields.share
-        self._latest: Array = np.full(share.size, np.nan)
-        self.points.predict()
-        self._in_c = struct(
-            "inelastic", size=share.size, latest=self._latest, points=self.points.points,
-            scene=share.grid.scene.size,
-            strains=self._strains.kernel.cells, force=self._force.cells,
-            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
-            at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
-        )  # fmt: skip
-        if self._predicted is not None:
-            forces, last_b, last_D = np.zeros((3, len(self._cells), 9))
-            of_tangent = {"forces": forces, "last_b": last_b, "last_D": last_D}
-            fill(self._in_c, predicted=self._predicted.c, **of_tangent)
-
-    def _begin(self) -> None:
-        self._latest.fill(np.nan)
-        self.points.points.predicts = 0
-
-    def _forget(self) -> None:
-        self._latest.fill(np.nan)
-
-    def _respond(self, q1: Array) -> None:
-        lib.respond_at(self._in_c, doubles(q1))
-
-    def demand(self) -> Loop | None:
-        """C function of :meth:`missed`."""
-        return loop("missed_by_points", self._in_c) if self.points.points.line else None
-
-    def missed(self, q1: Array, scale: float) -> float:
-        """Largest force of a point at ``q1`` that is not that of its strain, over ``scale``."""
-        q = doubles(q1)
-        return float(lib.missed_by_points(self._in_c, q, q, scale, 0.0))
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """The points, and two forms."""
-        functions = ("add_inelastic_force", "add_inelastic_tangent")
-        return loop(functions[0], self._in_c), loop(functions[1], self._in_c)
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the points."""
-        c = struct(
-            "inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger)
-        )  # fmt: skip
-        begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
-        if self._predicted is not None:
-            begin.append(self._predicted.beginning())
-
-        def leave(q: Array) -> None:
-            self._q = q
-
-        ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
-        over = self.over if self.points.softens else None
-        change = loop("change_of_points", c)
-        admits = loop("points_dissipate", c) if self.must_dissipate else None
-        return Phases(begin, *ends, change, self._start_at, leave, over, admits)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the internal forces."""
-        lib.add_inelastic_force(self._in_c, doubles(q1), doubles(r))
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the stiffness, material and geometric; see :class:`ElasticBeams`."""
-        lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))
-
-
-class ReferenceInelasticBeams(InelasticBeams):
-    """The same equations as :class:`CompiledInelasticBeams`, line by line."""
-
-    def _prepare(self, forms: InelasticForms) -> None:
-        self._forms = forms
-        self._last: tuple[Array, Array] = np.empty(0), np.empty(0)
-
-    def _begin(self) -> None:
-        """Nothing is kept."""
-
-    def _respond(self, q1: Array) -> None:
-        self.points.respond(self._strains(q1))
-
-    def _forget(self) -> None:
-        """Nothing is kept."""
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the work of the resultants on the virtual strains, P(34)."""
-        self._respond(q1)
-        self._force.put(self._forms.r, self.points.r)
-        self._force.add(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add its derivative; in statics with the forces that static_tangents.py explains."""
-        self._respond(q1)
-        r, D = self.points.r, self.points.D.reshape(-1, 3, 3)
-        elastic = np.einsum("kij,kj->ki", D, self.points.strains)
-        forces: Array = r
-        if (predicted := self._predicted) is not None:
-            if predicted.c.begins:
-                forces = self.points.kept[:, :3]
-            elif not (predicted.c.exact or self._search.flags[STIFF]):
-                b, before = self._last
-                forces = b + np.einsum("kij,kj->ki", before, predicted(q1))
-            self._last = r - elastic, D.copy()
-            predicted.take(q1)
-        for function, values in ((self._forms.b, forces - elastic), (self._forms.D, self.points.D)):
-            self._tangent.put(function, values)
-        self._tangent.add(q1, self._A.data)

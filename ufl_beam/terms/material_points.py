@@ -1,26 +1,41 @@
 # SPDX-License-Identifier: MIT
-"""Material points: what is known of many, what they store, dissipate and remember.
+"""Material points: return map, internal variables, stored and dissipated energies.
 
-The return map has two forms, one in C (compiled_points.py) and one in NumPy (reference_points.py).
+The laws are traced with UFL symbols: UFL derives the consistent tangents, by the implicit function
+theorem where a discontinuity opens, and FFCx compiles them.  The return map is a loop in C over the
+points, material_points.c, which calls the compiled laws.
 """
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Callable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
+import ufl
+from ufl.conditional import Condition
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import lib
-from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.fibres import Layout
+from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.errors import SceneError, StepFailed
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.model import law_functions
+from ufl_beam.model.fibres import Kind, Layout
 from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, SearchFlags
-from ufl_beam.terms.point_equations import PointEquations, curved, inputs, prefixed, rows
+from ufl_beam.terms.point_equations import End, PointEquations, curved, inputs, prefixed, rows
+
+law_functions.where.register(Condition, ufl.conditional)
+law_functions.below.register(Expr, ufl.lt)
+law_functions.exp.register(Expr, ufl.exp)
+law_functions.sqrt.register(Expr, ufl.sqrt)
+law_functions.log.register(Expr, ufl.ln)
+law_functions.tanh.register(Expr, ufl.tanh)
 
 DIGITS = 16 * float(np.finfo(float).eps)
 """Round-off of dissipated energies, as a part of elastic ones of the strains."""
@@ -53,7 +68,77 @@ def releases(layout: Layout, scheme: Scheme) -> bool:
     return breaks or (scheme.average(0.0, 1.0) != 1.0 and curved(layout.kind))
 
 
-class Points(ABC):
+class PointForms:
+    """Compiled laws: C functions from the inputs of a point to what the loops need.
+
+    The numbers of ``softening`` do not matter: they are inputs.
+
+    Attributes:
+        law: Stresses and their derivatives by strains; of a law that solves for its variables
+            residuals and their derivatives, then stresses and theirs, see solve_law in C.
+        resistance: That of the discontinuity, and its derivative by the growth.
+        end: ``point_output`` of loops.h, stresses, and changes of the variables.
+        own: What a law that must dissipate does by itself, and the size of that; or null.
+    """
+
+    def __init__(
+        self, inputs: tuple[str, ...], kind: Kind, softening: SofteningLaw | None, scheme: Scheme
+    ) -> None:
+        self._pointwise = pointwise = Pointwise(inputs)
+        self._equations = equations = PointEquations(kind, softening, scheme)
+        law = kind.law
+        self._strains = rows(law, "strain")
+        unknown = prefixed("new", law.variables) if law.solves else ()
+        free = {name: ufl.variable(pointwise.at[name]) for name in (*self._strains, *unknown)}
+        self._at = at = {**pointwise.at, **free}
+        try:
+            stress = tuple(map(ufl.as_ufl, equations.stress(at)))
+            answer = [*stress, *self._derivatives(stress, self._strains)]
+            if law.solves:
+                r = tuple(map(ufl.as_ufl, equations.residuals(at)))
+                by_both = [self._derivatives(r, names) for names in (unknown, self._strains)]
+                answer = [
+                    *r,
+                    *by_both[0],
+                    *by_both[1],
+                    *answer,
+                    *self._derivatives(stress, unknown),
+                ]
+            *numbers, stress, changes = equations.end(at)
+            self.own = ffi.NULL
+            if law.must_dissipate:
+                stored = ufl.as_ufl(equations.stored(at))
+                slopes = tuple(self._derivatives((stored,), unknown))
+                self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
+        except Exception as error:
+            raise SceneError(
+                f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
+                "written with + - * / ** and the functions of ub.law_functions"
+            ) from error
+        self.law = pointwise.compile(*answer)
+        end = in_order("point_output", dict(zip(End._fields, numbers, strict=False)))
+        self.end = pointwise.compile(*end, *stress, *changes)
+        self.resistance = ffi.NULL
+        if softening is not None:
+            a = ufl.variable(pointwise.at["growth"])
+            resistance = equations.resistance({**pointwise.at, "growth": a}, a)
+            self.resistance = pointwise.compile(resistance, ufl.diff(resistance, a))
+
+    @cached_property
+    def elastic(self) -> Any:
+        """Stresses and their derivatives by strains while the variables stay as they are."""
+        stress = tuple(map(ufl.as_ufl, self._equations.elastic_stress(self._at)))
+        return self._pointwise.compile(*stress, *self._derivatives(stress, self._strains))
+
+    def _derivatives(self, of: tuple[Expr, ...], by: tuple[str, ...]) -> list[Expr]:
+        """Derivatives, one row of each function."""
+        return [ufl.diff(f, self._at[name]) for f in of for name in by]
+
+
+_point_forms = stated(PointForms)
+
+
+class Points:
     """Points of the same layout in many cells.
 
     Args:
@@ -61,15 +146,15 @@ class Points(ABC):
         keys: See :meth:`Layout.numbers`.
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
-        storage: Zeros, for all that is known of the points; (cells, n, number of inputs).
         search: Shared by all points of a scene.
 
     Attributes:
+        c: ``points`` of loops.h.
         names: Names of the inputs.
         strains: Of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
         dt: Length of the step; (1,); s.
-        over: The :attr:`excess`; (1,).
+        over: Largest ``|stress| / limit - 1`` of a point that was held closed, or zero; (1,).
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
         sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
@@ -85,14 +170,15 @@ class Points(ABC):
         keys: list[tuple[int, int]],
         length: Array,
         scheme: Scheme,
-        storage: Array,
         search: SearchFlags | None = None,
     ) -> None:
         self._search = search or SearchFlags()
-        self._layout, self._storage, self._alpha = layout, storage, scheme.alpha
+        self._layout, self._alpha = layout, scheme.alpha
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._releases = releases(layout, scheme)
         self.names, law = inputs(layout), layout.kind.law
+        cells, of_cell, width = len(length), len(layout.weights), len(self.names)
+        self._storage = storage = np.zeros((cells, of_cell, width))
         self._at = {name: storage[:, :, i] for i, name in enumerate(self.names)}
         self._kept = kept_inputs(law)
         self._components = len(law.resultants or "x")
@@ -117,22 +203,25 @@ class Points(ABC):
                 self._at[f"softening {name}"][:, layout.breaking] = value
             self._resist()
 
-        cells = len(storage)
         self.kept = np.zeros((cells, int(lib.POINT_KEPT)))
         self.sums = np.zeros(int(lib.POINT_SUMS))
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self.over = np.zeros(1)
-        self._prepare(scheme, length)
 
-    @abstractmethod
-    def _prepare(self, scheme: Scheme, length: Array) -> None:
-        """Prepare the return map; called once, at the end of the constructor."""
-
-    @property
-    def in_c(self) -> dict[str, Any]:
-        """Data for loops in C of other terms, by name in their structs; empty without them."""
-        return {}
+        self._forms = forms = _point_forms(self.names, layout.kind, softening, scheme)
+        self._dynamic = has_inertia(scheme)
+        arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
+        arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
+        self.c = struct(
+            "points", cells=cells, of_cell=of_cell, width=width, w=storage,
+            theta=scheme.theta, length=np.ascontiguousarray(length), **arrays,
+            law=forms.law, resistance=forms.resistance, end=forms.end, solves=law.solves,
+            components=self._components, variables=len(law.variables),
+            strain=self.names.index(rows(law, "strain")[0]),
+            e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.kept, sum=self.sums,
+            own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search.flags,
+        )  # fmt: skip
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of an input at the points, by its name; a view; (cells, n)."""
@@ -166,22 +255,28 @@ class Points(ABC):
         """Begin a step of this length; s."""
         if dt != self.dt[0]:
             self["dt"][:] = self.dt[0] = dt
+        self.c.tried = 0  # of a law that solves for its variables
 
-    @abstractmethod
+    def predict(self) -> None:
+        """Let tangents predict stresses where points yield, see follow_prediction in C."""
+        if self._components == 1 and self._yields:
+            lines = np.zeros((2, *self._storage.shape[:2], int(lib.LINE)))
+            fill(self.c, line=lines[0], predicted=lines[1])
+
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """(N, V, M) that act in a step to these strains, and derivatives; (cells, 3), (cells, 9).
 
-        They are not a number where an opening was not found.  The arrays are reused.
+        They are not a number where an opening was not found.  The arrays are reused.  Predictions
+        of the last tangent do not matter.
         """
+        self.c.predicts, self.c.linear = 0, ffi.NULL
+        self.strains[:] = strains
+        lib.respond(self.c)
+        return self.r, self.D
 
-    @property
-    def excess(self) -> float:
-        """Largest ``|stress| / limit - 1`` of a point that was held closed, or zero."""
-        return float(self.over[0])
-
-    @abstractmethod
     def release(self, least: float) -> None:
         """Let held points open from now on whose excess was so large in the latest response."""
+        lib.release(self.c, least)
 
     def tangent(self) -> tuple[Array, Array]:
         """Strains of the accepted state, and derivatives of a response to them; nothing changes.
@@ -210,13 +305,13 @@ class Points(ABC):
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
 
-    @abstractmethod
     def gives_energy(self) -> int:
         """Number of the point that gives most energy in the latest response, or -1.
 
         That is a law whose dissipation is negative: its equations have several solutions, and one
         was found that no material comes to.  Points of all cells are counted through.
         """
+        return int(lib.gives_energy(self.c))
 
     def require_dissipation(self, describe: Callable[[int], str]) -> None:
         """Raise :class:`StepFailed` if a point gives energy; ``describe`` names its cell."""
@@ -229,9 +324,9 @@ class Points(ABC):
                 "docs/extending_laws.md"
             )
 
-    @abstractmethod
     def accept(self) -> None:
         """Take the strains of the latest response as the new state."""
+        lib.commit(self.c)
 
     def change(self) -> float:
         """Energy that :meth:`accept` would add to what is stored and dissipated; J.
@@ -253,9 +348,19 @@ class Points(ABC):
             size += sum(float(np.sum(volume * self[C] * self[e] ** 2)) for e in ends)
         return broken + (plastic if abs(plastic) > DIGITS * size else 0.0)
 
-    @abstractmethod
     def _sums_to_come(self) -> Array:
         """Return :attr:`sums` as :meth:`accept` would leave them."""
+        copy = self._copy()
+        lib.commit(copy)
+        return np.frombuffer(ffi.buffer(copy.sum, self.sums.nbytes)).copy()
+
+    def _copy(self) -> Any:
+        """Points with a copy of the state, which loops may change, and the same response."""
+        copy = ffi.new("points *", self.c[0])
+        return fill(
+            copy, e0=self._e0.copy(), w=self._storage.copy(), kept=self.kept.copy(),
+            sum=self.sums.copy(),
+        )  # fmt: skip
 
     def freeze(self) -> None:
         """Keep everything elastic from now on; hinges that bear no moment any more are free.
@@ -268,11 +373,7 @@ class Points(ABC):
             spent = np.isfinite(limit) & (borne <= SPENT * limit)
             self["stiffness"][:, breaking] *= np.where(spent, NOTHING, 1.0)
         self["traction"][:] = np.inf
-        self._let_stay()
-
-    @abstractmethod
-    def _let_stay(self) -> None:
-        """Let the variables of the bulk stay as they are from now on."""
+        self.c.law, self.c.solves = self._forms.elastic, False
 
     # -- the ledger ----------------------------------------------------------------------------
 
@@ -296,7 +397,10 @@ class Points(ABC):
             ledger.state["hardening"] += hardening
 
     def in_steps(self, ledger: Ledger) -> dict[str, Any]:
-        """Fields of ``inelastic_term`` of loops.h, with the entries of both methods above."""
+        """Fields of ``inelastic_term`` of loops.h, with the entries of both methods above.
+
+        In statics a copy as well, which tells what a step would change.
+        """
         state, lost = ledger.state, ledger.lost
         kinds = {
             "stored": (True, state, "stored"), "hardening": (self._yields, state, "hardening"),
@@ -305,7 +409,8 @@ class Points(ABC):
             "released": (self._releases, lost, "numerical"),
         }  # fmt: skip
         entries = {k: part.pointer(name) for k, (has, part, name) in kinds.items() if has}
-        return {"dt": self.dt, "alpha": self._alpha, **entries}
+        copy = {} if self._dynamic else {"copy": self._copy()}
+        return {"dt": self.dt, "alpha": self._alpha, **entries, **copy}
 
     # -- the state -----------------------------------------------------------------------------
 

@@ -82,11 +82,10 @@ class Openable(Protocol):
 
     @property
     def over(self) -> Array:
-        """The :attr:`excess` of each place, or the largest one."""
+        """``|stress| / limit - 1`` of held places in the latest residual; of all, or the largest.
 
-    @property
-    def excess(self) -> float:
-        """Largest ``|stress| / limit - 1`` of a held place in the latest residual, or zero."""
+        Zero of places that bear at most their limit.
+        """
 
     def release(self, least: float) -> None:
         """Let held places open from now on whose excess is at least so large."""
@@ -146,7 +145,8 @@ class Openings:
         Returns:
             True if there are such places.
         """
-        excess = self._share.largest(max((one.excess for one in self._places), default=0.0))
+        here = (float(one.over.max(initial=0.0)) for one in self._places)
+        excess = self._share.largest(max(here, default=0.0))
         if excess:
             self._released = True
             for one in self._places:

@@ -23,7 +23,7 @@ class Phases(NamedTuple):
     ``change`` is the method of that name of internal forces, of the type ``change_of_energy``.
     Between calls of C the term is what its attributes say: ``enter`` hands them over before C takes
     steps from the accepted configuration that it is called with, ``leave`` takes them back at the
-    one that C has come to.  ``over`` is :attr:`Openable.excess` of what may open; (1,).  ``admits``
+    one that C has come to.  ``over`` is :attr:`Openable.over` of what may open.  ``admits``
     is the check of a step before it is accepted, of the type ``admission``.
     """
 

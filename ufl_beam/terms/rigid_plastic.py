@@ -7,17 +7,18 @@ the law, a function of the slip that grows in the step; see rigid_plastic.c.
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import names
+from ufl_beam.compiled.c_library import doubles, in_order, lib, names, struct
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
@@ -25,8 +26,9 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_law import State
 from ufl_beam.model.material_laws import Hardening, SofteningLaw
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.terms.connector_responses import Response, Setting, respond
+from ufl_beam.terms.connector_responses import Response, Rows, respond
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT
+from ufl_beam.terms.phases import Callbacks
 
 INPUTS = (
     *names("slip_input", "slip_"),
@@ -78,6 +80,21 @@ def _(law: Hardening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
     )
 
 
+class SlipForms:
+    """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
+
+    def __init__(self, law: SofteningLaw | Hardening, scheme: Scheme) -> None:
+        self._pointwise = pointwise = Pointwise(INPUTS)
+        at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
+        end = slip(law, at, scheme)._asdict()
+        force = end.pop("force")
+        self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
+        self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
+
+
+_slip_forms = stated(SlipForms)
+
+
 EARLY = 0.01
 """Motion, in rad or as a part of the scene, that counts as much as the limit in deciding whether a
 connector slips in an iterate; solutions do not depend on it."""
@@ -102,17 +119,19 @@ def _slope(link: Connector, size: float) -> float:
     return max(early, least) + (2 * steepest if steepest < np.inf else 0.0)
 
 
-@respond.register
-def _(law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> Response:
-    return setting.slips(law, links, setting)
-
-
+@respond.register(RigidPlastic)
 class RigidPlasticResponse(Response):
-    """Rigid-plastic connectors whose laws are of one kind."""
+    """Rigid-plastic connectors whose laws are of one kind, followed in C.
+
+    Attributes:
+        over: ``|force| / limit - 1`` of each connector that was held, or zero; (num_links,).
+    """
+
+    name_in_files = "CompiledSlips"
 
     def _prepare(self, law: RigidPlastic) -> None:
         n, ledger, scheme = len(self._links), self._setting.ledger, self._setting.scheme
-        self._ledger, self._law = ledger, law.law
+        self._ledger = ledger
         ledger.lost["hinges"] += 0.0
         self._hardens = isinstance(law.law, Hardening)
         self._loss = 2 * scheme.alpha if self._hardens else 0.0
@@ -127,11 +146,33 @@ class RigidPlasticResponse(Response):
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
         self._limit = self._at["limit"].copy()
-        self._back_force, self._dissipated, self._excess = np.zeros((3, n))
+        self._back_force, self._dissipated, self.over = np.zeros((3, n))
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
         self._rows = np.zeros((n, 3))
         self._slope = np.array([_slope(link, self._setting.size) for link in self._links])
         self.openable = self
+
+        kind = Hardening(1.0) if isinstance(law.law, Hardening) else law.law.of(1.0, 1.0)
+        self._forms, self._sums = _slip_forms(kind, scheme), np.zeros(3)
+        self._c = struct(
+            "rigid_plastic", number=n, width=len(INPUTS), w=self._storage,
+            force=self._forms.force, end=self._forms.end, search=self._setting.search.flags,
+            limit=self._limit, back_force=self._back_force, dissipated=self._dissipated,
+            slope=self._slope, excess=self.over, slipped=self._slipped, way=self._way,
+            rows=self._rows,
+        )  # fmt: skip
+        self.in_c = {"rigid_plastic": self._c}
+
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
+        """The laws, and what they enter."""
+        ledger = self._ledger
+        entries = {"hinges": ledger.lost.pointer("hinges")}
+        if self._hardens:
+            entries["hardening"] = ledger.state.pointer("hardening")
+        if self._loss:
+            entries["numerical"] = ledger.lost.pointer("numerical")
+        of_law = {"dt_of_law": INPUTS.index("dt"), "way_before": self._way_before}
+        return {**of_law, "loss": self._loss, **entries}
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -144,21 +185,18 @@ class RigidPlasticResponse(Response):
         """Go on from the accepted state."""
         self._way[:] = self._way_before
 
+    def rows(self, e1: Array, λ: Array) -> Rows:
+        """Rows of the latest iterate, which C has set."""
+        return self._rows[:, 0], self._rows[:, 1], self._rows[:, 2]
+
     def about_force(self, rows: Array) -> Array:
         """Factors of the rows of those that slip, see rigid_plastic.c."""
         return np.where(self._way == 0, 0.0, -self._slope)
 
-    def factors(self) -> Array:
-        """Factors of motions beside forces."""
-        return self._slope
-
-    @abstractmethod
-    def _commit(self, e1: Array) -> tuple[float, float, float]:
-        """Take the slips as the new state; what is dissipated, lost numerically and stored; J."""
-
     def accept(self, e1: Array, work: float) -> None:
         """Commit the slips of the step."""
-        dissipated, lost, self.stored = self._commit(e1)
+        lib.commit_rigid_plastic(self._c, doubles(e1), doubles(self._sums))
+        dissipated, lost, self.stored = self._sums.tolist()
         self._way_before[:] = self._way * self._slipped
         self._ledger.lost["hinges"] += dissipated
         if self._loss:
@@ -171,19 +209,9 @@ class RigidPlasticResponse(Response):
 
     # -- openings, see openings.py -------------------------------------------------------------
 
-    @property
-    def over(self) -> Array:
-        """The same of each connector."""
-        return self._excess
-
-    @property
-    def excess(self) -> float:
-        """Largest ``|force| / limit - 1`` of a connector that was held, or zero."""
-        return float(self._excess.max(initial=0.0))
-
     def release(self, least: float) -> None:
         """Let held connectors slip from now on whose excess was so large."""
-        self._slipped[(self._excess > 0) & (self._excess >= least)] = RELEASED
+        self._slipped[(self.over > 0) & (self.over >= least)] = RELEASED
 
     def hold(self) -> None:
         """Close again the slips that :meth:`release` opened."""
@@ -195,9 +223,10 @@ class RigidPlasticResponse(Response):
         """Motions without the round-off of those that are held."""
         return self._at["start"]
 
-    @abstractmethod
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Energy dissipated in a step to the motions ``e1``, positive where one would slip; J."""
+        arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
+        return float(lib.dissipation_of_rigid_plastic(self._c, *arrays))
 
     def dissipated(self) -> Sequence[Array]:
         """Energy that each has dissipated; (num_links,); J."""

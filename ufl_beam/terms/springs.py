@@ -16,7 +16,6 @@ from ufl_beam.model.material_laws import Hardening
 from ufl_beam.terms.connector_responses import Response, Rows, respond
 from ufl_beam.terms.material_points import Points, expect_entries
 from ufl_beam.terms.phases import Callbacks
-from ufl_beam.terms.point_equations import inputs
 
 
 @respond.register(Spring)
@@ -35,13 +34,11 @@ class _Sprung(Response):
         )
         setting, number = self._setting, len(self._links)
         keys = [(0, i) for i in range(number)]
-        storage = np.zeros((number, 1, len(inputs(layout))))
-        of = (layout, keys, np.ones(number), setting.scheme, storage, setting.search)
-        self.points: Points = setting.points(*of)
+        self.points = Points(layout, keys, np.ones(number), setting.scheme, setting.search)
         expect_entries(layout, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
         self.must_dissipate = layout.kind.law.must_dissipate
-        self.in_c = self.points.in_c
+        self.in_c = {"points": self.points.c}
         self.openable = self.points if self.points.softens else None
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:

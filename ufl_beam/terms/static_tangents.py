@@ -51,21 +51,20 @@ class PredictedStrains:
 
     def __init__(self, fields: Fields) -> None:
         form, self._about = _linear_strains(fields.element)
-        self._form: Any = fields.hot_kernel(form, fields.element.q1)
+        self._form = fields.hot_kernel(form, fields.element.q1)
         self._weights = fields.share.grid.mesh.point_weights.repeat(3)
         self._last, change = np.zeros((2, fields.share.size))
         shape = self._shape = len(fields.order), len(self._weights)
         self.c = struct(
             "predicted_strains", size=len(change), of_cell=shape[1], weight=self._weights,
             about=self._last, change=change, e=np.zeros(shape),
+            strains=self._form.cells, at_about=self._form.position(self._about),
         )  # fmt: skip
-        if self._form.cells:
-            fill(self.c, strains=self._form.cells, at_about=self._form.position(self._about))
 
     def begin(self, step: Step) -> None:
         """Begin a step, with exact tangents until :meth:`restart`."""
-        self._q0, self._q_before = step.q0, step.q0 if step.q_before is None else step.q_before
-        fill(self.c, q0=self._q0, q_before=self._q_before, ratio=step.ratio)
+        self._q0, q_before = step.q0, step.q0 if step.q_before is None else step.q_before
+        fill(self.c, q0=self._q0, q_before=q_before, ratio=step.ratio)
         self.restart(Tangents.EXACT)
 
     def restart(self, tangents: Tangents) -> None:
@@ -74,14 +73,11 @@ class PredictedStrains:
         self.c.exact = tangents is not Tangents.PREDICTED
 
     def __call__(self, q: Array) -> Array:
-        """Strains at an iterate, in the order of the mesh, point after point; 1, 1, 1/m."""
+        """Strains of elastic cells, in the order of the mesh, point after point; 1, 1, 1/m."""
         if self.c.begins:
-            e, ratio = self._linear(self._q0, self._q0), self.c.ratio
-            return e + ratio * (e - self._linear(self._q_before, self._q_before)) if ratio else e
-        return self._linear(q if self.c.exact else self._last, q)
-
-    def _linear(self, about: Array, q: Array) -> Array:
-        """Strains at ``q`` that are linear about a configuration."""
+            about = q = self._q0
+        else:
+            about = q if self.c.exact else self._last
         e = np.zeros(self._shape)
         self._form.set(self._about, about)
         self._form.add(q - about, e)
@@ -135,10 +131,9 @@ class StaticTangent:
 
     @cached_property
     def _in_c(self) -> Any:
-        kernel: Any = self.kernel
         return struct(
-            "static_tangent", predicted=self.predicted.c, tangent=kernel.cells,
-            at_e=kernel.position(self._e),
+            "static_tangent", predicted=self.predicted.c, tangent=self.kernel.cells,
+            at_e=self.kernel.position(self._e),
         )  # fmt: skip
 
     def loop(self) -> Loop:

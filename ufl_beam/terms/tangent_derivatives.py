@@ -11,7 +11,7 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import CellForm, stated
+from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.terms.base import InternalForces
@@ -62,10 +62,10 @@ class Cells(InternalForces):
         return {}
 
     @cached_property
-    def _derivatives(self) -> tuple[_Forms, dict[str, CellForm]]:
+    def _derivatives(self) -> tuple[_Forms, dict[str, Kernel]]:
         return _forms(self._work_form, self._q1), {}
 
-    def _at(self, q1: Array, name: str, **motions: Array) -> CellForm:
+    def _at(self, q1: Array, name: str, **motions: Array) -> Kernel:
         """The kernel of one of the :class:`_Forms`, compiled when it is first asked for."""
         forms, kernels = self._derivatives
         if name not in kernels:

@@ -16,7 +16,7 @@ from ufl.algorithms import expand_derivatives
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, ffi, lib, loop
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import CellForm
+from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields, element_of
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving
 from ufl_beam.dolfinx_compat import fem
@@ -54,14 +54,14 @@ class Acting(ABC):
         with _named(work):
             self.residual = self._kernel(stated.residual)
             self._kernels = [self.residual]
-            self.tangent: CellForm | None = None
+            self.tangent: Kernel | None = None
             if not stated.tangent.empty():
                 self.tangent = self._kernel(stated.tangent)
                 self.tangent.place(A)
                 self._kernels.append(self.tangent)
         self._known: dict[str, float] = {}
 
-    def _kernel(self, form: ufl.Form) -> CellForm:
+    def _kernel(self, form: ufl.Form) -> Kernel:
         return self._fields.hot_kernel(form, self._fields.element.q1)
 
     @staticmethod
@@ -87,7 +87,7 @@ class Acting(ABC):
                     if kernel.uses(function):
                         kernel.put(function, np.array([value]))
 
-    def form_of_forces(self) -> CellForm:
+    def form_of_forces(self) -> Kernel:
         """The form of the residual."""
         return self.residual
 
@@ -125,7 +125,7 @@ class Acting(ABC):
             change.add(q1, self._A.data)
 
     @cached_property
-    def _change(self) -> tuple[CellForm | None, fem.Function]:
+    def _change(self) -> tuple[Kernel | None, fem.Function]:
         of = self._fields.element
         u = of.configuration()
         form = expand_derivatives(ufl.derivative(self._stated.tangent, of.q1, u))
@@ -332,7 +332,7 @@ class Works(LoadTerm):
             one.add_tangent_change(q1, u)
 
 
-def _calls(kernels: list[CellForm]) -> tuple[Any, Any]:
+def _calls(kernels: list[Kernel]) -> tuple[Any, Any]:
     """Argument of ``add_calls`` of loops.h, and what it needs alive."""
     calls = ffi.new("call[]", [loop("add_cells", kernel.cells) for kernel in kernels])
     return ffi.new("calls *", {"number": len(kernels), "part": calls}), calls
