@@ -113,10 +113,15 @@ class Couplings(Links):
         begin = beginning((self._work, self._tangent), self._forms.q0)
         phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")
         first, accept, state = ([loop(name, c)] for name in phases)
-        over = None if response.openable is None else response.openable.over
         admits = loop("springs_dissipate", c) if response.must_dissipate else None
-        change = loop("change_of_couplings", c)
-        return Phases([*begin, *first], accept, state, change, enter, leave, over, admits)
+        change, opens, again = loop("change_of_couplings", c), None, None
+        if response.openable is not None:
+            names = ("points", "slips", "way_before")
+            found = {**response.in_c, "slips": response.in_c.get("rigid_plastic"), **of_law}
+            opens = {name: found[name] for name in names if found.get(name) is not None}
+        if "rigid_plastic" in response.in_c:
+            again = loop("begin_slips_again", c)
+        return Phases([*begin, *first], accept, state, change, enter, leave, opens, admits, again)
 
     def demand(self) -> Loop:
         """The loop of :meth:`excess`."""

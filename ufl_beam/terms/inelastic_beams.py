@@ -125,10 +125,10 @@ class InelasticBeams(Cells):
             self._q = q
 
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
-        over = self.over if self.points.softens else None
+        opens = {"cells": self._in_c} if self.points.softens else None
         change = loop("change_of_points", c)
         admits = loop("points_dissipate", c) if self.must_dissipate else None
-        return Phases(begin, *ends, change, self._start_at, leave, over, admits)
+        return Phases(begin, *ends, change, self._start_at, leave, opens, admits)
 
     # -- the step ------------------------------------------------------------------------------
 

@@ -15,6 +15,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.base import InternalForces
 from ufl_beam.terms.connector_responses import Setting, respond
+from ufl_beam.terms.phases import Callbacks, Phases
 
 CONNECTION = 5
 """Numbers of a connector in a state, the columns of :class:`Connection`."""
@@ -100,6 +101,10 @@ class Links(InternalForces):
         """Put the forces that springs bear in the undeformed scene into its configuration."""
         if (borne := self.response.borne()) is not None:
             q[self._forces_at] = self._before[:] = borne
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """C functions of the methods."""
+        return super().phases(callbacks)._replace(again=callbacks.run(self.again))
 
     def energy_change(self, q1: Array) -> tuple[float, float, float]:
         """Energy that connectors take, and the sum of the sizes of their works; J."""

@@ -13,6 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.time_functions import ALWAYS, Table, TimeFunction, steady, value_at
 
@@ -23,8 +24,9 @@ class Phases(NamedTuple):
     ``change`` is the method of that name of internal forces, of the type ``change_of_energy``.
     Between calls of C the term is what its attributes say: ``enter`` hands them over before C takes
     steps from the accepted configuration that it is called with, ``leave`` takes them back at the
-    one that C has come to.  ``over`` is :attr:`Openable.over` of what may open.  ``admits``
-    is the check of a step before it is accepted, of the type ``admission``.
+    one that C has come to.  ``opens`` are fields of ``openable``, if something may open;
+    ``admits`` is the check of a step before it is accepted, of the type ``admission``; ``again``
+    begins a step again, which iterates have tried.
     """
 
     begin: Sequence[Loop] = ()
@@ -33,28 +35,50 @@ class Phases(NamedTuple):
     change: Loop | None = None
     enter: Callable[[Array], None] = lambda q: None
     leave: Callable[[Array], None] = lambda q: None
-    over: Array | None = None
+    opens: dict[str, Any] | None = None
     admits: Loop | None = None
+    again: Loop | None = None
 
 
 class Callbacks:
     """Python functions that C calls while it takes steps.
 
+    What they raise must not pass through C: the first exception is kept, and the step fails.
+
     Attributes:
-        error: First exception that one of them has raised.
+        error: What was raised in the latest step; a failure of a step gives way to anything else.
+        c: ``equation`` of loops.h.
         used: Whether a term has phases that are methods.
-        march: ``march`` of loops.h, once there is one.
     """
 
     error: BaseException | None = None
     used = False
-    march: Any = None
 
-    def __init__(self, size: int) -> None:
-        self._alive, self._bytes = list[Any](), 8 * size
+    def __init__(self, c: Any) -> None:
+        self.c, self._alive, self._bytes = c, list[Any](), 8 * c.size
         # What terms are told of the step that C takes; they know a configuration by its identity.
         self._step: Step | None = None
-        self._q0, self._q1, self._s = (np.full(size, math.nan) for _ in range(3))
+        self._q0, self._q1, self._s = (np.full(c.size, math.nan) for _ in range(3))
+
+    def note(self, error: BaseException) -> None:
+        """Keep an exception, and let C end the step on all processes."""
+        if self.error is None or isinstance(self.error, StepFailed):
+            self.error = error
+        self.c.raised = max(self.c.raised, 1 if isinstance(error, StepFailed) else 2)
+
+    # -- functions of the equation ---------------------------------------------------------------
+
+    def part(self, add: Callable[[Array, Array], None], size: int) -> Loop:
+        """C function that adds to ``size`` numbers what Python does; not a number if that fails."""
+        return lib.add_in_python, self.handle(add, size)
+
+    def demand(self, missed: Callable[[Array, Array, float, float], float]) -> Loop:
+        """C function that calls ``missed(q, r, scale, moved)``; not a number if that fails."""
+        return lib.missed_in_python, self.handle(missed)
+
+    def run(self, function: Callable[[], None]) -> Loop:
+        """C function that calls ``function()``."""
+        return lib.run_in_python, self.handle(function)
 
     def of_time(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
         """``time_function`` of loops.h for functions of time with their owners, see value_at."""
@@ -68,8 +92,10 @@ class Callbacks:
                 self._alive += points
             else:
                 place.ask = lib.time_in_python
-                place.handle = self.handle(partial(value_at, function, owner=owner))
+                place.handle = self.handle(partial(_value, function, owner))
         return of_time
+
+    # -- phases of terms -------------------------------------------------------------------------
 
     def begin(self, function: Callable[[Step], None]) -> Loop:
         """Phase of C that calls ``function(step)`` when a step begins."""
@@ -86,7 +112,7 @@ class Callbacks:
 
     def change(self, function: Callable[[Array], tuple[float, float, float]]) -> Loop:
         """C function that adds the ``energy_change`` of loops.h which ``function(q1)`` returns."""
-        return lib.change_in_python, self.handle(lambda q1: function(self._copy(q1)))
+        return lib.change_in_python, self.handle(function)
 
     def phase(self, function: Callable[[Any, Any, Any], None]) -> Loop:
         """Phase of C that calls ``function(step, q1, s)`` with pointers."""
@@ -94,55 +120,89 @@ class Callbacks:
 
     def note_beginning(self, step: Any, q1: Any, s: Any) -> None:
         """Make the step that terms are told of."""
-        if not np.array_equal(before := self._copy(step.q0), self._q1):
+        if not np.array_equal(before := self.copy(step.q0), self._q1):
             self._q1 = before
         self._q0 = self._q1
         numbers = step.load_time, step.motion_time, step.fraction, step.at
-        q_before = self._copy(step.q_before)
+        q_before = self.copy(step.q_before)
         self._step = Step(step.t0, step.t1, self._q0, *numbers, q_before, step.ratio)
 
     def note_end(self, step: Any, q1: Any, s: Any) -> None:
         """Copy the end of the step for terms."""
-        self._q1, self._s = self._copy(q1), self._copy(s)
+        self._q1, self._s = self.copy(q1), self.copy(s)
 
     @property
     def end(self) -> Array:
         """The end of the step."""
         return self._q1
 
-    def _copy(self, vector: Any) -> Array:
+    # -- handles -----------------------------------------------------------------------------------
+
+    def copy(self, vector: Any) -> Array:
+        """Copy a vector of C."""
         return np.frombuffer(ffi.buffer(vector, self._bytes)).copy()
 
-    def handle(self, function: Callable[..., Any]) -> Any:
-        """Handle of a function that C calls."""
-        self._alive.append(ffi.new_handle((self, function)))
+    def lend(self, vector: Any) -> Array:
+        """A vector of C, which C may change."""
+        return np.frombuffer(ffi.buffer(vector, self._bytes))
+
+    def handle(self, function: Callable[..., Any], size: int = 0) -> Any:
+        """Handle of a function that C calls; ``size`` of numbers that it adds to, if it does."""
+        self._alive.append(ffi.new_handle((self, function, size)))
         return self._alive[-1]
+
+
+def _value(function: TimeFunction, owner: object, t: float) -> float:
+    return value_at(function, t, owner)
 
 
 def _note(kind: type, error: BaseException, traceback: Any) -> None:
     """Note an exception in a callback; an interrupt may come before its first line has run."""
-    callbacks, _ = ffi.from_handle(traceback.tb_frame.f_locals["handle"])
-    callbacks.error = callbacks.error or error.with_traceback(traceback)
-    if callbacks.march is not None:
-        callbacks.march.raised = 1
+    arguments = traceback.tb_frame.f_locals
+    callbacks, _, size = ffi.from_handle(arguments["handle"])
+    callbacks.note(error.with_traceback(traceback))
+    if "out" in arguments:
+        np.frombuffer(ffi.buffer(arguments["out"], 8 * size)).fill(math.nan)
 
 
-@ffi.def_extern(error=math.nan, onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+def _in_c(error: float | None = None) -> Callable[[Callable[..., Any]], Any]:
+    """Decorate a callback of C, declared in c_library.py; its value if it raises is ``error``."""
+    more = {} if error is None else {"error": error}
+    declared: Any = ffi.def_extern(onerror=_note, **more)
+    return declared  # type: ignore[no-any-return]
+
+
+@_in_c()
+def add_in_python(handle: Any, q: Any, out: Any) -> None:
+    callbacks, function, size = ffi.from_handle(handle)
+    function(callbacks.lend(q), np.frombuffer(ffi.buffer(out, 8 * size)))
+
+
+@_in_c(math.nan)
+def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
+    callbacks, function, _ = ffi.from_handle(handle)
+    return float(function(callbacks.lend(q), callbacks.lend(r), scale, moved))
+
+
+@_in_c(math.nan)
 def time_in_python(handle: Any, t: float) -> float:
-    """Callback of C, declared in c_library.py."""
-    return float(ffi.from_handle(handle)[1](t=t))
+    return float(ffi.from_handle(handle)[1](t))
 
 
-@ffi.def_extern(onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+@_in_c()
+def run_in_python(handle: Any) -> None:
+    ffi.from_handle(handle)[1]()
+
+
+@_in_c()
 def phase_in_python(handle: Any, step: Any, q1: Any, s: Any) -> None:
-    """Callback of C, declared in c_library.py."""
     ffi.from_handle(handle)[1](step, q1, s)
 
 
-@ffi.def_extern(onerror=_note)  # type: ignore[misc, untyped-decorator, unused-ignore]
+@_in_c()
 def change_in_python(handle: Any, q1: Any, found: Any) -> None:
-    """Callback of C, declared in c_library.py."""
-    in_beams, in_connectors, effort = ffi.from_handle(handle)[1](q1)
+    callbacks, function, _ = ffi.from_handle(handle)
+    in_beams, in_connectors, effort = function(callbacks.copy(q1))
     found.in_beams += in_beams
     found.in_connectors += in_connectors
     found.effort += effort

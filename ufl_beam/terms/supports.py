@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import ffi, struct
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, struct
 from ufl_beam.compiled.csr import Csr, as_slice
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
@@ -19,30 +19,6 @@ from ufl_beam.model.supports import Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.phases import Callbacks, weight_of_before
-
-
-class TurnedAxes:
-    """The displacement of one place in axes turned by an angle, as supports at an angle hold it."""
-
-    def __init__(self, dofs: Index, angle: float, A: Csr) -> None:
-        self._i, self._j = dofs
-        self._c, self._s = math.cos(angle), math.sin(angle)
-        self._rows = [slice(A.indptr[d], A.indptr[d + 1]) for d in dofs]
-        self._columns = [np.flatnonzero(A.indices == d) for d in dofs]
-
-    def turn(self, x: Array, way: int) -> None:
-        """Transform to the turned axes (1) or to the axes of the plane (-1), in place."""
-        c, s = self._c, way * self._s
-        a, b = float(x[self._i]), float(x[self._j])  # Python's: infinite ones warn of nothing
-        x[self._i], x[self._j] = c * a + s * b, c * b - s * a
-
-    def turn_matrix(self, data: Array) -> None:
-        """Transform rows and columns of a matrix to the turned axes, in place."""
-        c, s = self._c, self._s
-        # Both dofs belong to the same cells, so their rows, and their columns, have one sparsity.
-        for i, j in (self._rows, self._columns):
-            first, second = data[i].copy(), data[j]
-            data[i], data[j] = c * first + s * second, c * second - s * first
 
 
 class Supports:
@@ -56,11 +32,12 @@ class Supports:
             freedom that are held, in turned axes.
         entries: Entries of the matrix that hold them, and those of them on the diagonal.
         pivots: What stands on the diagonal.
+        turned, axes: Number of supports at an angle; ``turned_axes`` of loops.h.
         moving: Local degrees of freedom whose values depend on time.
     """
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
-        self._turned: list[TurnedAxes] = []
+        turned: list[tuple[Any, ...]] = []
         held: list[int] = []
         self._motions: list[tuple[int, TimeFunction, Support]] = []
         if GROUND in share.grid.scene.rigid_bodies:
@@ -68,12 +45,13 @@ class Supports:
         for support in share.grid.scene.supports:
             dofs = share.at(support.place)
             if support.angle and len(share.local(dofs[:2])):
-                self._turned.append(TurnedAxes(share.local(dofs[:2]), support.angle, A))
+                turned.append(_turned_axes(share.local(dofs[:2]), support.angle, A))
             for component, motion in support.held.items():
                 here = share.local(dofs[[component]])
                 held.extend(here)
                 if component in support.moving:
                     self._motions.extend((dof, motion, support) for dof in here)
+        self.turned, self.axes, self._alive = len(turned), ffi.new("turned_axes[]", turned), turned
         self.dofs = np.array(sorted(held), dtype=np.int64)
         self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
         self._held = as_slice(self.dofs)
@@ -82,7 +60,6 @@ class Supports:
         of_columns, of_rows = np.flatnonzero(is_held[A.indices]), A.entries_of(self.dofs)
         self.entries = np.union1d(of_columns, of_rows), A.diagonal(self.dofs)
         self.pivots: Array = np.ones(len(self.dofs))
-        self._owned = self.dofs < share.num_owned
         self._acting, self._ledger = scheme.acting, ledger
         # True if values depend on time anywhere in the scene
         self.work = any(support.moving for support in share.grid.scene.supports)
@@ -91,30 +68,23 @@ class Supports:
         self.reactions: Array = np.zeros(len(self.dofs))
         self._before: Array = self.reactions.copy()
 
-    @property
-    def turned(self) -> bool:
-        """True if some supports are at an angle to the axes of the plane."""
-        return bool(self._turned)
-
     def enter(self, x: Array) -> None:
         """Transform from the axes of the plane to those of the supports, in place."""
-        for axes in self._turned:
-            axes.turn(x, 1)
+        lib.turn_axes(self.turned, self.axes, doubles(x), 1)
 
     def leave(self, x: Array) -> None:
         """Transform from the axes of the supports to those of the plane, in place."""
-        for axes in self._turned:
-            axes.turn(x, -1)
+        lib.turn_axes(self.turned, self.axes, doubles(x), -1)
 
     def in_axes(self, q: Array) -> Array:
         """``q`` in the axes of the supports; a copy only if an axis is turned."""
-        if self._turned:
+        if self.turned:
             self.enter(q := q.copy())
         return q
 
     def in_plane(self, x: Array) -> Array:
         """``x`` in the axes of the plane; a copy only if an axis is turned."""
-        if self._turned:
+        if self.turned:
             self.leave(x := x.copy())
         return x
 
@@ -140,29 +110,6 @@ class Supports:
         if len(self.dofs):
             self.reactions[:] = r[self._held]
             r[self._held] = 0.0
-
-    def hold_matrix(self, data: Array) -> None:
-        """Turn a tangent into the axes of the supports and hold what is held."""
-        for axes in self._turned:
-            axes.turn_matrix(data)
-        if len(self.dofs):
-            # What stands on the diagonal has the right dimension and size for what is held.
-            # Where material that flows freely leaves nothing, or the digits of motions that fade,
-            # what stood there before does as well.
-            zero, pivots = self.entries
-            diagonal = data[pivots]
-            normal = np.abs(diagonal) >= np.finfo(float).tiny
-            np.copyto(self.pivots, diagonal, where=normal)
-            data[zero] = 0.0
-            data[pivots] = self.pivots
-
-    def accept(self, s: Array) -> None:
-        """Work of the supports that move; ``s`` in their axes."""
-        if self._motions:
-            work = self._acting(self._before, self.reactions) * s[self._held]
-            self._ledger.supplied["supports"] += float(np.sum(work[self._owned]))
-        if len(self.dofs):
-            self.take()
 
     def stop(self, v: Array) -> None:
         """Set velocities of what does not move to zero, in place; else they would ring."""
@@ -199,3 +146,12 @@ class Supports:
         r = np.zeros(size)
         r[self._held] = self.reactions
         return r
+
+
+def _turned_axes(dofs: Index, angle: float, A: Csr) -> tuple[Any, ...]:
+    """Fields of ``turned_axes`` of loops.h for the displacement of a place."""
+    rows = [np.arange(A.indptr[d], A.indptr[d + 1], dtype=np.int32) for d in dofs]
+    # Both dofs belong to the same cells, so their rows, and their columns, have one sparsity.
+    columns = [np.flatnonzero(A.indices == d).astype(np.int32) for d in dofs]
+    sizes, entries = (len(rows[0]), len(columns[0])), map(integers, (*rows, *columns))
+    return *map(int, dofs), *sizes, math.cos(angle), math.sin(angle), *entries

@@ -286,7 +286,7 @@ typedef struct {
 typedef struct {
   const cells *work, *tangent, *motion;
   points *points;                  /* or none */
-  const rigid_plastic *rigid_plastic; /* or none; if neither, the rows stay during a step */
+  rigid_plastic *rigid_plastic; /* or none; if neither, the rows stay during a step */
   int number;
   const int32_t *link, *force;     /* of each cell; where each link's force is among the unknowns */
   int row, row_of_tangent;         /* where the coefficients of work and tangent have the rows */
@@ -536,7 +536,7 @@ enum {
 };
 
 double over_processes(const equation *e, enum agreement how, double here);
-void turn_axes(const equation *e, double *x, int way);
+void turn_axes(int number, const turned_axes *axes, double *x, int way);
 int residual(equation *e, const double *x, double *r, void *f);
 void fill_tangent(const equation *e, const double *q);
 void hold_tangent(const equation *e);
@@ -843,6 +843,7 @@ void begin_inelastic(void *self, const time_step *step, const double *q1, const 
 void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s);
 void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s);
 void begin_couplings(void *self, const time_step *step, const double *q1, const double *s);
+void begin_slips_again(void *self);
 void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s);
 int points_dissipate(void *self, const double *q1);

@@ -358,6 +358,13 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
   }
 }
 
+void begin_slips_again(void *self)
+{
+  const coupling_term *t = self;
+  const rigid_plastic *p = t->links->rigid_plastic;
+  memcpy(p->way, t->way_before, p->number * sizeof *p->way);
+}
+
 void accept_couplings(void *self, const time_step *step, const double *q1, const double *s)
 {
   coupling_term *t = self;
@@ -470,10 +477,10 @@ static void guess(march *m)
   const equation *e = m->equation;
   const double *q = m->q;
   predict(m->prediction, m->step.dt, q, m->guess);
-  turn_axes(e, m->guess, 1);
+  turn_axes(e->turned, e->axes, m->guess, 1);
   if (p->moving && e->turned) {
     memcpy(e->plane, q, m->size * sizeof *q);
-    turn_axes(e, e->plane, 1);
+    turn_axes(e->turned, e->axes, e->plane, 1);
     q = e->plane;
   }
   for (int k = 0; k < p->moving; ++k) {
@@ -589,7 +596,7 @@ static int measure(march *m)
   double turn = 0;
   if (e->turned) {
     memcpy(m->x, e->unknowns, m->size * sizeof *m->x);
-    turn_axes(e, m->x, -1);
+    turn_axes(e->turned, e->axes, m->x, -1);
   }
   for (int i = 0; i < m->size; ++i) m->s[i] = m->x[i] - m->q[i];
   for (int k = 0; k < m->rotations; ++k) turn = fmax(turn, fabs(m->s[m->rotation[k]]));
@@ -678,7 +685,7 @@ static void accept_supports(march *m)
 {
   const moving_supports *p = m->supports;
   const double a = p->weight_of_before;
-  turn_axes(m->equation, m->s, 1);
+  turn_axes(m->equation->turned, m->equation->axes, m->s, 1);
   if (p->moving)
     for (int k = 0; k < p->held; ++k)
       if (p->hold[k] < m->equation->owned)

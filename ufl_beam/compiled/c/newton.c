@@ -38,10 +38,10 @@ static int raised_anywhere(const equation *e) { return (int)over_processes(e, LA
 /* -- supports at an angle ---------------------------------------------------------------------- */
 
 /* A vector in the axes of supports (way = 1), or from these in those of the plane (-1), in place. */
-void turn_axes(const equation *e, double *x, int way)
+void turn_axes(int number, const turned_axes *axes, double *x, int way)
 {
-  for (int k = 0; k < e->turned; ++k) {
-    const turned_axes *t = e->axes + k;
+  for (int k = 0; k < number; ++k) {
+    const turned_axes *t = axes + k;
     const double a = x[t->i], b = x[t->j], s = way * t->s;
     x[t->i] = t->c * a + s * b, x[t->j] = t->c * b - s * a;
   }
@@ -52,7 +52,7 @@ static const double *in_plane(const equation *e, const double *x)
 {
   if (!e->turned) return x;
   memcpy(e->plane, x, e->size * sizeof *x);
-  turn_axes(e, e->plane, -1);
+  turn_axes(e->turned, e->axes, e->plane, -1);
   return e->plane;
 }
 
@@ -82,7 +82,7 @@ int residual(equation *e, const double *x, double *r, void *f)
   for (int k = 0; k < e->inner; ++k) e->force[k].add(e->force[k].self, q, r);
   note_inner_forces(e, r);
   for (int k = e->inner; k < e->forces; ++k) e->force[k].add(e->force[k].self, q, r);
-  turn_axes(e, r, 1);
+  turn_axes(e->turned, e->axes, r, 1);
   const int error = add_ghosts(e, f);
   for (int k = 0; k < e->held; ++k) {
     e->reactions[k] = r[e->hold[k]];
