@@ -38,8 +38,8 @@ def test_loads_may_go(scheme):
 def test_friction_that_sticks_and_slides(friction):
     """Its row is about the motion or about the force: no tangent of the one serves the other.
 
-    No step is cut, and the motion is that of Newton's full method.  Each of 60 steps may leave 1e-12
-    of some 2 N, which deflect the end by 1/3 m/N: together 4e-11 m.
+    No step is cut, and the motion is that of Newton's full method.  Each of 60 steps may leave
+    1e-12 of some 2 N, which deflect the end by 1/3 m/N: together 4e-11 m.
     """
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0, rhoA=1.0), cells=4)
     load = ub.PointLoad(beam.end, (0.5, 2.0), time=lambda t: math.sin(9 * t))
