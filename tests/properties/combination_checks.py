@@ -17,6 +17,7 @@ from combination_case import (
     difference,
     differences,
     only,
+    results,
 )  # fmt: skip
 from own_parts import LargestCurvature
 
@@ -238,7 +239,8 @@ def assert_agree(case, tolerance=SAME, **changes):
     """Runs with other arguments find the motions, forces and energies of `exact`.
 
     Where one of both must cut a step, last digits decide, and other steps have other errors; then
-    smaller steps, which none must cut, are compared.
+    smaller steps, which none must cut, are compared.  Beyond a limit load there are none: however
+    short its steps are, the state leaps, and what flows remembers in how many parts.
     """
     only(not case.exact.failure, "a step fails")
     for parts in (1, 4, 16):
@@ -253,7 +255,23 @@ def assert_agree(case, tolerance=SAME, **changes):
             continue
         assert not found.failure, found.failure
         return assert_near(differences(found, expected), tolerance)
+    only(not leaps(case, expected), "the state leaps over a limit load")
     raise AssertionError("steps are cut, however small")
+
+
+def leaps(case, short):
+    """Whether in statics a state leaps in steps of a sixteenth, as it does in whole ones.
+
+    A motion without leaps is a sixteenth as far in one of them; four times as much is no such
+    motion.  The first step does not count: it applies loads that are there from the start.
+    """
+    return case.combination.static and farthest(short) > 4 / 16 * farthest(case.exact)
+
+
+def farthest(run):
+    """Largest motion in a step but the first."""
+    motions, _ = results(run.names, run.solution)["motions"]
+    return np.abs(np.diff(motions, axis=1)[:, 1:]).max()
 
 
 def has_cut(*runs):
