@@ -461,6 +461,7 @@ typedef struct {
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands;
   const demand *demand; /* of connectors */
+  int32_t *switched;    /* a row of a connector is not about what it was in the tangent; see openings.py */
   double last, best, last_scale;
   int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
   int anew;                           /* no tangent is kept from step to step */
