@@ -16,7 +16,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.one_line import bracketed, one_line
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_solver import Trial
+from ufl_beam.simulation.stepper import Trial
 from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
 
 INVERSE_ITERATIONS = 50  # inverse iterations in which a mode is sought

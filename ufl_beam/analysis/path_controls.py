@@ -17,7 +17,7 @@ from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
-from ufl_beam.simulation.step_solver import Trial
+from ufl_beam.simulation.stepper import Trial
 
 LEAST_REST = 1e-3  # least part of a step of arc length that is left beyond a kink
 

@@ -17,7 +17,7 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.scene import Scene
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.step_solver import Trial
+from ufl_beam.simulation.stepper import Trial
 from ufl_beam.terms.base import Term
 
 MOST_DOUBLINGS = 30  # doublings of a step until something dissipates in it

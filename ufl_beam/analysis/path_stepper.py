@@ -14,7 +14,7 @@ from ufl_beam.analysis.critical_points import Branch, Candidate, CriticalPoint, 
 from ufl_beam.analysis.path_corrector import Control, Crossing, PathCorrector, Plane
 from ufl_beam.errors import StepFailed
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.step_solver import Trial
+from ufl_beam.simulation.stepper import Trial
 
 SMALLEST_STEP_PART = 2.0**-12  # a step is cut down to this part of it
 TARGET_ITERATIONS = 12  # steps of more are followed by shorter ones, of fewer by longer ones

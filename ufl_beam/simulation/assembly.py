@@ -38,7 +38,7 @@ from ufl_beam.terms.inelastic_cells import inelastic_cells
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import FrameForces, LoadTerm
 from ufl_beam.terms.material_points import expect_entries
-from ufl_beam.terms.openings import Openable, Openings, SearchFlags
+from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 from ufl_beam.terms.works import Works
@@ -58,7 +58,6 @@ class Assembly:
     loads: list[LoadTerm]
     inertia: Inertia | None
     supports: Supports
-    openings: Openings | None  # search for what opens; None if nothing can
     equation: StepEquation
     cell_forces: CellForces
 
@@ -187,8 +186,6 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     )
     of_links = share, connectors, A
     coupled = together(lambda: [*couplings(*of_links), *guides(*of_links)])
-    places = _openable(inelastic, coupled)
-    openings = Openings(search, places, share) if share.largest(float(bool(places))) else None
 
     loads = _loads(scene, fields, scheme, ledger, A)
     if scene.works:
@@ -204,10 +201,9 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
         ledger.state["stored"] += 0.0
     parts = share, A, beams, coupled, loads, others, supports, search
     equation = StepEquation(*parts, in_motion=inertia is not None)
-    equation.leave_to_c()
     return Assembly(
         ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
-        supports, openings, equation, _cell_forces(share, equation.terms),
+        supports, equation, _cell_forces(share, equation.terms),
     )  # fmt: skip
 
 
@@ -229,10 +225,3 @@ def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr)
     if followers:
         loads.append(FollowerLoads(followers, fields.share, scheme, ledger, A))
     return loads
-
-
-def _openable(inelastic: list[InelasticBeams], coupled: list[Links]) -> list[Openable]:
-    """Return the places of this process that may open: hinges, cracks, softening springs."""
-    cells: list[Openable] = [one for one in inelastic if one.points.softens]
-    laws = (one.response.openable for one in coupled)
-    return [*cells, *(law for law in laws if law is not None)]

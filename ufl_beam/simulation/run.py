@@ -36,7 +36,7 @@ from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive, number_of_steps, steps_of
-from ufl_beam.simulation.step_solver import MOST_PARTS
+from ufl_beam.simulation.stepper import MOST_PARTS
 from ufl_beam.simulation.watches import LedgerWatch
 from ufl_beam.solvers.newton_options import Newton
 

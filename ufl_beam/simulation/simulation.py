@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cached_property, partial
+from functools import cached_property
 from typing import NoReturn
 
 from mpi4py import MPI
@@ -27,22 +27,14 @@ from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import Assembly, assemble
 from ufl_beam.simulation.branch_check import add_forces_at_rest
-from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
 from ufl_beam.simulation.diagnosis import no_equilibrium, require_held
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_solver import (
-    APPLYING,
-    LARGEST_TURN,
-    StepSolver,
-    Trial,
-    begins_loaded,
-    go_in_parts,
-)
+from ufl_beam.simulation.stepper import APPLYING, Extras, Stepper, Trial, begins_loaded
 from ufl_beam.simulation.watches import ForceWatch
-from ufl_beam.solvers.equation import Border
+from ufl_beam.solvers.newton import Border
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.solvers.petsc_options import checked_newton
 
@@ -123,7 +115,7 @@ class Simulation(StateView):
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
         self.equation, self.terms = parts.equation, parts.equation.terms
 
-        self.t, self.parts, self.left, self.q = t0, 0, [0, 0], q[share.dofs]
+        self.t, self.parts, self.q = t0, 0, q[share.dofs]
         self._begun_at: Array | None = None  # of the state before the first step
         weights, in_motion = self.equation.weights, has_inertia(scheme)
         self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
@@ -155,16 +147,21 @@ class Simulation(StateView):
             self._begun_at = before
         self.begun = self.between < 1 or self.cell_forces.asks_for_before
 
-        self._steps = StepSolver(
-            scheme, self.equation, parts.openings, self._branch, newton, together
-        )
-        self.solver = self._steps.newton
         self.solution, self._end = kind(scene, grid), np.zeros(1)
         self._watches: list[Watch] = []
         self._describe(self.solution)
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
-        in_python = self._copies or self._loose or not share.alone
-        self._in_c = None if in_python else self._steps_in_c(parts)
+        notes = bool(self._watch) or self._copies is not None
+        extras = Extras(
+            self._ask if self.asked else None, self.controllers.stops,
+            self._require_held if self._loose else None, self._note if notes else None,
+        )  # fmt: skip
+        self._applies = fresh and begins_loaded(scene, scheme, t0)
+        self._stepper = Stepper(
+            scheme, self.equation, newton, self.ledger, parts.inertia, self._branch,
+            self.support_dofs, self.cell_forces, self.begun, together, extras,
+        )  # fmt: skip
+        self.solver = self._stepper.solver
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -176,23 +173,10 @@ class Simulation(StateView):
                 was accepted, which the solution of the error ends with.
         """
         self._end[0] = t1
-        if self._in_c is None or not self._in_c.take(self, self._end):
-            self._step_in_python(t1)
-            self._observe()
-
-    def _step_in_python(self, t1: float) -> None:
-        fresh = self.parts == 0 and not self._continues
-        if fresh and begins_loaded(self.scene, self.scheme, self.t):
-            self.take_back()
-            begin, end = self.t, self.t + APPLYING * (t1 - self.t)
-            attempt = partial(self._steps.attempt_loads, self, begin=begin, end=end)
-            go_in_parts(begin, end, attempt, self.accept, self.give_up)
-        while self.t != t1:
-            end = self.controllers.next_sample(self.t, t1)
-            go_in_parts(self.t, end, partial(self.attempt, end=end), self.accept, self.give_up)
+        self._take(self._end)
 
     def steps_to(self, ends: Array, *, keep: bool = False) -> int:
-        """Go to the first of these times, and on to others as far as that needs no Python.
+        """Go to the first of these times, and on to others for a moment.
 
         Args:
             ends: Ends of steps; (n,); s.
@@ -213,40 +197,36 @@ class Simulation(StateView):
             >>> simulation.close()
         """
         ends = np.ascontiguousarray(ends, dtype=np.float64)
-        if self._in_c is not None and (taken := self._in_c.take(self, ends, keep=keep)):
-            return taken
-        self._step_in_python(float(ends[0]))
-        self._observe()
+        if self.share.alone:
+            return self._take(ends, keep=keep)
+        self._take(ends[:1])
         if keep:
             self.keep()
         return 1
 
-    def _steps_in_c(self, parts: Assembly) -> CompiledSteps | None:
-        """Steps without Python; None where something in the scene needs it."""
-        fresh = not self._continues and begins_loaded(self.scene, self.scheme, self.t)
-        return compiled_steps(
-            self.scheme, self.equation, self.solver, self.ledger, parts.inertia, self._branch,
-            parts.openings, LARGEST_TURN, fresh, self.support_dofs, parts.cell_forces, self.begun,
-            (bool(self.asked), bool(self._watch), self.controllers.stops),
-        )  # fmt: skip
+    def _take(self, ends: Array, *, keep: bool = False) -> int:
+        """Take steps in C; end the run where even the smallest part fails."""
+        try:
+            if self._applies:
+                self._applies = False
+                self._stepper.apply_loads(self, self.t + APPLYING * (float(ends[0]) - self.t))
+            taken = self._stepper.take(self, ends, keep=keep)
+            self._begun_at = None
+            return taken
+        except StepFailed as failure:
+            self.give_up(failure, float(self._stepper.c.failed_end))
 
     def watch(self, parts: Array) -> Watch | None:
         """Begin to take in extremes after each step in C, or return None if that cannot be."""
         if not self.share.alone:
             return None
         self._watches.append(one := Watch(self.share, self.cell_forces, self._along, parts))
-        if self._in_c is not None:
-            self._in_c.watch(self._watches)
+        self._stepper.watch(self._watches)
         return one
-
-    def _observe(self) -> None:
-        for one in self._watches:
-            one.take(self.parts, self.t, self.q, self.q_before)
 
     def take_back(self) -> None:
         """Take the state back from C: what follows is in Python."""
-        if self._in_c is not None:
-            self._in_c.hand_back(self)
+        self._stepper.hand_back(self)
 
     def attempt(self, t1: float, end: float | None = None) -> Trial:
         """Solve the next step, to ``t1``; the state changes if :meth:`accept` takes it.
@@ -258,43 +238,29 @@ class Simulation(StateView):
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
         """
-        self.take_back()
-        return self._steps.attempt(self, t1, t1 if end is None else end)
+        return self._stepper.attempt(self, t1, t1 if end is None else end)
 
     def attempt_along(
         self, step: Step, guess: Array, border: Border, *, hold: bool = True
     ) -> Trial:
-        """Solve the next step with the load factor; see :meth:`StepSolver.attempt_along`."""
-        self.take_back()
-        return self._steps.attempt_along(self, step, guess, border, hold=hold)
+        """Solve the next step with the load factor; see :meth:`Stepper.attempt_along`."""
+        return self._stepper.attempt_along(self, step, guess, border, hold=hold)
 
     def accept(self, trial: Trial) -> None:
         """Go where the latest :meth:`attempt` went."""
-        self.together(self._accept, trial)
-        self.prediction.agree()
-        if self._copies is not None:
-            self._copies.note(self.t, self.q)
+        self._stepper.accept(self, trial)
 
-    def _accept(self, trial: Trial) -> None:
-        step, q1, s = trial
+    def _require_held(self, q1: Array) -> None:
+        """Raise if loads do not hold in an equilibrium what nothing else holds."""
         if self._loose:
             self._loose = require_held(self.equation, self.solver, q1, self._loose)
-        if self._branch is not None:
-            self._branch.accept(self.equation.force)
-        for term in self.terms:
-            term.accept(q1, s)
-        self.cell_forces.accept()
-        self.supports.enter(s)
-        self.supports.accept(s)
-        self.prediction.accept(self.q, q1, step.dt)
-        self._begun_at = None
-        self.q, self.t = q1, step.t1
-        self.parts += 1
-        self.ledger.begin()
-        for term in self.terms:
-            term.add_state(q1)
+
+    def _note(self, q1: Array, t: float, dt: float) -> None:
+        """Take note of the end of a step."""
+        if self._copies is not None:
+            self._copies.note(t, q1)
         if self._watch:
-            self.judge(q1, step.t1, step.dt)
+            self.warn(self._watch.judge(q1, t, dt), here=not self.share.alone)
 
     def warn(self, found: Iterable[str], *, here: bool = False) -> None:
         """Warn, and note in the solution, of what it does not say; by one process or ``here``."""
@@ -304,16 +270,15 @@ class Simulation(StateView):
                 if here or self.comm.rank == 0:
                     warn(said)
 
-    def judge(self, q1: Array, t: float, dt: float) -> None:
-        """Warn of forces of users' functions that alternate in steps to ``q1`` at ``t``."""
-        self.warn(self._watch.judge(q1, t, dt), here=not self.share.alone)
-
     @property
     def q_before(self) -> Array:  # type: ignore[override]
         """Configuration at the beginning of the last step."""
-        if self._in_c is not None and self._in_c.ahead:
-            return self._in_c.q_before()
+        if self._stepper.ahead:
+            return self._stepper.q_before()
         return self.prediction.q_before if self._begun_at is None else self._begun_at
+
+    def _ask(self) -> None:
+        self._assembly.ask(self, self.q)
 
     def ask(self) -> None:
         """Ask controllers and friction for forces and limits in the next step, on all processes."""
@@ -367,8 +332,8 @@ class Simulation(StateView):
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
-        if self._in_c is not None and self._in_c.ahead:
-            now: Later | Snapshots = self._in_c.now(self)
+        if self._stepper.ahead and self.share.alone:
+            now: Later | Snapshots = self._stepper.now(self)
         else:
             now = Snapshots.of(self.gather())
         self.solution.keep(now, self.parts, self.iterations)
@@ -408,8 +373,6 @@ class Simulation(StateView):
         self.take_back()
         self.t = memory.number("t", self.t)
         self.parts = int(memory.number("parts", self.parts))
-        left = ((f"left to Python {i}", number) for i, number in enumerate(self.left))
-        self.left = [int(memory.number(*one)) for one in left]
         self.solver.remember(memory)
         self.q = memory.at_dofs("q", self.q)
         self.controllers.remember(memory, self.t)

@@ -13,7 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed, require_number, require_sequence
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.step_solver import Trial
+from ufl_beam.simulation.stepper import Trial
 
 GROWTH = 1.5
 """Largest ratio of the length of a step to that of the one before it."""

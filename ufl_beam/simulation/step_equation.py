@@ -8,12 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.base import InternalForces, Term
 from ufl_beam.terms.links import Links
@@ -36,7 +35,6 @@ class StepEquation:
         force: Internal forces in the latest residual, in statics; else empty.
         c: ``equation`` of loops.h, which a solver completes with its own numbers.
         callbacks: Python functions that take part.
-        phases: What each term does when a step begins and ends.
     """
 
     def __init__(
@@ -61,7 +59,6 @@ class StepEquation:
         self.terms: list[Term] = [*self.inner, *self.others]
         self.c = struct("equation", size=A.size, owned=share.num_owned, weight=self.weights)
         self.callbacks = callbacks = Callbacks(self.c)
-        self.phases = [term.phases(callbacks) for term in self.terms]
         loops = [term.loops() or self._in_python(term) for term in self.terms]
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
 
@@ -78,7 +75,6 @@ class StepEquation:
         demands += filter(None, (one.demand() for one in beams))
         demanding = share.largest(float(bool(demands)))
         predicted = [one.predicted.c for one in beams if one.predicted is not None]
-        again = [one.again for one in self.phases if one.again is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -93,7 +89,7 @@ class StepEquation:
             plane=np.zeros(share.size if supports.turned else 0),
             demands=len(demands), demand=ffi.new("demand[]", demands), demanding=int(demanding),
             predictions=len(predicted), predicted=ffi.new("predicted_strains *[]", predicted),
-            agains=len(again), again=ffi.new("again[]", again), search=search.flags,
+            search=search.flags, switched=search.switched,
         )  # fmt: skip
         self._alive = loops, demands, predicted
         if not in_motion:
@@ -105,6 +101,11 @@ class StepEquation:
 
         residual = self.callbacks.part(term.add_residual, self.share.size)
         return residual, self.callbacks.part(add_tangent, len(self.A.data))
+
+    @property
+    def held(self) -> Index:
+        """Degrees of freedom that supports hold; what stands for them in A means nothing."""
+        return self.supports.dofs
 
     def begin(self, step: Step) -> None:
         """Let all terms begin a step."""
@@ -159,8 +160,6 @@ class StepEquation:
         for term in self.terms:
             if term.kind != "inertia":
                 term.begin(step)
-                if isinstance(term, InternalForces):
-                    term.restart(Tangents.EXACT)
                 term.add_residual(q, r)
                 term.add_tangent(q)
         return r, self.A.data.copy()

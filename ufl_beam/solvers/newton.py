@@ -1,85 +1,123 @@
 # SPDX-License-Identifier: MIT
-"""Equilibrium of a step by Newton's method, as a solver of PETSc."""
+"""Equilibrium of a step by Newton's method of newton.c, as a solver of PETSc."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from functools import cached_property, partial
-from typing import Any
+from functools import cached_property
+from typing import Any, Protocol
 
 from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_beam.arrays import Array
-from ufl_beam.collective_errors import Agreement
-from ufl_beam.compiled.c_library import ffi, fill, give_back_memory, lib, loop, opaque, petsc
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import (
+    ffi,
+    fill,
+    give_back_memory,
+    lib,
+    loop,
+    opaque,
+    petsc,
+    struct,
+)
+from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.tangents import Tangents
-from ufl_beam.solvers.bordered import BorderedNewton
 from ufl_beam.solvers.convergence import Convergence
-from ufl_beam.solvers.equation import Border, Equation, SnesCallbacks
-from ufl_beam.solvers.line_search import SearchingNewton
 from ufl_beam.solvers.newton_options import PREFIX, Newton
 from ufl_beam.solvers.null_vectors import IdleMotions
 from ufl_beam.solvers.petsc_options import database, take_options
 from ufl_beam.solvers.static_condensation import ChainsFirst
-from ufl_beam.solvers.vectors import Vectors, unlock
+from ufl_beam.solvers.vectors import Vectors
+from ufl_beam.terms.phases import Callbacks, from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
 """A norm in a line search would add forces and moments, and each search costs a residual."""
 
-PATIENCE = 10
-"""Iterations in a row without half the least residual that are one too many.
 
-Those that wander longer find a solution by luck: the last digits of the data would decide.
-"""
+class Equation(Protocol):
+    """Equation of a step; see :class:`StepEquation`."""
+
+    A: Csr
+    c: Any
+    callbacks: Callbacks
+    weights: Array
+
+    @property
+    def held(self) -> Index:
+        """Degrees of freedom that supports hold."""
+
+    def working(self, q: Array, y: Array) -> Array:
+        """Return the conjugates of residuals in a step ``y``; a new array."""
+
+
+class Border(Protocol):
+    """Additional unknown ``t`` on which the residual depends, with its equation."""
+
+    t: float
+
+    def arrive(self, x: Array) -> None:
+        """Take note of an iterate; the residual that follows is at the unknown found so far."""
+
+    def tangent(self, x: Array, r: Array) -> None:
+        """Fill the matrix, and add the local part of the derivative by the unknown to ``r``."""
+
+    def correct(self, y: Array, z: Array) -> None:
+        """Change the unknown by what solves the equation, and ``y`` accordingly.
+
+        Newton's method subtracts ``y`` from the iterate; ``z`` is what the inverse of the tangent
+        makes of the rate.
+        """
+
+    def met(self) -> bool:
+        """Return whether the equation is."""
 
 
 class Solver:
-    """Finds the configuration in which the residual of an equation vanishes.
+    """Newton's method of newton.c, with the objects of PETSc that it works on.
+
+    By default it is the solver of SNES.  Where options or monitors ask for PETSc's ``newtonls``,
+    that drives the same residuals, tangents and test of convergence.
 
     Attributes:
-        in_c: Whether C can solve steps with no Python.
-        iterations: Number of iterations so far.
+        change: Of the latest iteration; between solutions others may use it.
     """
 
-    def __init__(
-        self,
-        share: Share,
-        equation: Equation,
-        newton: Newton,
-        least: int,
-        agreement: Agreement,
-    ) -> None:
+    def __init__(self, share: Share, equation: Equation, newton: Newton, least: int) -> None:
         self._share, self._equation, self._newton = share, equation, newton
-        self._factors = ChainsFirst(share, equation.A)
-        self._agreement, self._vectors = agreement, Vectors(share)
-        self._x, self._f = self._vectors.new(), self._vectors.new()
-        self._q, r = (self._vectors.view(one, writable=True) for one in (self._x, self._f))
-        self.convergence = Convergence(share, equation, self._q, r, newton, least)
-        equation.c.x = opaque(self._x)
-        self._callbacks = SnesCallbacks(equation, self._vectors, self.convergence.test)
-        self.in_c = equation.in_c and not self._chosen()
-        self._matrix = self._make_matrix()
+        self._vectors, self._factors = Vectors(share), ChainsFirst(share, equation.A)
+        self._x, self._f, self._y = (self._vectors.new() for _ in range(3))
+        local = [self._vectors.view(one, writable=True) for one in (self._x, self._f, self._y)]
+        self._q, self._r, self.change = local
+        c = self._c = equation.c
+        self.convergence = Convergence(share, c, equation.A, equation.held, newton)
+        handle = equation.callbacks.handle
+        fill(
+            c,
+            least=least, unknowns=self._q, residual=self._r, change=self.change,
+            x=opaque(self._x), f=opaque(self._f), y=opaque(self._y),
+            handle=handle(self), find_conjugates=lib.find_conjugates_in_python,
+            find_idle=lib.find_idle_in_python, forget_idle=lib.forget_idle_in_python,
+            aside=np.zeros(share.size if c.search != ffi.NULL else 0),
+        )  # fmt: skip
+        if share.alone:
+            self._factors.drive(c)
+        else:
+            fill(c, agree=lib.agree_in_python, solve=lib.solve_in_python)
         self._ksp = PETSc.KSP().create(self._x.comm)
         self._ksp.setOptionsPrefix(PREFIX)
         self._ksp.setType("preonly")
         self._ksp.getPC().setType("python")
         self._ksp.getPC().setPythonContext(self._factors)
-        self._bordered: BorderedNewton | None = None
-        self._snes = self._make_snes()
-        if self.in_c:
-            self._leave_newton_to_c()
-        self.iterations = self._done = 0
+        self._make_snes()
+        self._has_idle = False
 
     # -- PETSc ---------------------------------------------------------------------------------
 
     def _make_matrix(self) -> PETSc.Mat:
-        if not (self._vectors.parallel or self.in_c):
+        if self._share.alone and self._c.monitored:
             return self._equation.A.petsc()
         # Nothing but the preconditioner, which has its own, asks for the matrix.
         self._equation.A.release()
@@ -89,129 +127,75 @@ class Solver:
         matrix.setUp()
         return matrix
 
-    def _chosen(self) -> dict[str, Any]:
-        """PETSc options that the user has chosen."""
-        return {**database(), **self._newton.petsc}
-
-    def _make_snes(self) -> PETSc.SNES:
-        snes = PETSc.SNES().create(self._x.comm)
+    def _make_snes(self) -> None:
+        chosen = {**database(), **self._newton.petsc}
+        c, snes = self._c, PETSc.SNES().create(self._x.comm)
+        c.monitored, c.searches = bool(chosen), "snes_linesearch_type" not in chosen
         snes.setOptionsPrefix(PREFIX)
-        if self._equation.in_c:
-            petsc("SNESSetFunction", snes, self._f, *loop("snes_function", self._equation.c))
-            self._let_c_fill(snes)
-            petsc("SNESSetConvergenceTest", snes, *loop("snes_test", self._equation.c), ffi.NULL)
-        else:
-            snes.setFunction(self._callbacks.function, self._f)
-            snes.setJacobian(self._callbacks.jacobian, self._matrix)
-            snes.setConvergenceTest(self._callbacks.test)
+        petsc("SNESSetFunction", snes, self._f, *loop("snes_function", c))
+        petsc("SNESSetConvergenceTest", snes, *loop("snes_test", c), ffi.NULL)
+        self._let_c_fill(snes)
         snes.setTolerances(max_it=self._newton.max_iterations)
         snes.setType("newtonls")
         snes.setKSP(self._ksp)
-        take_options(snes, {**FULL_STEPS, **self._chosen()})
-        return snes
+        take_options(snes, {**FULL_STEPS, **chosen})
+        if not c.monitored:
+            snes.setType("shell")
+            solve, context = loop("snes_newton", c)
+            petsc("SNESShellSetContext", snes, context)
+            petsc("SNESShellSetSolve", snes, solve)
+        self._snes, c.snes = snes, opaque(snes)
 
     def _let_c_fill(self, snes: PETSc.SNES) -> None:
+        self._matrix = self._make_matrix()
         matrices = self._matrix, self._matrix
-        petsc("SNESSetJacobian", snes, *matrices, *loop("snes_jacobian", self._equation.c))
-
-    def _leave_newton_to_c(self) -> None:
-        self._factors.drive(self._equation.c)
-        solve, context = loop("snes_newton", self._equation.c)
-        self._snes.setType("shell")
-        petsc("SNESShellSetContext", self._snes, context)
-        petsc("SNESShellSetSolve", self._snes, solve)
+        petsc("SNESSetJacobian", snes, *matrices, *loop("snes_jacobian", self._c))
 
     @property
     def snes(self) -> PETSc.SNES:
         """SNES of the steps; from when it is asked for, their method is PETSc's ``newtonls``."""
-        if self.in_c:
-            self.in_c = False
-            self._matrix = self._make_matrix()
+        if not self._c.monitored:
+            self._c.monitored = 1
             self._let_c_fill(self._snes)
             self._snes.setType("newtonls")
             take_options(self._snes, FULL_STEPS)  # SNES has forgotten its line search
         return self._snes
 
-    @cached_property
-    def _careful(self) -> PETSc.SNES | SearchingNewton:
-        """Newton's method with a line search."""
-        if "snes_linesearch_type" in self._chosen():
-            return self._snes
-        return SearchingNewton(self._snes, self._vectors, self._equation, self.convergence)
+    # -- callbacks of C --------------------------------------------------------------------------
 
-    def _along(self, border: Border) -> PETSc.SNES:
-        """SNES of the equation with a border."""
-        if self._bordered is None:
-            factors, snes, of_steps = self._ksp.getPC(), self._make_snes(), self._snes
+    def agree(self, how: int, here: float) -> float:
+        """Agree with the other processes about a number."""
+        if how == lib.TOTAL:
+            return self._share.total(here)
+        if how == lib.LARGEST:
+            return self._share.largest(here)
+        return math.hypot(*self._share.comm.allgather(here))
 
-            def call_monitors(*arguments: Any) -> None:
-                for monitor, more, named in of_steps.getMonitor() or ():
-                    monitor(*arguments, *more, **named)
+    def solve(self, anew: bool) -> bool:
+        """Find the change of an iteration over all processes; return whether that fails."""
+        owned = slice(self._share.num_owned)
+        if anew and not self._factors.factor(self._r[owned]):
+            return True
+        return not self._factors.solve(self._r[owned], self.change[owned], reduced=anew)
 
-            snes.setMonitor(call_monitors)
-            self._bordered = BorderedNewton(snes, self._callbacks, factors, border)
-        self._bordered.border = border
-        return self._bordered.snes
-
-    # -- the calls -----------------------------------------------------------------------------
-
-    @np.errstate(over="ignore", invalid="ignore")  # of iterates that diverge
-    def solve(self, guess: Array, loads: list[Array], like_last: bool = False) -> Array:
-        """Find the configuration from ``guess``; local values, ghosts included; a new array.
-
-        The ``loads``, for the scale of convergence, are new arrays where they change; ``like_last``
-        lets the tangent of the last solution do for this one.
-        """
-        self.convergence.take_loads(loads)
-        self._go_to(guess)
-        reason = self._iterate(self._snes, 2, like_last=like_last)
-        if reason == lib.SINGULAR and self._may_go_on():
-            reason = self._hold_idle(partial(self._again, guess))
-        if reason == lib.STALLED:
-            self._equation.restart(Tangents.EXACT)
-            reason = self._iterate(self._careful, PATIENCE)
-        if reason <= 0 and self._may_go_on() and self._equation.stiffen(True):
-            self._go_to(guess)
-            reason = self._stiffened()
-        return self._solution(reason)
-
-    def solve_along(self, guess: Array, loads: list[Array], border: Border) -> Array:
-        """Find the configuration as :meth:`solve` does, together with the unknown of a border."""
-        self.convergence.take_loads(loads)
-        start = border.t
-
-        def iterate() -> int:
-            border.t = start
-            self._go_to(guess)
-            self._equation.restart(Tangents.FIRST)
-            return self._iterate(self._along(border), 12)
-
-        reason = iterate()
-        if reason == lib.SINGULAR and self._may_go_on():
-            reason = self._hold_idle(iterate)
-        return self._solution(reason)
+    def find_conjugates(self, q: Array) -> None:
+        """Find what a residual works on in a change."""
+        conjugate = self._equation.working(q, self.change)
+        fill(self._c, conjugate=conjugate, start=np.empty(len(q)))
 
     @cached_property
     def _idle(self) -> IdleMotions:
         """Idle motions; only scenes in which a tangent was singular have any."""
-        return IdleMotions(
-            self._share, self._equation.A, self.convergence.diagonal, self._equation.held
-        )
+        self._has_idle = True
+        A, diagonal = self._equation.A, self.convergence.diagonal
+        return IdleMotions(self._share, A, diagonal, self._equation.held)
 
-    def _again(self, guess: Array) -> int:
-        """Iterate from a guess once more."""
-        self._go_to(guess)
-        return self._iterate(self._snes, 2)
-
-    def _hold_idle(self, again: Callable[[], int]) -> int:
-        """Iterate again with idle motions held; without any if that does not help."""
-        reason, now = int(lib.SINGULAR), self.convergence
-        while reason == lib.SINGULAR and self._idle.find(now.residuals(), now.scale()):
-            self._put_idle()
-            reason = again()
-        if reason <= 0 and self.forget_idle():
-            reason = again()
-        return reason
+    def find_idle(self) -> bool:
+        """Look for more idle motions, and hold them; return whether there are any."""
+        now = self.convergence
+        found = self._idle.find(now.residuals(), now.scale())
+        self._put_idle()
+        return found
 
     def forget_idle(self) -> bool:
         """Hold idle motions no more; return whether any were held."""
@@ -222,75 +206,71 @@ class Solver:
 
     def _put_idle(self) -> None:
         """Add the stiffnesses against idle motions to tangents from now on."""
-        entries, stiffnesses = self._callbacks.idle = self._idle.entries
-        idle = {"idle_entry": entries, "idle_stiffness": stiffnesses}
-        fill(self._equation.c, idle=len(entries), **idle)
+        entries, stiffnesses = self._idle.entries
+        idle = {"idle_entry": entries.astype(np.int32), "idle_stiffness": stiffnesses}
+        fill(self._c, idle=len(entries), **idle)
         self.convergence.leave_out(self._idle.stiffness > 0.0)
 
-    def _stiffened(self) -> int:
-        """Iterate with stiffer tangents, which come near but slowly, then with true ones."""
-        slow = self._iterate(self._snes, PATIENCE)
-        self._equation.stiffen(False)
-        if slow != lib.TOO_MANY and slow <= 0:
-            return slow
-        near = self.iterate()
-        exact = self._iterate(self._snes, 2)
-        if exact <= 0:
-            self._go_to(near)
-        return exact if exact > 0 else slow
+    # -- paths -----------------------------------------------------------------------------------
 
-    def _go_to(self, q: Array) -> None:
-        self._q[:] = q
-        self._x.stateIncrease()
-        self._equation.restart(Tangents.PREDICTED)
+    def follow(self, border: Border | None) -> None:
+        """Solve for the unknown of a border as well, or no more."""
+        if border is None:
+            self._c.border = ffi.NULL
+            return
+        t, handle = np.array([border.t]), self._equation.callbacks.handle
+        fill(self._c, border=struct(
+            "border", handle=handle(Bordered(self, border, t)), t=t, arrive=lib.arrive_in_python,
+            change=lib.change_of_border_in_python, met=lib.border_is_met_in_python,
+        ))  # fmt: skip
 
-    def _iterate(
-        self, snes: PETSc.SNES | SearchingNewton, patience: int, *, like_last: bool = False
-    ) -> int:
-        """Solve; give up after so many iterations in a row without half the least residual."""
-        self.convergence.begin(patience, like_last=like_last)
-        self._equation.error = None
-        try:
-            snes.solve(None, self._x)
-            reason = int(snes.getConvergedReason())
-        except PETSc.Error as error:
-            cause: BaseException = error
-            while cause.__cause__ is not None:
-                cause = cause.__cause__
-            if getattr(cause, "ierr", 0) != lib.OF_LIBRARY:
-                raise cause from None
-            reason = int(lib.SINGULAR)  # KLU stops PETSc where it finds no pivot
-        if reason <= 0:
-            unlock(self._f)
-        self._done = snes.getIterationNumber()
-        self.iterations += self._done
-        return reason
+    def bordered_change(self, border: Border, x: Array) -> bool:
+        """Find the change of an iteration of the bordered equation; return whether that fails.
 
-    def _may_go_on(self) -> bool:
-        """Return True; raise what a function of the user has raised on any process."""
-        error = self._equation.error
-        self._agreement.settle(None if isinstance(error, StepFailed) else error)
-        return True
+        By elimination of the border: one factorisation and two solutions, as the tangent alone is
+        banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
+        """
+        rate = self._rate
+        self._rates.fill(0.0)
+        border.tangent(x, self._rates)
+        if self._c.idle:
+            entries, stiffnesses = self._idle.entries
+            self._equation.A.data[entries] += stiffnesses
+        self._vectors.add_ghosts(rate)
+        self._rates[self._equation.held] = 0.0
+        owned = slice(self._share.num_owned)
+        if not self._factors.factor(self._r[owned]):
+            return True
+        y, z = np.zeros((2, len(x)))
+        self._factors.solve(self._r[owned], y[owned], reduced=True)
+        good = self._factors.solve(self._rates[owned], z[owned], reduced=False)
+        for found in (y, z):
+            self.change[owned] = found[owned]
+            self._vectors.update_ghosts(self._y)
+            found[:] = self.change
+        border.correct(y, z)
+        self.change[:] = y
+        return not good
 
-    def _solution(self, reason: int) -> Array:
-        """Return the latest iterate; raise the failure, or what a function of the user raised."""
-        if reason <= 0:
-            self._agreement.settle(self._equation.error)
-            raise self.convergence.failure(reason, self._done)
-        if self._vectors.parallel:
-            self._vectors.update_ghosts(self._x)
-        return self._q.copy()
+    @cached_property
+    def _rate(self) -> PETSc.Vec:
+        return self._vectors.new()
+
+    @cached_property
+    def _rates(self) -> Array:
+        return self._vectors.view(self._rate, writable=True)
 
     # -- what is known of it -------------------------------------------------------------------
+
+    @property
+    def iterations(self) -> int:
+        """Number of iterations so far."""
+        return int(self._c.total)
 
     @property
     def unknowns(self) -> Array:
         """The unknowns of SNES, which C writes to; local values."""
         return self._q
-
-    def in_petsc(self) -> Any:
-        """SNES, as C has it."""
-        return opaque(self._snes)
 
     def iterate(self) -> Array:
         """Return the latest configuration, converged or not; local values, ghosts included."""
@@ -298,18 +278,82 @@ class Solver:
 
     def begin_steps_anew(self) -> None:
         """Keep no tangent from step to step: a run that goes on from a checkpoint has none."""
-        self._equation.c.anew = 1
+        self._c.anew = 1
 
     def remember(self, memory: Memory) -> None:
         """Pass on the number of iterations, and motions found to be idle."""
-        self._equation.c.rate = math.inf  # the next tangent is a new one, here and there
-        self.iterations = int(memory.number("iterations", self.iterations))
-        if memory.number("idle motions are known", float(self._callbacks.idle is not None)):
+        self._c.rate = math.inf  # the next tangent is a new one, here and there
+        self._c.total = int(memory.number("iterations", self.iterations))
+        if memory.number("idle motions are known", float(self._has_idle)):
             self._idle.remember(memory)
             self._put_idle()
 
     def destroy(self) -> None:
         """Give back what PETSc holds."""
-        self._snes.destroy()
-        self._x.destroy()
-        self._matrix.destroy()
+        for one in (self._snes, self._x, self._matrix):
+            one.destroy()
+
+
+class Bordered:
+    """Border of the equation as C calls it; ``t`` is its unknown there; (1,)."""
+
+    def __init__(self, solver: Solver, border: Border, t: Array) -> None:
+        self._solver, self._border, self._t = solver, border, t
+
+    def arrive(self, x: Array) -> None:
+        """Take note of an iterate."""
+        self._border.t = float(self._t[0])
+        self._border.arrive(x)
+
+    def change(self, x: Array) -> bool:
+        """Find the change of an iteration; return whether that fails."""
+        failed = self._solver.bordered_change(self._border, x)
+        self._t[0] = self._border.t
+        return failed
+
+    def met(self) -> bool:
+        """Return whether the equation of the border is met."""
+        return self._border.met()
+
+
+@from_c(math.nan)
+def agree_in_python(handle: Any, how: int, here: float) -> float:
+    return float(ffi.from_handle(handle)[1].agree(how, here))
+
+
+@from_c(1)
+def solve_in_python(handle: Any, anew: int) -> int:
+    return int(ffi.from_handle(handle)[1].solve(bool(anew)))
+
+
+@from_c()
+def find_conjugates_in_python(handle: Any, q: Any) -> None:
+    callbacks, solver, _ = ffi.from_handle(handle)
+    solver.find_conjugates(callbacks.lend(q))
+
+
+@from_c(0)
+def find_idle_in_python(handle: Any) -> int:
+    return int(ffi.from_handle(handle)[1].find_idle())
+
+
+@from_c(0)
+def forget_idle_in_python(handle: Any) -> int:
+    return int(ffi.from_handle(handle)[1].forget_idle())
+
+
+@from_c()
+def arrive_in_python(handle: Any, x: Any) -> None:
+    callbacks, border, _ = ffi.from_handle(handle)
+    border.arrive(callbacks.lend(x))
+
+
+@from_c(1)
+def change_of_border_in_python(handle: Any, x: Any) -> int:
+    callbacks, border, _ = ffi.from_handle(handle)
+    return int(border.change(callbacks.lend(x)))
+
+
+@from_c(0)
+def border_is_met_in_python(handle: Any) -> int:
+    return int(ffi.from_handle(handle)[1].met())

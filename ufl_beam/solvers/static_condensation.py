@@ -256,13 +256,23 @@ class ChainsFirst:
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
         """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
-        if self._is_new:
-            self._good = self._solved.factor(b.array_r)
-        elif self._good:
-            self._good = succeeds(self._solved.reduce, b.array_r)
-        self._is_new = False
-        if self._good:
-            self._solved.expand(self._solved.f, x.array_w)
-        else:
+        reduced, self._is_new = self._is_new, False
+        if reduced:
+            self._good = self.factor(b.array_r)
+        if not (self._good and self.solve(b.array_r, x.array_w, reduced=reduced)):
             x.array_w[:] = 0.0
             pc.setFailedReason(BAD_PIVOT)
+
+    def factor(self, b: Array) -> bool:
+        """Factor, and eliminate from a right-hand side; return whether the matrix is regular."""
+        return bool(self._solved.factor(b))
+
+    def solve(self, b: Array, x: Array, *, reduced: bool) -> bool:
+        """Solve for ``x``; return whether that succeeds.
+
+        A right-hand side that is ``reduced`` was eliminated by :meth:`factor`.
+        """
+        good = reduced or succeeds(self._solved.reduce, b)
+        if good:
+            self._solved.expand(self._solved.f, x)
+        return good

@@ -14,7 +14,6 @@ from collections.abc import Sequence
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Callbacks, Phases
@@ -86,9 +85,6 @@ class InternalForces(Term):
     def energy_change(self, q1: Array) -> tuple[float, float, float]:
         """Numbers of ``energy_change`` of loops.h for the step to ``q1``; J."""
         return self.change(q1), 0.0, 0.0
-
-    def restart(self, tangents: Tangents) -> None:
-        """Begin to iterate anew, with tangents of this kind."""
 
     @abstractmethod
     def change(self, q1: Array) -> float:

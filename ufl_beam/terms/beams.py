@@ -19,7 +19,6 @@ from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step, has_inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
@@ -62,6 +61,7 @@ class ElasticBeams(OfForms, Cells):
         forms = elastic_forms(fields.element, scheme)
         self._static = None if has_inertia(scheme) else StaticTangent(fields, scheme, A)
         tangent = None if self._static is None else self._static.kernel
+        self.predicted = None if self._static is None else self._static.predicted
         super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
         self._fields, self._work_form, self._held = fields, forms.work, 0.0
         self._stored = fields.hot_kernel(forms.stored, self._q1)
@@ -78,11 +78,6 @@ class ElasticBeams(OfForms, Cells):
     def in_cells(self) -> Sequence[InCells]:
         """The forces of the resultants, which both configurations of a step determine."""
         return [InCells(lambda: self._force, lib.STRESS, self._order, q0=self._q0)]
-
-    def restart(self, tangents: Tangents) -> None:
-        """Begin to iterate anew, with tangents of this kind."""
-        if self._static is not None:
-            self._static.predicted.restart(tangents)
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
@@ -188,6 +183,10 @@ class Inertia(OfMatrix):
     def velocities(self, s: Array) -> Array:
         """Velocities at the end of a step ``s`` of the nodes."""
         return self.scheme.rates(self._dt, s, self)[0]
+
+    def last_step(self, dt: float) -> None:
+        """Take note of the length of the latest step; s."""
+        self._dt = dt
 
     @property
     def ready(self) -> bool:

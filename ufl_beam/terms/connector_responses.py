@@ -18,7 +18,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.openings import Openable, SearchFlags
+from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Callbacks
 
 Rows = tuple[Any, Any, Any]
@@ -49,7 +49,7 @@ class Response(ABC):
     must_dissipate = False  # True if require_dissipation has to be called before a step is accepted
     name_in_files = ""  # of the internal variables, if it is not that of the class
     stored = 0.0  # by rigid-plastic connectors; J
-    openable: Openable | None = None  # connectors that open beyond a limit, if there are any
+    opens = False  # True if connectors open beyond a limit
     _part, _entry, _sign = "lost", "", 1.0
 
     def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:

@@ -115,7 +115,7 @@ class Couplings(Links):
         first, accept, state = ([loop(name, c)] for name in phases)
         admits = loop("springs_dissipate", c) if response.must_dissipate else None
         change, opens, again = loop("change_of_couplings", c), None, None
-        if response.openable is not None:
+        if response.opens:
             names = ("points", "slips", "way_before")
             found = {**response.in_c, "slips": response.in_c.get("rigid_plastic"), **of_law}
             opens = {name: found[name] for name in names if found.get(name) is not None}

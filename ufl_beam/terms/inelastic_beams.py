@@ -18,7 +18,6 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
@@ -72,7 +71,7 @@ class InelasticBeams(Cells):
         search: SearchFlags,
     ) -> None:  # fmt: skip
         self._A, self._ledger, self._hinges = A, ledger, layout.hinges
-        self._predicted = None if has_inertia(scheme) else PredictedStrains(fields)
+        self.predicted = None if has_inertia(scheme) else PredictedStrains(fields)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
         share, lengths = fields.share, fields.share.cell_lengths()[fields.order]
@@ -98,10 +97,10 @@ class InelasticBeams(Cells):
             tangent=self._tangent.cells, at_r=self._force.position(forms.r),
             at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
         )  # fmt: skip
-        if self._predicted is not None:
+        if self.predicted is not None:
             forces, last_b, last_D = np.zeros((3, len(lengths), 9))
             of_tangent = {"forces": forces, "last_b": last_b, "last_D": last_D}
-            fill(self._in_c, predicted=self._predicted.c, **of_tangent)
+            fill(self._in_c, predicted=self.predicted.c, **of_tangent)
 
     # -- in C ----------------------------------------------------------------------------------
 
@@ -118,8 +117,8 @@ class InelasticBeams(Cells):
         """Loops over the points."""
         c = struct("inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger))
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
-        if self._predicted is not None:
-            begin.append(self._predicted.beginning())
+        if self.predicted is not None:
+            begin.append(self.predicted.beginning())
 
         def leave(q: Array) -> None:
             self._q = q
@@ -138,15 +137,10 @@ class InelasticBeams(Cells):
         self._tangent.set(self._q0, step.q0)
         self._start_at(step.q0)
         self.points.begin(step.dt)
-        if self._predicted is not None:
-            self._predicted.begin(step)
+        if self.predicted is not None:
+            self.predicted.begin(step)
         self._forget()
         self.points.c.predicts = 0
-
-    def restart(self, tangents: Tangents) -> None:
-        """Begin to iterate anew, with tangents of this kind."""
-        if self._predicted is not None:
-            self._predicted.restart(tangents)
 
     def _start_at(self, q0: Array) -> None:
         """Let the points begin at the strains of a configuration, if they are not there."""
@@ -169,11 +163,6 @@ class InelasticBeams(Cells):
     def add_tangent(self, q1: Array) -> None:
         """Add the stiffness, material and geometric."""
         lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))
-
-    def missed(self, q1: Array, scale: float) -> float:
-        """Largest force of a point at ``q1`` that is not that of its strain, over ``scale``."""
-        q = doubles(q1)
-        return float(lib.missed_by_points(self._in_c, q, q, scale, 0.0))
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
@@ -211,17 +200,6 @@ class InelasticBeams(Cells):
         strains, D = self.points.tangent()
         elastic = np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         return self._cells, self.points.kept[:, :3] - elastic, D
-
-    # -- see openings.py -----------------------------------------------------------------------
-
-    def release(self, least: float) -> None:
-        """Let held points open whose excess is so large."""
-        self.points.release(least)
-        self._forget()
-
-    def hold(self) -> None:
-        """Close again the points that :meth:`release` opened."""
-        self.points.hold()
 
     # -- the state -----------------------------------------------------------------------------
 

@@ -274,10 +274,6 @@ class Points:
         lib.respond(self.c)
         return self.r, self.D
 
-    def release(self, least: float) -> None:
-        """Let held points open from now on whose excess was so large in the latest response."""
-        lib.release(self.c, least)
-
     def tangent(self) -> tuple[Array, Array]:
         """Strains of the accepted state, and derivatives of a response to them; nothing changes.
 
@@ -290,11 +286,6 @@ class Points:
         finally:
             for array, values in zip(arrays, before, strict=True):
                 array[:] = values
-
-    def hold(self) -> None:
-        """Close again the points that :meth:`release` opened."""
-        flows = self["flows"]
-        flows[flows == RELEASED] = 0.0
 
     def remaining(self, change: Array) -> Array:
         """Part of the elastic stiffness that is left for small changes of the strains; (cells,)."""

@@ -165,41 +165,41 @@ def _note(kind: type, error: BaseException, traceback: Any) -> None:
         np.frombuffer(ffi.buffer(arguments["out"], 8 * size)).fill(math.nan)
 
 
-def _in_c(error: float | None = None) -> Callable[[Callable[..., Any]], Any]:
+def from_c(error: float | None = None) -> Callable[[Callable[..., Any]], Any]:
     """Decorate a callback of C, declared in c_library.py; its value if it raises is ``error``."""
     more = {} if error is None else {"error": error}
     declared: Any = ffi.def_extern(onerror=_note, **more)
     return declared  # type: ignore[no-any-return]
 
 
-@_in_c()
+@from_c()
 def add_in_python(handle: Any, q: Any, out: Any) -> None:
     callbacks, function, size = ffi.from_handle(handle)
     function(callbacks.lend(q), np.frombuffer(ffi.buffer(out, 8 * size)))
 
 
-@_in_c(math.nan)
+@from_c(math.nan)
 def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
     callbacks, function, _ = ffi.from_handle(handle)
     return float(function(callbacks.lend(q), callbacks.lend(r), scale, moved))
 
 
-@_in_c(math.nan)
+@from_c(math.nan)
 def time_in_python(handle: Any, t: float) -> float:
     return float(ffi.from_handle(handle)[1](t))
 
 
-@_in_c()
+@from_c()
 def run_in_python(handle: Any) -> None:
     ffi.from_handle(handle)[1]()
 
 
-@_in_c()
+@from_c()
 def phase_in_python(handle: Any, step: Any, q1: Any, s: Any) -> None:
     ffi.from_handle(handle)[1](step, q1, s)
 
 
-@_in_c()
+@from_c()
 def change_in_python(handle: Any, q1: Any, found: Any) -> None:
     callbacks, function, _ = ffi.from_handle(handle)
     in_beams, in_connectors, effort = function(callbacks.copy(q1))

@@ -41,6 +41,10 @@ class Moving(Rates, Protocol):
 
     scheme: DynamicScheme
 
+    @property
+    def ready(self) -> bool:
+        """True if a step can begin."""
+
 
 class RatesInC:
     """The rates of a scene as C has them; attributes of ``moving`` are handed over and back.
@@ -74,13 +78,18 @@ class RatesInC:
 
     def find(self, numbers: Any) -> None:
         """Write the numbers of the steps that ``scheme_numbers`` of loops.h is about."""
-        n = self.c.number
+        n, known = self.c.number, numbers.more
         scheme: Any = self._scheme
-        ends, inertia, velocity, *rates, slip = _numbers(scheme, n, numbers.dt, numbers.last_dt)
+        of = MORE + known, numbers.dt, numbers.last_dt
+        ends, inertia, velocity, *rates, slip = _numbers(scheme, *of)
         numbers.factor, numbers.back, numbers.factor_of_velocity, numbers.back_of_velocity = ends
-        numbers.inertia[0:n], numbers.velocity[0:n], numbers.slip[0:n] = inertia, velocity, slip
-        for place, row in zip(numbers.rates, rates, strict=False):
-            place[0:n] = row
+        zeros = [0.0] * (n - MORE - known)
+        for place, row in (
+            (numbers.inertia, inertia), (numbers.velocity, velocity), (numbers.slip, slip),
+            *zip(numbers.rates, rates, strict=False),
+        ):  # fmt: skip
+            place[0:n] = [*row, *zeros]
+        numbers.gives = len(rates) - 1
 
     def times(self, product: StepProduct, **entries: Any) -> Any:
         """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
@@ -93,10 +102,11 @@ class RatesInC:
     def enter(self, q: Array) -> None:
         """Take the rates from Python."""
         moving, now = self._moving, self._now
+        self.c.more, self.c.ready = len(moving.more), moving.ready
         for k, rate in enumerate((moving.v, moving.v_before, *moving.more)):
             now[k] = rate
         # No second arrays of what C has; velocities are asked for between its calls.
-        moving.v_before, moving.more = now[1], tuple(now[2:])
+        moving.v_before, moving.more = now[1], tuple(now[2 : 2 + self.c.more])
         v, *more = self._next if self._asks else (now[1], *self._next)
         for k, (rate, new) in enumerate(zip(now, (v, self._slip, *more), strict=True), start=V):
             self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
@@ -106,7 +116,8 @@ class RatesInC:
         """Give the rates back to Python."""
         moving, size = self._moving, 8 * self.c.size
         rates = [
-            np.frombuffer(ffi.buffer(self.c.rate[k], size)).copy() for k in range(V, self.c.number)
+            np.frombuffer(ffi.buffer(self.c.rate[k], size)).copy()
+            for k in range(V, MORE + self.c.more)
         ]
         moving.v, moving.v_before, moving.more = rates[0], rates[1], tuple(rates[2:])
         moving.last_dt = self.c.last_dt

@@ -27,7 +27,7 @@ from ufl_beam.model.material_law import State
 from ufl_beam.model.material_laws import Hardening, SofteningLaw
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.terms.connector_responses import Response, Rows, respond
-from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT
+from ufl_beam.terms.openings import NOTHING, SPENT
 from ufl_beam.terms.phases import Callbacks
 
 INPUTS = (
@@ -150,7 +150,7 @@ class RigidPlasticResponse(Response):
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
         self._rows = np.zeros((n, 3))
         self._slope = np.array([_slope(link, self._setting.size) for link in self._links])
-        self.openable = self
+        self.opens = True
 
         kind = Hardening(1.0) if isinstance(law.law, Hardening) else law.law.of(1.0, 1.0)
         self._forms, self._sums = _slip_forms(kind, scheme), np.zeros(3)
@@ -207,16 +207,6 @@ class RigidPlasticResponse(Response):
         if self._hardens:
             self._ledger.state["hardening"] += self.stored
 
-    # -- openings, see openings.py -------------------------------------------------------------
-
-    def release(self, least: float) -> None:
-        """Let held connectors slip from now on whose excess was so large."""
-        self._slipped[(self.over > 0) & (self.over >= least)] = RELEASED
-
-    def hold(self) -> None:
-        """Close again the slips that :meth:`release` opened."""
-        self._slipped[:] = np.abs(self._way_before)
-
     # -- what has slipped ----------------------------------------------------------------------
 
     def motion(self, e: Array) -> Array:
@@ -258,7 +248,7 @@ class RigidPlasticResponse(Response):
         *variables, stored = rows.T
         for mine, values in zip(self._variables, variables, strict=True):
             mine[:] = values
-        self.hold()
+        self._slipped[:] = np.abs(self._way_before)
         self.stored = float(stored.sum())
 
     def start(self, e: Array) -> None:

@@ -39,7 +39,7 @@ class _Sprung(Response):
         self._strains = np.zeros((number, 3))
         self.must_dissipate = layout.kind.law.must_dissipate
         self.in_c = {"points": self.points.c}
-        self.openable = self.points if self.points.softens else None
+        self.opens = self.points.softens
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
         return self.points.in_steps(self._setting.ledger)

@@ -28,7 +28,6 @@ from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 
 
@@ -62,15 +61,10 @@ class PredictedStrains:
         )  # fmt: skip
 
     def begin(self, step: Step) -> None:
-        """Begin a step, with exact tangents until :meth:`restart`."""
+        """Begin a step, with exact tangents until ``restart`` of newton.c."""
         self._q0, q_before = step.q0, step.q0 if step.q_before is None else step.q_before
         fill(self.c, q0=self._q0, q_before=q_before, ratio=step.ratio)
-        self.restart(Tangents.EXACT)
-
-    def restart(self, tangents: Tangents) -> None:
-        """Begin to iterate anew, with tangents of this kind."""
-        self.c.begins, self.c.stale = tangents is not Tangents.EXACT, True
-        self.c.exact = tangents is not Tangents.PREDICTED
+        self.c.begins, self.c.stale, self.c.exact = False, True, True
 
     def __call__(self, q: Array) -> Array:
         """Strains of elastic cells, in the order of the mesh, point after point; 1, 1, 1/m."""

@@ -15,6 +15,7 @@ from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.terms.base import InternalForces
+from ufl_beam.terms.static_tangents import PredictedStrains
 
 
 class _Forms(NamedTuple):
@@ -48,14 +49,12 @@ class Cells(InternalForces):
     _q1: fem.Function
     _fields: Fields
     _A: Csr
+    predicted: PredictedStrains | None = None
+    """In statics, the strains whose forces tangents have."""
 
     def demand(self) -> Loop | None:
         """Return the C function of :meth:`missed` with its data, if it is ever more than zero."""
         return None
-
-    def missed(self, q1: Array, scale: float) -> float:
-        """Return how far the forces at ``q1`` are from those of its strains, over ``scale`` (N)."""
-        return 0.0
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         """Values in the cells, at ``q1``, of what the virtual work depends on besides."""

@@ -504,6 +504,7 @@ typedef struct {
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands, demanding; /* demanding: whether there are any on any process */
   const demand *demand; /* of connectors and points */
+  int32_t *switched;    /* a row of a connector is not about what it was in the tangent; see openings.py */
   double last, best, last_scale;
   int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
   int anew;                           /* no tangent is kept from step to step */
@@ -666,6 +667,7 @@ typedef struct {
 enum { MOST_RATES = 6, MOST_KNOWN = 16 };
 typedef struct {
   double dt, last_dt;
+  int more, gives; /* of the rates after those before the last: how many are known, and will be */
   double factor, back, inertia[MOST_RATES], factor_of_velocity, back_of_velocity, velocity[MOST_RATES];
   double rates[MOST_RATES][MOST_RATES], slip[MOST_RATES];
 } scheme_numbers;
@@ -677,7 +679,7 @@ typedef struct {
   double *new_rate[MOST_RATES]; /* space, as many; of velocities perhaps that of those before */
   double last_dt;
   int after_any; /* whether numbers are the same after steps of any length */
-  int ready;     /* whether a step can begin */
+  int ready, more; /* whether a step can begin; how many are known of those after that before the last */
   int known, oldest;
   scheme_numbers numbers[MOST_KNOWN];
   const scheme_numbers *now;   /* those of the step */
@@ -766,6 +768,8 @@ typedef struct {
   const int32_t *way_before; /* of these, after the last step */
 } openable;
 
+enum { MOST_PARTS = 4096 }; /* largest number of parts that a step is cut into */
+
 /* Why a step is not accepted. */
 enum failure {
   SUCCEEDS, RAISED, NO_EQUILIBRIUM, APPLIED_TOO_FAST, TURNS_TOO_FAR, GIVES_ENERGY, LEAVES_MECHANISM, LEAPS
@@ -853,7 +857,7 @@ void change_of_points(void *self, const double *q1, energy_change *sum);
 void change_of_couplings(void *self, const double *q1, energy_change *sum);
 double value_at(const time_function *f, double t);
 void keep_state(const march *m, double *row);
-int solve_step(march *m, int hold);
+int solve_begun_step(march *m, int hold);
 int attempt_step(march *m, double t1, double end);
 int accept_step(march *m);
 int go_to_time(march *m, double end);

@@ -205,10 +205,11 @@ static int find_numbers(rates *r, double dt)
 {
   for (int k = 0; k < r->known; ++k) {
     r->now = r->numbers + k;
-    if (r->now->dt == dt && (r->after_any || r->now->last_dt == r->last_dt)) return 1;
+    if (r->now->dt == dt && (r->after_any || r->now->last_dt == r->last_dt) && r->now->more == r->more)
+      return 1;
   }
   scheme_numbers *n = r->numbers + r->oldest;
-  n->dt = dt, n->last_dt = r->last_dt;
+  n->dt = dt, n->last_dt = r->last_dt, n->more = r->more;
   if (!r->find(r->handle, n)) {
     n->dt = NAN;
     return 0;
@@ -250,7 +251,7 @@ void accept_inertia(void *self, const time_step *step, const double *q1, const d
     last = r->rate[j];
     r->rate[j] = r->new_rate[j], r->new_rate[j] = last;
   }
-  r->last_dt = step->dt;
+  r->last_dt = step->dt, r->more = r->now->gives;
 }
 
 void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s)
@@ -557,6 +558,7 @@ static void end_search(march *m, int opened)
 static int solve(march *m, int hold)
 {
   equation *e = m->equation;
+  const double t = e->border ? *e->border->t : 0;
   const int like_last = m->rates && as_last(m->prediction, m->step.dt);
   e->loads = size_of_loads(m);
   if (!m->opens) return find_equilibrium(e, m->guess, like_last) > 0;
@@ -576,6 +578,7 @@ static int solve(march *m, int hold)
     end_search(m, opened);
     if (found || !over || e->raised == OTHER) return found;
     if (!begin_terms(m)) return 0;
+    if (e->border) *e->border->t = t;
   }
   return find_equilibrium(e, m->guess, like_last) > 0;
 }
@@ -646,7 +649,7 @@ static int followed(march *m)
 }
 
 /* Solve the step, whose terms have begun it, from the guess; whether its end can be trusted. */
-int solve_step(march *m, int hold)
+static int solve_step(march *m, int hold)
 {
   equation *e = m->equation;
   int admitted = 1;
@@ -656,9 +659,6 @@ int solve_step(march *m, int hold)
   if (m->judges && over_processes(e, LARGEST, !admitted) > 0) return fails(m, GIVES_ENERGY);
   return !m->path || followed(m);
 }
-
-/* Largest number of parts that a step is cut into. */
-enum { MOST_PARTS = 4096 };
 
 /* Part of the first step after which accelerations are taken for those at the beginning. Shorter ones are
  * nearer to it, but magnify the velocities of supports that do not begin with theirs. */
@@ -679,6 +679,13 @@ int attempt_step(march *m, double t1, double end)
   if (!set_step(m, t1, end) || !begin_terms(m)) return fails(m, RAISED);
   guess(m);
   return solve_step(m, 1);
+}
+
+/* The same of a step of a path, which Python has set. */
+int solve_begun_step(march *m, int hold)
+{
+  m->equation->raised = NOTHING;
+  return begin_terms(m) ? solve_step(m, hold) : fails(m, RAISED);
 }
 
 static void accept_supports(march *m)

@@ -213,6 +213,10 @@ static int judge(equation *e, const double *q, int iteration, double residual, d
     e->last_scale = scale;
     e->near |= residual * pow(e->rate, MORE) <= wanted;
   }
+  /* With the tangent of a row about a motion, one about a force would move the iterate by as many metres
+   * as newtons are missing. */
+  const int switched = e->demanding ? over_processes(e, LARGEST, *e->switched) > 0 : 0;
+  if (switched) e->near = *e->switched = 0;
   e->slow += 1;
   /* Where a connector has just been released, it is no measure for what follows that forces are in
    * balance, as long as its law is not met. */

@@ -1,0 +1,511 @@
+# SPDX-License-Identifier: MIT
+"""Steps of a scene, which march.c takes: solved, judged, accepted, and cut where they fail.
+
+In statics, where forces act over the step, a step that turns a node far does not end in
+equilibrium.  So loads that act at once are applied in parts that turn nodes little, and the rest of
+the first step has nothing left to do but to follow them.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from functools import cache, partial
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index, Later, Snapshots
+from ufl_beam.collective_errors import Agreement
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib
+from ufl_beam.errors import SceneError, StepFailed
+from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.model.loads import RotatingFrame
+from ufl_beam.model.scene import Scene
+from ufl_beam.output.watches import Watch
+from ufl_beam.simulation.branch_check import StaticPath
+from ufl_beam.simulation.kept_rows import KeptRows
+from ufl_beam.simulation.prediction import Prediction
+from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.solvers.newton import Border, Solver
+from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.terms.beams import Inertia
+from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.dead_loads import DeadLoads
+from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.follower_loads import FollowerLoads
+from ufl_beam.terms.inelastic_beams import InelasticBeams
+from ufl_beam.terms.links import Links
+from ufl_beam.terms.rates_in_c import V
+
+LARGEST_TURN = 0.75 * math.pi
+"""A step that turns a node further is cut; the algorithmic strains end at π."""
+
+LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
+"""Least iterations in statics and in dynamics, unless a residual is far below its tolerance.
+
+A column that nearly buckles magnifies a load that is hardly larger than the tolerance.  In motion
+its inertia holds it meanwhile.
+"""
+
+APPLYING = 1 / 8
+"""Part of the first step in which loads that are there from the start are applied."""
+
+APPLYING_TURN = 0.02
+"""Largest turn of a node meanwhile in a part; rad.
+
+Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
+"""
+
+SHORT_PART = 512
+"""Parts shorter by this factor may turn nodes further: shorter ones would turn them as far."""
+
+MOST_PARTS: int = lib.MOST_PARTS
+"""Largest number of parts that a step is cut into."""
+
+ROOM = 2**20
+"""Numbers that C keeps of steps before Python takes them."""
+
+LONGEST = 0.05
+"""Time after which C returns, so that a run can be interrupted and shows its progress; s."""
+
+LAST_DIGITS = 1e-14
+"""Difference of two numbers from the same formula, relative, that is nothing but round-off."""
+
+
+class Trial(NamedTuple):
+    """A step that was solved but not yet accepted, and the configuration ``q1`` at its end.
+
+    Forces work on ``s``, see :meth:`Scheme.nodal_step`; in dynamics the mean velocity times ``dt``.
+    """
+
+    step: Step
+    q1: Array
+    s: Array
+
+
+class Keeping(Protocol):
+    """Solution that states are appended to."""
+
+    def keep(self, states: Snapshots, parts: int, iterations: int) -> None:
+        """Append states of a run, up to the last of which so many were done."""
+
+
+class Stepping(Protocol):
+    """The state that steps lead from and to; see :class:`Simulation`."""
+
+    t: float
+    q: Array
+    prediction: Prediction
+    parts: int
+
+    @property
+    def solution(self) -> Keeping:
+        """States that were kept."""
+
+    def ask(self) -> None:
+        """Ask controllers and friction for their forces and limits in the next step."""
+
+
+class Extras(NamedTuple):
+    """Functions of Python that take part in the steps of some scenes, or None."""
+
+    ask: Callable[[], None] | None  # controllers and friction, when a step begins
+    stop: Callable[[float, float], float] | None  # the next sample of a controller after a time
+    require: Callable[[Array], None] | None  # that an accepted state is held; raises if not
+    note: Callable[[Array, float, float], None] | None  # (q1, t1, dt) of an accepted step
+
+
+class Stepper:
+    """Steps of a scene in C; see march.c.
+
+    From the first step until :meth:`hand_back` the state is that of C.  What there is to see of it
+    is in Python after each call: time, configuration, velocities, reactions and ledger.
+
+    Attributes:
+        ahead: Whether steps have been taken since the state was handed over or back.
+    """
+
+    def __init__(
+        self, scheme: Scheme, equation: StepEquation, newton: Newton, ledger: Ledger,
+        inertia: Inertia | None, path: StaticPath | None, support_dofs: Index,
+        cell_forces: CellForces, begun: bool, together: Agreement, extras: Extras,
+    ) -> None:  # fmt: skip
+        self.ahead = False
+        self._equation, self._inertia, self._path, self._begun = equation, inertia, path, begun
+        self._together, self._extras, self._callbacks = together, extras, equation.callbacks
+        # The ledger has all its entries now, to whose places phases write.
+        share, phases = equation.share, [one.phases(self._callbacks) for one in equation.terms]
+        self._phases = phases
+        again = [one.again for one in phases if one.again is not None]
+        fill(equation.c, agains=len(again), again=ffi.new("again[]", again))
+        least = LEAST_IN_MOTION if inertia is not None else LEAST_AT_REST
+        self.solver = solver = Solver(share, equation, newton, least)
+        known: Any = scheme
+        whole, turns = _whole_steps(known), _nodal_step(known)
+        if whole is None or turns is None:
+            raise SceneError(
+                f"{scheme!r}: `step` must take loads and motions at fixed parts of a step, and "
+                "`nodal_step` must be that of ExactStep or PlainStep, see docs/extending.md"
+            )
+        self._space, rotations = np.zeros((2, share.size)), share.rotations()
+        half_tangents = rotations[: len(rotations) * turns[1]]
+        self._bytes = 8 * share.size
+        kinds = DeadLoads, FollowerLoads
+        loads = {type(x): x.steps_in_c for x in equation.terms if isinstance(x, kinds)}
+        dead, following = (loads.get(kind, ffi.NULL) for kind in kinds)
+        self._loads = [x for x in equation.loads if not isinstance(x, kinds)]
+        multipliers = share.multipliers().astype(np.int32)
+        opens = [one.opens for one in phases if one.opens is not None]
+        places = ffi.new("openable[]", opens)
+        admits = [one.admits for one in phases if one.admits is not None]
+        s = np.zeros(share.size) if equation.supports.turned else solver.change
+        self.c = fill(
+            ffi.new("march *"),
+            equation=equation.c, size=share.size, x=solver.unknowns, s=s,
+            guess=np.zeros(share.size), in_parts=not has_inertia(scheme),
+            load_weight=whole[0], motion_weight=whole[1], at=whole[2], limits_turn=turns[0],
+            largest_turn=LARGEST_TURN, rotations=len(rotations), rotation=rotations,
+            half_tangents=len(half_tangents), half_tangent=half_tangents,
+            multipliers=len(multipliers), multiplier=multipliers,
+            loads=dead, follower_loads=following,
+            supports=equation.supports.in_c(self._callbacks),
+            states=len(ledger.state), state=ledger.state.numbers, cell_forces=cell_forces.c,
+            opens=int(share.largest(float(bool(opens)))), places=len(opens), place=places,
+            admissions=len(admits), admission=ffi.new("admission_call[]", admits),
+            judges=int(share.largest(float(bool(admits)))),
+            applying_turn=APPLYING_TURN, short_part=SHORT_PART,
+        )  # fmt: skip
+        if self.c.opens:
+            fill(self.c, found=np.zeros(share.size))
+        if equation.supports.turned:
+            fill(self.c, x=np.zeros(share.size))
+        if inertia is not None:
+            rates = inertia.in_c
+            if rates is None:
+                raise SceneError(
+                    f"{scheme!r}: what it makes of velocities must be sums of multiples of them"
+                )
+            handle = self._callbacks.handle(self._prepare)
+            fill(self.c, rates=rates.c, prepare=lib.run_in_python, handle=handle)
+        if path is not None:
+            changes = [one.change for one in phases if one.change is not None]
+            fill(self.c, path=path.in_c(changes))
+        self._alive: list[Any] = [opens]
+        self._watches: Sequence[Watch] = ()
+        self._state: Stepping | None = None  # while C takes steps
+        self._add_extras({
+            name: [x for one in phases for x in getattr(one, name)]
+            for name in ("begin", "accept", "add_state")
+        })  # fmt: skip
+        inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
+        links = [one for one in equation.terms if isinstance(one, Links)]
+        more = len(share.grid.scene.links), cell_forces.kept
+        self._of_rows = ledger, equation.supports, support_dofs, inelastic, links, *more
+        self._rows: KeptRows | None = None
+
+    def _add_extras(self, loops: dict[str, list[Loop]]) -> None:
+        """Let functions of Python take part in the phases of a step."""
+        extras, callbacks = self._extras, self._callbacks
+        if extras.stop is not None:
+            stop = callbacks.handle(lambda t: extras.stop(self.c.t, t))  # type: ignore[misc]
+            fill(self.c, stop=lib.time_in_python, stops=stop)
+        if callbacks.used or extras != Extras(None, None, None, None):
+            # What may raise comes first, before loops of C have accepted anything.
+            mine = [one for one in loops["accept"] if one[0] == lib.phase_in_python]
+            others = [one for one in loops["accept"] if one[0] != lib.phase_in_python]
+            if extras.require is not None:
+                mine.insert(0, callbacks.accept(lambda q1, s: extras.require(q1)))  # type: ignore[misc]
+            loops["accept"] = [callbacks.phase(callbacks.note_end), *mine, *others]
+            loops["begin"].insert(0, callbacks.phase(callbacks.note_beginning))
+            loops["begin"].append(callbacks.phase(self._note_loads))
+        if extras.ask is not None:
+            loops["begin"].insert(0, callbacks.phase(self._ask))
+        if extras.note is not None:
+            loops["add_state"].append(callbacks.phase(self._note))
+        for name, calls in loops.items():
+            place, in_c = getattr(self.c, name), ffi.new("phase_call[]", calls)
+            self._alive += [in_c, calls]
+            place.number, place.call = len(calls), in_c
+
+    # -- steps -----------------------------------------------------------------------------------
+
+    def take(self, state: Stepping, ends: Array, *, keep: bool = False) -> int:
+        """Take steps to these times, for :data:`LONGEST` at most; those that fail in parts.
+
+        Returns:
+            How many were taken.  With ``keep`` the state after each of them is in the solution.
+
+        Raises:
+            StepFailed: Even the smallest part failed; the state is that before it.
+            BaseException: What a function of a user has raised; the steps before are taken.
+        """
+        c, steps = self.c, len(ends)
+        rows: Array = np.zeros((1, 0))
+        if keep:
+            kept = self._rows or self._kept(state.q)
+            steps = min(steps, 1 + ROOM // kept.width)
+            rows = np.zeros((steps + 1, kept.width))  # the first one is of the state before
+            rows[0, kept.q] = state.q
+        with self._in_c(state):
+            taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows[1:])))
+        if keep and taken:
+            if taken < steps:
+                rows = rows[: taken + 1].copy()  # so that the rest does not stay
+            states = kept.states(ends[:taken].copy(), rows, self._begun)
+            state.solution.keep(states, state.parts, self.solver.iterations)
+        if c.failure:
+            self._fail()
+        return taken
+
+    def apply_loads(self, state: Stepping, end: float) -> None:
+        """Apply the loads that act at the present time, in parts, up to the time ``end``."""
+        fill(self.c, applies=1, begin_of_run=state.t, applied_by=end)
+        with self._in_c(state):
+            reached = lib.go_to_time(self.c, end)
+        self.c.applies = 0
+        if not reached:
+            self._fail()
+
+    def attempt(self, state: Stepping, t1: float, end: float) -> Trial:
+        """Solve the step to ``t1``, which is a part of one to ``end``."""
+        with self._in_c(state):
+            solved = lib.attempt_step(self.c, t1, end)
+        return self._trial(solved)
+
+    def attempt_along(
+        self, state: Stepping, step: Step, guess: Array, border: Border, *, hold: bool
+    ) -> Trial:
+        """Solve a step, whose times are those of the guess, together with the load factor.
+
+        With ``hold`` what does not flow stays closed if it can, see openings.py.  The guess is in
+        the axes of supports.
+        """
+        c = self.c
+        self.solver.follow(border)
+        with self._in_c(state):
+            of_step = c.step
+            of_step.t0, of_step.t1, of_step.dt = step.t0, step.t1, step.dt
+            of_step.load_time, of_step.motion_time = step.load_time, step.motion_time
+            of_step.fraction = of_step.at = 1.0
+            of_step.ratio, of_step.q0, of_step.q_before = 0.0, c.q, c.prediction.q_before
+            ffi.memmove(c.guess, doubles(guess), self._bytes)
+            solved = lib.solve_begun_step(c, hold)
+        self.solver.follow(None)
+        return self._trial(solved)
+
+    def accept(self, state: Stepping, trial: Trial) -> None:
+        """Go where the latest attempt went."""
+        self.c.step.t1 = trial.step.t1
+        with self._in_c(state):
+            accepted = lib.accept_step(self.c)
+        if not accepted:
+            self._fail()
+
+    def _trial(self, solved: int) -> Trial:
+        if not solved:
+            self._fail()
+        c = self.c
+        q0, q1, s, q_before = map(self._copy, (c.q, c.x, c.s, c.step.q_before))
+        of = c.step
+        numbers = of.load_time, of.motion_time, of.fraction, of.at
+        return Trial(Step(of.t0, of.t1, q0, *numbers, q_before, of.ratio), q1, s)
+
+    def _fail(self) -> None:
+        """Raise why the latest step failed; all processes call it together."""
+        c, error, self._callbacks.error = self.c, self._callbacks.error, None
+        failure, c.failure = c.failure, lib.SUCCEEDS
+        if c.equation.raised == lib.OTHER or failure == lib.RAISED:
+            self._together.settle(error)
+        if c.equation.error:
+            raise RuntimeError(f"PETSc failed with error {c.equation.error}")
+        if failure == lib.NO_EQUILIBRIUM:
+            if error is not None:
+                self._together.settle(error)
+            raise self.solver.convergence.failure()
+        if failure == lib.TURNS_TOO_FAR:
+            raise StepFailed(
+                f"a node turns by {c.turn:.3g} rad in the step, and |Δψ| must stay below π; "
+                "reduce dt"
+            )
+        if failure == lib.APPLIED_TOO_FAST:
+            raise StepFailed("a node turns too far while the loads at the beginning are applied")
+        if failure == lib.GIVES_ENERGY:
+            self._together(self._require_dissipation)
+        if self._path is not None:
+            raise self._path.failure(failure == lib.LEAVES_MECHANISM)
+        raise StepFailed("the step cannot be trusted")
+
+    def _require_dissipation(self) -> None:
+        q1 = self._copy(self.c.x)
+        for one in self._equation.inner:
+            if one.must_dissipate:
+                one.require_dissipation(q1)
+
+    # -- callbacks -------------------------------------------------------------------------------
+
+    def _ask(self, *_: Any) -> None:
+        """Let controllers and friction ask the scene, which has the state of C."""
+        if self._state is not None and self._extras.ask is not None:
+            self._state.t = self.c.t
+            self._lend(self._state)
+            self._extras.ask()
+
+    def _note(self, step: Any, q1: Any, s: Any) -> None:
+        """Note an accepted step."""
+        if self._extras.note is not None:
+            self._extras.note(self._callbacks.end, step.t1, step.dt)
+
+    def _note_loads(self, *_: Any) -> None:
+        """Take the sizes of loads that have no loops, for the scale of convergence."""
+        sizes = [self.solver.convergence.size(one.force) for one in self._loads]
+        self.c.loads_in_python = sum(sizes)
+
+    def _prepare(self) -> None:
+        """Take from a trial step what the scheme keeps besides the velocities."""
+        inertia = self._inertia
+        if inertia is not None and inertia.in_c is not None:
+            c = self.c
+            inertia.last_step(c.step.dt)
+            inertia.prepare(self._copy(c.s))
+            inertia.in_c.enter(self._copy(c.q))
+            self._equation.supports.take()
+            q1 = self._copy(c.x)
+            for one in self._of_rows[4]:
+                one.take(q1)
+
+    # -- the state -------------------------------------------------------------------------------
+
+    def _in_c(self, state: Stepping) -> _Taking:
+        return _Taking(self, state)
+
+    def enter(self, state: Stepping) -> None:
+        """Hand the state over, unless C has it."""
+        self._state = state
+        if not self.ahead:
+            self._hand_over(state)
+        self.c.parts, self.c.failure, self._callbacks.error = 0, lib.SUCCEEDS, None
+
+    def leave(self, state: Stepping) -> None:
+        """Show Python the state."""
+        self._state = None
+        state.t = self.c.t
+        state.parts += self.c.parts
+        self.c.parts = 0
+        for one in self._watches:
+            one.seen = state.parts
+        self._lend(state)
+
+    def _kept(self, q: Array) -> KeptRows:
+        """Rows of numbers, one for each step that C keeps."""
+        if self._rows is None:
+            self._rows = rows = KeptRows(self.c, *self._of_rows, q)
+            fill(self.c, kinds=len(rows.kinds), width=rows.width, kept=rows.kinds)
+        return self._rows
+
+    def watch(self, watches: Sequence[Watch]) -> None:
+        """Let these take in the state after each step."""
+        self._watches = watches
+        of_c = ffi.new("watch *[]", [one.c for one in watches])
+        fill(self.c, watches=len(watches), watch=of_c)
+
+    def q_before(self) -> Array:
+        """The configuration at the beginning of the last step, a new array."""
+        return self._copy(self.c.prediction.q_before)
+
+    def now(self, state: Stepping) -> Later:
+        """The state that C has."""
+        kept = self._rows or self._kept(state.q)
+        rows = np.zeros((2, kept.width))
+        if self._begun:
+            ffi.memmove(doubles(rows[0, kept.q]), self.c.prediction.q_before, self._bytes)
+        lib.keep_state(self.c, doubles(rows[1]))
+        t = np.array([self.c.t])
+        return Later(t, partial(kept.states, t, rows, self._begun))
+
+    def _copy(self, values: Any) -> Array:
+        return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
+
+    def _hand_over(self, state: Stepping) -> None:
+        c, (q, before) = self.c, self._space
+        q[:], before[:] = state.q, state.prediction.q_before
+        state.prediction.began_at(before)  # no second array of what C has
+        fill(c, q=q, prediction=state.prediction.c, t=state.t)
+        if self._path is not None:
+            ffi.memmove(c.path.force, doubles(self._path.force), self._bytes)
+        for one in self._phases:
+            one.enter(state.q)
+        self._lend(state)
+        give_back_memory(len(q))
+        self.ahead = True
+
+    def _lend(self, state: Stepping) -> None:
+        """Let Python copy the state when it asks for it; C leaves it alone until the next one."""
+        state.q = self._on_demand(self.c.q)
+        if self._inertia is not None:
+            self._inertia.v = self._on_demand(self.c.rates.rate[V])
+
+    def _on_demand(self, values: Any) -> Any:
+        return partial(self._copy, values)
+
+    def hand_back(self, state: Stepping) -> None:
+        """Let all of Python know the state, so that it may change it."""
+        if self.ahead:
+            self.ahead = False
+            state.prediction.began_at(self._copy(state.prediction.c.q_before))
+            if self._path is not None:
+                self._path.force = self._copy(self.c.path.force)
+            for one in self._phases:
+                one.leave(state.q)
+
+
+class _Taking:
+    """Context in which C takes steps."""
+
+    def __init__(self, stepper: Stepper, state: Stepping) -> None:
+        self._stepper, self._state = stepper, state
+
+    def __enter__(self) -> None:
+        self._stepper.enter(self._state)
+
+    def __exit__(self, *_: object) -> None:
+        self._stepper.leave(self._state)
+
+
+def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
+    """Return whether loads that act at ``t`` are to be applied before the first step."""
+    over_step = scheme.average(0.0, 1.0) != 1.0
+    if has_inertia(scheme) or not over_step:
+        return False
+    frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
+    return frames or bool(scene.works) or any(f(t) != 0 for _, f in scene.time_functions())
+
+
+@cache
+def _whole_steps(scheme: Any) -> tuple[float, float, float] | None:
+    """Parts of a step at which loads and motions are taken, and its ``at``, if always the same."""
+    q = np.zeros(0)
+    unit = scheme.step(0.0, 1.0, 1.0, q)
+    weights = unit.load_time, unit.motion_time
+    for t0, t1 in ((0.0, 1.0), (2.0, 2.25), (-1e3, 7.0)):
+        step = scheme.step(t0, t1, t1, q)
+        for w, t in zip(weights, (step.load_time, step.motion_time), strict=True):
+            if abs((1 - w) * t0 + w * t1 - t) > LAST_DIGITS * max(abs(t0), abs(t1)):
+                return None
+        if (step.fraction, step.at) != (1.0, unit.at):
+            return None
+    return *weights, unit.at
+
+
+@cache
+def _nodal_step(scheme: Any) -> tuple[bool, bool] | None:
+    """Flags: turns of a step are limited, and are 2 tan(Δψ/2) in it; None if that is not known."""
+    if not hasattr(scheme, "half_tangents"):
+        return None
+    q0, q1, rotations = np.zeros(3), np.array([0.3, -0.7, 0.5]), np.array([1, 2], dtype=np.int32)
+    tangents = len(scheme.half_tangents(rotations)) > 0
+    s, turn = scheme.nodal_step(q0, q1, rotations)
+    turned = 2 * np.tan(q1[1:] / 2) if tangents else q1[1:]
+    if not np.allclose(s, [0.3, *turned], rtol=LAST_DIGITS, atol=0.0) or turn not in (0.0, 0.7):
+        return None
+    return turn > 0, tangents
