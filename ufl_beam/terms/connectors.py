@@ -9,7 +9,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.partition import Share
@@ -119,6 +119,8 @@ class Couplings(Links):
             names = ("points", "slips", "way_before")
             found = {**response.in_c, "slips": response.in_c.get("rigid_plastic"), **of_law}
             opens = {name: found[name] for name in names if found.get(name) is not None}
+            if "way_before" in opens:
+                opens["way_before"] = integers(opens["way_before"])
         if "rigid_plastic" in response.in_c:
             again = loop("begin_slips_again", c)
         return Phases([*begin, *first], accept, state, change, enter, leave, opens, admits, again)

@@ -723,6 +723,7 @@ int accept_step(march *m)
   p->q_before = m->q, m->q = spare;
   memcpy(m->q, m->x, m->size * sizeof *m->q);
   m->t = m->step.t1;
+  m->failure = SUCCEEDS;
   ++m->parts;
   for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, m->t, p->q_before, m->q);
   return 1;
