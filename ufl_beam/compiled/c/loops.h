@@ -143,7 +143,7 @@ enum force_kind { STRESS, WORK, DENSITY };
  * linear in a vector, that vector: in the latest residual and in that of the accepted step. Entries that
  * depend on nothing but configurations are computed when they are asked for. */
 typedef struct {
-  const cells *form; /* that is linear, if C evaluates it; or none */
+  const cells *form; /* that is linear; or none */
   double **latest, *accepted; /* latest: or none; also if another form has the same vector */
   double *const *vector;
   double *const *entries; /* of the accepted step, in batches */
@@ -222,7 +222,7 @@ extern const double NO_ENERGY; /* dissipation that is none, as a part of its siz
 
 enum { LINE = 3 }; /* strain, stress and slope: what a tangent knows of a point */
 
-/* Flags that all points of a scene share in a step; see SearchFlags in material_points.py. */
+/* Flags that all points of a scene share in a step; see SearchFlags in openings.py. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
 /* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
