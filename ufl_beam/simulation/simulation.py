@@ -232,7 +232,7 @@ class Simulation(StateView):
         """Begin to take in extremes after each step in C, or return None if that cannot be."""
         if not (self.share.alone and isinstance(self.fields, CompiledFields)):
             return None
-        self._watches.append(one := Watch(self.share, self.cell_forces, self._along, parts))
+        self._watches.append(one := Watch(self.fields, self.cell_forces, self._along, parts))
         if self._in_c is not None:
             self._in_c.watch(self._watches)
         return one
