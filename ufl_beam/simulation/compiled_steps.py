@@ -213,7 +213,8 @@ class CompiledSteps:
     def now(self, state: Stepping) -> Later:
         """The state that C has."""
         kept = self._rows or self._kept(state.q)
-        row, before = np.zeros((1, kept.width)), None
+        # NumPy asks for large pages from 4 MiB on, and the first touch of these takes longer here.
+        row, before = np.frombuffer(bytearray(8 * kept.width))[None], None
         lib.keep_state(self.c, doubles(row))
         if self._begun:
             number, before = self._last
