@@ -1,5 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Modified Newton's method: loads that go, and runs that go on from a checkpoint."""
+"""Modified Newton's method: loads that go, friction, and runs that go on from a checkpoint."""
+
+import math
 
 import numpy as np
 import pytest
@@ -30,6 +32,29 @@ def test_loads_may_go(scheme):
     if scheme == ub.Static():
         assert run.parts == 24
         assert abs(run.q[-1]).max() < 1e-9 * abs(run.q).max()
+
+
+@pytest.mark.parametrize("friction", [0.05, 0.25, 1.0])
+def test_friction_that_sticks_and_slides(friction):
+    """Its row is about the motion or about the force: no tangent of the one serves the other.
+
+    No step is cut, and the motion is that of Newton's full method.  Each of 60 steps may leave
+    1e-12 of some 2 N, which deflect the end by 1/3 m/N: together 4e-11 m.
+    """
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0, rhoA=1.0), cells=4)
+    load = ub.PointLoad(beam.end, (0.5, 2.0), time=lambda t: math.sin(9 * t))
+    rub = ub.Stretch(ub.ground(1.3, 0.4), beam.end, ub.Coulomb(friction))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], connectors=[rub])
+
+    def run(**options):
+        newton = ub.Newton(rtol=1e-12, **options)
+        return ub.simulate(scene, ub.Midpoint(0.05), t=(0, 1), dt=1 / 60, newton=newton, **QUIET)
+
+    kept, full = run(modified=True), run()
+    assert kept.parts == full.parts == 60
+    np.testing.assert_allclose(kept.q, full.q, rtol=0, atol=1e-10)
+    force = full.connector(rub).force
+    assert [force.min(), force.max()] == pytest.approx([-friction, friction]), "it never turns"
 
 
 class Killed(ub.Recorder):

@@ -246,7 +246,8 @@ class Kernel:
     def address_in_lanes(self) -> int | None:
         """Return the address of the SIMD loop, or None."""
         sizes = (self._entries, self._form.packed.shape[1], len(self._form.constants))
-        return in_lanes(self._form.source, int(ffi.cast("intptr_t", self._form.tabulate)), sizes)
+        kernel = int(ffi.cast("intptr_t", self._form.tabulate))
+        return in_lanes(self._form.source, kernel, sizes, (self._at, self._unknowns))
 
     def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
         """Use the SIMD loop from now on, with coordinates in batches."""

@@ -137,6 +137,7 @@ class CompiledSteps:
         more = len(scene.links), cell_forces.kept
         self._of_rows = ledger, equation.supports, support_dofs, inelastic, links, *more
         self._rows: KeptRows | None = None
+        self._last: tuple[int, Array] = -1, self._end  # step whose end was kept last; state there
 
     def _kept(self, q: Array) -> KeptRows:
         """Rows of numbers, one for each step that C keeps."""
@@ -187,7 +188,8 @@ class CompiledSteps:
             if keep:
                 if taken < steps:
                     rows = rows[: taken + 1].copy()  # so that the rest does not stay
-                states = kept.states(ends[:taken].copy(), rows, self._begun)
+                before = rows[:-1, kept.q] if self._begun else None
+                states = kept.states(ends[:taken].copy(), rows[1:], before)
                 state.solution.keep(states, state.parts, self._solver.iterations)
         state.left = [0, 0]
         if c.failed:
@@ -211,12 +213,16 @@ class CompiledSteps:
     def now(self, state: Stepping) -> Later:
         """The state that C has."""
         kept = self._rows or self._kept(state.q)
-        rows = np.zeros((2, kept.width))
+        # NumPy asks for large pages from 4 MiB on, and the first touch of these takes longer here.
+        row, before = np.frombuffer(bytearray(8 * kept.width))[None], None
+        lib.keep_state(self.c, doubles(row))
         if self._begun:
-            ffi.memmove(doubles(rows[0, kept.q]), self.c.prediction.q_before, self._bytes)
-        lib.keep_state(self.c, doubles(rows[1]))
+            number, before = self._last
+            if number != state.parts - 1:
+                before = self.q_before()[None]
+            self._last = state.parts, row[:, kept.q]
         t = np.array([self.c.t])
-        return Later(t, partial(kept.states, t, rows, self._begun))
+        return Later(t, partial(kept.states, t, row, before))
 
     def _begins(self, state: Stepping) -> bool:
         """Return whether the next step is like those that follow."""
@@ -252,7 +258,7 @@ class CompiledSteps:
     def hand_back(self, state: Stepping) -> None:
         """Let all of Python know the state, so that it may take a step."""
         if self.ahead:
-            self.ahead = False
+            self.ahead, self._last = False, (-1, self._end)
             state.prediction.began_at(self._copy(state.prediction.c.q_before))
             if self._path is not None:
                 self._path.force = self._copy(self.c.path.force)

@@ -117,7 +117,7 @@ class Simulation(StateView):
         self._copies = Copies(comm, share) if comm.size > share.comm.size else None
         q, v, internal = initial_state(grid, start)
         self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], together)
-        self.ledger, self.controllers = parts.ledger, parts.controllers
+        self.fields, self.ledger, self.controllers = parts.fields, parts.ledger, parts.controllers
         self.asked = parts.controllers.values
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
@@ -233,7 +233,7 @@ class Simulation(StateView):
         """Begin to take in extremes after each step in C, or return None if that cannot be."""
         if not self.share.alone:
             return None
-        self._watches.append(one := Watch(self.share, self.cell_forces, self._along, parts))
+        self._watches.append(one := Watch(self.fields, self.cell_forces, self._along, parts))
         if self._in_c is not None:
             self._in_c.watch(self._watches)
         return one

@@ -53,6 +53,7 @@ class StepEquation(Equation):
         self.terms: list[Term] = [*self.inner, *self.others]
         predicted = share.largest(float(any(one.demand() is not None for one in beams)))
         self._tangent_in_c = False  # in C
+        fill(self.c, switched=search.switched)
         if not share.grid.scene.links and predicted == 0.0:  # in any process
             self.demand([])
 

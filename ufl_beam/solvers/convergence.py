@@ -107,6 +107,8 @@ class Convergence:
         nearly = iteration > 1 and residual > self.c.rtol * scale
         if nearly or self.c.demands:
             self._find_motion(self._x)
+        if self.c.demands:  # all processes make a new tangent, or none
+            self.c.switched[0] = int(self._share.largest(float(self.c.switched[0])))
         if nearly or (iteration > 1 and self.c.demands):
             floor = 8 * self.size(self._round_off(self._x))
         return int(lib.judge(self.c, doubles(self._x), iteration, residual, scale, floor))

@@ -157,6 +157,7 @@ class _Rubbing(Response):
     def _prepare(self, law: Any) -> None:
         self._slip: Array = np.zeros(len(self._links))
         self._accepted: Array = self._slip
+        self._sticks = np.zeros(len(self._links), dtype=bool)
         self._tiny = 1e-14 * self._lengths()
         self._softness = (CREEP if self._setting.friction_repeats else 0.0) * self._lengths()
 
@@ -200,6 +201,8 @@ class _Rubbing(Response):
         self._guessed = False
         self._slip = np.where(back, 0.0, np.where(over, np.sign(λ), self._slip))
         sticks = (self._slip == 0) & (self._limit > 0)
+        if (sticks != self._sticks).any():
+            self._sticks, self._setting.search.switched[0] = sticks, 1
         rest = self._e0 + np.where(self._against, 0.0, self._way)
         return (
             np.where(sticks, 1.0, 0.0),

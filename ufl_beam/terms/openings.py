@@ -52,15 +52,18 @@ BEGIN = tuple(np.eye(lib.SEARCH_FLAGS, dtype=np.int32)[HOLD] * hold for hold in 
 
 
 class SearchFlags:
-    """Flags that all points of a scene share in a step.
+    """Flags that all points and connectors of a scene share in a step.
 
     Attributes:
         flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
             STIFF: points that do not open answer elastically.  HOLD: points that do not flow stay
             closed.  OVER: one of them has borne more than its limit.
+        switched: Whether the row of a connector was about its motion in the latest tangent and is
+            about its force now, or the other way round; (1,), int32.
     """
 
     def __init__(self) -> None:
+        self.switched: Index = np.zeros(1, dtype=np.int32)
         self.flags: Index = np.zeros(lib.SEARCH_FLAGS, dtype=np.int32)
 
     def begin(self, hold: bool) -> None:

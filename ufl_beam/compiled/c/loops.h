@@ -21,6 +21,7 @@ void add_calls(void *self, const double *q, double *out);
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
 enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns of degree 3 */
+enum { SOME = 128 };         /* cells, of which the processor has all at hand for what comes next */
 
 /* A compiled form on some cells. w holds the packed coefficients of a cell but for its unknowns, which
  * the form has from `at` on; `width` numbers further are those of the next cell, as the values may be a
@@ -181,11 +182,13 @@ typedef struct {
 /* Extremes of section forces in points of the cells, and of motions, see extremes.py. */
 typedef struct {
   const cell_forces *forces;
-  const cells *along;       /* form of the section forces, which it keeps */
+  const cells *along;       /* form of the section forces, which it keeps, with two angles of a cell */
+  const double *angles;     /* of all cells, in batches */
+  int at_angles;            /* where it has these */
   int at_numbers, first;    /* where it has the first of CELL_NUMBERS, and how many */
   int in_order;             /* whether all forms have all cells, in batches as this one */
   double between, *q;       /* part of a step at whose configuration they are; space for that */
-  double *numbers;          /* space */
+  double *numbers, *some;   /* space: for all cells; for what the form has of SOME */
   extent of_forces, of_motion;
 } watch;
 
@@ -461,6 +464,7 @@ typedef struct {
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands;
   const demand *demand; /* of connectors */
+  int32_t *switched;    /* a row of a connector is not about what it was in the tangent; see openings.py */
   double last, best, last_scale;
   int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
   int anew;                           /* no tangent is kept from step to step */

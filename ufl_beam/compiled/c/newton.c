@@ -32,9 +32,6 @@ static void begin_rows(const equation *e, int first, int last)
   if (e->product) add_rows(e->product, first, last, e->tangent);
 }
 
-/* Cells whose rows the processor still has at hand when the cells add to them. */
-enum { SOME = 128 };
-
 /* The cells from `first` on */
 static cells some_cells(const cells *c, int first)
 {
@@ -128,6 +125,9 @@ int judge(equation *e, const double *q, int iteration, double residual, double s
     e->last_scale = scale;
     e->near |= residual * pow(e->rate, MORE) <= wanted;
   }
+  /* With the tangent of a row about a motion, one about a force would move the iterate by as many metres
+   * as newtons are missing. */
+  if (*e->switched) e->near = *e->switched = 0;
   e->slow += 1;
   /* Where a connector has just been released, it is no measure for what follows that forces are in
    * balance, as long as its law is not met. */
