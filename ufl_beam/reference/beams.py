@@ -204,26 +204,23 @@ class YieldingBeams(CellForce):
         return super().residual(q1)
 
     def tangent(self, q1: Array) -> csr_array:
-        """Its derivative, with the consistent tangent of the return map."""
-        self.points.respond(e := self.strains(q1))
+        """Its derivative, with the consistent tangent of the return map in the latest residual."""
         r, D = self.points.r, self.points.D
-        self.cells.put(self._b, r - np.einsum("kij,kj->ki", D, e))
+        self.cells.put(self._b, r - np.einsum("kij,kj->ki", D, self.points.strains))
         self.cells.put(self._D, D)
         return super().tangent(q1)
 
     def change(self, q1: Array) -> float:
         """Energy that is stored and dissipated in the step to ``q1``; J."""
-        self.points.respond(self.strains(q1))
         return self.points.change()
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if the law of a point gives energy in the step."""
-        self.points.respond(self.strains(q1))
         self.points.require_dissipation([*map(self._grid.describe_cell, self.cells.numbers)])
 
     def accept(self, q1: Array, s: Array) -> None:
         """Take the internal variables at the end of the step."""
-        super().accept(q1, s)
+        self.note()
         self.points.accept()
 
     def enter_state(self, q: Array) -> None:

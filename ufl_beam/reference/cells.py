@@ -110,6 +110,7 @@ class Form:
         self.compiled, self._at, self._size = compile_form(form, jit_directory()), at, size
         ones, rows = np.ones(len(at)), np.arange(len(at))
         self._joins = csr_array((ones, (rows, at)), shape=(len(at), size))
+        self._matrix = fem.create_matrix(self.compiled) if self.compiled.rank == 2 else None
 
     def entries(self) -> Array:
         """Vector of a linear form, by the degrees of freedom of its own space."""
@@ -121,7 +122,8 @@ class Form:
 
     def matrix(self) -> csr_array:
         """Matrix of a bilinear form."""
-        K = csr_array(fem.assemble_matrix(self.compiled).to_scipy())
+        self._matrix.set_value(0.0)
+        K = csr_array(fem.assemble_matrix(self._matrix, self.compiled).to_scipy())
         return csr_array(self._joins.T @ K @ self._joins)
 
     def value(self) -> float:

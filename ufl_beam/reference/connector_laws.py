@@ -251,20 +251,16 @@ class _Sprung(LawInStep):
         self.points = MaterialPoints(layout, [(0, 0)], np.ones(1), *of)
         self.softens = self.points.softens
 
-    def _respond(self, e: float) -> None:
-        self.points.respond(np.array([[e, 0.0, 0.0]]))
-
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
         self.points.begin(step.dt)
 
     def row(self, e1: float, λ: float) -> Row:
-        self._respond(e1)
+        self.points.respond(np.array([[e1, 0.0, 0.0]]))
         f, D = float(self.points.r[0, 0]), float(self.points.D[0, 0, 0])
         return -D, 1.0, f - D * e1
 
     def accept(self, e1: float, work: float) -> None:
-        self._respond(e1)
         self.points.accept()
         self.dissipated = float(self.points.kept[0, 4:].sum())
 
@@ -277,11 +273,9 @@ class _Sprung(LawInStep):
         self.points.enter_stored()
 
     def change(self, e1: float, work: float) -> float:
-        self._respond(e1)
         return self.points.change()
 
     def require_dissipation(self, e1: float) -> None:
-        self._respond(e1)
         self.points.require_dissipation([str(self.link)])
 
     def borne(self) -> float | None:

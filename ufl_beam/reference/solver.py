@@ -44,6 +44,9 @@ LARGEST_TURN = 0.75 * math.pi
 MOST_PARTS = 2**12
 """Largest number of parts that a step is cut into."""
 
+PATIENCE = 8
+"""Iterations in a row without half the least residual, after which Newton's method gives up."""
+
 FIRST = 1 / 16
 """Part of the first step after which accelerations are taken for those at the beginning."""
 
@@ -186,7 +189,7 @@ class Solver:
 
     # -- controllers and friction ----------------------------------------------------------------
 
-    def _ask(self) -> None:
+    def ask(self) -> None:
         """Ask controllers for forces and friction for limits; note the rates of what may slip."""
         now = Now(self)
         for link in self.asked:
@@ -235,7 +238,12 @@ class Solver:
 
     # -- the equation of a step ------------------------------------------------------------------
 
-    def _residual(self, x: Array) -> Array:
+    def begin(self, step: Step) -> None:
+        """Let all forces begin a step."""
+        for force in self.forces:
+            force.begin(step)
+
+    def residual(self, x: Array) -> Array:
         """Residual at ``x``; both are in the axes of the supports."""
         q1 = self.supports.axes.T @ x
         self._inner = sum((force.residual(q1) for force in self.inner), np.zeros(len(x)))
@@ -244,7 +252,7 @@ class Solver:
         self.supports.note(r)
         return r
 
-    def _tangent(self, x: Array) -> csr_array:
+    def tangent(self, x: Array) -> csr_array:
         """Its derivative."""
         axes, q1 = self.supports.axes, self.supports.axes.T @ x
         K = csr_array((len(x), len(x)))
@@ -265,7 +273,7 @@ class Solver:
 
     def _make_snes(self, rtol: float, max_iterations: int, petsc: dict[str, Any]) -> None:
         n = len(self.supports.free)
-        self._rtol, self._best, self._since = rtol, math.inf, 0
+        self._rtol = rtol
         self._x, self._K = self.q, csr_array((self.grid.size, self.grid.size))
         self._vector, f = (PETSc.Vec().createSeq(n) for _ in range(2))
         self._matrix = PETSc.Mat().createAIJ((n, n), comm=PETSc.COMM_SELF)
@@ -282,11 +290,12 @@ class Solver:
         snes.ksp.pc.setType("lu")
         snes.ksp.pc.setFactorSolverType("mumps")
         options = PETSc.Options("ub_")
-        for name, value in {"snes_linesearch_type": "basic", **petsc}.items():
+        for name, value in petsc.items():
             options[name] = value
         snes.setFromOptions()
-        for name in ("snes_linesearch_type", *petsc):
+        for name in petsc:
             options.delValue(name)
+        self._searches = ("basic", "bt") if "snes_linesearch_type" not in petsc else ("",)
 
     def _all(self, vector: PETSc.Vec) -> Array:
         """All degrees of freedom, from those that are free."""
@@ -297,7 +306,7 @@ class Solver:
     def _function(self, snes: PETSc.SNES, vector: PETSc.Vec, f: PETSc.Vec) -> None:
         """Residual of the free degrees of freedom; NaN, at which SNES stops, after an error."""
         try:
-            self._r = self._residual(self._all(vector))
+            self._r = self.residual(self._all(vector))
         except Exception as error:  # of a function of the user
             self._error = error
         if self._error is not None:
@@ -307,7 +316,7 @@ class Solver:
     def _jacobian(self, snes: PETSc.SNES, vector: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
         """Derivative of the residual by the free degrees of freedom."""
         try:
-            self._K = self._tangent(self._all(vector))
+            self._K = self.tangent(self._all(vector))
         except Exception as error:
             self._error = error
         K = csr_array(self._K[self.supports.free][:, self.supports.free])
@@ -337,20 +346,30 @@ class Solver:
         stays = size <= digits and size > self._last / 2
         if iteration > 1 and stays and missed <= max(self._rtol, 1e-10):
             return reasons.CONVERGED_FNORM_ABS
-        self._last = size
-        return reasons.CONVERGED_ITERATING
+        self._last, self._slow = size, self._slow + 1
+        if size <= self._best / 2:
+            self._best, self._slow = size, 0
+        return reasons.DIVERGED_DTOL if self._slow > PATIENCE else reasons.CONVERGED_ITERATING
 
     def _newton(self, guess: Array) -> Array:
         """Find the equilibrium from a guess, by SNES; both are in the axes of the supports."""
-        self._x, self._error, self._last = guess, None, math.inf
-        self._vector.array_w[:] = guess[self.supports.free]
-        self.snes.solve(None, self._vector)
-        self.iterations += self.snes.getIterationNumber()
-        if self._error is not None:
-            raise self._error
-        if (reason := self.snes.getConvergedReason()) <= 0:
-            raise self._failure(reason)
-        return self._all(self._vector)
+        for search in self._searches:  # full steps; if they fail, a line search
+            if search:
+                PETSc.Options("ub_")["snes_linesearch_type"] = search
+                self.snes.setFromOptions()
+                PETSc.Options("ub_").delValue("snes_linesearch_type")
+            self._x, self._error = guess, None
+            self._last, self._best, self._slow = math.inf, math.inf, 0
+            self._vector.array_w[:] = guess[self.supports.free]
+            self.snes.solve(None, self._vector)
+            self.iterations += self.snes.getIterationNumber()
+            if self._error is not None and not isinstance(self._error, StepFailed):
+                raise self._error
+            if (reason := self.snes.getConvergedReason()) > 0:
+                return self._all(self._vector)
+            for one in self.connectors:
+                one.again()
+        raise self._error or self._failure(reason)
 
     def _failure(self, reason: int) -> StepFailed:
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
@@ -366,7 +385,7 @@ class Solver:
 
     # -- openings --------------------------------------------------------------------------------
 
-    def _equilibrium(self, guess: Array, begin: Callable[[], None]) -> Array:
+    def _equilibrium(self, guess: Array, step: Step) -> Array:
         """Find the equilibrium of a step in which no more opens than must.
 
         What does not flow at the beginning stays closed if there is an equilibrium in which it
@@ -390,7 +409,7 @@ class Solver:
             self.search.hold = False
             for one in self._open:
                 one.close()
-        begin()
+        self.begin(step)
         return self._newton(guess)
 
     def _largest_excess(self) -> float:
@@ -464,16 +483,11 @@ class Solver:
     def _solve(self, step: Step) -> tuple[Array, Array]:
         """Configuration at the end of a step, and the step of the nodes that forces work on."""
         q0, axes = self.q, self.supports.axes
-
-        def begin() -> None:
-            for force in self.forces:
-                force.begin(step)
-
-        self._ask()
-        begin()
+        self.ask()
+        self.begin(step)
         guess = axes @ (q0 + step.dt / self.last_dt * (q0 - self.q_before))
         self.supports.move(guess, axes @ q0, step)
-        q1 = np.asarray(axes.T @ self._equilibrium(guess, begin))
+        q1 = np.asarray(axes.T @ self._equilibrium(guess, step))
         s, turn = self.scheme.nodal_step(q0, q1, self.grid.rotations.astype(np.int32))
         s[self.grid.multipliers] = 0.0
         if not turn <= LARGEST_TURN:

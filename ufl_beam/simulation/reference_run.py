@@ -9,7 +9,7 @@ from typing import Any
 from mpi4py import MPI
 
 from ufl_beam.arrays import Snapshots
-from ufl_beam.errors import ConvergenceError, SceneError, StepFailed
+from ufl_beam.errors import ConvergenceError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -17,16 +17,8 @@ from ufl_beam.progress_bar import progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.solvers.newton_options import Newton
-
-INSTEAD = "leave reference=True out"
-
-
-def require_plain(newton: Newton | None, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` that the reference solver has not."""
-    if newton is not None and newton.reference:
-        raise SceneError(f"Newton(reference=True) is for simulate alone, not for {what}: {INSTEAD}")
-
+from ufl_beam.solvers.newton_options import Newton, require_plain
+from ufl_beam.solvers.petsc_options import checked_newton
 
 def simulate_by_reference(
     scene: Scene, scheme: Scheme, newton: Newton, times: tuple[float, float], number: int, *,
@@ -35,7 +27,8 @@ def simulate_by_reference(
 ) -> Solution:  # fmt: skip
     """Simulate a scene by so many equal steps; arguments are those of ``simulate``."""
     if comm.size > 1:
-        raise SceneError(f"Newton(reference=True) computes on one process, not on {comm.size}: {INSTEAD}, or mpirun")
+        require_plain(newton, f"mpirun, here with {comm.size} processes")
+    newton = checked_newton(newton, comm)
     begin, (t0, t1) = time.perf_counter(), times
     grid, _ = checked_grid(scene, scheme, mesh_of(start, mesh), fresh=start is None)
     q, v, internal = initial_state(grid, start)

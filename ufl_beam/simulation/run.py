@@ -33,13 +33,13 @@ from ufl_beam.simulation.checkpoint import FORMAT, Checkpoint, Keeper, end_of
 from ufl_beam.simulation.diagnosis import ROOM, open_ledger
 from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
-from ufl_beam.simulation.reference_run import require_plain, simulate_by_reference
+from ufl_beam.simulation.reference_run import simulate_by_reference
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive, number_of_steps, steps_of
 from ufl_beam.simulation.step_solver import MOST_PARTS
 from ufl_beam.simulation.watches import LedgerWatch
-from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.solvers.newton_options import Newton, require_plain
 
 BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
@@ -109,16 +109,13 @@ def simulate(
     recorders, outputs = recorders_of(record, comm, "simulate", *kept)
     begin = time.perf_counter()
     if newton is not None and newton.reference:
-        for what, given in (
-            ("dt = Adaptive(...)", isinstance(dt, Adaptive)), ("record", bool(recorders)),
-            ("checkpoint", checkpoint is not None),
-        ):  # fmt: skip
-            if given:
-                require_plain(newton, what)
-        number = number_of_steps(t1 - t0, dt)
+        if isinstance(dt, Adaptive):
+            require_plain(newton, "adaptive steps, dt = Adaptive(...)")
+        if recorders or checkpoint is not None:
+            require_plain(newton, "recorders" if recorders else "checkpoint")
         return simulate_by_reference(
-            scene, scheme, newton, (t0, t1), number, start=start, mesh=mesh, every=every, most=most,
-            comm=comm, progress=progress,
+            scene, scheme, newton, (t0, t1), number_of_steps(t1 - t0, dt), start=start, mesh=mesh,
+            every=every, most=most, comm=comm, progress=progress,
         )  # fmt: skip
     keeper: Keeper | None = None
     if checkpoint is not None:

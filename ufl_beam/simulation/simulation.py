@@ -30,7 +30,7 @@ from ufl_beam.simulation.assembly import Assembly, assemble
 from ufl_beam.simulation.branch_check import add_forces_at_rest
 from ufl_beam.simulation.compiled_steps import CompiledSteps, compiled_steps
 from ufl_beam.simulation.diagnosis import no_equilibrium, require_held
-from ufl_beam.simulation.evaluation import COMPILED, REFERENCE
+from ufl_beam.simulation.evaluation import COMPILED
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.replicas import Copies, sharing
@@ -45,7 +45,7 @@ from ufl_beam.simulation.step_solver import (
 )
 from ufl_beam.simulation.watches import ForceWatch
 from ufl_beam.solvers.equation import Border
-from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.solvers.newton_options import Newton, require_plain
 from ufl_beam.solvers.petsc_options import checked_newton
 
 
@@ -102,6 +102,7 @@ class Simulation(StateView):
         comm = communicator(comm, "comm")
         require_number(t0, "t0")
         newton = checked_newton(newton, comm)
+        require_plain(newton, "Simulation" if kind is Solution else "follow")
         if not (isinstance(kind, type) and issubclass(kind, Solution)):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
         if start is not None:
@@ -113,8 +114,7 @@ class Simulation(StateView):
         self.together = together = Agreement(share.comm)
         self._copies = Copies(comm, share) if comm.size > share.comm.size else None
         q, v, internal = initial_state(grid, start)
-        by = REFERENCE if newton.reference else COMPILED
-        self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], by, together)
+        self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], COMPILED, together)
         self.fields, self.ledger, self.controllers = parts.fields, parts.ledger, parts.controllers
         self.asked = parts.controllers.values
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
@@ -153,7 +153,7 @@ class Simulation(StateView):
             self._begun_at = before
         self.begun = self.between < 1 or self.cell_forces.asks_for_before
 
-        factors = by.factors(share, self.equation.A)
+        factors = COMPILED.factors(share, self.equation.A)
         self._steps = StepSolver(
             scheme, self.equation, parts.openings, self._branch, newton, factors, together
         )
