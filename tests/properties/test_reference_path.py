@@ -176,7 +176,9 @@ def dense(A):
 # -- start and refusals ----------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1), ub.DecayingMidpoint(), ub.GeneralizedAlpha(0.6)])
+@pytest.mark.parametrize(
+    "scheme", [ub.Midpoint(0.1), ub.DecayingMidpoint(), ub.GeneralizedAlpha(0.6)]
+)
 @pytest.mark.parametrize("first", [False, True])
 def test_a_run_begins_where_another_one_ends(scheme, first):
     """Of either kind; internal variables and what the scheme keeps go on."""

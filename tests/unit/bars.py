@@ -3,9 +3,9 @@
 
 import numpy as np
 
+from ufl_beam.mechanics.point_equations import inputs
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.compiled_points import CompiledPoints
-from ufl_beam.terms.point_equations import inputs
 
 C, LENGTH = 200.0, 0.5
 

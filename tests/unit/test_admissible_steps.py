@@ -7,9 +7,9 @@ from bars import Bars
 from laws_of_ones_own import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, TwoRoots
 
 import ufl_beam as ub
+from ufl_beam.mechanics.point_equations import inputs
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.compiled_points import CompiledPoints
-from ufl_beam.terms.point_equations import inputs
 from ufl_beam.terms.reference_points import ReferencePoints
 
 EA, EI, NP, MP = 2e3, 1.0, 4.0, 0.4

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+from ufl_beam.mechanics.point_equations import inputs
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.compiled_points import CompiledPoints
-from ufl_beam.terms.point_equations import inputs
 from ufl_beam.terms.reference_points import ReferencePoints
 
 EA, EI, NP, MP = 1000.0, 50.0, 10.0, 2.0

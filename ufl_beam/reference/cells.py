@@ -198,7 +198,10 @@ class Strains:
         self._cells, space = cells, of.at_points(3).function_space
         z = ufl.TestFunction(space)
         weighted = ufl.dot(strain(of.q1, of.axis), z) / of.axis.h * of.dx(1)
-        self._form, self._dofs = Form(weighted, np.zeros(0, dtype=np.int64), 0), dofs_of_cells(space)
+        self._form, self._dofs = (
+            Form(weighted, np.zeros(0, dtype=np.int64), 0),
+            dofs_of_cells(space),
+        )
         self._weights = np.repeat(cells._grid.mesh.point_weights, 3)
 
     def __call__(self, q: Array) -> Array:
@@ -210,5 +213,7 @@ class Strains:
 
 def coupled(size: int, rows: Index, columns: Index, values: Array) -> csr_array:
     """Matrix of the scene from entries; those at one place add up."""
-    entries = scipy.sparse.coo_array((np.ravel(values), (np.ravel(rows), np.ravel(columns))), (size, size))
+    entries = scipy.sparse.coo_array(
+        (np.ravel(values), (np.ravel(rows), np.ravel(columns))), (size, size)
+    )
     return csr_array(entries)

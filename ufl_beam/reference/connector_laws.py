@@ -16,6 +16,7 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import NoNumber, SceneError, require_returned
+from ufl_beam.mechanics.slips import Slip, slip
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import (
@@ -37,7 +38,6 @@ from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.reference.cells import Ledger
 from ufl_beam.reference.points import CLOSED, FLOWING, RELEASED, MaterialPoints, Search, derivative
-from ufl_beam.terms.rigid_plastic import Slip, slip
 
 CREEP = 1e-12
 """Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
@@ -364,7 +364,9 @@ class _Slipping(LawInStep):
         super().__init__(link, setting)
         law, scheme, ledger = law_of(link), setting.scheme, setting.ledger
         self._law = law
-        self.at: dict[str, Any] = dict.fromkeys(("energy", "modulus", "kinematic", "viscosity"), 0.0)
+        self.at: dict[str, Any] = dict.fromkeys(
+            ("energy", "modulus", "kinematic", "viscosity"), 0.0
+        )
         self.at |= {name: float(x) for name, x in law.numbers(np.ones(())).items()}
         self.at |= {"slipped": 0.0, "start": 0.0, "θ": scheme.theta, "dt": 1.0}
         self._limit, self._back_force, self._stored = float(law.limit), 0.0, 0.0
@@ -569,7 +571,9 @@ class _Asked(LawInStep):
         """Energy that can be had back; J."""
         if self.law.stored is None:
             return 0.0
-        value = self.law.stored(e, **dict.fromkeys(self.law.asked_by_stored, self._variables.copy()))
+        value = self.law.stored(
+            e, **dict.fromkeys(self.law.asked_by_stored, self._variables.copy())
+        )
         return require_returned(value, f"{self.link}: the energy", f"motion = {e:.6g}", finite=True)
 
     def accept(self, e1: float, work: float) -> None:

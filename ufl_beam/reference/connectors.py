@@ -13,14 +13,14 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import NoNumber
+from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
 from ufl_beam.reference.cells import Force, Form, coupled, dofs_of_cells, separate_cells
-from ufl_beam.reference.connector_laws import LawInStep, Setting, law_in_step
-from ufl_beam.terms.connector_forms import connector_forms
+from ufl_beam.reference.connector_laws import Setting, law_in_step
 
 MOTION, FORCE, WORK, RATE, DISSIPATED = range(5)
 """Columns of ``Connection``."""
@@ -137,7 +137,9 @@ class Connectors(Linked):
         amplitude, weight = moved / size, np.abs(self._rows[:, 1])
         unit = np.array([law.slope for law in self.laws])
         of_motion = 0.01 * self._length * amplitude
-        wanted = np.where(weight * unit < 1 - 1e-12, of_motion, weight * scale * size / self._length)
+        wanted = np.where(
+            weight * unit < 1 - 1e-12, of_motion, weight * scale * size / self._length
+        )
         far = np.maximum(np.abs(q[self.dofs[:, :4]]).max(axis=1) / size,
                          np.abs(q[self.dofs[:, 4:6]]).max(axis=1)) + amplitude  # fmt: skip
         left = np.abs(r[self.forces_at])
@@ -341,5 +343,3 @@ def connectors_of(grid: Grid, setting: Setting) -> list[Linked]:
             found.append(Connectors(motion, numbers, grid, setting))
     guides = (i for i, link in enumerate(links) if isinstance(link.law, Guide))
     return [*found, *(GuideForce(i, grid, setting) for i in guides)]
-
-

@@ -12,6 +12,7 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.bodies import Body, carries
@@ -20,7 +21,6 @@ from ufl_beam.model.time_functions import value_at
 from ufl_beam.model.works import Potential, Work
 from ufl_beam.reference.beams import CellForce, Mass
 from ufl_beam.reference.cells import Cells, Force, Ledger, OnNodes, coupled
-from ufl_beam.terms.work_forms import GROWTH, statement
 
 AT_REST = 1e300
 """Longest step that forms are told of, in which all rates vanish; s."""
@@ -246,9 +246,7 @@ class WorkForce(CellForce):
 
     kind = "work"
 
-    def __init__(
-        self, work: Work, grid: Grid, scheme: Scheme, ledger: Ledger, t0: float
-    ) -> None:
+    def __init__(self, work: Work, grid: Grid, scheme: Scheme, ledger: Ledger, t0: float) -> None:
         numbers = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
         cells = Cells(grid, numbers)
         stated = statement(work, cells.element, scheme)

@@ -15,11 +15,11 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.law_functions import Values
 from ufl_beam.reference.cells import Ledger
-from ufl_beam.terms.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 
 CLOSED, FLOWING, RELEASED = 0.0, 1.0, 2.0
 """A discontinuity did not grow in the last step, grew in it, may open in this one."""

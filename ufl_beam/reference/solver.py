@@ -336,7 +336,9 @@ class Solver:
         if not math.isfinite(size):
             return reasons.DIVERGED_FNORM_NAN
         scale = self._norm(self._inner) + sum(self._norm(load.force) for load in self.loads)
-        moved = min(float(np.max(np.abs(x) * (self.weights > 0), initial=0.0)), self.grid.scene.size)
+        moved = min(
+            float(np.max(np.abs(x) * (self.weights > 0), initial=0.0)), self.grid.scene.size
+        )
         q1 = self.supports.axes.T @ x
         missed = max((c.missed(q1, r, scale, moved) for c in self.connectors), default=0.0)
         if size <= self._rtol * scale and missed <= self._rtol and iteration > 0:

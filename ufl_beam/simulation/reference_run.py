@@ -20,6 +20,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers.newton_options import Newton, require_plain
 from ufl_beam.solvers.petsc_options import checked_newton
 
+
 def simulate_by_reference(
     scene: Scene, scheme: Scheme, newton: Newton, times: tuple[float, float], number: int, *,
     start: Solution | None, mesh: Mesh | None, every: int, most: int, comm: MPI.Intracomm,

@@ -11,12 +11,13 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.mechanics.slips import slip
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.material_laws import Hardening, SofteningLaw
 from ufl_beam.terms.connector_responses import Rows
 from ufl_beam.terms.phases import TimeFunctions
-from ufl_beam.terms.rigid_plastic import INPUTS, RigidPlasticResponse, slip
+from ufl_beam.terms.rigid_plastic import INPUTS, RigidPlasticResponse
 
 
 class SlipForms:

@@ -19,6 +19,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
+from ufl_beam.mechanics.point_equations import inputs
 from ufl_beam.mechanics.tangents import Tangents
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.fibres import Layout
@@ -28,7 +29,6 @@ from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import STIFF, SearchFlags
 from ufl_beam.terms.phases import Phases, TimeFunctions, beginning
-from ufl_beam.terms.point_equations import inputs
 from ufl_beam.terms.static_tangents import PredictedStrains
 from ufl_beam.terms.tangent_derivatives import Cells
 

@@ -15,12 +15,12 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.point_equations import PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, SearchFlags
-from ufl_beam.terms.point_equations import PointEquations, curved, inputs, prefixed, rows
 
 DIGITS = 16 * float(np.finfo(float).eps)
 """Round-off of dissipated energies, as a part of elastic ones of the strains."""

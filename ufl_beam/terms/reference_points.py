@@ -11,11 +11,11 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.mechanics.point_equations import At, prefixed
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.terms.complex_steps import EPS, derivative, jacobian, part_of, solved
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import HOLD, OPENED, OVER, RELEASED, STIFF
-from ufl_beam.terms.point_equations import At, prefixed
 
 
 class ReferencePoints(Points):
@@ -98,7 +98,7 @@ class ReferencePoints(Points):
         at["growth"][:] = at["direction"][:] = 0.0
         stress, slope = self._answer(at)
         first = stress[0]  # of points that can open the only one
-        over = np.abs(first) > at["traction"]  # P(51)
+        over = np.abs(first) > at["traction"]
         held = over & (flags[HOLD] == 1) & (at["flows"] == lib.CLOSED) & (at["traction"] > 0)
         self.over[0] = float(np.max(np.abs(first[held]) / at["traction"][held] - 1, initial=0.0))
         opens = over & ~held
@@ -130,7 +130,7 @@ class ReferencePoints(Points):
         stress, slope = self._answer(at)
         _, softens = self._resistance(at)
         with np.errstate(divide="ignore", invalid="ignore"):
-            return stress, slope * softens / (slope / at["length"] + softens)  # P(76)
+            return stress, slope * softens / (slope / at["length"] + softens)
 
     def _growth(self, at: At, stress: Array, opens: Array) -> Array:
         """Growth at which nothing is over the resistance; Newton's method between two bounds."""
@@ -146,7 +146,7 @@ class ReferencePoints(Points):
             now = {**at, "growth": a}
             borne, tangent = self._answer(now)
             resists, softens = self._resistance(now)
-            over = at["direction"] * borne[0] - resists  # P(32)
+            over = at["direction"] * borne[0] - resists
             return over, -tangent[0, 0] / length - softens
 
         with np.errstate(all="ignore"):

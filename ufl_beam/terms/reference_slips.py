@@ -7,11 +7,12 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.mechanics.slips import Slip, slip
 from ufl_beam.model.law_functions import Values
 from ufl_beam.terms.complex_steps import derivative
 from ufl_beam.terms.connector_responses import Rows
 from ufl_beam.terms.openings import HOLD, OPENED, OVER
-from ufl_beam.terms.rigid_plastic import RigidPlasticResponse, Slip, slip
+from ufl_beam.terms.rigid_plastic import RigidPlasticResponse
 
 
 class ReferenceSlips(RigidPlasticResponse):

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.mechanics.point_equations import inputs
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import Spring
 from ufl_beam.model.fibres import Layout
@@ -16,7 +17,6 @@ from ufl_beam.model.material_laws import Hardening
 from ufl_beam.terms.connector_responses import Response, Rows, respond
 from ufl_beam.terms.material_points import Points, expect_entries
 from ufl_beam.terms.phases import TimeFunctions
-from ufl_beam.terms.point_equations import inputs
 
 
 @respond.register(Spring)

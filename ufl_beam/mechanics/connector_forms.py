@@ -3,13 +3,13 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import basix.ufl
 import ufl
 from ufl.core.expr import Expr
 
-from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
@@ -32,7 +32,7 @@ class ConnectorForms(NamedTuple):
     u: fem.Function
 
 
-@stated
+@lru_cache(maxsize=128)
 def connector_forms(motion: str, scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
     """Forms on cells of unit length, from one node of a connector to the other."""
     line = basix.ufl.element("Lagrange", "interval", 1)
