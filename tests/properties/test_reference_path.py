@@ -19,10 +19,10 @@ from ufl_beam.reference import beams, cells, connectors, loads, points
 from ufl_beam.reference.connector_laws import _Slipping
 from ufl_beam.reference.solver import Solver
 
-WANDERING = (9, 19, 22, 25, 26, 32, 35, 36, 38, 42, 43, 45)
+WANDERING = (9, 19, 22, 25, 26, 32, 35, 36, 38, 42, 43, 45, 60, 79, 83, 86, 99, 106, 111, 115)
 """Scenes in whose steps Newton's method wanders, so that round-off decides where a step is cut."""
 
-SEEDS = [seed for seed in range(100) if seed not in WANDERING]
+SEEDS = [seed for seed in range(120) if seed not in WANDERING]
 """Scenes that have, between them, every object, law and scheme that `any_scene` draws."""
 
 MACHINES = [*range(12)]

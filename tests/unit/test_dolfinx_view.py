@@ -172,7 +172,7 @@ def test_an_own_form(degree):
     beam = ub.Beam((0, 0), (2, 0.3), ub.Section(**STEEL), cells=4)
     down = ub.PointLoad(beam.at(0.5), force=(0, -30.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Pinned(beam.end)], loads=[down])
-    simulation = moved(scene, ub.ExactStatic(), reference, mesh=ub.Mesh(degree=degree))
+    simulation = moved(scene, ub.ExactStatic(), mesh=ub.Mesh(degree=degree))
     view = simulation.dolfinx
     w = ufl.TestFunction(view.function_space)
     weight = assembled(simulation, w[1] * view.dx)
@@ -189,7 +189,7 @@ def test_an_own_form(degree):
 def test_each_process_has_its_cells():
     """Energies of all of them are those of the ledger; of one process, those of the scene."""
     scene = frame()
-    simulation = moved(scene, ub.Midpoint(0.1), reference, comm=MPI.COMM_WORLD)
+    simulation = moved(scene, ub.Midpoint(0.1), comm=MPI.COMM_WORLD)
     view, (state, _, _) = simulation.dolfinx, simulation.entries()
     v, M = view.velocity.x.array, fem.assemble_matrix(fem.form(view.forms.mass)).to_scipy()
     kinetic = MPI.COMM_WORLD.allreduce(v @ M @ v / 2)
@@ -197,7 +197,7 @@ def test_each_process_has_its_cells():
     jump = np.zeros(len(simulation.grid.cells))
     jump[view.cells] = view.jump.x.array
     MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, jump)
-    alone = moved(scene, ub.Midpoint(0.1), reference)
+    alone = moved(scene, ub.Midpoint(0.1))
     # Jumps of some 0.1 rad, by steps solved to 1e-12 of the forces.
     assert np.allclose(jump, alone.damage()[0], rtol=0, atol=1e-8)
     assert np.abs(jump).max() > 1e-3

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import NamedTuple
 
 import basix.ufl
@@ -14,6 +13,7 @@ from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
 from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.structure_cache import stated
 
 
 class ConnectorForms(NamedTuple):
@@ -32,7 +32,7 @@ class ConnectorForms(NamedTuple):
     u: fem.Function
 
 
-@lru_cache(maxsize=128)
+@stated
 def connector_forms(motion: str, scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
     """Forms on cells of unit length, from one node of a connector to the other."""
     line = basix.ufl.element("Lagrange", "interval", 1)

@@ -20,10 +20,9 @@ from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
-from ufl_beam.model.bodies import Body
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.model.fibres import Layout
-from ufl_beam.reference.cells import Cells, Force, Form, Ledger, OnNodes, Strains
+from ufl_beam.reference.cells import Cells, Force, Form, Ledger, OnNodes, Strains, lumps
 from ufl_beam.reference.points import MaterialPoints, Search
 
 
@@ -283,9 +282,8 @@ class Mass:
     def __init__(self, grid: Grid) -> None:
         self.cells = cells = Cells(grid, np.arange(len(grid.cells)))
         form, diagonal = mass_form(cells.element), np.zeros(grid.size)
-        for one in (*grid.scene.masses, *grid.scene.bodies):
-            dofs = grid.node(one.middle if isinstance(one, Body) else one.place)
-            np.add.at(diagonal, dofs, [one.mass, one.mass, one.inertia])
+        for dofs, mass, inertia in lumps(grid):
+            np.add.at(diagonal, dofs, [mass, mass, inertia])
         self.matrix = cells.form(form).matrix() + csr_array(scipy.sparse.diags_array(diagonal))
         self.of_beams = cells.form(ufl.action(form, cells.element.q1))
 
@@ -338,7 +336,8 @@ class Inertia(MatrixForce):
         super().__init__(grid, scheme, self.mass.matrix)
         self.v, self.v_before, self.more = v, v, tuple[Array, ...]()
         self.dt = self.last_dt = math.inf
-        self._ledger, self._rate = ledger, np.zeros(grid.size)
+        self._ledger = ledger
+        self._rate: Array = np.zeros(grid.size)
         if scheme.slips:
             ledger.lost["numerical"] += 0.0
 

@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy  # its parts are loaded when they are used
@@ -110,7 +110,7 @@ class Form:
         self.compiled, self._at, self._size = compile_form(form, jit_directory()), at, size
         ones, rows = np.ones(len(at)), np.arange(len(at))
         self._joins = csr_array((ones, (rows, at)), shape=(len(at), size))
-        self._matrix = fem.create_matrix(self.compiled) if self.compiled.rank == 2 else None
+        self._matrix: Any = None if self.compiled.rank < 2 else fem.create_matrix(self.compiled)
 
     def entries(self) -> Array:
         """Vector of a linear form, by the degrees of freedom of its own space."""
@@ -118,7 +118,9 @@ class Form:
 
     def vector(self) -> Array:
         """Vector of a linear form; cells that share a node add up."""
-        return np.bincount(self._at, weights=self.entries(), minlength=self._size)
+        vector: Array = np.zeros(self._size)
+        np.add.at(vector, self._at, self.entries())
+        return vector
 
     def matrix(self) -> csr_array:
         """Matrix of a bilinear form."""
@@ -142,6 +144,12 @@ def separate_cells(points: Array) -> tuple[meshes.Mesh, Index]:
     n = len(points)
     mesh = line_mesh(points.reshape(-1, 2), np.arange(2 * n).reshape(n, 2))
     return mesh, np.asarray(mesh.topology.original_cell_index)
+
+
+def lumps(grid: Grid) -> list[tuple[Index, float, float]]:
+    """Degrees of freedom, mass and inertia of point masses and rigid bodies; (3,), kg, kg m²."""
+    masses = [(grid.node(one.place), one.mass, one.inertia) for one in grid.scene.masses]
+    return masses + [(grid.node(one.middle), one.mass, one.inertia) for one in grid.scene.bodies]
 
 
 class Cells:

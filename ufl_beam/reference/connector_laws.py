@@ -282,13 +282,13 @@ class _Sprung(LawInStep):
         return float(self.points.kept[0, 0])
 
     def state(self) -> Array:
-        return self.points.state()[0]
+        return np.asarray(self.points.state()[0])
 
     def restore(self, state: Array) -> None:
         self.points.restore([0], state[None])
 
     @property
-    def excess(self) -> Any:  # type: ignore[override]
+    def excess(self) -> Any:
         return self.points.excess
 
     def release(self, least: float) -> None:

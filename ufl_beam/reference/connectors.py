@@ -42,7 +42,9 @@ class Linked(Force):
         self.links: list[Connector] = [grid.scene.links[i] for i in numbers]
         self.dofs = grid.dofs_of_links[numbers]
         self.forces_at = self.dofs[:, 6]
-        self.before, self.work, self.rate = np.zeros((3, len(numbers)))
+        self.before: Array = np.zeros(len(numbers))
+        self.work: Array = np.zeros(len(numbers))
+        self.rate: Array = np.zeros(len(numbers))
 
     def kept(self, q: Array) -> Array:
         """Columns of ``Connection``; (num_links, 5)."""
@@ -88,7 +90,8 @@ class Connectors(Linked):
         self._row_dofs = dofs_of_cells(stated.row.function_space)
         self._cell_dofs = dofs_of_cells(stated.bend.function_space)[:, 0]
         self._length = np.array([law.length for law in self.laws])
-        self._rows, self._e0 = np.zeros((n, 3)), np.zeros(n)
+        self._rows: Array = np.zeros((n, 3))
+        self._e0: Array = np.zeros(n)
         self._dt = 1.0
 
     def _put(self, function: Any, values: Array) -> None:
@@ -117,8 +120,8 @@ class Connectors(Linked):
 
     def residual(self, q1: Array) -> Array:
         """Forces on the nodes, and the rows of the laws."""
-        pairs = zip(self.motion(q1).tolist(), q1[self.forces_at].tolist(), strict=True)
-        rows = [law.row(*pair) for law, pair in zip(self.laws, pairs, strict=True)]
+        e1, λ = self.motion(q1), q1[self.forces_at]
+        rows = [law.row(float(e1[i]), float(λ[i])) for i, law in enumerate(self.laws)]
         self._rows = np.array(rows)
         self._put(self._stated.row, self._rows)
         return self._work.vector()
@@ -169,7 +172,7 @@ class Connectors(Linked):
         """Take the end of the step; enter what was supplied or lost."""
         e, taken = self.motion(q1), self._taken(q1)
         self.work = self.work + taken
-        self.rate, self._e0 = (e - self._e0) / self._dt, e
+        self.rate, self._e0 = np.asarray((e - self._e0) / self._dt), e
         self.take_forces(q1)
         for law, motion, work in zip(self.laws, e, taken, strict=True):
             law.accept(float(motion), float(work))
@@ -249,7 +252,7 @@ class GuideForce(Linked):
     def _frame(self, q: Array) -> tuple[float, Array, Array, Array]:
         """Distance, normals there and over the step, derivative of the latter by the point."""
         on, slope = self._nearest(q)
-        t = slope / math.hypot(*slope)
+        t: Array = slope / math.hypot(*slope)
         n = _turned(t)
         distance = float(n @ (self._point + q[self._x] - on))
         if not self._over_step:
@@ -265,12 +268,12 @@ class GuideForce(Linked):
             bend = (t - d * (d @ t)) * (np.sign(chord @ d) / length)
         else:
             middle = (self._s0 + self._s) / 2
-            along = tangent(self._curve, middle, self._step)
+            along: Array = tangent(self._curve, middle, self._step)
             speed = float(np.linalg.norm(along))
             d = along / speed
             bend = self._bend(middle) / (self._step * speed) ** 2
-            bend = (bend - d * (d @ bend)) / 2
-        return distance, n, _turned(d), np.outer(_turned(bend), t)
+            bend = np.asarray((bend - d * (d @ bend)) / 2)
+        return distance, n, _turned(np.asarray(d)), np.outer(_turned(bend), t)
 
     def again(self) -> None:
         """Begin at the point of the last step."""

@@ -15,12 +15,12 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
-from ufl_beam.model.bodies import Body, carries
+from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.model.works import Potential, Work
 from ufl_beam.reference.beams import CellForce, Mass
-from ufl_beam.reference.cells import Cells, Force, Ledger, OnNodes, coupled
+from ufl_beam.reference.cells import Cells, Force, Ledger, OnNodes, coupled, lumps
 
 AT_REST = 1e300
 """Longest step that forms are told of, in which all rates vanish; s."""
@@ -35,7 +35,8 @@ class LoadForce(Force):
 
     def __init__(self, size: int, scheme: Scheme, ledger: Ledger, entry: str = "loads") -> None:
         self.size, self.scheme, self.ledger, self._entry = size, scheme, ledger, entry
-        self.force = self.before = np.zeros(size)
+        self.force: Array = np.zeros(size)
+        self.before: Array = self.force
         ledger.supplied[entry] += 0.0
 
     def enter_work(self, force: Array, s: Array, end: Array) -> None:
@@ -86,7 +87,6 @@ class DeadLoad(LoadForce):
 def _nodal_forces(load: Load, grid: Grid) -> tuple[Array, Array | None]:
     """Consistent nodal forces of a dead load, (size,); those along beams, (num_cells, 3, nodes)."""
     scene, vector = grid.scene, np.zeros(grid.size)
-    at_places: list[tuple[object, Sequence[float]]] = []
     of_beams = np.zeros((len(scene.beams), 3))
     if isinstance(load, PointLoad) and carries(load.place):  # else Scene.links has connectors
         np.add.at(vector, grid.node(load.place), [*load.force, load.moment])
@@ -94,9 +94,8 @@ def _nodal_forces(load: Load, grid: Grid) -> tuple[Array, Array | None]:
         of_beams[scene.beams.index(load.beam)] = *load.force, load.moment
     elif isinstance(load, Gravity):
         of_beams[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
-        for one in (*scene.masses, *scene.bodies):
-            dofs = grid.node(one.middle if isinstance(one, Body) else one.place)
-            np.add.at(vector, dofs[:2], one.mass * np.array(load.acceleration))
+        for dofs, mass, _ in lumps(grid):
+            np.add.at(vector, dofs[:2], mass * np.array(load.acceleration))
     if not of_beams.any():
         return vector, None
     total = of_beams[grid.beam_of_cell] * grid.lengths(np.arange(len(grid.cells)))[:, None]
@@ -200,8 +199,8 @@ class FrameForce(LoadForce):
         self.residual(q1)
         self.enter_work(self.force, s, self.force)
         self._grown, change = self._end, q1 - self._q0
-        x = self._places + self._q0 + self.scheme.load_weight * change
-        self._note(x, self._growth, change / self._dt)
+        x: Array = self._places + self._q0 + self.scheme.load_weight * change
+        self._note(x, self._growth, np.asarray(change / self._dt))
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
         """The centrifugal forces at ``q``."""
@@ -228,9 +227,8 @@ def _turned_mass(grid: Grid, cells: Cells) -> csr_array:
     of = cells.element
     (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
     G = cells.form(of.inertia[0] * ufl.dot(turn(u), w_u) * of.dx_of_mass()).matrix()
-    for one in (*grid.scene.masses, *grid.scene.bodies):
-        u, v, _ = grid.node(one.middle if isinstance(one, Body) else one.place)
-        G = G + coupled(grid.size, np.array([u, v]), np.array([v, u]), one.mass * np.array([-1, 1]))
+    for (u, v, _), m, _ in lumps(grid):
+        G = G + coupled(grid.size, np.array([u, v]), np.array([v, u]), m * np.array([-1, 1]))
     return csr_array(G)
 
 
@@ -256,7 +254,8 @@ class WorkForce(CellForce):
         self._varies, self._held = stated.varies(work), 0.0
         self._t = self._t_end = t0
         self._grown = self._grown_end = 0.0
-        self.force = self.before = np.zeros(grid.size)
+        self.force: Array = np.zeros(grid.size)
+        self.before: Array = self.force
         if isinstance(work, Potential):
             ledger.state[work.name] += 0.0
             if self._varies:

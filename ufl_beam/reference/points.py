@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.mechanics.time_schemes import Scheme
@@ -62,7 +62,11 @@ def jacobian(
     f: Callable[[At], Array], at: Mapping[str, Values], by: Sequence[str]
 ) -> tuple[Array, Array]:
     """Values of functions of points, and derivatives by some numbers; (n, ...), (n, k, ...)."""
-    columns = [derivative(lambda x, name=name: f({**at, name: x}), at[name]) for name in by]
+
+    def column(name: str) -> tuple[Array, Array]:
+        return derivative(lambda x: f({**at, name: x}), at[name])
+
+    columns = [column(name) for name in by]
     return columns[0][0], np.stack([slope for _, slope in columns], axis=1)
 
 
@@ -121,9 +125,13 @@ class MaterialPoints:
         self._equations = PointEquations(layout.kind, softening and softening.of(1.0, 1.0), scheme)
         # Strains of the points by component are B times those of the cell.
         self._B = np.asarray(layout.strains).reshape(n, -1, 3)
-        self.strains, self.strains0, self.r = np.zeros((3, cells, 3))
-        self.D, self.kept = np.zeros((cells, 3, 3)), np.zeros((cells, 6))
-        self.excess, self._stored = np.zeros((cells, n)), np.zeros(2)
+        self.strains: Array = np.zeros((cells, 3))
+        self.strains0: Array = np.zeros((cells, 3))
+        self.r: Array = np.zeros((cells, 3))
+        self.D: Array = np.zeros((cells, 3, 3))
+        self.kept: Array = np.zeros((cells, 6))
+        self.excess: Array = np.zeros((cells, n))
+        self._stored: Array = np.zeros(2)
         self._resist()
         self._expect_entries()
 
@@ -144,7 +152,7 @@ class MaterialPoints:
 
     def _of_points(self, strains: Array) -> Array:
         """Strains of the points, by component, from those of the cells; (d, cells, n)."""
-        return np.einsum("nak,ck->acn", self._B, strains)
+        return np.asarray(np.einsum("nak,ck->acn", self._B, strains))
 
     def _resist(self) -> None:
         """Resistance after the openings so far."""
@@ -227,7 +235,8 @@ class MaterialPoints:
             small = (abs(R) <= digits) | (abs(δ) <= 1e-9 * abs(z))
             ends = ~done & small.all(axis=0)
             sizes = sizes + digits
-            before, part = _part_of(R, sizes), np.ones(done.shape)
+            before = _part_of(R, sizes)
+            part: Array = np.ones(done.shape)
             for _ in range(HALVINGS):
                 for name, value in zip(unknown, z - part * δ, strict=True):
                     at[name][:] = np.where(done, at[name], value)
@@ -273,7 +282,7 @@ class MaterialPoints:
         found, last = np.full_like(stress, np.nan), np.full_like(stress, np.inf)
         low, high = np.zeros_like(stress), np.full_like(stress, np.inf)
         over, slope = excess(low)
-        none = ~(opens & (over > 0))  # or over the limit by a last digit
+        none = np.logical_not(np.logical_and(opens, over > 0))  # or over the limit by a last digit
         a = np.where(slope < 0, np.fmin(bound, -over / slope), bound)
         for _ in range(2 * CORRECTIONS):
             before, (over, slope) = over, excess(a)
@@ -425,9 +434,9 @@ class MaterialPoints:
         stored = np.zeros((len(self.kept), 2))
         stored[:1] = self._stored  # of all cells together; to whom it belongs does not matter
         variables = [self.at[name] for name in self._variables]
-        return np.hstack([*variables, self.kept, self.strains0, stored])
+        return np.asarray(np.hstack([*variables, self.kept, self.strains0, stored]))
 
-    def restore(self, cells: Sequence[int] | Array, table: Array) -> None:
+    def restore(self, cells: Sequence[int] | Index, table: Array) -> None:
         """Take over :meth:`state` in some of the cells."""
         n = self.at["length"].shape[1]
         ends = np.arange(1, len(self._variables) + 1) * n

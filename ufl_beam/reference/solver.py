@@ -7,6 +7,7 @@ import math
 import sys
 from collections import defaultdict
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from petsc4py import PETSc
@@ -31,10 +32,10 @@ from ufl_beam.reference.beams import (
     inelastic_cells,
 )
 from ufl_beam.reference.cells import Force, Ledger
-from ufl_beam.reference.connector_laws import Setting
+from ufl_beam.reference.connector_laws import LawInStep, Setting
 from ufl_beam.reference.connectors import Connectors, connectors_of
 from ufl_beam.reference.loads import loads_of
-from ufl_beam.reference.points import Search
+from ufl_beam.reference.points import MaterialPoints, Search
 from ufl_beam.reference.state import Now
 from ufl_beam.reference.supports import Supports
 
@@ -92,7 +93,8 @@ class Solver:
         self._make_forces(v)
         self._make_snes(rtol, max_iterations, petsc)
         self._error: Exception | None = None
-        self._inner_before = np.zeros(grid.size)
+        self._inner: Array = np.zeros(grid.size)  # inner forces in the latest residual
+        self._inner_before: Array = self._inner
 
     def _make_forces(self, v: Array) -> None:
         """Read the scene into forces."""
@@ -126,7 +128,8 @@ class Solver:
             ledger.state["stored"] += 0.0
         laws = (law for c in self.connectors if isinstance(c, Connectors) for law in c.laws)
         points = (beams.points for beams in self.yielding)
-        self._open = [one for one in (*laws, *points) if one.softens]
+        everything: list[LawInStep | MaterialPoints] = [*laws, *points]
+        self._open = [one for one in everything if one.softens]
 
     # -- the initial state -----------------------------------------------------------------------
 
@@ -137,7 +140,7 @@ class Solver:
         """
         fresh, internal = internal is None, internal or {}
         v = None if self.inertia is None else self.inertia.v
-        loads = np.zeros(self.grid.size)
+        loads: Array = np.zeros(self.grid.size)
         if not fresh or (has_inertia(self.scheme) and self.scheme.kept):
             for load in self.loads:
                 loads = loads + load.equilibrium(self.t, self.q, v)
@@ -273,7 +276,7 @@ class Solver:
 
     def _make_snes(self, rtol: float, max_iterations: int, petsc: dict[str, Any]) -> None:
         n = len(self.supports.free)
-        self._rtol = rtol
+        self._rtol, self._last, self._best, self._slow = rtol, math.inf, math.inf, 0
         self._x, self._K = self.q, csr_array((self.grid.size, self.grid.size))
         self._vector, f = (PETSc.Vec().createSeq(n) for _ in range(2))
         self._matrix = PETSc.Mat().createAIJ((n, n), comm=PETSc.COMM_SELF)
@@ -428,10 +431,10 @@ class Solver:
         if self.parts == 0 and not self._continues and self._begins_loaded():
             begin = self.t
             end = begin + APPLYING * (t1 - begin)
-            self._in_parts(end, lambda to: self._apply_loads(to, begin, end))
+            self._in_parts(end, partial(self._apply_loads, begin=begin, end=end))
         while self.t != t1:
             end = self._next_sample(t1)
-            self._in_parts(end, lambda to, end=end: self._attempt(to, end))
+            self._in_parts(end, partial(self._attempt, end=end))
 
     def _in_parts(self, t1: float, attempt: Callable[[float], None]) -> None:
         """Go to ``t1`` at once, or in parts: halves, halves of these, and so on."""

@@ -44,7 +44,8 @@ class Supports:
         self.axes = csr_array(axes.tocsr())
         self.held = np.array(sorted(held), dtype=np.int64)
         self.free = np.setdiff1d(np.arange(grid.size), self.held)
-        self.reactions = self.before = np.zeros(grid.size)
+        self.reactions: Array = np.zeros(grid.size)
+        self.before: Array = self.reactions
         if self._motions:
             ledger.supplied["supports"] += 0.0
 
@@ -64,8 +65,9 @@ class Supports:
 
     def note(self, r: Array) -> None:
         """Note the reactions in a residual, which is in the axes of the supports."""
-        self.reactions = np.zeros(len(r))
-        self.reactions[self.held] = r[self.held]
+        reactions: Array = np.zeros(len(r))
+        reactions[self.held] = r[self.held]
+        self.reactions = reactions
 
     def accept(self, s: Array) -> None:
         """Enter the work of supports that move in a step of the nodes."""

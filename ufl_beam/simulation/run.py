@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import chain
-from typing import Any
+from typing import Any, cast
 
 from mpi4py import MPI
 
@@ -113,9 +113,10 @@ def simulate(
             require_plain(newton, "adaptive steps, dt = Adaptive(...)")
         if recorders or checkpoint is not None:
             require_plain(newton, "recorders" if recorders else "checkpoint")
+        number = number_of_steps(t1 - t0, cast(float, dt))
         return simulate_by_reference(
-            scene, scheme, newton, (t0, t1), number_of_steps(t1 - t0, dt), start=start, mesh=mesh,
-            every=every, most=most, comm=comm, progress=progress,
+            scene, scheme, newton, (t0, t1), number, start=start, mesh=mesh, every=every, most=most,
+            comm=comm, progress=progress,
         )  # fmt: skip
     keeper: Keeper | None = None
     if checkpoint is not None:
