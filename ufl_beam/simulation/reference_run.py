@@ -9,8 +9,9 @@ from typing import Any
 from mpi4py import MPI
 
 from ufl_beam.arrays import Snapshots
+from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ConvergenceError, StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.progress_bar import progress_bar
@@ -37,6 +38,11 @@ def simulate_by_reference(
     solver = Solver(grid, scheme, t0, q, v, rtol=newton.rtol, **options)
     same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
     solver.start(None if start is None else internal, same=same)
+    if start is not None and start.scheme == scheme and same_unknowns(start.grid, grid):
+        goes_on = same and "reactions" in internal and not len(start.v)
+        if goes_on or has_inertia(scheme):
+            solver.given, before = start.last_forces()
+            solver.q_before = q if before is None else before
     solution = Solution(scene, grid)
     solution.between = float(scheme.average(0.0, 1.0))
     solution.find_cell_forces(scheme, None)
