@@ -207,12 +207,6 @@ ACCELERATIONS = {
         ),
         (JOINTED,),
     ),
-    "all of them": Acceleration(
-        "The compiled path beside `Newton(reference=True)`, which is meant for reading and "
-        "comparison.",
-        by.SHIPPED, by.REFERENCE, (),
-        (ELASTIC, LARGE, HINGED, JOINTED),
-    ),
 }  # fmt: skip
 """Accelerations by name."""
 

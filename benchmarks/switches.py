@@ -124,7 +124,7 @@ EACH_STEP_ANEW = (step_solver, "Solver", EachStepAnew)
 AT_VELOCITY = (stepping, "Prediction", AtVelocity)
 STEPS_IN_PYTHON = (stepping, "compiled_steps", nothing)
 
-SHIPPED, STEPS, REFERENCE = "as shipped", "steps in Python", "`reference=True`"
+SHIPPED, STEPS = "as shipped", "steps in Python"
 MODIFIED, MODIFIED_STEPS = "`modified=True`", "`modified=True`, steps in Python"
 PETSC, PYTHON = "PETSc's `newtonls`", "`newtonls`, equation in Python"
 ASSEMBLERS = "`newtonls`, equation in Python, assemblers of DOLFINx"
@@ -159,6 +159,5 @@ VARIANTS = {
     POINTS: Variant((classes(inelastic=ReferenceInelasticBeams),)),
     NUMPY: Variant((classes(inelastic=ReferenceInelasticBeams, points=ReferencePoints),)),
     CONNECTORS: Variant((classes(couplings=ReferenceCouplings, slips=ReferenceSlips),)),
-    REFERENCE: Variant((), {"reference": True}),
 }
 """Variants of a simulation by name."""

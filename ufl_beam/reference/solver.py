@@ -94,7 +94,10 @@ class Solver:
         self.weights[grid.multipliers] = 0.0
         self.supports = Supports(grid, scheme, self.ledger)
         self._make_forces(v)
-        self._make_snes(rtol, max_iterations, petsc)
+        self._rtol, self._max_iterations, self._petsc = rtol, max_iterations, petsc
+        self._last, self._best, self._slow = math.inf, math.inf, 0
+        self._x, self._K = self.q, csr_array((grid.size, grid.size))
+        self._make_snes()
         self._error: Exception | None = None
         self.given: Array | None = None
         self._inner: Array = np.zeros(grid.size)  # inner forces in the latest residual
@@ -278,10 +281,9 @@ class Solver:
 
     # -- PETSc -----------------------------------------------------------------------------------
 
-    def _make_snes(self, rtol: float, max_iterations: int, petsc: dict[str, Any]) -> None:
-        n = len(self.supports.free)
-        self._rtol, self._last, self._best, self._slow = rtol, math.inf, math.inf, 0
-        self._x, self._K = self.q, csr_array((self.grid.size, self.grid.size))
+    def _make_snes(self) -> None:
+        """Make the SNES of a step, whose unknowns are the free degrees of freedom."""
+        petsc, n = self._petsc, len(self.supports.free)
         self._vector, f = (PETSc.Vec().createSeq(n) for _ in range(2))
         self._matrix = PETSc.Mat().createAIJ((n, n), comm=PETSc.COMM_SELF)
         self._matrix.setOption(PETSc.Mat.Option.NEW_NONZERO_ALLOCATION_ERR, False)
@@ -291,7 +293,7 @@ class Solver:
         snes.setFunction(self._function, f)
         snes.setJacobian(self._jacobian, self._matrix)
         snes.setConvergenceTest(self._converged)
-        snes.setTolerances(max_it=max_iterations)
+        snes.setTolerances(max_it=self._max_iterations)
         snes.setType("newtonls")
         snes.ksp.setType("preonly")
         snes.ksp.pc.setType("lu")
@@ -370,15 +372,29 @@ class Solver:
             self._x, self._error = guess, None
             self._last, self._best, self._slow = math.inf, math.inf, 0
             self._vector.array_w[:] = guess[self.supports.free]
-            self.snes.solve(None, self._vector)
-            self.iterations += self.snes.getIterationNumber()
+            reason = self._iterate()
             if self._error is not None and not isinstance(self._error, StepFailed):
                 raise self._error
-            if (reason := self.snes.getConvergedReason()) > 0:
+            if reason > 0:
                 return self._all(self._vector)
             for one in self.connectors:
                 one.again()
         raise self._error or self._failure(reason)
+
+    def _iterate(self) -> int:
+        """Let SNES iterate; return why it has stopped."""
+        try:
+            self.snes.solve(None, self._vector)
+        except PETSc.Error as error:  # also where a callback is interrupted
+            cause: BaseException = error
+            while cause.__cause__ is not None:
+                cause = cause.__cause__
+            if not isinstance(cause, PETSc.Error):
+                raise cause from None
+            self._make_snes()  # MUMPS has stopped it where it found no pivot
+            return int(PETSc.SNES.ConvergedReason.DIVERGED_LINEAR_SOLVE)
+        self.iterations += self.snes.getIterationNumber()
+        return int(self.snes.getConvergedReason())
 
     def _failure(self, reason: int) -> StepFailed:
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
