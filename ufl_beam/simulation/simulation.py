@@ -43,7 +43,7 @@ from ufl_beam.simulation.step_solver import (
 )
 from ufl_beam.simulation.watches import ForceWatch
 from ufl_beam.solvers.equation import Border
-from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.solvers.newton_options import Newton, require_plain
 from ufl_beam.solvers.petsc_options import checked_newton
 
 
@@ -100,11 +100,7 @@ class Simulation(StateView):
         comm = communicator(comm, "comm")
         require_number(t0, "t0")
         newton = checked_newton(newton, comm)
-        if newton.reference:
-            raise SceneError(
-                "Newton(reference=True): a Simulation runs compiled code; only simulate() can call "
-                "the reference package instead"
-            )
+        require_plain(newton, "Simulation" if kind is Solution else "follow")
         if not (isinstance(kind, type) and issubclass(kind, Solution)):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
         if start is not None:
