@@ -32,20 +32,6 @@ class Acceleration(NamedTuple):
 
 
 ACCELERATIONS = {
-    "cell loops in C": Acceleration(
-        "A loop over the cells calls FFCx's kernels and adds their results to known entries of "
-        "vector and matrix. Without it, `fem.assemble_vector` and `fem.assemble_matrix` evaluate "
-        "the same forms, and NumPy adds the results.",
-        by.PYTHON, by.ASSEMBLERS,
-        (
-            "discretization/compiled_forms.py:Kernel", "discretization/compiled_forms.py:prepared",
-            "discretization/compiled_forms.py:Prepared",
-            "discretization/compiled_forms.py:tabulator", "compiled/c/loops.c:in_cell",
-            "compiled/c/loops.c:set_cells", "compiled/c/loops.c:put_in_cell",
-            "compiled/c/loops.c:add_cells", "compiled/c/loops.c:add_static_tangent",
-            "compiled/c/loops.c:value_of_cells",
-        ),
-    ),
     "equation in C": Acceleration(
         "SNES calls residual and tangent in C, which call the loops of all terms one after the "
         "other. Without it, SNES calls Python, which calls the same loops. Several processes and "
@@ -58,10 +44,10 @@ ACCELERATIONS = {
             "solvers/equation.py:Equation.demand_in_python", "solvers/equation.py:_lent",
             "solvers/equation.py:add_in_python", "solvers/equation.py:missed_in_python",
             "terms/base.py:Term.loops", "terms/beams.py:ElasticBeams.loops",
-            "terms/inelastic_beams.py:CompiledInelasticBeams.loops",
+            "terms/inelastic_beams.py:InelasticBeams.loops",
             "terms/forms_and_matrices.py:OfForms.loops",
             "terms/forms_and_matrices.py:OfMatrix.loops", "terms/dead_loads.py:DeadLoads.loops",
-            "terms/connectors.py:CompiledCouplings.loops", "compiled/csr.py:StepProduct.loops",
+            "terms/connectors.py:Couplings.loops", "compiled/csr.py:StepProduct.loops",
             "compiled/c/newton.c:residual", "compiled/c/newton.c:assemble",
             "compiled/c/newton.c:snes_function", "compiled/c/newton.c:snes_jacobian",
             "compiled/c/newton.c:snes_test", "compiled/c/newton.c:verdict",
@@ -74,8 +60,8 @@ ACCELERATIONS = {
         (
             "solvers/newton.py:Solver._leave_newton_to_c",
             "solvers/static_condensation.py:ChainsFirst.drive",
-            "solvers/direct_solver.py:DirectSolver.drive", "compiled/c/newton.c:factor_tangent",
-            "compiled/c/newton.c:solve_tangent", "compiled/c/newton.c:snes_newton",
+            "compiled/c/newton.c:factor_tangent", "compiled/c/newton.c:solve_tangent",
+            "compiled/c/newton.c:snes_newton",
         ),
     ),
     "steps in C": Acceleration(
@@ -98,7 +84,7 @@ ACCELERATIONS = {
             "discretization/compiled_forms.py:vectorise",
             "discretization/compiled_forms.py:Kernel.address_in_lanes",
             "discretization/compiled_forms.py:Kernel.compute_in_lanes",
-            "discretization/function_spaces.py:CompiledFields._coordinates_in_lanes",
+            "discretization/function_spaces.py:Fields._coordinates_in_lanes",
         ),
     ),
     "elimination along beams": Acceleration(
@@ -107,17 +93,6 @@ ACCELERATIONS = {
         "tangent, called from the same Newton's method in C. Several processes share all of this "
         "but what is at their borders.",
         by.SHIPPED, by.WHOLE,
-        (
-            "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
-            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:_plan",
-            "solvers/static_condensation.py:_what_is_left",
-            "solvers/static_condensation.py:Elimination",
-        ),
-    ),
-    "elimination beside `DirectSolver`": Acceleration(
-        "The same beside `DirectSolver` of the reference path, which copies the tangent and "
-        "factors it by KLU. Both are called by PETSc's `newtonls`.",
-        by.PETSC, by.KLU,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
             "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:_plan",
@@ -167,50 +142,6 @@ ACCELERATIONS = {
             "solvers/convergence.py~like_last|rate", "solvers/newton.py~like_last",
             "simulation/step_solver.py~like_last", "simulation/prediction.py~like_last",
         ),
-        (ELASTIC, LARGE, HINGED, JOINTED),
-    ),
-    "cells with points in C": Acceleration(
-        "One loop evaluates strains, points and forces of cells that yield or break, once for "
-        "each iterate. Without it, Python calls these three in turn, and evaluates the points for "
-        "the residual and again for the tangent.",
-        by.SHIPPED, by.POINTS,
-        (
-            "terms/inelastic_beams.py:CompiledInelasticBeams",
-            "compiled/c/material_points.c:linearise",
-            "compiled/c/material_points.c:respond_at",
-            "compiled/c/material_points.c:add_inelastic_force",
-            "compiled/c/material_points.c:add_inelastic_tangent",
-        ),
-        (HINGED,),
-    ),
-    "return map in C": Acceleration(
-        "Points are evaluated one after the other, with laws and tangents that UFL derives and "
-        "FFCx compiles. Without it, NumPy evaluates the laws at all points at once, with tangents "
-        "by complex steps. In both variants, Python calls the cells.",
-        by.POINTS, by.NUMPY,
-        (
-            "terms/compiled_points.py", "compiled/c/material_points.c:ask",
-            "compiled/c/material_points.c:growth", "compiled/c/material_points.c:respond",
-            "compiled/c/material_points.c:release", "compiled/c/material_points.c:commit",
-            "discretization/compiled_forms.py:Pointwise",
-        ),
-        (HINGED,),
-    ),
-    "connectors in C": Acceleration(
-        "Evaluates motions, forces and laws of springs and plastic hinges of zero length in C. "
-        "Without it, DOLFINx assembles their forms and NumPy evaluates the slips, called by "
-        "Python.",
-        by.SHIPPED, by.CONNECTORS,
-        (
-            "terms/connectors.py:CompiledCouplings", "terms/compiled_slips.py",
-            "compiled/c/connectors.c", "compiled/c/rigid_plastic.c",
-        ),
-        (JOINTED,),
-    ),
-    "all of them": Acceleration(
-        "The compiled path beside `Newton(reference=True)`, which is meant for reading and "
-        "comparison.",
-        by.SHIPPED, by.REFERENCE, (),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
 }  # fmt: skip

@@ -15,19 +15,12 @@ import ufl_beam as ub
 from ufl_beam.compiled import c_library
 from ufl_beam.compiled.jit import compiled
 from ufl_beam.discretization import function_spaces
-from ufl_beam.discretization.dolfinx_forms import DolfinxFields
 from ufl_beam.simulation import simulation as stepping
 from ufl_beam.simulation import step_solver
-from ufl_beam.simulation.evaluation import COMPILED
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers import newton, static_condensation
-from ufl_beam.solvers.direct_solver import DirectSolver
 from ufl_beam.solvers.klu import Klu
-from ufl_beam.terms.connectors import ReferenceCouplings
-from ufl_beam.terms.inelastic_beams import ReferenceInelasticBeams
-from ufl_beam.terms.reference_points import ReferencePoints
-from ufl_beam.terms.reference_slips import ReferenceSlips
 
 plan = static_condensation._plan
 
@@ -109,11 +102,6 @@ class Variant(NamedTuple):
             return ub.Simulation(scene, ub.Midpoint(), newton=ub.Newton(**self.newton))
 
 
-def classes(**others):
-    """Other classes in the place of some of the compiled ones."""
-    return stepping, "COMPILED", COMPILED._replace(**others)
-
-
 NEWTON_OF_PETSC = (newton.Solver, "_leave_newton_to_c", nothing)
 EQUATION_IN_PYTHON = (StepEquation, "leave_to_c", nothing)
 CELL_BY_CELL = (function_spaces, "vectorise", nothing)
@@ -124,41 +112,26 @@ EACH_STEP_ANEW = (step_solver, "Solver", EachStepAnew)
 AT_VELOCITY = (stepping, "Prediction", AtVelocity)
 STEPS_IN_PYTHON = (stepping, "compiled_steps", nothing)
 
-SHIPPED, STEPS, REFERENCE = "as shipped", "steps in Python", "`reference=True`"
+SHIPPED, STEPS = "as shipped", "steps in Python"
 MODIFIED, MODIFIED_STEPS = "`modified=True`", "`modified=True`, steps in Python"
 PETSC, PYTHON = "PETSc's `newtonls`", "`newtonls`, equation in Python"
-ASSEMBLERS = "`newtonls`, equation in Python, assemblers of DOLFINx"
-SCALAR, WHOLE, KLU, LEFT = (
-    "cell by cell",
-    "fronts of the whole tangent",
-    "`newtonls`, KLU of the whole tangent",
-    "KLU in the place of fronts",
-)
+SCALAR, WHOLE = "cell by cell", "fronts of the whole tangent"
+LEFT = "KLU in the place of fronts"
 TANGENTS, VELOCITY = "a tangent in each iteration", "guess at the last velocity"
 ANEW = "`modified=True`, steps in Python, a tangent in each"
-POINTS, NUMPY = "cells with points in Python", "cells and return map in Python"
-CONNECTORS = "connectors in Python"
 
 VARIANTS = {
     SHIPPED: Variant(),
     STEPS: Variant((STEPS_IN_PYTHON,)),
     PETSC: Variant((STEPS_IN_PYTHON, NEWTON_OF_PETSC)),
     PYTHON: Variant((EQUATION_IN_PYTHON,)),
-    ASSEMBLERS: Variant(
-        (classes(fields=DolfinxFields, inelastic=ReferenceInelasticBeams, in_c=False),)
-    ),
     SCALAR: Variant((CELL_BY_CELL,)),
     WHOLE: Variant((NO_CHAINS,)),
-    KLU: Variant((STEPS_IN_PYTHON, NEWTON_OF_PETSC, classes(factors=DirectSolver))),
     LEFT: Variant((NO_FRONTS,)),
     TANGENTS: Variant((ALL_TANGENTS,)),
     VELOCITY: Variant((AT_VELOCITY,)),
     MODIFIED: Variant((), {"modified": True}),
     MODIFIED_STEPS: Variant((STEPS_IN_PYTHON,), {"modified": True}),
     ANEW: Variant((STEPS_IN_PYTHON, EACH_STEP_ANEW), {"modified": True}),
-    POINTS: Variant((classes(inelastic=ReferenceInelasticBeams),)),
-    NUMPY: Variant((classes(inelastic=ReferenceInelasticBeams, points=ReferencePoints),)),
-    CONNECTORS: Variant((classes(couplings=ReferenceCouplings, slips=ReferenceSlips),)),
-    REFERENCE: Variant((), {"reference": True}),
 }
 """Variants of a simulation by name."""

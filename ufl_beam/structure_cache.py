@@ -10,11 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import lru_cache, wraps
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar, cast
 
 import numpy as np
 
 T = TypeVar("T", bound=tuple[Any, ...])
+P = ParamSpec("P")
+Stated = TypeVar("Stated")
 
 KEPT = 64
 """Results that are kept of each function."""
@@ -24,6 +26,11 @@ LARGEST = 2**16
 
 That are some 500 cells, of which a hundred steps take longer than all of the building.
 """
+
+
+def stated(function: Callable[P, Stated]) -> Callable[P, Stated]:
+    """Call a function that states forms once in a process with the same arguments."""
+    return cast("Callable[P, Stated]", lru_cache(maxsize=128)(function))
 
 
 def of_structure(function: Callable[..., T]) -> Callable[..., T]:

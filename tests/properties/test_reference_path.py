@@ -1,33 +1,35 @@
 # SPDX-License-Identifier: MIT
-"""The compiled path and the reference path find the same motions, forces and energies.
+"""The reference solver finds the same motions, forces and energies as a run.
 
-They share the records of a scene, the numbering, the time scheme and the algebra of vectors.  What
-C evaluates in one, DOLFINx, NumPy and PETSc evaluate in the other: forms, return maps, laws of
-connectors, factorization, Newton's method.
+They share the records of a scene, the numbering, the time schemes, and what states the mechanics.
+The equation of a step, its solution, the return map, the laws of connectors and the ledger are
+written twice.
 """
 
 from mpi4py import MPI
 
+import any_scene
 import numpy as np
 import pytest
-from any_scene import STEPS, script
+import random_machines
 
 import ufl_beam as ub
-from ufl_beam.discretization.dolfinx_forms import DolfinxForm
-from ufl_beam.solvers.direct_solver import DirectSolver
-from ufl_beam.terms.connectors import ReferenceCouplings
-from ufl_beam.terms.reference_points import ReferencePoints
-from ufl_beam.terms.reference_slips import ReferenceSlips
+from ufl_beam.mechanics.tangents import Tangents
+from ufl_beam.reference import beams, cells, connectors, loads, points
+from ufl_beam.reference.connector_laws import _Slipping
+from ufl_beam.reference.solver import Solver
 
-WANDERING = (1, 19, 25, 26, 32, 36, 38, 45)
-"""Scenes in whose steps Newton's method wanders, so that round-off decides where a step is cut.
+WANDERING = (9, 19, 22, 25, 26, 32, 35, 36, 38, 42, 43, 45, 60, 79, 83, 86, 99, 106, 111, 115)
+"""Scenes in whose steps Newton's method wanders, so that round-off decides where a step is cut."""
 
-In 1 and 45 that of the reference path needs more cuts: its points choose between flow and elastic
-response by strains.
-"""
-
-SEEDS = [seed for seed in range(48) if seed not in WANDERING]
+SEEDS = [*(seed for seed in range(120) if seed not in WANDERING), 165]
 """Scenes that have, between them, every object, law and scheme that `any_scene` draws."""
+
+MACHINES = [0, 1, 5, 6, 8, 10, 11, *range(14, 21), 22, 23, *range(25, 32), 33, 34, 35, 37, 38]
+"""Random machines, whose parts are up to 1e9 times as stiff as others.
+
+In those left out steps are cut, or forces have lost the digits that stiff parts take.
+"""
 
 SAME = 1e-9
 """Difference as a part of the largest motion or force, or of the energy that went through.
@@ -36,188 +38,269 @@ Newton's method stops at 1e-12 of the forces; conditions of the scenes magnify t
 times in 15 steps.
 """
 
-pytestmark = pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
+COLUMNS = "motion", "force", "work", "rate", "dissipated"
+"""Of the history of a connector; forces are in the configuration."""
+
+pytestmark = [
+    pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning"),
+    pytest.mark.skipif(MPI.COMM_WORLD.size > 1, reason="the reference solver has one process"),
+]
 
 
-def run(seed, *, reference):
-    """The solution of a scene, as far as it goes."""
+def made(source, steps):
+    """Scene, scheme, times, length of equal steps and mesh that a script makes."""
     names = {}
-    exec(script(seed), names)
+    exec(source, names)
+    times = names.get("times") or (0.0, steps * names["dt"])
+    return names["scene"], names["scheme"], times, (times[1] - times[0]) / steps, names.get("mesh")
+
+
+def run(case, *, reference):
+    """The solution of a scene, as far as it goes."""
+    scene, scheme, times, dt, mesh = case
     newton = ub.Newton(rtol=1e-12, reference=reference)
-    scene, scheme, times = (names[name] for name in ("scene", "scheme", "times"))
     try:
-        return ub.simulate(
-            scene, scheme, t=times, dt=names["dt"], mesh=names["mesh"], newton=newton
-        )
+        return ub.simulate(scene, scheme, t=times, dt=dt, mesh=mesh, newton=newton, progress=False)
     except ub.ConvergenceError as error:
         return error.solution
 
 
 def difference(a, b):
-    """Largest difference, as a part of the largest size."""
+    """Largest difference, as a part of the largest size; what is no number is in both."""
     a, b = np.asarray(a), np.asarray(b)
     assert a.shape == b.shape
-    return np.abs(a - b).max(initial=0.0) / (np.abs(b).max(initial=0.0) or 1.0)
+    assert np.array_equal(np.isnan(a), np.isnan(b))
+    size = np.abs(np.nan_to_num(b)).max(initial=0.0)
+    return np.abs(np.nan_to_num(a - b)).max(initial=0.0) / (size or 1.0)
 
 
-def differences(compiled, reference):
+def differences(found, reference):
     """Largest differences of all kinds of results, by name."""
-    found = {"times": difference(compiled.times, reference.times)}
-    found["motions and forces"] = difference(compiled.q, reference.q)
-    mine, others = (_forces(solution) for solution in (compiled, reference))
+    if len(found) != len(reference):
+        return {"number of steps": np.inf}
+    scene, through = reference.scene, reference.energy.throughput or 1.0
+    every = {"times": (found.times, reference.times), "q": (found.q, reference.q)}
+    every["velocities"] = found.v, reference.v
+    mine, others = (_forces(solution) for solution in (found, reference))
     for name, part in (("forces", slice(0, 2)), ("moments", slice(2, 3))):
-        found[name] = difference(mine[..., part], others[..., part])
-    through = reference.energy.throughput or 1.0
+        every[name] = mine[..., part], others[..., part]
+    of = {name: difference(*pair) for name, pair in every.items()}
     for kind in ("state", "supplied", "lost"):
-        mine, others = getattr(compiled.energy, kind), getattr(reference.energy, kind)
+        mine, others = getattr(found.energy, kind), getattr(reference.energy, kind)
         assert set(mine) == set(others)
         for name in mine:
-            found[name] = np.abs(mine[name] - others[name]).max() / through
-    return found
+            of[name] = np.abs(mine[name] - others[name]).max() / through
+    for link in scene.links:
+        size = 1.0 if link.turns else scene.size
+        pairs = [*zip(found.connector(link), reference.connector(link), strict=True)]
+        sizes = size, np.inf, through, size / (found.times[-1] - found.times[0]), through
+        for name, pair, of_size in zip(COLUMNS, pairs, sizes, strict=True):
+            of[f"{name} of {link}"] = np.abs(np.nan_to_num(pair[0] - pair[1])).max() / of_size
+    return of
 
 
 def _forces(solution):
     """Reactions, and forces and moments in two cells of each beam, at all times."""
-    places = [beam.at(s) for beam in solution.scene.beams for s in (0.3, 0.8)]
-    reactions = [solution.reaction(support) for support in solution.scene.supports]
+    scene = solution.scene
+    reactions = [solution.reaction(support) for support in scene.supports]
+    places = [beam.at(s) for beam in scene.beams for s in (0.3, 0.8)]
     return np.array([*reactions, *(solution.section_forces_at(place) for place in places)])
 
 
-@pytest.mark.parametrize("seed", SEEDS if MPI.COMM_WORLD.size == 1 else SEEDS[::6])
-def test_both_paths_agree(seed):
-    found = differences(run(seed, reference=False), run(seed, reference=True))
+def require_same(case):
+    found = differences(run(case, reference=False), run(case, reference=True))
     assert max(found.values()) < SAME, {k: v for k, v in found.items() if not v < SAME}
 
 
-@pytest.mark.serial
 @pytest.mark.parametrize("seed", SEEDS)
-def test_residuals_and_tangents_agree(seed):
-    """Somewhere off equilibrium, so that nothing hides behind a converged solution."""
-    names = {}
-    exec(script(seed), names)
-    found = []
-    for reference in (False, True):
-        simulation = ub.Simulation(
-            names["scene"], names["scheme"], mesh=names["mesh"], comm=MPI.COMM_SELF,
-            newton=ub.Newton(rtol=1e-12, reference=reference),
-        )  # fmt: skip
-        t0, dt = names["times"][0], (names["times"][1] - names["times"][0]) / STEPS
-        simulation.step_to(t0 + dt)
-        x = simulation.supports.in_axes(simulation.q + step(simulation.share))
-        simulation.ask()
-        simulation.equation.begin(
-            names["scheme"].step(t0 + dt, t0 + 2 * dt, t0 + 2 * dt, simulation.q)
-        )
-        r = np.empty(len(x))
-        simulation.equation.residual(x, r)
-        simulation.equation.tangent(x)
-        found.append((r, simulation.equation.A.data.copy()))
-        simulation.close()
-    for compiled, reference in zip(*found, strict=True):
-        # States of both differ by the tolerance of one step.
-        assert difference(compiled, reference) < SAME
+def test_scenes(seed):
+    require_same(made(any_scene.script(seed), any_scene.STEPS))
 
 
-def step(share):
-    """Motions and forces at random, small enough that no node turns far."""
-    random = np.random.default_rng(5)
-    return 1e-3 * share.grid.scene.size * random.uniform(-1, 1, share.size)
+@pytest.mark.parametrize("seed", MACHINES)
+def test_machines(seed):
+    require_same(made(random_machines.script(seed), random_machines.STEPS))
 
 
-@pytest.mark.serial
 def test_the_scenes_have_everything():
     """The seeds above leave out nothing that hundreds of scenes have."""
 
     def names(seeds):
-        words = " ".join(script(seed) for seed in seeds).split("ub.")[1:]
+        words = " ".join(any_scene.script(seed) for seed in seeds).split("ub.")[1:]
         return {word.split("(")[0] for word in words}
 
     assert names(SEEDS) == names(range(200))
 
 
-# -- mistakes that are found ---------------------------------------------------------------------
+@pytest.mark.parametrize("seed", SEEDS[:40])
+def test_residuals_and_tangents(seed):
+    """Somewhere off equilibrium, so that nothing hides behind a converged solution."""
+    scene, scheme, (t0, _), dt, mesh = made(any_scene.script(seed), any_scene.STEPS)
+    newton = ub.Newton(rtol=1e-12)
+    simulation = ub.Simulation(scene, scheme, mesh=mesh, newton=newton, comm=MPI.COMM_SELF)
+    equation, supports = simulation.equation, simulation.supports
+    solver = Solver(
+        simulation.grid, scheme, t0, simulation.q, initial_velocities(simulation), rtol=1e-12,
+        max_iterations=30, petsc={},
+    )  # fmt: skip
+    solver.start(None, same=False)
+    simulation.step_to(t0 + dt)
+    solver.step_to(t0 + dt)
+    random = np.random.default_rng(5)
+    to = simulation.q + 1e-3 * scene.size * random.uniform(-1, 1, len(simulation.q))
+    simulation.ask()
+    equation.begin(scheme.step(t0 + dt, t0 + 2 * dt, t0 + 2 * dt, simulation.q))
+    equation.restart(Tangents.EXACT)
+    r, x = np.empty(len(to)), supports.in_axes(to)
+    equation.residual(x, r)
+    equation.tangent(x)
+    K = dense(equation.A)
+    solver.ask()
+    solver.begin(scheme.step(t0 + dt, t0 + 2 * dt, t0 + 2 * dt, solver.q))
+    of_solver, free = solver.residual(x), solver.supports.free
+    # States of both differ by the tolerance of one step.
+    assert difference(r, of_solver) < SAME
+    tangent = solver.tangent(x).toarray()
+    assert difference(K[np.ix_(free, free)], tangent[np.ix_(free, free)]) < SAME
+    simulation.close()
+
+
+def initial_velocities(simulation):
+    return simulation.inertia.v if simulation.scheme.dynamic else np.zeros(len(simulation.q))
+
+
+def dense(A):
+    """A matrix of the package as one of NumPy."""
+    K = np.zeros((A.size, A.size))
+    K[A.rows(), A.indices] = A.data
+    return K
+
+
+# -- start and refusals ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "scheme", [ub.Midpoint(0.1), ub.DecayingMidpoint(), ub.GeneralizedAlpha(0.6)]
+)
+@pytest.mark.parametrize("first", [False, True])
+def test_a_run_begins_where_another_one_ends(scheme, first):
+    """Of either kind; internal variables and what the scheme keeps go on."""
+    options = {"dt": 2e-3, "progress": False}
+    newton = {one: ub.Newton(rtol=1e-12, reference=one) for one in (False, True)}
+    scene = yielding()
+    begun = ub.simulate(scene, scheme, t=(0, 0.1), newton=newton[first], **options)
+    one, other = (
+        ub.simulate(scene, scheme, t=(0.1, 0.12), newton=newton[by], start=begun, **options)
+        for by in (False, True)
+    )
+    assert max(differences(one, other).values()) < SAME
+
+
+def test_what_it_does_not_compute():
+    scene, newton = yielding(), ub.Newton(reference=True)
+    times = {"t": (0, 0.1), "newton": newton, "progress": False}
+    calls = {
+        "adaptive steps": lambda: ub.simulate(scene, ub.Midpoint(), dt=ub.Adaptive(1e-3), **times),
+        "recorders": lambda: ub.simulate(
+            scene, ub.Midpoint(), dt=0.01, record=ub.Extremes(), **times
+        ),
+        "Simulation": lambda: ub.Simulation(scene, ub.Midpoint(), newton=newton),
+        "follow": lambda: ub.follow(scene, ub.LoadControl(0.1), steps=1, newton=newton),
+    }
+    for what, call in calls.items():
+        with pytest.raises(ub.SceneError, match=f"reference=True does not go with {what}"):
+            call()
+
+
+def test_a_step_without_equilibrium():
+    """The solution so far comes with the error, as that of a run does."""
+    section = ub.Section(EA=1e6, GA=4e5, EI=800.0, hinge=ub.Softening(40.0, energy=15.0))
+    beam = ub.Beam((0, 0), (0, 1), section, cells=3)
+    push = ub.PointLoad(beam.end, force=(100.0, 0.0), time=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    newton = ub.Newton(reference=True)
+    with pytest.raises(ub.ConvergenceError, match="no equilibrium after t = 0") as failure:
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, newton=newton, progress=False)
+    assert 0.39 < failure.value.solution.times[-1] <= 0.48 + 1e-9  # 40 N m over 1 m to 5/6 m
+
+
+# -- mistakes that are found -----------------------------------------------------------------------
 
 
 def sign_of_jump(patch):
     """A hinge that opens adds to the strain of the bulk."""
-    flow = ReferencePoints._flow
-
-    def wrong(self, at):
-        return flow(self, {**at, "jump": -at["jump"]})
-
-    patch.setattr(ReferencePoints, "_flow", wrong)
+    bulk = points.MaterialPoints._bulk
+    wrong = lambda self, at: bulk(self, {**at, "jump": -at["jump"]})  # noqa: E731
+    patch.setattr(points.MaterialPoints, "_bulk", wrong)
 
 
 def hardening_twice(patch):
     """Accumulated plastic strain counts twice."""
-    commit = ReferencePoints._commit
+    commit = points.MaterialPoints._commit
 
-    def wrong(self, storage, e0, kept):
-        before = self._state(storage)["state accumulated"].copy()
-        sums = commit(self, storage, e0, kept)
-        accumulated = self._state(storage)["state accumulated"]
-        accumulated += accumulated - before
+    def wrong(self):
+        before = self.at["state accumulated"].copy()
+        sums = commit(self)
+        self.at["state accumulated"] += self.at["state accumulated"] - before
         return sums
 
-    patch.setattr(ReferencePoints, "_commit", wrong)
+    patch.setattr(points.MaterialPoints, "_commit", wrong)
 
 
 def factor_of_forms(patch):
-    """Forms on cells are too large by a part in a million."""
-    add = DolfinxForm.add
-
-    def wrong(self, q, b):
-        before = b.copy()
-        add(self, q, b)
-        b += 1e-6 * (b - before)
-
-    patch.setattr(DolfinxForm, "add", wrong)
+    """Forms are too large by a part in a million."""
+    vector = cells.Form.vector
+    patch.setattr(cells.Form, "vector", lambda self: (1 + 1e-6) * vector(self))
 
 
 def motion_of_connectors(patch):
     """Relative motions are too large by a part in a million."""
-    motion = ReferenceCouplings.motion
-    patch.setattr(ReferenceCouplings, "motion", lambda self, q: (1 + 1e-6) * motion(self, q))
+    motion = connectors.Connectors.motion
+    wrong = lambda self, q: (1 + 1e-6) * motion(self, q)  # noqa: E731
+    patch.setattr(connectors.Connectors, "motion", wrong)
 
 
 def limit_of_slips(patch):
     """Plastic hinges of zero length slip at a limit that is too small."""
-    rows = ReferenceSlips.rows
+    direction = _Slipping._direction
 
-    def wrong(self, e1, λ):
+    def wrong(self, motion, λ):
         self._limit *= 0.9
         try:
-            return rows(self, e1, λ)
+            return direction(self, motion, λ)
         finally:
             self._limit /= 0.9
 
-    patch.setattr(ReferenceSlips, "rows", wrong)
+    patch.setattr(_Slipping, "_direction", wrong)
 
 
 def energy_of_points(patch):
     """What points dissipate is entered with the wrong sign."""
-    commit = ReferencePoints._commit
+    commit = points.MaterialPoints._commit
 
-    def wrong(self, storage, e0, kept):
-        return commit(self, storage, e0, kept) * [-1, 1, 1, 1, 1, 1, 1]
+    def wrong(self):
+        plastic, *others = commit(self)
+        return -plastic, *others
 
-    patch.setattr(ReferencePoints, "_commit", wrong)
+    patch.setattr(points.MaterialPoints, "_commit", wrong)
 
 
-def solution_of_tangent(patch):
-    """Corrections are a part in ten too small; convergence to 1e-12 makes up for it."""
-    apply = DirectSolver.apply
+def time_of_loads(patch):
+    """Loads are taken at the end of the step."""
+    begin = loads.DeadLoad.begin
+    wrong = lambda self, step: begin(self, step._replace(load_time=step.t1))  # noqa: E731
+    patch.setattr(loads.DeadLoad, "begin", wrong)
 
-    def wrong(self, pc, b, x):
-        apply(self, pc, b, x)
-        x.scale(0.9)
 
-    patch.setattr(DirectSolver, "apply", wrong)
+def mass_of_beams(patch):
+    """Inertia is too large by a part in a million."""
+    rate = beams.MatrixForce.rate
+    patch.setattr(beams.MatrixForce, "rate", lambda self, q1: (1 + 1e-6) * rate(self, q1))
 
 
 MISTAKES = [
     sign_of_jump, hardening_twice, factor_of_forms, motion_of_connectors, limit_of_slips,
-    energy_of_points,
+    energy_of_points, time_of_loads, mass_of_beams,
 ]  # fmt: skip
 
 
@@ -247,39 +330,27 @@ def yielding():
     )
 
 
-def simulated(reference):
-    newton = ub.Newton(rtol=1e-12, reference=reference)
-    return ub.simulate(yielding(), ub.Midpoint(0.1), t=(0, 0.12), dt=2e-3, newton=newton)
+@pytest.fixture(scope="module")
+def case():
+    """The scene with everything that yields."""
+    return yielding(), ub.Midpoint(0.1), (0, 0.12), 2e-3, None
 
 
 @pytest.fixture(scope="module")
-def compiled():
-    """The scene with everything that yields, computed in C."""
-    return simulated(reference=False)
+def compiled(case):
+    """Its solution by a run."""
+    return run(case, reference=False)
 
 
-def test_everything_yields(compiled):
+def test_everything_yields(case, compiled):
     """That the mistakes below can show."""
     lost = compiled.energy.lost
     assert lost["plastic"][-1] > 1.0
     assert lost["hinges"][-1] > 1.0
-    assert max(differences(compiled, simulated(reference=True)).values()) < SAME
+    assert max(differences(compiled, run(case, reference=True)).values()) < SAME
 
 
-@pytest.mark.serial
 @pytest.mark.parametrize("mistake", MISTAKES)
-def test_a_mistake_is_found(mistake, compiled, monkeypatch):
+def test_a_mistake_is_found(mistake, case, compiled, monkeypatch):
     mistake(monkeypatch)
-    try:
-        found = simulated(reference=True)
-    except ub.ConvergenceError as error:
-        found = error.solution
-    if len(found.times) == len(compiled.times):
-        assert max(differences(compiled, found).values()) > SAME
-
-
-@pytest.mark.serial
-def test_an_inexact_tangent_is_no_mistake(compiled, monkeypatch):
-    """Only the number of iterations tells it."""
-    solution_of_tangent(monkeypatch)
-    assert max(differences(compiled, simulated(reference=True)).values()) < SAME
+    assert max(differences(compiled, run(case, reference=True)).values()) > SAME

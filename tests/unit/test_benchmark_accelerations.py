@@ -7,8 +7,6 @@ from pathlib import Path
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.solvers.direct_solver import DirectSolver
 
 ROOT = Path(__file__).parents[2]
 
@@ -86,12 +84,10 @@ def test_what_is_switched_off(bench, advanced):
     assert shipped.solver._factors._elimination.c.chains == 2  # from both ends
     assert snes(advanced(switches.PETSC)) == "newtonls"
     assert not advanced(switches.PYTHON).equation.in_c
-    assert not isinstance(advanced(switches.ASSEMBLERS).beams[0]._force, Kernel)
     assert advanced(switches.SCALAR).beams[0]._force.cells.lanes == 1
     whole = advanced(switches.WHOLE)
     assert snes(whole) == "shell"
     assert whole.solver._factors._elimination.c.left_size == len(whole.q)
-    assert isinstance(advanced(switches.KLU).solver._factors, DirectSolver)
 
 
 def test_kept_tangents_are_switched_off(bench):
@@ -115,8 +111,7 @@ def test_nothing_stays_replaced(bench, advanced):
     import switches
 
     for name in switches.VARIANTS:
-        if name not in {switches.POINTS, switches.NUMPY, switches.CONNECTORS}:
-            advanced(name)
+        advanced(name)
     simulation = advanced(switches.SHIPPED)
     assert simulation.equation.in_c
     assert simulation.solver._snes.getType() == "shell"
@@ -149,7 +144,7 @@ def test_gains_are_ratios_within_a_round(bench):
     found = bench.gains(cases(bench, {"as shipped": 1.0, "cell by cell": 1.5}))
     assert found["SIMD kernels"]["elastic", 64] == pytest.approx(1.5)
     assert found["equation in C"]["hinged", 8] == pytest.approx(1.0)
-    assert {scene for scene, _ in found["return map in C"]} == {"hinged"}
+    assert {scene for scene, _ in found["SIMD kernels"]} == {"elastic", "hinged", "jointed"}
 
 
 def test_what_gains_too_little_is_to_be_deleted(bench):
@@ -168,7 +163,7 @@ def test_lines_of_code(bench):
             assert accelerations.lines_of(place)
     text = (ROOT / "ufl_beam/compiled/c/elimination.c").read_text(encoding="utf-8")
     assert accelerations.count(["compiled/c/elimination.c"]) == len(text.splitlines())
-    nested = ["simulation/evaluation.py:Classes", "simulation/evaluation.py"]
+    nested = ["solvers/klu.py:Klu", "solvers/klu.py"]
     assert accelerations.count(nested) == accelerations.count(nested[1:])
     start = min(accelerations.lines_of("compiled/c/newton.c:snes_newton"))[1]
     lines = (ROOT / "ufl_beam/compiled/c/newton.c").read_text(encoding="utf-8").splitlines()

@@ -20,8 +20,8 @@ from ufl_beam.compiled.c_library import ffi, in_order, lib, names, petsc
 from ufl_beam.discretization import compiled_forms
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
+from ufl_beam.mechanics.point_equations import inputs as inputs_of_points
 from ufl_beam.terms import rigid_plastic
-from ufl_beam.terms.point_equations import inputs as inputs_of_points
 from ufl_beam.terms.supports import Supports
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes

@@ -434,7 +434,7 @@ def test_a_kernel_without_vectors_is_remembered(place, tmp_path):
     source.write_text("nothing")
     for _ in range(2):
         simd_kernels.in_lanes.cache_clear()
-        assert simd_kernels.in_lanes(source, 0, (1, 1, 0)) is None
+        assert simd_kernels.in_lanes(source, 0, (1, 1, 0), (0, 1)) is None
     assert len([path for path in place.iterdir() if path.is_dir()]) == 1
 
 

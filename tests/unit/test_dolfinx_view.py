@@ -13,8 +13,6 @@ from ufl_beam.discretization.dolfinx_forms import DolfinxFields
 from ufl_beam.output import dolfinx_view
 from ufl_beam.simulation import replicas
 
-BOTH = pytest.mark.parametrize("reference", [False, True], ids=["compiled", "reference"])
-
 STEEL = {"EA": 1e6, "GA": 4e5, "EI": 800.0, "rhoA": 10.0, "rhoI": 0.01}
 
 
@@ -81,9 +79,9 @@ def frame():
     )
 
 
-def moved(scene, scheme, reference=False, *, t=0.06, **more):
+def moved(scene, scheme, *, t=0.06, **more):
     """A simulation some steps later."""
-    newton = ub.Newton(rtol=1e-12, reference=reference)
+    newton = ub.Newton(rtol=1e-12)
     simulation = ub.Simulation(scene, scheme, newton=newton, **{"comm": MPI.COMM_SELF, **more})
     for k in range(6):
         simulation.step_to(t * (k + 1) / 6)
@@ -97,11 +95,10 @@ def assembled(simulation, work):
     return r
 
 
-@BOTH
 @pytest.mark.parametrize("scheme", [ub.Midpoint(0.1), ub.ExactStatic(), ub.GeneralizedAlpha()])
-def test_forms_are_those_of_the_terms(reference, scheme):
+def test_forms_are_those_of_the_terms(scheme):
     """In a step that has not begun; cells that flow have the tangent of a step."""
-    simulation = moved(frame(), scheme, reference, t=0.06 if scheme.dynamic else 0.03)
+    simulation = moved(frame(), scheme, t=0.06 if scheme.dynamic else 0.03)
     assert simulation.damage()[1].max() > 1e-3  # J
     beams = [term for term in simulation.terms if term.kind == "beams"]
     points = [one.points for one in simulation.inelastic]
@@ -136,13 +133,9 @@ def test_forms_are_those_of_the_terms(reference, scheme):
     simulation.close()
 
 
-@BOTH
-def test_forms_asked_for_on_the_way(reference):
+def test_forms_asked_for_on_the_way():
     """They change no digit of the steps to come."""
-    plain, asked = (
-        ub.Simulation(frame(), ub.Midpoint(0.1), newton=ub.Newton(reference=reference))
-        for _ in range(2)
-    )
+    plain, asked = (ub.Simulation(frame(), ub.Midpoint(0.1)) for _ in range(2))
     for k in range(8):
         asked.dolfinx.forms  # noqa: B018
         for one in (plain, asked):
@@ -153,9 +146,8 @@ def test_forms_asked_for_on_the_way(reference):
         one.close()
 
 
-@BOTH
-def test_functions_follow_the_state(reference):
-    simulation = moved(frame(), ub.Midpoint(0.1), reference)
+def test_functions_follow_the_state():
+    simulation = moved(frame(), ub.Midpoint(0.1))
     view, first = simulation.dolfinx, simulation.dolfinx.configuration
     before = first.x.array.copy()
     simulation.step_to(0.08)
@@ -174,14 +166,13 @@ def test_functions_follow_the_state(reference):
     simulation.close()
 
 
-@BOTH
 @pytest.mark.parametrize("degree", [1, 3])
-def test_an_own_form(reference, degree):
+def test_an_own_form(degree):
     """The length of a beam by a load of 1 N/m, and the load of the scene by internal forces."""
     beam = ub.Beam((0, 0), (2, 0.3), ub.Section(**STEEL), cells=4)
     down = ub.PointLoad(beam.at(0.5), force=(0, -30.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Pinned(beam.end)], loads=[down])
-    simulation = moved(scene, ub.ExactStatic(), reference, mesh=ub.Mesh(degree=degree))
+    simulation = moved(scene, ub.ExactStatic(), mesh=ub.Mesh(degree=degree))
     view = simulation.dolfinx
     w = ufl.TestFunction(view.function_space)
     weight = assembled(simulation, w[1] * view.dx)
@@ -195,11 +186,10 @@ def test_an_own_form(reference, degree):
     simulation.close()
 
 
-@BOTH
-def test_each_process_has_its_cells(reference):
+def test_each_process_has_its_cells():
     """Energies of all of them are those of the ledger; of one process, those of the scene."""
     scene = frame()
-    simulation = moved(scene, ub.Midpoint(0.1), reference, comm=MPI.COMM_WORLD)
+    simulation = moved(scene, ub.Midpoint(0.1), comm=MPI.COMM_WORLD)
     view, (state, _, _) = simulation.dolfinx, simulation.entries()
     v, M = view.velocity.x.array, fem.assemble_matrix(fem.form(view.forms.mass)).to_scipy()
     kinetic = MPI.COMM_WORLD.allreduce(v @ M @ v / 2)
@@ -207,7 +197,7 @@ def test_each_process_has_its_cells(reference):
     jump = np.zeros(len(simulation.grid.cells))
     jump[view.cells] = view.jump.x.array
     MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, jump)
-    alone = moved(scene, ub.Midpoint(0.1), reference)
+    alone = moved(scene, ub.Midpoint(0.1))
     # Jumps of some 0.1 rad, by steps solved to 1e-12 of the forces.
     assert np.allclose(jump, alone.damage()[0], rtol=0, atol=1e-8)
     assert np.abs(jump).max() > 1e-3
@@ -252,11 +242,10 @@ def test_files_of_dolfinx(tmp_path):
 # -- the SNES ------------------------------------------------------------------------------------
 
 
-@BOTH
-def test_a_monitor_sees_each_iteration_and_changes_none(reference):
-    plain = moved(frame(), ub.Midpoint(0.1), reference)
+def test_a_monitor_sees_each_iteration_and_changes_none():
+    plain = moved(frame(), ub.Midpoint(0.1))
     watched = ub.Simulation(
-        frame(), ub.Midpoint(0.1), newton=ub.Newton(rtol=1e-12, reference=reference)
+        frame(), ub.Midpoint(0.1), newton=ub.Newton(rtol=1e-12)
     )  # under mpirun, by all processes
     seen = []
     watched.snes.setMonitor(lambda snes, iteration, norm: seen.append((iteration, norm)))

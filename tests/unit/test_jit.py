@@ -47,8 +47,8 @@ def gcc(*arguments, **options):
 
 def lanes_source():
     """The loop of lanes.c with a kernel that asks for every function of lanes.h."""
-    sizes = {"LANES": 4, "SIDE": 1, "ENTRIES": 1, "WIDTH": 1, "CONSTANTS": 1}
-    defined = [f"#define {name} {size}" for name, size in sizes.items()]
+    names = "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "UNKNOWNS"
+    defined = ["#define LANES 4", "#define AT 0", *(f"#define {name} 1" for name in names)]
     head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("lanes.h")]
     # The functions that Python calls are declared in no header: cffi reads them as text.
     return "\n".join([*head, KERNEL, simd_kernels.INTERFACE, jit.text("lanes.c")])

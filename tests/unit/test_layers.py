@@ -25,19 +25,19 @@ FILES = {
 
 ROOMS = [
     *("", "model", "compiled", "mechanics", "discretization", "terms", "solvers"),
-    *("output", "simulation", "analysis", "plotting"),
+    *("output", "reference", "simulation", "analysis", "plotting"),
 ]
 """Subpackages from the ground up; a module imports from its own room and from those before it.
 
 The first one is the ground: modules that stand beside the rooms.
 """
 
-FLOORS = 14
+FLOORS = 15
 """Longest chain of imports at most."""
 
 MACHINERY = {"basix", "cffi", "dolfinx", "ffcx", "mpi4py", "petsc4py", "ufl"}
 
-PETSC = {"compiled", "solvers", "dolfinx_compat"}
+PETSC = {"compiled", "solvers", "reference", "dolfinx_compat"}
 """Where PETSc is used; `dolfinx_compat` explains what is not installed."""
 
 
@@ -121,7 +121,7 @@ def test_floors():
         print(f"\nfloor {level}")
         for module in (m for m in FILES if floor(m) == level):
             print(f"  {module}: {', '.join(sorted(siblings(module))) or '-'}")
-    assert len(ROOMS) - 1 <= 10
+    assert len(ROOMS) - 1 <= 11
     assert height <= FLOORS
 
 
@@ -138,6 +138,17 @@ def test_only_dolfinx_compat_asks_for_versions(module):
         if isinstance(node, ast.Name)
     }
     assert "VERSION" not in names
+
+
+@pytest.mark.parametrize("module", [m for m in FILES if room(m) == "reference"])
+def test_the_reference_solver_is_apart(module):
+    """It shares statements with runs, and neither terms nor solvers."""
+    assert not {room(one) for one in siblings(module)} & {"terms", "solvers", "compiled"}
+
+
+def test_nothing_but_a_run_knows_the_reference_solver():
+    users = {m for m in FILES if any(room(one) == "reference" for one in siblings(m))}
+    assert {m for m in users if room(m) != "reference"} == {"simulation.reference_run"}
 
 
 def test_kinematics_imports_ufl_alone():

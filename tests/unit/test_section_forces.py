@@ -429,7 +429,7 @@ def test_extremes_of_any_number_of_cells(cells, degree):
     require_extremes(scene, ub.Static(), 2, mesh=ub.Mesh(degree=degree))
 
 
-def test_extremes_of_paths_and_of_the_reference_path():
+def test_extremes_of_paths():
     scene, _ = two_beams("line")
     extremes = ub.Extremes()
     path = ub.follow(scene, ub.LoadControl(0.05), steps=4, record=extremes)
@@ -437,7 +437,6 @@ def test_extremes_of_paths_and_of_the_reference_path():
     M = np.array([path.diagram(beam, n, points=2).M for n in range(len(path))])
     found = extremes.section_forces(beam)
     assert np.abs(found.low[:, 2] - M.min(axis=0)).max() < ROUND_OFF * np.abs(M).max()
-    require_extremes(scene, ub.Midpoint(), 2, newton=ub.Newton(reference=True))
 
 
 def test_a_recorder_of_extremes_changes_nothing():

@@ -156,15 +156,6 @@ def test_tangent(kind, scheme):
     assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-7 * scale
 
 
-@MEANT
-@pytest.mark.parametrize("scheme", SCHEMES[:4], ids=str)
-def test_tangent_of_the_reference_path(scheme):
-    newton = ub.Newton(reference=True)
-    probe = Probe(scene("follower roller masses works"), scheme, turn=1.5, newton=newton)
-    tangent = probe.tangent()
-    assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-7 * np.abs(tangent).max()  # ditto
-
-
 @pytest.mark.parametrize("mesh", [ub.Mesh(degree=2), ub.Mesh(degree=3, lumped=True)], ids=str)
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(0.1, 0.1)], ids=str)
 def test_tangent_of_higher_degrees(mesh, scheme):
@@ -270,15 +261,6 @@ def test_tangent_of_inelastic_scenes(kind, scheme):
         # As above; and none of these states lies within 1e-5 of a corner of its laws
         scale = np.abs(tangent).max()
         assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-6 * scale
-
-
-@pytest.mark.parametrize("kind", LAWS)
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(0.1, 0.1)], ids=str)
-def test_tangent_of_inelastic_scenes_by_the_reference_path(kind, scheme):
-    newton = ub.Newton(reference=True)
-    probe = Probe(inelastic_scene(kind), scheme, turn=1.0, newton=newton)
-    tangent = probe.tangent()
-    assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-6 * np.abs(tangent).max()  # ditto
 
 
 @pytest.mark.parametrize("kind", LAWS)

@@ -142,10 +142,15 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
 
 
 @cache
-def in_lanes(source: Path, kernel: int, sizes: tuple[int, int, int]) -> int | None:
-    """Return the address of the SIMD loop of a compiled form, or None; see above for ``sizes``."""
-    names = ("LANES", "SIDE", "ENTRIES", "WIDTH", "CONSTANTS")
-    numbers = LANES, math.isqrt(sizes[0]), *sizes
+def in_lanes(
+    source: Path, kernel: int, sizes: tuple[int, int, int], unknowns: tuple[int, int]
+) -> int | None:
+    """Return the address of the SIMD loop of a compiled form, or None; see above for ``sizes``.
+
+    ``unknowns`` are the position of the first one among the coefficients, and their number.
+    """
+    names = ("LANES", "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "AT", "UNKNOWNS")
+    numbers = LANES, math.isqrt(sizes[0]), *sizes, *unknowns
     defined = [f"#define {x} {n}" for x, n in zip(names, numbers, strict=True)]
     head, loop = "\n".join([HEADERS, DECLARATIONS, *defined, text("lanes.h")]), text("lanes.c")
     try:

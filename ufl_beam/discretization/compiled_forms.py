@@ -10,11 +10,11 @@ silently wrong in FFCx 0.9 to 0.11.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec, TypeVar, cast
+from typing import Any, NamedTuple
 
 import basix.ufl
 import numpy as np
@@ -28,6 +28,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
+from ufl_beam.structure_cache import stated as stated
 
 
 def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
@@ -42,15 +43,6 @@ def tabulator(compiled: fem.Form) -> Any:
     """Return the C function of a compiled cell form; it lives as long as the form."""
     integral = compiled.ufcx_form.form_integrals[0]
     return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
-
-
-P = ParamSpec("P")
-T = TypeVar("T")
-
-
-def stated(function: Callable[P, T]) -> Callable[P, T]:
-    """Call a function that states forms once in a process with the same arguments."""
-    return cast("Callable[P, T]", lru_cache(maxsize=128)(function))
 
 
 class Prepared(NamedTuple):
@@ -246,7 +238,8 @@ class Kernel:
     def address_in_lanes(self) -> int | None:
         """Return the address of the SIMD loop, or None."""
         sizes = (self._entries, self._form.packed.shape[1], len(self._form.constants))
-        return in_lanes(self._form.source, int(ffi.cast("intptr_t", self._form.tabulate)), sizes)
+        kernel = int(ffi.cast("intptr_t", self._form.tabulate))
+        return in_lanes(self._form.source, kernel, sizes, (self._at, self._unknowns))
 
     def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
         """Use the SIMD loop from now on, with coordinates in batches."""

@@ -141,9 +141,11 @@ class Fields:
         self._put_sections(kernel)
         return kernel
 
-    def hot_kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
-        """Such a form for evaluation in each iteration: several cells at once."""
-        (kernel,) = self._several_at_once(unknown, form)
+    def hot_kernel(
+        self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index | None = None
+    ) -> Kernel:
+        """Such a form, several cells at once; ``cell_dofs`` if not all are unknown."""
+        (kernel,) = self._several_at_once(unknown, form, cell_dofs=cell_dofs)
         self._put_sections(kernel)
         return kernel
 
@@ -156,10 +158,12 @@ class Fields:
         tangent.place(A)
         return force, tangent
 
-    def _several_at_once(self, unknown: fem.Function, *forms: ufl.Form) -> list[Kernel]:
+    def _several_at_once(
+        self, unknown: fem.Function, *forms: ufl.Form, cell_dofs: Index | None = None
+    ) -> list[Kernel]:
         """Kernels that compute several cells at once, all or none; without values of sections."""
-        coordinates = self._coordinates()
-        kernels = [Kernel(form, unknown, self.cell_dofs, coordinates) for form in forms]
+        dofs, coordinates = self.cell_dofs if cell_dofs is None else cell_dofs, self._coordinates()
+        kernels = [Kernel(form, unknown, dofs, coordinates) for form in forms]
         vectorise(kernels, self._coordinates_in_lanes)
         return kernels
 

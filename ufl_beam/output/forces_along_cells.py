@@ -29,6 +29,9 @@ class ForcesAlongCells:
     Args:
         grid: Cells and numbering.
         between: Part of a step at whose configuration its forces are in equilibrium.
+
+    Attributes:
+        angles: Of the undeformed axis at both ends of the cells; (num_cells, 2); rad.
     """
 
     def __init__(self, grid: Any, between: float) -> None:
@@ -38,8 +41,8 @@ class ForcesAlongCells:
         self._works = bool(grid.scene.works)
         places = grid.points[nodes[:, self._along]]
         self._places: Complex = places[..., 0] + 1j * places[..., 1]
-        self._angles = np.asarray(np.angle(self._places[:, -1] - self._places[:, 0]), np.float64)
-        self.turns = _turns(grid, self._angles)
+        angles = np.asarray(np.angle(self._places[:, -1] - self._places[:, 0]), np.float64)
+        self.angles = angles[:, None] + _turns(grid, angles)
 
     def __call__(
         self,
@@ -88,8 +91,8 @@ class ForcesAlongCells:
         lever = (x @ self._mesh.slopes(before_point).T).conj() * force(before_point)
         lever = parts * (np.imag(lever).reshape(len(x), len(parts), len(points)) @ weights)
         M = -moments[0][:, None] - lever - np.multiply.outer(couple, parts)
-        turns = self.turns[cells] @ np.array([1 - parts, parts])
-        angles = self._angles[cells, None] + turns + q[:, 2] @ self._mesh.weights(parts).T
+        angles = self.angles[cells] @ np.array([1 - parts, parts])
+        angles += q[:, 2] @ self._mesh.weights(parts).T
         F = force(parts) * np.exp(-1j * angles)
         return np.stack([F.real, F.imag, M], axis=2)
 

@@ -146,14 +146,15 @@ class StateView(ABC):
 
         Several supports may be at one node: each has the forces of the components that it holds.
         """
-        dofs = self.support_dofs
-        here = np.where(dofs >= 0, self.supports.all_reactions(self.share.size)[dofs], 0.0)
+        forces = self.supports.all_reactions(self.share.size + 1)  # the last one is zero
+        here: Array = forces[self.support_dofs]
         if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
-        for force, support in zip(here, self.scene.supports, strict=True):
+        for k, support in enumerate(self.scene.supports):
             if support.angle:
                 c, s = math.cos(support.angle), math.sin(support.angle)
-                force[:2] = c * force[0] - s * force[1], s * force[0] + c * force[1]
+                x, y = here[k, :2]
+                here[k, :2] = c * x - s * y, s * x + c * y
         return here
 
     @cached_property

@@ -14,9 +14,7 @@ from ufl_beam.compiled.c_library import doubles, lib, struct
 from ufl_beam.compiled.simd_kernels import in_batches
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields
-from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.mechanics.kinematics import split
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.output.forces_along_cells import ForcesAlongCells, gauss_rule
 from ufl_beam.terms.cell_forces import CellForces
@@ -26,86 +24,81 @@ EXTENT = ("low", "high", "time_low", "time_high")
 
 
 class AlongCells(NamedTuple):
-    """Form of the section forces in points of cells, and what it depends on besides motions.
+    """Form of the section forces in points of cells, and what it depends on.
+
+    At both ends of cells, displacements and what is between the ends do not matter.
 
     Attributes:
+        motions: The last degrees of freedom of a cell: all, or rotations.
         numbers: Forces of the cells, the first ones of ``cell_number`` of loops.h.
-        turns: Angles from the cells to the axis at their ends.
-        first: How many numbers: at both ends of cells, what is between them does not matter.
+        angles: :attr:`ForcesAlongCells.angles`.
+        first: How many numbers.
+        moves: How many degrees of freedom.
     """
 
     form: ufl.Form
+    motions: fem.Function
     numbers: fem.Function
-    turns: fem.Function
+    angles: fem.Function
     first: int
+    moves: int
 
 
 @stated
 def along_cells(of: Element, parts: tuple[float, ...], works: bool) -> AlongCells:
-    """State what :class:`ForcesAlongCells` computes, in a configuration q1; entries (N, V, M)."""
-    axis, h = of.axis, of.axis.h
-    between = set(parts) > {0.0, 1.0}
-    first = lib.CELL_NUMBERS if between else lib.COUPLE
-    numbers, turns, values = (of.in_cells(n) for n in (first, 2, 3 * len(parts)))
-    points, weights, _ = gauss_rule(element_mesh(of))
-
-    def vector(x: int, y: int) -> tuple[Expr, Expr]:
-        """Two of the numbers as a vector in the axes of the cell."""
-        a = ufl.as_vector([numbers[x], numbers[y]])
-        return ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
-
-    def times(a: Any, x: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
-        return a * x[0], a * x[1]
-
-    def plus(x: tuple[Expr, Expr], y: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
-        return x[0] + y[0], x[1] + y[1]
-
-    def cross(x: tuple[Expr, Expr], y: tuple[Expr, Expr]) -> Expr:
-        return x[0] * y[1] - x[1] * y[0]
-
-    start, end = vector(lib.START_X, lib.START_Y), vector(lib.END_X, lib.END_Y)
-    at_start, at_end = numbers[lib.START_M], numbers[lib.END_M]
-    all_of_it, couple, skew = times(-1.0, plus(start, end)), 0.0, (0.0, 0.0)
-    if between:
-        couple, skew = -numbers[lib.COUPLE], times(-6.0, vector(lib.SKEW_X, lib.SKEW_Y))
-    u, _ = split(of.q1)
-    nodes = [axis.at_nodes(x) for x in (ufl.dot(u, axis.t0), ufl.dot(u, axis.n0), of.q1[2])]
-
-    def way(part: float) -> tuple[Expr, Expr]:
-        """Derivative of the place by the part."""
-        slopes = [float(x) for x in element_mesh(of).slopes(part)]
-        x, y = (sum(a * b for a, b in zip(slopes, of_nodes, strict=True)) for of_nodes in nodes[:2])
-        return h + x, y
-
-    def force(part: float, skew: tuple[Expr, Expr]) -> tuple[Expr, Expr]:
-        linear = plus(times(-1.0, start), times(-part, all_of_it))
-        return plus(linear, times(part * (1 - part), skew))
-
+    """State what :class:`ForcesAlongCells` computes; entries (N, V, M)."""
+    mesh, h, between = Mesh(degree=of.degree), of.axis.h, set(parts) > {0.0, 1.0}
+    n = len(mesh.nodes)
+    first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
+    # All are constant in cells: to interpolate in a cell would take longer than the rest.
+    motions, numbers, angles, values = map(of.in_cells, (moves, first, 2, 3 * len(parts)))
+    order = [0, *range(2, n), 1]  # of the nodes along a cell
+    *displacements, rotations = ([motions[k + i] for i in order] for k in range(0, moves, n))
+    points, weights, _ = gauss_rule(mesh)
     pairs = [(float(a), float(b)) for a, b in zip(points, weights, strict=True)]
+
+    def vector(x: Any, y: Any) -> Expr:
+        return ufl.as_vector([x, y])
+
+    def cross(a: Expr, b: Expr) -> Expr:
+        return a[0] * b[1] - a[1] * b[0]
+
+    def weighted(weights: Array, values: list[Expr]) -> Expr:
+        return sum(float(a) * x for a, x in zip(weights, values, strict=True))
+
+    start, end = (vector(numbers[x], numbers[x + 1]) for x in (lib.START_X, lib.END_X))
+    at_start, at_end = numbers[lib.START_M], numbers[lib.END_M]
+    couple, skew = 0.0, 0.0 * start
+    if between:
+        couple, skew = -numbers[lib.COUPLE], -6 * vector(numbers[lib.SKEW_X], numbers[lib.SKEW_Y])
+
+    def way(part: float) -> Expr:
+        """Derivative of the place by the part."""
+        way = h * of.axis.t0
+        if between:
+            way += vector(*(weighted(mesh.slopes(part), nodes) for nodes in displacements))
+        return way
+
+    def force(part: float, skew: Expr) -> Expr:
+        return part * (start + end) - start + part * (1 - part) * skew
+
     missed = at_start + at_end + couple + sum(b * cross(way(a), force(a, skew)) for a, b in pairs)
     if works:
-        x, y = (sum(6 * b * a * (1 - a) * way(a)[i] for a, b in pairs) for i in (0, 1))
-        skew = plus(skew, times(6 * missed / (x**2 + y**2), (y, -x)))
+        x, y = sum(6 * b * a * (1 - a) * way(a) for a, b in pairs)
+        skew += 6 * missed / (x**2 + y**2) * vector(y, -x)
     else:
-        couple = couple - missed
+        couple -= missed
     found = []
     for part in parts:
-        M, (x, y) = at_end, end
+        M, F = at_end, end
         if part < 1:
             levers = sum(b * cross(way(a * part), force(a * part, skew)) for a, b in pairs)
-            M, (x, y) = -at_start - part * (levers + couple), force(part, skew)
-        weight = [float(x) for x in element_mesh(of).weights(part)]
-        turn = (1 - part) * turns[0] + part * turns[1]
-        ψ = sum(a * b for a, b in zip(weight, nodes[2], strict=True)) + turn
-        c, s = ufl.cos(ψ), ufl.sin(ψ)
-        found += [c * x + s * y, c * y - s * x, M]
-    z = ufl.TestFunction(values.function_space)
-    return AlongCells(ufl.dot(ufl.as_vector(found), z) / h * of.dx(1), numbers, turns, first)
-
-
-def element_mesh(of: Element) -> Mesh:
-    """The mesh of one cell of an element."""
-    return Mesh(degree=of.degree)
+            M, F = -at_start - part * (levers + couple), force(part, skew)
+        angle = (1 - part) * angles[0] + part * angles[1] + weighted(mesh.weights(part), rotations)
+        c, s = ufl.cos(angle), ufl.sin(angle)
+        found += [c * F[0] + s * F[1], c * F[1] - s * F[0], M]
+    form = ufl.dot(ufl.as_vector(found), ufl.TestFunction(values.function_space)) / h * of.dx(1)
+    return AlongCells(form, motions, numbers, angles, first, moves)
 
 
 class Watch:
@@ -117,23 +110,23 @@ class Watch:
     """
 
     def __init__(
-        self, share: Share, cell_forces: CellForces, along: ForcesAlongCells, parts: Array
+        self, fields: Fields, cell_forces: CellForces, along: ForcesAlongCells, parts: Array
     ) -> None:
-        fields, size = Fields(share), share.size
-        works = bool(share.grid.scene.works)
+        size, works = fields.share.size, bool(fields.share.grid.scene.works)
         of = along_cells(fields.element, tuple(map(float, parts)), works)
-        self._kernel = fields.hot_kernel(of.form, fields.element.q1)
-        self._kernel.put(of.turns, along.turns)
-        self._kernel.put(of.numbers, np.zeros(of.first))
+        self._kernel = fields.hot_kernel(of.form, of.motions, fields.cell_dofs[:, -of.moves :])
         _, self._lanes, spare = self._kernel.keep_entries()
-        self._cells, self._points, self._forces = len(along.turns), len(parts), cell_forces
+        self._cells, self._points, self._forces = len(along.angles), len(parts), cell_forces
         sizes = spare.size, size
         self._extents = [dict(zip(EXTENT, np.zeros((4, n)), strict=True)) for n in sizes]
         cell_forces.keep_latest()
         self.c = struct(
             "watch", forces=cell_forces.c, along=self._kernel.cells, between=along.between,
-            at_numbers=self._kernel.position(of.numbers), q=np.zeros(size),
-            numbers=np.zeros(lib.CELL_NUMBERS * self._cells), first=of.first,
+            angles=in_batches(along.angles, self._lanes), q=np.zeros(size), first=of.first,
+            at_angles=self._kernel.position(of.angles),
+            at_numbers=self._kernel.position(of.numbers),
+            numbers=np.zeros(lib.CELL_NUMBERS * self._cells),
+            some=np.zeros(lib.SOME * self._kernel.cells.width),
             in_order=cell_forces.in_order(self._lanes),
         )  # fmt: skip
         for c, extent in zip((self.c.of_forces, self.c.of_motion), self._extents, strict=True):

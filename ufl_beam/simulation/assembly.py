@@ -48,6 +48,7 @@ from ufl_beam.terms.works import Works
 class Assembly:
     """Terms of a scene and what they share."""
 
+    fields: Fields  # on the cells of this process
     ledger: Ledger
     controllers: Controllers  # with their forces, and the limits of friction, in the step
     rates: dict[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
@@ -202,7 +203,7 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     parts = share, A, beams, coupled, loads, others, supports, search
     equation = StepEquation(*parts, in_motion=inertia is not None)
     return Assembly(
-        ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
+        fields, ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, equation, _cell_forces(share, equation.terms),
     )  # fmt: skip
 

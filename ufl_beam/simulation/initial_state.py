@@ -20,6 +20,7 @@ from ufl_beam.discretization.model_warnings import (
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
+from ufl_beam.discretization.work_forms import require_works
 from ufl_beam.errors import SceneError, require_kind, shorten, warn
 from ufl_beam.garbage_collection import no_garbage_collection
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
@@ -37,7 +38,6 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.protocols import require_members
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.work_forms import require_works
 
 
 @no_garbage_collection()

@@ -111,12 +111,12 @@ class KeptRows:
         self._alive.append(both)
         self._kinds.append((place, at.size, 0, *map(integers, both)))
 
-    def states(self, times: Array, rows: Array, before: bool) -> Snapshots:
-        """The states at these times, as views of their rows, which one of the state before leads.
+    def states(self, times: Array, rows: Array, before: Array | None) -> Snapshots:
+        """The states at these times, as views of their rows.
 
-        ``before`` says whether configurations at the beginnings of the steps are asked for.
+        ``before`` are the configurations at the beginnings of the steps, if they are asked for.
         """
-        n, rows, begun = len(times), rows[1:], rows[:-1, self.q] if before else None
+        n = len(times)
         names = zip(self._names, self._entries, strict=True)
         return Snapshots(
             times, rows[:, self.q], None if self._v is None else rows[:, self._v],
@@ -124,5 +124,5 @@ class KeptRows:
             tuple(dict(zip(of, rows[:, at].T, strict=True)) for of, at in names),
             rows[:, self._material].reshape(n, -1, MATERIAL),
             rows[:, self._connections].reshape(n, -1, CONNECTION),
-            rows[:, self._cells], begun,
+            rows[:, self._cells], before,
         )  # fmt: skip

@@ -9,7 +9,7 @@ import time
 from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import chain
-from typing import Any
+from typing import Any, cast
 
 from mpi4py import MPI
 
@@ -33,12 +33,13 @@ from ufl_beam.simulation.checkpoint import FORMAT, Checkpoint, Keeper, end_of
 from ufl_beam.simulation.diagnosis import ROOM, open_ledger
 from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
+from ufl_beam.simulation.reference_run import simulate_by_reference
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive, number_of_steps, steps_of
 from ufl_beam.simulation.stepper import MOST_PARTS
 from ufl_beam.simulation.watches import LedgerWatch
-from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.solvers.newton_options import Newton, require_plain
 
 BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
 
@@ -107,6 +108,16 @@ def simulate(
     kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
     recorders, outputs = recorders_of(record, comm, "simulate", *kept)
     begin = time.perf_counter()
+    if newton is not None and newton.reference:
+        if isinstance(dt, Adaptive):
+            require_plain(newton, "adaptive steps, dt = Adaptive(...)")
+        if recorders or checkpoint is not None:
+            require_plain(newton, "recorders" if recorders else "checkpoint")
+        number = number_of_steps(t1 - t0, cast(float, dt))
+        return simulate_by_reference(
+            scene, scheme, newton, (t0, t1), number, start=start, mesh=mesh, every=every, most=most,
+            comm=comm, progress=progress,
+        )  # fmt: skip
     keeper: Keeper | None = None
     if checkpoint is not None:
         step = None if isinstance(dt, Adaptive) else (t1 - t0) / number_of_steps(t1 - t0, dt)

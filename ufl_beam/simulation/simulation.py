@@ -25,7 +25,7 @@ from ufl_beam.output.state_view import StateView
 from ufl_beam.output.watches import Watch
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
-from ufl_beam.simulation.assembly import Assembly, assemble
+from ufl_beam.simulation.assembly import assemble
 from ufl_beam.simulation.branch_check import add_forces_at_rest
 from ufl_beam.simulation.diagnosis import no_equilibrium, require_held
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of
@@ -35,7 +35,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.stepper import APPLYING, Extras, Stepper, Trial, begins_loaded
 from ufl_beam.simulation.watches import ForceWatch
 from ufl_beam.solvers.newton import Border
-from ufl_beam.solvers.newton_options import Newton
+from ufl_beam.solvers.newton_options import Newton, require_plain
 from ufl_beam.solvers.petsc_options import checked_newton
 
 
@@ -92,11 +92,7 @@ class Simulation(StateView):
         comm = communicator(comm, "comm")
         require_number(t0, "t0")
         newton = checked_newton(newton, comm)
-        if newton.reference:
-            raise SceneError(
-                "Newton(reference=True): a Simulation runs compiled code; only simulate() can call "
-                "the reference package instead"
-            )
+        require_plain(newton, "Simulation" if kind is Solution else "follow")
         if not (isinstance(kind, type) and issubclass(kind, Solution)):
             raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
         if start is not None:
@@ -109,7 +105,7 @@ class Simulation(StateView):
         self._copies = Copies(comm, share) if comm.size > share.comm.size else None
         q, v, internal = initial_state(grid, start)
         self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], together)
-        self.ledger, self.controllers = parts.ledger, parts.controllers
+        self.fields, self.ledger, self.controllers = parts.fields, parts.ledger, parts.controllers
         self.asked = parts.controllers.values
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
@@ -220,7 +216,7 @@ class Simulation(StateView):
         """Begin to take in extremes after each step in C, or return None if that cannot be."""
         if not self.share.alone:
             return None
-        self._watches.append(one := Watch(self.share, self.cell_forces, self._along, parts))
+        self._watches.append(one := Watch(self.fields, self.cell_forces, self._along, parts))
         self._stepper.watch(self._watches)
         return one
 

@@ -200,9 +200,11 @@ class Stepper:
         })  # fmt: skip
         inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
         links = [one for one in equation.terms if isinstance(one, Links)]
-        more = len(share.grid.scene.links), cell_forces.kept
-        self._of_rows = ledger, equation.supports, support_dofs, inelastic, links, *more
+        self._links, number = links, len(share.grid.scene.links)
+        parts = ledger, equation.supports, support_dofs, inelastic, links, number
+        self._of_rows: Any = (*parts, cell_forces.kept)
         self._rows: KeptRows | None = None
+        self._last: tuple[int, Array] = -1, np.zeros(0)  # step kept last; state at its end
 
     def _add_extras(self, loops: dict[str, list[Loop]]) -> None:
         """Let functions of Python take part in the phases of a step."""
@@ -252,7 +254,12 @@ class Stepper:
         if keep and taken:
             if taken < steps:
                 rows = rows[: taken + 1].copy()  # so that the rest does not stay
-            states = kept.states(ends[:taken].copy(), rows, self._begun)
+            before = None
+            if self._begun:
+                before = rows[:-1, kept.q]
+                if c.parts_of_last > 1:
+                    before = np.vstack([before[:-1], self.q_before()])
+            states = kept.states(ends[:taken].copy(), rows[1:], before)
             state.solution.keep(states, state.parts, self.solver.iterations)
         if c.failure:
             self._fail()
@@ -371,7 +378,7 @@ class Stepper:
             inertia.in_c.enter(self._copy(c.q))
             self._equation.supports.take()
             q1 = self._copy(c.x)
-            for one in self._of_rows[4]:
+            for one in self._links:
                 one.take(q1)
 
     # -- the state -------------------------------------------------------------------------------
@@ -416,12 +423,16 @@ class Stepper:
     def now(self, state: Stepping) -> Later:
         """The state that C has."""
         kept = self._rows or self._kept(state.q)
-        rows = np.zeros((2, kept.width))
+        # NumPy asks for large pages from 4 MiB on, and the first touch of these takes longer here.
+        row, before = np.frombuffer(bytearray(8 * kept.width))[None], None
+        lib.keep_state(self.c, doubles(row))
         if self._begun:
-            ffi.memmove(doubles(rows[0, kept.q]), self.c.prediction.q_before, self._bytes)
-        lib.keep_state(self.c, doubles(rows[1]))
+            number, before = self._last
+            if number != state.parts - 1:
+                before = self.q_before()[None]
+            self._last = state.parts, row[:, kept.q]
         t = np.array([self.c.t])
-        return Later(t, partial(kept.states, t, rows, self._begun))
+        return Later(t, partial(kept.states, t, row, before))
 
     def _copy(self, values: Any) -> Array:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
@@ -451,7 +462,7 @@ class Stepper:
     def hand_back(self, state: Stepping) -> None:
         """Let all of Python know the state, so that it may change it."""
         if self.ahead:
-            self.ahead = False
+            self.ahead, self._last = False, (-1, np.zeros(0))
             state.prediction.began_at(self._copy(state.prediction.c.q_before))
             if self._path is not None:
                 self._path.force = self._copy(self.c.path.force)

@@ -318,42 +318,50 @@ class Bordered:
 
 @from_c(math.nan)
 def agree_in_python(handle: Any, how: int, here: float) -> float:
+    """Callback of C, declared in c_library.py."""
     return float(ffi.from_handle(handle)[1].agree(how, here))
 
 
 @from_c(1)
 def solve_in_python(handle: Any, anew: int) -> int:
+    """Callback of C, declared in c_library.py."""
     return int(ffi.from_handle(handle)[1].solve(bool(anew)))
 
 
 @from_c()
 def find_conjugates_in_python(handle: Any, q: Any) -> None:
+    """Callback of C, declared in c_library.py."""
     callbacks, solver, _ = ffi.from_handle(handle)
     solver.find_conjugates(callbacks.lend(q))
 
 
 @from_c(0)
 def find_idle_in_python(handle: Any) -> int:
+    """Callback of C, declared in c_library.py."""
     return int(ffi.from_handle(handle)[1].find_idle())
 
 
 @from_c(0)
 def forget_idle_in_python(handle: Any) -> int:
+    """Callback of C, declared in c_library.py."""
     return int(ffi.from_handle(handle)[1].forget_idle())
 
 
 @from_c()
 def arrive_in_python(handle: Any, x: Any) -> None:
+    """Callback of C, declared in c_library.py."""
     callbacks, border, _ = ffi.from_handle(handle)
     border.arrive(callbacks.lend(x))
 
 
 @from_c(1)
 def change_of_border_in_python(handle: Any, x: Any) -> int:
+    """Callback of C, declared in c_library.py."""
     callbacks, border, _ = ffi.from_handle(handle)
     return int(border.change(callbacks.lend(x)))
 
 
 @from_c(0)
 def border_is_met_in_python(handle: Any) -> int:
+    """Callback of C, declared in c_library.py."""
     return int(ffi.from_handle(handle)[1].met())

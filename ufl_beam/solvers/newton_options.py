@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ufl_beam.errors import (
+    SceneError,
     require_count,
     require_kind,
     require_number,
@@ -34,8 +35,10 @@ class Newton:
             is used, otherwise an equivalent one in C, which is faster for few cells.  A
             ``snes_linesearch_type`` replaces the line search after full steps.  A run raises
             :class:`SceneError` for options that PETSc has no use for.
-        reference: Evaluate the same equations by DOLFINx, NumPy and PETSc alone, to compare with,
-            or to read: ten to a hundred times slower, see docs/theory.md.
+        reference: Let the reference solver compute the run: the equations of the paper with forms
+            of DOLFINx, a return map in NumPy and PETSc's SNES, to compare with, or to read.  It is
+            ten to a thousand times slower; :func:`simulate` takes it with equal steps, on one
+            process.  See docs/theory.md.
 
     Example:
         >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})
@@ -59,3 +62,12 @@ class Newton:
         require_switch(self.reference, "Newton: reference")
         for option in self.petsc:
             require_text(option, "Newton: petsc, an option")
+
+
+def require_plain(newton: Newton | None, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` the reference solver does not compute."""
+    if newton is not None and newton.reference:
+        raise SceneError(
+            f"Newton: reference=True does not go with {what}: the reference solver computes equal "
+            "steps of simulate, on one process and without files; leave it out"
+        )

@@ -131,8 +131,12 @@ class CellForces:
         """Copy what the forces follow from besides configurations; None if they are given."""
         if self.c.given:
             return None
-        arrays = [np.frombuffer(ffi.buffer(place[0], 8 * n)) for place, n in self.kept]
-        return np.concatenate(arrays) if arrays else np.zeros(0)
+        record, at = np.empty(sum(n for _, n in self.kept)), 0
+        to = doubles(record)
+        for place, n in self.kept:
+            ffi.memmove(to + at, place[0], n * record.itemsize)
+            at += n
+        return record
 
     def of_record(self, record: Array, q: Array, before: Array) -> Array:
         """The numbers of a :meth:`record`, as a call returns them."""

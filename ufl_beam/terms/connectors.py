@@ -16,11 +16,11 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
+from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import HELD, ForceLaw, Law, RigidPlastic, Spring
 from ufl_beam.terms import connector_laws, force_laws, rigid_plastic, springs
-from ufl_beam.terms.connector_forms import connector_forms
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.phases import Callbacks, Phases, beginning, weight_of_before

@@ -77,7 +77,9 @@ class FollowerLoads(LoadTerm):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the loads."""
-        c = fill(self.steps_in_c, factor=callbacks.of_time([(load.time, load) for load in self._loads]))
+        c = fill(
+            self.steps_in_c, factor=callbacks.of_time([(load.time, load) for load in self._loads])
+        )
         c.work = self._ledger.supplied.pointer("loads")
         begin, accept = (loop(f"{name}_follower_loads", c) for name in ("begin", "accept"))
         return Phases([begin], [accept])

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 import ufl
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
@@ -85,10 +85,18 @@ class FrameForces(LoadTerm):
         S.data[np.isin(S.rows(), share.rotations())] = 0.0
         S.data *= frame.rate**2
         G.data *= 2 * frame.rate if has_inertia(scheme) else 0.0
+        self._slope: Array | None = None  # of the forces of the step
         self._S, self._G, self._pull, self._turn = S.data, G.data, Product(S), Product(G)
         self._from_centre, self._fields = _positions(fields, frame.about), fields
-        self._rate, self._double = frame.rate**2, 2 * frame.rate * has_inertia(scheme)
-        self._translations, self._accelerations = share.translations(), np.zeros(share.size)
+        # Accelerations by places, and in motion by displacements of the other direction.
+        self._outward, self._across = np.zeros((2, share.size))
+        self._other: Index = np.arange(share.size)
+        u, v = share.translations()
+        self._other[u], self._other[v] = v, u
+        self._outward[u] = self._outward[v] = -(frame.rate**2)
+        self._across[u], self._across[v] = -2 * frame.rate, 2 * frame.rate
+        self._in_motion = has_inertia(scheme)
+        self._accelerations = np.zeros(share.size)
         self._place = ffi.new("double *[1]", [doubles(self._accelerations)])
         self._A, self._share_of_end, self._grown = A, scheme.load_weight, 0.0
 
@@ -97,48 +105,47 @@ class FrameForces(LoadTerm):
         self._q0, self._dt = step.q0, step.dt
         growth = step.fraction * (1.0 - self._grown)
         self._growth, self._growth_at_end = self._grown + step.at * growth, self._grown + growth
+        self._at_beginning = self._from_centre + step.q0
+        self._slope = None
 
     def in_cells(self) -> Sequence[InCells]:
         """The mass of the beams times the accelerations of the frame."""
         form = partial(mass_kernel, self._fields)
         return [InCells(form, lib.DENSITY, self._fields.order, self._place)]
 
-    def _put_accelerations(self, x: Array, growth: float, change: Array | float = 0.0) -> None:
-        """Note the accelerations at places ``x``, which move by ``change`` in the step."""
-        a: Array = -growth * self._rate * x
-        a[self._fields.share.rotations()] = 0.0
-        if self._double and isinstance(change, np.ndarray):
-            u, v = self._translations
-            a[u] -= self._double * change[v] / self._dt
-            a[v] += self._double * change[u] / self._dt
+    def _put_accelerations(self, a: Array) -> None:
+        """Note the accelerations, where forces in cells find them."""
         ffi.memmove(self._place[0], doubles(a), a.nbytes)
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The forces at ``q``; take that state as one that is in equilibrium with them."""
         self._grown = 1.0
-        self._put_accelerations(self._from_centre + q, 1.0)
+        self._put_accelerations(self._outward * (self._from_centre + q))
         self._force = self._before = self._pull(self._from_centre + q)
         return self._force
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Subtract centrifugal and Coriolis forces from the residual."""
-        q: Array = self._q0 + self._share_of_end * (q1 - self._q0)
-        self._force = self._growth * self._pull(self._from_centre + q)
+        self._change = q1 - self._q0
+        self._x = self._at_beginning + self._share_of_end * self._change
+        self._force = self._growth * self._pull(self._x)
         r -= self._force
-        r += self._turn(q1 - self._q0) / self._dt
+        r += self._turn(self._change) / self._dt
 
     def add_tangent(self, q1: Array) -> None:
         """Subtract the derivative of the forces from the tangent."""
-        self._A.data -= self._growth * self._share_of_end * self._S
-        self._A.data += self._G / self._dt
+        if self._slope is None:
+            self._slope = self._G / self._dt - self._growth * self._share_of_end * self._S
+        self._A.data += self._slope
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the work of the centrifugal forces, and take how much of them acts."""
         self._ledger.supplied["loads"] += float(self._acting(self._before, self._force) @ s)
         self._before, self._grown = self._force, self._growth_at_end
-        change: Array = q1 - self._q0
-        x: Array = self._from_centre + self._q0 + self._share_of_end * change
-        self._put_accelerations(x, self._growth, change)
+        a = self._growth * self._outward * self._x
+        if self._in_motion:
+            a += self._across / self._dt * self._change.take(self._other)
+        self._put_accelerations(a)
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step, and how much of them acts."""

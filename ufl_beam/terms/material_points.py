@@ -21,14 +21,21 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import SceneError, StepFailed
+from ufl_beam.mechanics.point_equations import (
+    End,
+    PointEquations,
+    curved,
+    inputs,
+    prefixed,
+    rows,
+)
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, Layout
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.material_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.openings import NOTHING, RELEASED, SPENT, SearchFlags
-from ufl_beam.terms.point_equations import End, PointEquations, curved, inputs, prefixed, rows
+from ufl_beam.terms.openings import NOTHING, SPENT, SearchFlags
 
 law_functions.where.register(Condition, ufl.conditional)
 law_functions.below.register(Expr, ufl.lt)

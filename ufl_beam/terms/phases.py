@@ -146,8 +146,8 @@ class Callbacks:
         """A vector of C, which C may change."""
         return np.frombuffer(ffi.buffer(vector, self._bytes))
 
-    def handle(self, function: Callable[..., Any], size: int = 0) -> Any:
-        """Handle of a function that C calls; ``size`` of numbers that it adds to, if it does."""
+    def handle(self, function: Any, size: int = 0) -> Any:
+        """Handle of what C calls; ``size`` of numbers that it adds to, if it does."""
         self._alive.append(ffi.new_handle((self, function, size)))
         return self._alive[-1]
 
@@ -174,33 +174,39 @@ def from_c(error: float | None = None) -> Callable[[Callable[..., Any]], Any]:
 
 @from_c()
 def add_in_python(handle: Any, q: Any, out: Any) -> None:
+    """Callback of C, declared in c_library.py."""
     callbacks, function, size = ffi.from_handle(handle)
     function(callbacks.lend(q), np.frombuffer(ffi.buffer(out, 8 * size)))
 
 
 @from_c(math.nan)
 def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
+    """Callback of C, declared in c_library.py."""
     callbacks, function, _ = ffi.from_handle(handle)
     return float(function(callbacks.lend(q), callbacks.lend(r), scale, moved))
 
 
 @from_c(math.nan)
 def time_in_python(handle: Any, t: float) -> float:
+    """Callback of C, declared in c_library.py."""
     return float(ffi.from_handle(handle)[1](t))
 
 
 @from_c()
 def run_in_python(handle: Any) -> None:
+    """Callback of C, declared in c_library.py."""
     ffi.from_handle(handle)[1]()
 
 
 @from_c()
 def phase_in_python(handle: Any, step: Any, q1: Any, s: Any) -> None:
+    """Callback of C, declared in c_library.py."""
     ffi.from_handle(handle)[1](step, q1, s)
 
 
 @from_c()
 def change_in_python(handle: Any, q1: Any, found: Any) -> None:
+    """Callback of C, declared in c_library.py."""
     callbacks, function, _ = ffi.from_handle(handle)
     in_beams, in_connectors, effort = function(callbacks.copy(q1))
     found.in_beams += in_beams

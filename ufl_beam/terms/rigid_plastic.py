@@ -7,23 +7,21 @@ the law, a function of the slip that grows in the step; see rigid_plastic.c.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from functools import singledispatch
-from typing import Any, NamedTuple
+from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import ufl
-from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.mechanics.slips import slip
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_law import State
 from ufl_beam.model.material_laws import Hardening, SofteningLaw
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.terms.connector_responses import Response, Rows, respond
@@ -36,48 +34,6 @@ INPUTS = (
 )
 """Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
 and motion at t_n, which loops.h names as well; numbers of the scheme and the law."""
-
-
-class Slip(NamedTuple):
-    """A law of slip over a step, in UFL; J, forces in N or N m."""
-
-    force: Expr  # that acts in the step, in the direction of the motion
-    dissipated: Expr  # in the step
-    lost: Expr  # numerically by backward Euler, over ``2 alpha`` of the scheme
-    stored: Expr  # at the end
-    limit: Expr  # force beyond the back force up to which the motion is held after the step
-    back_force: Expr  # force about which the limit lies after the step
-
-
-@singledispatch
-def slip(law: Any, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
-    """Slip by a law, from :data:`INPUTS` by name; numbers of ``law`` itself do not matter."""
-    raise TypeError(f"{law!r} is no law of a hinge")
-
-
-@slip.register
-def _(law: SofteningLaw, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
-    a, ξ, none = at["slip"], at["slipped"], 0 * at["slip"]
-    law = law.of(at["limit"], at["energy"])
-    force = at["direction"] * scheme.resistance(law, ξ, a)
-    return Slip(force, a * law.mean_traction(ξ, a), none, none, law.traction(ξ + a), none)
-
-
-@slip.register
-def _(law: Hardening, at: Mapping[str, Expr], scheme: Scheme) -> Slip:
-    a, ξ, s, e, θ, dt = (at[n] for n in ("slip", "slipped", "direction", "start", "θ", "dt"))
-    numbers = {name: at[name] for name in ("limit", "modulus", "kinematic", "viscosity")}
-    H, B, change = at["modulus"], at["kinematic"], State({"plastic": a, "accumulated": a})
-    bulk = law.of(np.inf, numbers)
-    resistance = at["limit"] + H * (ξ + θ * a) + at["viscosity"] * a / dt
-    return Slip(
-        s * resistance + B * (e + θ * s * a),
-        bulk.dissipation(s * a, change, change, dt),
-        bulk.hardening_energy(change),
-        bulk.hardening_energy(State({"plastic": e + s * a, "accumulated": ξ + a})),
-        at["limit"] + H * (ξ + a),
-        B * (e + s * a),
-    )
 
 
 class SlipForms:

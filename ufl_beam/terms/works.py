@@ -19,6 +19,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields, element_of
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving
+from ufl_beam.discretization.work_forms import GROWTH, Statement, statement
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, Step
@@ -28,7 +29,6 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.phases import weight_of_before
-from ufl_beam.terms.work_forms import GROWTH, Statement, statement
 
 AT_REST = 1e300
 """Longest step that forms are told of, in which all rates vanish; s."""

@@ -17,8 +17,8 @@ void accept_cell_forces(cell_forces *c)
 
 /* out += factor times the numbers that forces on the nodes of some cells mean, one batch of them. */
 static inline void add_numbers(const cell_forces *c, const int nodes, const int lanes, int some,
-                               int kind, double factor, const double *e, const int32_t *cell,
-                               size_t row, double *out)
+                               int kind, double factor, const double *restrict e,
+                               const int32_t *cell, size_t row, double *restrict out)
 {
 #define NODE(i, k) e[((i) * nodes + (k)) * lanes + l]
 #define OUT(i) out[(i) * row + (cell ? cell[l] : l)]
@@ -105,31 +105,17 @@ void find_cell_forces(const cell_forces *c, int now, double *out)
   add_forms(c, now, 0, c->cells, p);
 }
 
-/* Take numbers of a time where they are beyond a limit, with a sign. */
-static void go_beyond(int number, double sign, const double *restrict x, double t,
-                      double *restrict limit, double *restrict when)
-{
-  enum { NEIGHBOURS = 64 }; /* few are beyond, or most: all of a moving scene */
-  for (int first = 0; first < number; first += NEIGHBOURS) {
-    const int last = first + NEIGHBOURS < number ? first + NEIGHBOURS : number;
-    int beyond = 0;
-#pragma omp simd reduction(| : beyond)
-    for (int i = first; i < last; ++i) beyond |= sign * x[i] > sign * limit[i];
-    if (!beyond) continue;
-#pragma omp simd
-    for (int i = first; i < last; ++i) {
-      const int is = sign * x[i] > sign * limit[i];
-      when[i] = is ? t : when[i];
-      limit[i] = is ? x[i] : limit[i];
-    }
-  }
-}
-
 /* Extend ranges, from `begin` on, by numbers of a time. */
-static void widen(const extent *e, size_t begin, int number, const double *x, double t)
+static void widen(const extent *e, size_t begin, int number, const double *restrict x, double t)
 {
-  go_beyond(number, -1, x, t, e->low + begin, e->time_low + begin);
-  go_beyond(number, 1, x, t, e->high + begin, e->time_high + begin);
+  double *restrict low = e->low + begin, *restrict time_low = e->time_low + begin;
+  double *restrict high = e->high + begin, *restrict time_high = e->time_high + begin;
+#pragma omp simd
+  for (int i = 0; i < number; ++i) {
+    const int below = x[i] < low[i], above = x[i] > high[i];
+    low[i] = below ? x[i] : low[i], time_low[i] = below ? t : time_low[i];
+    high[i] = above ? x[i] : high[i], time_high[i] = above ? t : time_high[i];
+  }
 }
 
 /* Take in the state after a step; see find_cell_forces. Some cells after the other, so that the processor
@@ -140,6 +126,7 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
   const int n = c->lanes, in_order = w->in_order && !w->forces->given;
   const double b = w->between;
   const double *at = q;
+  widen(&w->of_motion, 0, w->of_motion.size, q, t);
   if (b != 1) {
     combine(w->of_motion.size, 1 - b, before, b, q, w->q);
     at = w->q;
@@ -147,13 +134,17 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
   if (!in_order) find_cell_forces(w->forces, now, w->numbers);
   for (int first = 0; first < c->number; first += SOME) {
     cells some = some_cells(c, first);
-    const places p = {some.w + w->at_numbers * n, n, c->width, n, w->first};
+    const places p = {w->some + w->at_numbers * n, n, c->width, n, w->first};
     const int all = (some.number + n - 1) / n * n;
-    if (in_order) {
-      for (int k = 0; k < all; k += n)
-        memset(p.out + k * p.batch, 0, w->first * n * sizeof *p.out);
+    some.w = w->some;
+    for (int k = 0; k < all; k += n) {
+      double *batch = w->some + k * c->width;
+      memset(batch + w->at_numbers * n, 0, w->first * n * sizeof *batch);
+      memcpy(batch + w->at_angles * n, w->angles + 2 * (size_t)(first + k), 2 * n * sizeof *batch);
+    }
+    if (in_order)
       add_forms(w->forces, now, first, some.number, p);
-    } else
+    else
       for (int k = 0; k < some.number; ++k)
         for (int i = 0; i < w->first; ++i)
           p.out[(k - k % n) * p.batch + i * n + k % n] =
@@ -161,5 +152,4 @@ void watch_step(const watch *w, int now, double t, const double *before, const d
     add_cells(&some, at, 0);
     widen(&w->of_forces, (size_t)first * c->rows, all * c->rows, c->each, t);
   }
-  widen(&w->of_motion, 0, w->of_motion.size, q, t);
 }

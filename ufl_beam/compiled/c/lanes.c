@@ -79,22 +79,26 @@ static inline void add_batch(const cells *c, const lanes *e, int first, int some
       for (int l = 0; l < some; ++l) b[dofs[l * ENTRIES + i]] += e[i][l];
 }
 
+/* The unknowns of a batch of which `some` are cells, and the first one in the place of others. */
+static inline void take_unknowns(const int32_t *dofs, const double *q, int some, lanes *w)
+{
+#define Q(l) q[dofs[(l < some ? l * UNKNOWNS : 0) + i]]
+  for (int i = 0; i < UNKNOWNS; ++i) w[i] = (lanes){EACH(Q)};
+#undef Q
+}
+
 static void add_in_lanes(const cells *c, const double *q, double *b)
 {
-  const int after = c->at + c->unknowns;
   lanes e[ENTRIES], w[COEFFICIENTS] = {0}, x[6] = {0}, constants[NUMBERS];
   for (int i = 0; i < CONSTANTS; ++i) constants[i] = ALL(c->constants[i]);
   for (int first = 0; first < c->number; first += LANES) {
     const int some = c->number - first < LANES ? c->number - first : LANES;
-    const int32_t *dofs[LANES];
     const lanes *stored = (const lanes *)(c->w + (size_t)first * c->width);
-    for (int l = 0; l < LANES; ++l)
-      dofs[l] = c->dofs + (size_t)(first + (l < some ? l : 0)) * c->of_cell;
-    for (int i = 0; i < c->at; ++i) w[i] = stored[i];
-#define Q(l) q[dofs[l][i]]
-    for (int i = 0; i < c->unknowns; ++i) w[c->at + i] = (lanes){EACH(Q)};
-#undef Q
-    for (int i = after; i < WIDTH; ++i) w[i] = stored[i - c->unknowns];
+    const int32_t *dofs = c->dofs + (size_t)first * UNKNOWNS;
+    for (int i = 0; i < AT; ++i) w[i] = stored[i];
+    if (some == LANES) take_unknowns(dofs, q, LANES, w + AT);
+    else take_unknowns(dofs, q, some, w + AT);
+    for (int i = AT + UNKNOWNS; i < WIDTH; ++i) w[i] = stored[i - UNKNOWNS];
     const lanes *at = (const lanes *)(c->coordinates + (size_t)first * 4);
     x[0] = at[0], x[1] = at[1], x[3] = at[2], x[4] = at[3];
     memset(e, 0, sizeof e);

@@ -21,6 +21,7 @@ void add_calls(void *self, const double *q, double *out);
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
 enum { MOST_ENTRIES = 144 }; /* of the vector or matrix of a cell: 12 unknowns of degree 3 */
+enum { SOME = 128 };         /* cells, of which the processor has all at hand for what comes next */
 
 /* A compiled form on some cells. w holds the packed coefficients of a cell but for its unknowns, which
  * the form has from `at` on; `width` numbers further are those of the next cell, as the values may be a
@@ -143,7 +144,7 @@ enum force_kind { STRESS, WORK, DENSITY };
  * linear in a vector, that vector: in the latest residual and in that of the accepted step. Entries that
  * depend on nothing but configurations are computed when they are asked for. */
 typedef struct {
-  const cells *form; /* that is linear, if C evaluates it; or none */
+  const cells *form; /* that is linear; or none */
   double **latest, *accepted; /* latest: or none; also if another form has the same vector */
   double *const *vector;
   double *const *entries; /* of the accepted step, in batches */
@@ -181,11 +182,13 @@ typedef struct {
 /* Extremes of section forces in points of the cells, and of motions, see extremes.py. */
 typedef struct {
   const cell_forces *forces;
-  const cells *along;       /* form of the section forces, which it keeps */
+  const cells *along;       /* form of the section forces, which it keeps, with two angles of a cell */
+  const double *angles;     /* of all cells, in batches */
+  int at_angles;            /* where it has these */
   int at_numbers, first;    /* where it has the first of CELL_NUMBERS, and how many */
   int in_order;             /* whether all forms have all cells, in batches as this one */
   double between, *q;       /* part of a step at whose configuration they are; space for that */
-  double *numbers;          /* space */
+  double *numbers, *some;   /* space: for all cells; for what the form has of SOME */
   extent of_forces, of_motion;
 } watch;
 
@@ -222,7 +225,7 @@ extern const double NO_ENERGY; /* dissipation that is none, as a part of its siz
 
 enum { LINE = 3 }; /* strain, stress and slope: what a tangent knows of a point */
 
-/* Flags that all points of a scene share in a step; see SearchFlags in material_points.py. */
+/* Flags that all points of a scene share in a step; see SearchFlags in openings.py. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
 /* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
@@ -815,7 +818,7 @@ typedef struct {
   cell_forces *cell_forces;
   int watches;
   const watch *const *watch;
-  int parts;              /* steps and parts of steps in the latest call */
+  int parts, parts_of_last; /* steps and parts of steps in the latest call; in its last step */
   int failure;            /* of the latest step; see enum failure */
   double failed_end;      /* of the smallest part that was tried */
   double (*stop)(void *handle, double t); /* the next time at which a step must stop; or none */

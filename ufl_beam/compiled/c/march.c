@@ -770,19 +770,22 @@ void keep_state(const march *m, double *row)
 }
 
 /* Steps to the times `ends`, up to the first that fails, or that ends so many seconds later; how many
- * were taken. Each is kept in one of `rows`, which are zero, if `keeps`. */
+ * were taken. Each is kept in one of `rows`, which are zero, if `keeps`; one that was cut is the last, as
+ * its last part does not begin where the one before has ended. */
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
 {
   const double end = steps > 1 ? seconds_now() + seconds : 0;
   m->failure = SUCCEEDS;
   m->parts = 0;
   for (int k = 0; k < steps; ++k) {
+    const int before = m->parts;
     do {
       const double stop = m->stop ? fmin(m->stop(m->stops, ends[k]), ends[k]) : ends[k];
       if (!go_to_time(m, stop)) return k;
     } while (m->t != ends[k]);
     if (keeps) keep_state(m, rows + (size_t)k * m->width);
-    if (steps > 1 && seconds_now() > end) return k + 1;
+    m->parts_of_last = m->parts - before;
+    if (m->parts_of_last > 1 || (steps > 1 && seconds_now() > end)) return k + 1;
   }
   return steps;
 }

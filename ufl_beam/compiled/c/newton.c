@@ -99,9 +99,6 @@ static void begin_rows(const equation *e, int first, int last)
   if (e->product) add_rows(e->product, first, last, e->tangent);
 }
 
-/* Cells whose rows the processor still has at hand when the cells add to them. */
-enum { SOME = 128 };
-
 /* The cells from `first` on */
 static cells some_cells(const cells *c, int first)
 {

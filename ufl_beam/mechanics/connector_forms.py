@@ -9,11 +9,11 @@ import basix.ufl
 import ufl
 from ufl.core.expr import Expr
 
-from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
 from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.structure_cache import stated
 
 
 class ConnectorForms(NamedTuple):

@@ -1,0 +1,453 @@
+# SPDX-License-Identifier: MIT
+"""Return map of material points in NumPy, all points of a kind at once.
+
+A point answers the strain at the end of a step.  Its law is called on arrays; derivatives are
+complex steps.  Where the stress exceeds the resistance of the discontinuity, the jump grows until
+both are equal, and the tangent is condensed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.fibres import Layout
+from ufl_beam.model.law_functions import Values
+from ufl_beam.reference.cells import Ledger
+
+CLOSED, FLOWING, RELEASED = 0.0, 1.0, 2.0
+"""A discontinuity did not grow in the last step, grew in it, may open in this one."""
+
+IMAGINARY = 1e-200
+"""Step into the imaginary: its square disturbs no digit of the value."""
+
+EPS = float(np.finfo(float).eps)
+
+NO_ENERGY = 1e-9
+"""Dissipation that is none, as a part of its size."""
+
+CORRECTIONS, HALVINGS = 100, 10
+"""Most corrections of the variables of a law, and most halvings of each."""
+
+
+@dataclass
+class Search:
+    """Search for the equilibrium of a step in which no more opens than must.
+
+    Attributes:
+        hold: Whether what did not flow in the last step stays closed.
+        over: Whether something that was held has borne more than its limit.
+    """
+
+    hold: bool = False
+    over: bool = False
+
+
+# -- derivatives ---------------------------------------------------------------------------------
+
+
+def derivative(f: Callable[[Values], Values], x: Array) -> tuple[Array, Array]:
+    """Value and derivative of a function of arrays, entry by entry."""
+    y = f(x + 1j * IMAGINARY)
+    return np.real(y).copy(), np.imag(y) / IMAGINARY
+
+
+def jacobian(
+    f: Callable[[At], Array], at: Mapping[str, Values], by: Sequence[str]
+) -> tuple[Array, Array]:
+    """Values of functions of points, and derivatives by some numbers; (n, ...), (n, k, ...)."""
+
+    def column(name: str) -> tuple[Array, Array]:
+        return derivative(lambda x: f({**at, name: x}), at[name])
+
+    columns = [column(name) for name in by]
+    return columns[0][0], np.stack([slope for _, slope in columns], axis=1)
+
+
+def solved(A: Array, b: Array) -> Array:
+    """Solve A x = b at many points; (n, n, ...), (n, k, ...); NaN where A is singular."""
+    A, b = (np.moveaxis(x, (0, 1), (-2, -1)) for x in (A, b))
+    A = np.where((np.linalg.det(A) == 0)[..., None, None], np.nan, A)
+    return np.asarray(np.moveaxis(np.linalg.solve(A, b), (-2, -1), (0, 1)))
+
+
+# -- points --------------------------------------------------------------------------------------
+
+
+class MaterialPoints:
+    """Points of one layout in many cells.
+
+    Args:
+        layout: The points of a cell, with their laws.
+        keys: Of the cells, for numbers that are drawn at random.
+        length: Of the cells; (cells,); m.
+        scheme: Time scheme; it says where in a step the laws hold.
+        search: Of all points of a scene.
+        ledger: Where energies are entered.
+
+    Attributes:
+        at: Numbers of the points by name, internal variables among them; (cells, n) each.
+        r: (N, V, M) of the latest response; (cells, 3).
+        D: Their derivatives by the strains; (cells, 3, 3).
+        kept: By cell: (N, V, M) of the accepted state, the jump of the last point, the energies
+            dissipated by plastic strains and by discontinuities; (cells, 6).
+        excess: ``|stress| / limit - 1`` of the points that are held closed, else 0; (cells, n).
+    """
+
+    def __init__(
+        self, layout: Layout, keys: list[tuple[int, int]], length: Array, scheme: Scheme,
+        search: Search, ledger: Ledger,
+    ) -> None:  # fmt: skip
+        self._layout, self._scheme, self._search, self._ledger = layout, scheme, search, ledger
+        cells, n, self._law = len(keys), len(layout.weights), layout.kind.law
+        self.at = at = {name: np.zeros((cells, n)) for name in inputs(layout)}
+        self._e, self._e0, self._C = (
+            rows(self._law, name) for name in ("strain", "before", "stiffness")
+        )
+        for name, C in zip(self._C, np.reshape(layout.stiffness, (n, -1)).T, strict=True):
+            at[name][:] = C
+        for name, value in layout.numbers(keys).items():
+            at[f"number {name}"][:] = value
+        for name, initial in self._law.variables.items():
+            at[f"state {name}"][:] = initial
+        at["length"][:], at["theta"][:], at["dt"][:] = length[:, None], scheme.theta, 1.0
+        at["softening energy"][:], at["traction"][:] = 1.0, np.inf
+        self.softens, softening = layout.softening is not None, layout.softening
+        if softening is not None:
+            for name in ("limit", "energy"):
+                at[f"softening {name}"][:, layout.breaking] = getattr(softening, name)
+        self._equations = PointEquations(layout.kind, softening and softening.of(1.0, 1.0), scheme)
+        # Strains of the points by component are B times those of the cell.
+        self._B = np.asarray(layout.strains).reshape(n, -1, 3)
+        self.strains: Array = np.zeros((cells, 3))
+        self.strains0: Array = np.zeros((cells, 3))
+        self.r: Array = np.zeros((cells, 3))
+        self.D: Array = np.zeros((cells, 3, 3))
+        self.kept: Array = np.zeros((cells, 6))
+        self.excess: Array = np.zeros((cells, n))
+        self._stored: Array = np.zeros(2)
+        self._resist()
+        self._expect_entries()
+
+    def _expect_entries(self) -> None:
+        """Make the entries of the ledger."""
+        layout, scheme, ledger = self._layout, self._scheme, self._ledger
+        # What has broken may have a stress at the ends of a step, and none where its law holds.
+        self._releases = (self.softens and scheme.theta < 1) or (
+            scheme.average(0.0, 1.0) != 1.0 and curved(layout.kind)
+        )
+        if layout.yields:
+            ledger.state["hardening"] += 0.0
+            ledger.lost["plastic"] += 0.0
+        if self.softens:
+            ledger.lost["hinges"] += 0.0
+        if scheme.alpha or self._releases:
+            ledger.lost["numerical"] += 0.0
+
+    def _of_points(self, strains: Array) -> Array:
+        """Strains of the points, by component, from those of the cells; (d, cells, n)."""
+        return np.asarray(np.einsum("nak,ck->acn", self._B, strains))
+
+    def _resist(self) -> None:
+        """Resistance after the openings so far."""
+        softening, breaking = self._layout.softening, self._layout.breaking
+        if softening is not None:
+            self.at["traction"][:, breaking] = softening.traction(self.at["opening"][:, breaking])
+
+    # -- a step ----------------------------------------------------------------------------------
+
+    def start(self, strains: Array) -> None:
+        """Begin at these strains of the cells; (cells, 3)."""
+        self.strains0 = strains.copy()
+        for name, values in zip(self._e0, self._of_points(strains), strict=True):
+            self.at[name][:] = values
+        self._resist()
+
+    def begin(self, dt: float) -> None:
+        """Begin a step of this length; s."""
+        self.at["dt"][:] = dt
+
+    @np.errstate(all="ignore")
+    def respond(self, strains: Array) -> None:
+        """Answer the strains of an iterate, (cells, 3), with :attr:`r` and :attr:`D`."""
+        at, θ, w = self.at, self._scheme.theta, self._layout.weights
+        self.strains = strains.copy()
+        for name, values in zip(self._e, self._of_points(strains), strict=True):
+            at[name][:] = values
+        at["growth"][:] = at["direction"][:] = 0.0
+        stress, slope = self._bulk(at)
+        first = stress[0]  # of points that can open it is the only one
+        over = np.abs(first) > at["traction"]  # P(51)
+        held = over & (at["flows"] == CLOSED) & (at["traction"] > 0) & self._search.hold
+        self.excess = np.where(held, np.abs(first) / at["traction"] - 1, 0.0)
+        self._search.over |= bool(held.any())
+        opens = over & ~held
+        if opens.any():
+            at["direction"][:] = np.where(opens, np.where(first < 0, -1.0, 1.0), 0.0)
+            at["growth"][:] = self._growth(first, opens)
+            stress_open, slope_open = self._opened()
+            stress, slope = np.where(opens, stress_open, stress), np.where(opens, slope_open, slope)
+        rest = self._layout.rest  # stiffness of what has no points
+        self.r = rest * ((1 - θ) * self.strains0 + θ * strains)
+        self.r = self.r + np.einsum("n,acn,nak->ck", w, stress, self._B)
+        self.D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B) + θ * np.diag(rest)
+
+    def _bulk(self, at: At) -> tuple[Array, Array]:
+        """Stresses of the bulk where its law holds, and derivatives; (d, cells, n), (d, d, ...)."""
+
+        def stress(at: At) -> Array:
+            return np.array([σ + 0 * at["length"] for σ in self._equations.stress(at)])
+
+        if not self._law.solves:
+            return jacobian(stress, at, self._e)
+        self._solve(at)
+        unknown = prefixed("new", self._law.variables)
+        σ, by_strains = jacobian(stress, at, self._e)
+        _, by_unknown = jacobian(stress, at, unknown)
+        J, E = (jacobian(self._residuals, at, names)[1] for names in (unknown, self._e))
+        return σ, by_strains - np.einsum("aj...,jb...->ab...", by_unknown, solved(J, E))
+
+    def _residuals(self, at: At) -> Array:
+        """Residuals of the variables that a law solves for; (m, cells, n)."""
+        return np.array([r + 0 * at["length"] for r in self._equations.residuals(at)])
+
+    def _solve(self, at: At) -> None:
+        """Find the variables of a law from its residuals, by Newton's method at each point."""
+        variables = self._law.variables
+        unknown = prefixed("new", variables)
+        for name, old in zip(unknown, prefixed("state", variables), strict=True):
+            at[name][:] = at[old]
+        ε, done = np.array([at[name] for name in self._e]), np.zeros(at["length"].shape, bool)
+        for _ in range(CORRECTIONS + 1):
+            R, J = jacobian(self._residuals, at, unknown)
+            _, E = jacobian(self._residuals, at, self._e)
+            z, δ = np.array([at[name] for name in unknown]), solved(J, R[:, None])[:, 0]
+            # Sizes of the terms of each equation, and what their last digits make of it.
+            sizes = np.einsum("ij...,j...->i...", abs(J), abs(δ))
+            digits = np.einsum("ij...,j...->i...", abs(J), abs(z))
+            digits = 4 * EPS * (digits + np.einsum("ij...,j...->i...", abs(E), abs(ε)))
+            small = (abs(R) <= digits) | (abs(δ) <= 1e-9 * abs(z))
+            ends = ~done & small.all(axis=0)
+            sizes = sizes + digits
+            before = _part_of(R, sizes)
+            part: Array = np.ones(done.shape)
+            for _ in range(HALVINGS):
+                for name, value in zip(unknown, z - part * δ, strict=True):
+                    at[name][:] = np.where(done, at[name], value)
+                falls = _part_of(self._residuals(at), sizes) <= (1 - part / 10) * before
+                if (falls | done | ends).all():
+                    break
+                part = np.where(falls | done | ends, part, part / 2)
+            done |= ends
+            if done.all():
+                return
+        for name in unknown:
+            at[name][~done] = np.nan
+
+    # -- discontinuities -------------------------------------------------------------------------
+
+    def _resistance(self, at: At) -> tuple[Array, Array]:
+        """Resistance of the discontinuities in the step, and its derivative by their growth."""
+        return derivative(lambda a: self._equations.resistance(at, a), at["growth"])
+
+    def _opened(self) -> tuple[Array, Array]:
+        """Stress at the growth that was found, and its derivative, condensed as P(74), P(75)."""
+        stress, slope = self._bulk(self.at)
+        _, softens = self._resistance(self.at)
+        return stress, slope * softens / (slope / self.at["length"] + softens)  # P(76)
+
+    def _growth(self, stress: Array, opens: Array) -> Array:
+        """Growth at which bulk and discontinuity bear the same; Newton's method in bounds."""
+        at, length = self.at, self.at["length"]
+
+        def excess(a: Array) -> tuple[Array, Array]:
+            """What the bulk bears more than the discontinuity, and its derivative."""
+            now = {**at, "growth": a}
+            borne, tangent = self._bulk(now)
+            resists, softens = self._resistance(now)
+            over = at["direction"] * borne[0] - resists  # P(32)
+            return over, -tangent[0, 0] / length - softens
+
+        # An elastic bulk lets go of all its stress over this length.
+        bound = np.abs(stress) / at["stiffness"] * length / self._scheme.theta
+        bound += np.finfo(float).tiny
+        digits = np.maximum(np.abs(at["before"]), np.abs(at["strain"])) * length
+        digits = 4 * EPS * (bound + digits + np.abs(at["jump"]))
+        found, last = np.full_like(stress, np.nan), np.full_like(stress, np.inf)
+        low, high = np.zeros_like(stress), np.full_like(stress, np.inf)
+        over, slope = excess(low)
+        none = np.logical_not(np.logical_and(opens, over > 0))  # or over the limit by a last digit
+        a = np.where(slope < 0, np.fmin(bound, -over / slope), bound)
+        for _ in range(2 * CORRECTIONS):
+            before, (over, slope) = over, excess(a)
+            low, high = np.where(over > 0, a, low), np.where(over > 0, high, a)
+            better = a - over / slope
+            step = np.abs(better - a)
+            # So small a relative step was the last but none: the next one would be its square.
+            ends = np.isnan(found) & ((step <= 1e-9 * a) | (step <= digits))
+            found = np.where(ends, np.where(better > 0, better, a), found)
+            if (none | ~np.isnan(found)).all():
+                break
+            halved = np.where(np.isfinite(high), (low + high) / 2, 2 * a)
+            wanders = ((before > 0) != (over > 0)) & (step > last / 2) & np.isfinite(high)
+            within, last = (better > low) & (better < high) & ~wanders, step
+            a = np.where(within, better, halved)
+        return np.where(none, 0.0, found)
+
+    def release(self, least: float) -> None:
+        """Let points that are held open from now on whose excess is so large."""
+        self.at["flows"][(self.excess > 0) & (self.excess >= least)] = RELEASED
+
+    def close(self) -> None:
+        """Take back what was released: the step is accepted, or begins again."""
+        self.at["flows"][self.at["flows"] == RELEASED] = CLOSED
+
+    # -- the end of a step -----------------------------------------------------------------------
+
+    @np.errstate(all="ignore")
+    def require_dissipation(self, names: Sequence[str]) -> None:
+        """Raise :class:`StepFailed` if a law gives energy; ``names`` are those of the cells."""
+        if not self._law.must_dissipate:
+            return
+
+        def stored(at: At) -> Array:
+            return np.array([self._equations.stored(at) + 0 * at["length"]])
+
+        _, slopes = jacobian(stored, self.at, prefixed("new", self._law.variables))
+        own, size = self._equations.own_dissipation(self.at, tuple(slopes[0]))
+        part = np.nan_to_num(own / size)
+        worst = int(np.argmin(part))
+        if part.flat[worst] < -NO_ENERGY:
+            raise StepFailed(
+                f"{type(self._law).__name__} of {names[worst // part.shape[1]]} has a negative "
+                "dissipation in the step: its equations have several solutions, or it stores "
+                "energy that it does not state. A law that is to give energy has active = True, "
+                "see docs/extending_laws.md"
+            )
+
+    def change(self) -> float:
+        """Energy that the latest response stores and dissipates; J.
+
+        Where viscous stresses relax it is as the trapezoidal rule counts it.
+        """
+        before = self.at, self.strains0, self.kept, self._stored
+        self.at = {name: values.copy() for name, values in self.at.items()}
+        self.kept, stored = self.kept.copy(), self._stored.sum()
+        plastic, broken, _, released, relaxed = self._commit()
+        change = plastic + broken + self._stored.sum() - stored + released + relaxed
+        self.at, self.strains0, self.kept, self._stored = before
+        return float(change)
+
+    def accept(self) -> None:
+        """Take the latest response as the new state, and enter what it dissipated."""
+        plastic, broken, lost, released, _ = self._commit()
+        entries, α = self._ledger.lost, self._scheme.alpha
+        if self._layout.yields:
+            entries["plastic"] += plastic
+        if self.softens:
+            entries["hinges"] += broken
+        if α or self._releases:
+            entries["numerical"] += 2 * α * lost + released
+
+    def enter_stored(self) -> None:
+        """Enter what the accepted state stores."""
+        elastic, hardening = self._stored
+        self._ledger.state["stored"] += elastic
+        if self._layout.yields:
+            self._ledger.state["hardening"] += hardening
+
+    @np.errstate(over="ignore")
+    def _commit(self) -> tuple[float, float, float, float, float]:
+        """Write the end of the step into the variables.
+
+        Returns:
+            Energy dissipated by plastic strains and by discontinuities; lost numerically by
+            backward Euler, over ``2 alpha``; let go by what has broken; work of the mean stress on
+            plastic strains, less that at the end, of points whose stress relaxes; J.
+        """
+        at, layout, w = self.at, self._layout, self._layout.weights
+        length, volume, rest = at["length"][:, 0], w * at["length"], layout.rest
+        end = self._equations.end(at)
+        energy, stress = end.elastic, np.array([σ + 0 * at["length"] for σ in end.stress])
+
+        change, self.strains0 = self.strains - self.strains0, self.strains
+        lost = np.sum(rest * change**2 / 2 * length[:, None]) + np.sum(volume * end.lost)
+        elastic = np.sum(rest * self.strains**2 / 2 * length[:, None])
+
+        for name, grown in zip(prefixed("state", self._law.variables), end.changes, strict=True):
+            at[name] += grown
+        for name, now in zip(self._e0, self._e, strict=True):
+            at[name][:] = at[now]
+        at["jump"] += at["direction"] * at["growth"]
+        at["opening"] += at["growth"]
+        at["flows"][:] = np.where(at["growth"] > 0, FLOWING, CLOSED)
+        at["growth"][:] = at["direction"][:] = 0.0
+
+        # What has broken bears nothing; its elastic strain goes into the jump.
+        breaks = np.isfinite(at["traction"])
+        at["traction"][breaks] = (end.resistance + 0 * at["length"])[breaks]
+        gone = at["traction"] == 0
+        for relieved, name in zip(stress, self._C, strict=True):
+            at["jump"] += np.where(gone, relieved / at[name] * at["length"], 0.0)
+        released = np.sum(np.where(gone, volume * (energy - end.left), 0.0) + volume * end.missed)
+        energy, stress = np.where(gone, end.left, energy), np.where(gone, 0.0, stress)
+
+        self.kept[:, :3] = rest * self.strains + np.einsum("n,acn,nak->ck", w, stress, self._B)
+        self.kept[:, 3] = at["jump"][:, -1]
+        plastic = np.sum(volume * end.worked, axis=1)
+        broken = np.sum(w * (end.broken + 0 * at["length"]), axis=1)
+        self.kept[:, 4] += plastic
+        self.kept[:, 5] += broken
+        stored = elastic + np.sum(volume * energy), np.sum(volume * end.hardening)
+        self._stored = np.array(stored)
+        sums = plastic.sum(), broken.sum(), lost, released, np.sum(volume * end.relaxed)
+        return tuple(map(float, sums))  # type: ignore[return-value]
+
+    # -- a state that no step has led to ---------------------------------------------------------
+
+    def refresh(self) -> None:
+        """Make forces and stored energies those of the strains at which the points begin."""
+        at, length, w = self.at, self.at["length"][:, 0], self._layout.weights
+        law, state = self._equations.law(at), self._equations.state(at)
+        volume, rest = w * at["length"], self._layout.rest
+        e = law.as_argument(tuple(self._of_points(self.strains0) - at["jump"] / at["length"]))
+        stress = np.array([σ + 0 * at["length"] for σ in law.as_tuple(law.stress(e, state))])
+        self.kept[:, :3] = rest * self.strains0 + np.einsum("n,acn,nak->ck", w, stress, self._B)
+        self._stored[0] = np.sum(volume * law.elastic_energy(e, state))
+        self._stored[0] += np.sum(self.strains0**2 @ rest / 2 * length)
+        self._stored[1] = np.sum(volume * law.hardening_energy(state))
+
+    @property
+    def _variables(self) -> tuple[str, ...]:
+        """Names of all that later steps depend on."""
+        others = "jump", "opening", *self._e0, "traction", "flows"
+        return (*prefixed("state", self._law.variables), *others)
+
+    def state(self) -> Array:
+        """Return the internal variables of the accepted state; (cells, k)."""
+        stored = np.zeros((len(self.kept), 2))
+        stored[:1] = self._stored  # of all cells together; to whom it belongs does not matter
+        variables = [self.at[name] for name in self._variables]
+        return np.asarray(np.hstack([*variables, self.kept, self.strains0, stored]))
+
+    def restore(self, cells: Sequence[int] | Index, table: Array) -> None:
+        """Take over :meth:`state` in some of the cells."""
+        n = self.at["length"].shape[1]
+        ends = np.arange(1, len(self._variables) + 1) * n
+        *variables, kept, e0, stored = np.split(table, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
+        for name, values in zip(self._variables, variables, strict=True):
+            self.at[name][cells] = values
+        self.kept[cells], self.strains0[cells] = kept, e0
+        self._stored = stored.sum(axis=0)
+
+
+def _part_of(residuals: Array, sizes: Array) -> Array:
+    """Largest part that the residuals of a law are of their sizes; infinite if it is no number."""
+    part = np.where(residuals == 0, 0.0, np.abs(residuals) / sizes)
+    return np.asarray(np.nan_to_num(part, nan=np.inf, posinf=np.inf).max(axis=0))
