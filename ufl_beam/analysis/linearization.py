@@ -86,6 +86,9 @@ class _Standstill(Newmark):
     def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
         return 1 / dt, 0.0, rates.v
 
+    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
+        return super().rates(dt, s, rates)[:1]
+
 
 class SmallMotions:
     """Matrices of the small motions about a state, without the motions that supports hold.

@@ -138,7 +138,7 @@ class Stepper:
         share, phases = equation.share, [one.phases(self._callbacks) for one in equation.terms]
         self._phases = phases
         again = [one.again for one in phases if one.again is not None]
-        fill(equation.c, agains=len(again), again=ffi.new("again[]", again))
+        fill(equation.c, agains=len(again), again=ffi.new("again_call[]", again))
         least = LEAST_IN_MOTION if inertia is not None else LEAST_AT_REST
         self.solver = solver = Solver(share, equation, newton, least)
         known: Any = scheme
@@ -187,7 +187,8 @@ class Stepper:
                     f"{scheme!r}: what it makes of velocities must be sums of multiples of them"
                 )
             handle = self._callbacks.handle(self._prepare)
-            fill(self.c, rates=rates.c, prepare=lib.run_in_python, handle=handle)
+            fill(self.c, rates=rates.c, prepare=lib.run_in_python)
+            self.c.handle = handle  # what `fill` keeps must not keep this object
         if path is not None:
             changes = [one.change for one in phases if one.change is not None]
             fill(self.c, path=path.in_c(changes))
@@ -211,7 +212,7 @@ class Stepper:
         extras, callbacks = self._extras, self._callbacks
         if extras.stop is not None:
             stop = callbacks.handle(lambda t: extras.stop(self.c.t, t))  # type: ignore[misc]
-            fill(self.c, stop=lib.time_in_python, stops=stop)
+            self.c.stop, self.c.stops = lib.time_in_python, stop
         if callbacks.used or extras != Extras(None, None, None, None):
             # What may raise comes first, before loops of C have accepted anything.
             mine = [one for one in loops["accept"] if one[0] == lib.phase_in_python]

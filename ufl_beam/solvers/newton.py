@@ -98,10 +98,11 @@ class Solver:
             c,
             least=least, unknowns=self._q, residual=self._r, change=self.change,
             x=opaque(self._x), f=opaque(self._f), y=opaque(self._y),
-            handle=handle(self), find_conjugates=lib.find_conjugates_in_python,
+            find_conjugates=lib.find_conjugates_in_python,
             find_idle=lib.find_idle_in_python, forget_idle=lib.forget_idle_in_python,
             aside=np.zeros(share.size if c.search != ffi.NULL else 0),
         )  # fmt: skip
+        c.handle = handle(self)  # what `fill` keeps must not keep this object
         if share.alone:
             self._factors.drive(c)
         else:
@@ -219,10 +220,12 @@ class Solver:
             self._c.border = ffi.NULL
             return
         t, handle = np.array([border.t]), self._equation.callbacks.handle
-        fill(self._c, border=struct(
-            "border", handle=handle(Bordered(self, border, t)), t=t, arrive=lib.arrive_in_python,
-            change=lib.change_of_border_in_python, met=lib.border_is_met_in_python,
-        ))  # fmt: skip
+        self._border = t, struct(
+            "border", t=t, arrive=lib.arrive_in_python, change=lib.change_of_border_in_python,
+            met=lib.border_is_met_in_python,
+        )  # fmt: skip
+        self._border[1].handle = handle(Bordered(self, border, t))
+        self._c.border = self._border[1]
 
     def bordered_change(self, border: Border, x: Array) -> bool:
         """Find the change of an iteration of the bordered equation; return whether that fails.

@@ -468,7 +468,7 @@ typedef struct {
 typedef struct {
   void (*run)(void *self);
   void *self;
-} again;
+} again_call;
 
 /* The equation of a step, and how far its solution is. Unknowns and residuals are in the axes of supports. */
 typedef struct {
@@ -523,7 +523,7 @@ typedef struct {
   predicted_strains *const *predicted;
   int32_t *search;       /* flags of points that may open; or none */
   int agains;
-  const again *again;
+  const again_call *again;
   double *conjugate, *start, *aside; /* space: of a search; of a solution with stiffer tangents */
   void *handle;
   double (*agree)(void *handle, int how, double here); /* over processes; none if there is one */
@@ -653,7 +653,8 @@ typedef struct {
 
 /* Vectors times functions of time at some degrees of freedom, see DeadLoads. */
 typedef struct {
-  int size, vectors, changed; /* changed: since norm was computed */
+  int size, vectors;
+  int changed, whole; /* since norm was computed; whether the latest step went all the way to its loads */
   const int32_t *dof;
   const double *const *vector;
   const time_function *factor;

@@ -109,7 +109,8 @@ void begin_dead_loads(void *self, const time_step *step, const double *q1, const
 {
   dead_loads *l = self;
   const int whole = step->fraction == 1 && step->at == 1;
-  int same = whole;
+  int same = whole && l->whole;
+  l->whole = whole;
   for (int k = 0; k < l->vectors; ++k) {
     const double factor = value_at(l->factor + k, step->load_time);
     if (factor != l->factors[k]) l->factors[k] = factor, same = 0;
@@ -733,17 +734,17 @@ int accept_step(march *m)
 int go_to_time(march *m, double end)
 {
   const double begin = m->t;
-  for (int done = 0, part = MOST_PARTS; done < MOST_PARTS;) {
-    const double t1 = done + part == MOST_PARTS ? end : begin + (end - begin) * (done + part) / MOST_PARTS;
+  for (int done = 0, some = MOST_PARTS; done < MOST_PARTS;) {
+    const double t1 = done + some == MOST_PARTS ? end : begin + (end - begin) * (done + some) / MOST_PARTS;
     if (attempt_step(m, t1, end)) {
       if (!accept_step(m)) return 0;
-      done += part;
+      done += some;
       /* A part grows again where the larger one would begin anyway. */
-      if (done % (2 * part) == 0 && part < MOST_PARTS) part *= 2;
+      if (done % (2 * some) == 0 && some < MOST_PARTS) some *= 2;
     } else {
       m->failed_end = t1;
-      if (part == 1 || m->equation->raised == OTHER || m->equation->error) return 0;
-      part /= 2;
+      if (some == 1 || m->equation->raised == OTHER || m->equation->error) return 0;
+      some /= 2;
     }
   }
   return 1;

@@ -18,18 +18,18 @@ static double norm_of(const equation *e, const double *forces)
 }
 
 /* Values of a vector of PETSc that other processes own; or what this one has for them, added there. */
-static int update_ghosts(const equation *e, void *vector)
+static int update_ghosts(const equation *e, void *v)
 {
   if (!e->agree) return 0;
-  const int error = petsc.VecGhostUpdateBegin(vector, INSERT_VALUES, FORWARD);
-  return error ? error : petsc.VecGhostUpdateEnd(vector, INSERT_VALUES, FORWARD);
+  const int error = petsc.VecGhostUpdateBegin(v, INSERT_VALUES, FORWARD);
+  return error ? error : petsc.VecGhostUpdateEnd(v, INSERT_VALUES, FORWARD);
 }
 
-static int add_ghosts(const equation *e, void *vector)
+static int add_ghosts(const equation *e, void *v)
 {
   if (!e->agree) return 0;
-  const int error = petsc.VecGhostUpdateBegin(vector, ADD_VALUES, REVERSE);
-  return error ? error : petsc.VecGhostUpdateEnd(vector, ADD_VALUES, REVERSE);
+  const int error = petsc.VecGhostUpdateBegin(v, ADD_VALUES, REVERSE);
+  return error ? error : petsc.VecGhostUpdateEnd(v, ADD_VALUES, REVERSE);
 }
 
 /* What a function of a user has raised on any process, see `raised`. */
@@ -360,17 +360,17 @@ static int search(equation *e, double *x)
   TRY(update_ghosts(e, e->y));
   e->find_conjugates(e->handle, in_plane(e, x)); /* which makes room for them, and for the start */
   memcpy(e->start, x, e->size * sizeof *x);
-  double before = work_of_residual(e), last = 0, part = 1;
+  double before = work_of_residual(e), last = 0, way = 1;
   const double first = fabs(before);
   for (int k = 1;; ++k) {
-    for (int i = 0; i < e->owned; ++i) x[i] = e->start[i] - part * e->change[i];
+    for (int i = 0; i < e->owned; ++i) x[i] = e->start[i] - way * e->change[i];
     TRY(residual_at(e, x));
-    const double now = work_of_residual(e), slope = (now - before) / (part - last);
+    const double now = work_of_residual(e), slope = (now - before) / (way - last);
     if (k == EVALUATIONS || !(fabs(now) > PART * first) || slope == 0) return 0;
-    double next = part - now / slope;
-    if (next < SHORTEST) next = part + now / slope;
+    double next = way - now / slope;
+    if (next < SHORTEST) next = way + now / slope;
     if (!(SHORTEST <= next && next <= LONGEST)) return 0;
-    before = now, last = part, part = next;
+    before = now, last = way, way = next;
   }
 }
 
@@ -420,17 +420,17 @@ int snes_newton(void *snes, void *x)
 }
 
 /* Local values of a vector, ghosts included. */
-static int open_vector(const equation *e, void *vector, void **local, double **values)
+static int open_vector(const equation *e, void *v, void **local, double **values)
 {
-  *local = vector;
-  if (e->agree) TRY(petsc.VecGhostGetLocalForm(vector, local));
+  *local = v;
+  if (e->agree) TRY(petsc.VecGhostGetLocalForm(v, local));
   return petsc.VecGetArray(*local, values);
 }
 
-static int close_vector(const equation *e, void *vector, void **local, double **values)
+static int close_vector(const equation *e, void *v, void **local, double **values)
 {
   TRY(petsc.VecRestoreArray(*local, values));
-  return e->agree ? petsc.VecGhostRestoreLocalForm(vector, local) : 0;
+  return e->agree ? petsc.VecGhostRestoreLocalForm(v, local) : 0;
 }
 
 int snes_function(void *snes, void *x, void *f, void *self)
@@ -494,11 +494,11 @@ static int go_to(equation *e, const double *guess, enum tangents kind)
 }
 
 /* Let a vector be written again that PETSc keeps locked after a linear solution has failed. */
-static void unlock(void *vector)
+static void unlock(void *v)
 {
   petsc_int locks = 0;
-  petsc.VecLockGet(vector, &locks);
-  while (locks-- > 0) petsc.VecLockReadPop(vector);
+  petsc.VecLockGet(v, &locks);
+  while (locks-- > 0) petsc.VecLockReadPop(v);
 }
 
 /* Iterations in a row without half the least residual that are one too many: of full steps, of steps that a
