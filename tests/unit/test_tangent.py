@@ -119,15 +119,16 @@ class Probe:
         inelastic.restore(cells, rows)
 
     def residual(self, x):
-        r = np.empty(len(x))
-        self.simulation.equation.residual(x, r)
+        supports = self.simulation.supports
+        r = self.simulation.equation.forces(supports.in_plane(x))
+        supports.enter(r)
         return r[self.free]
 
     def tangent(self):
         A = self.simulation.equation.A
         self.residual(self.x)  # rows of connectors are those of the latest residual
         for _ in range(2):  # the first tangent of a static step takes the forces before the step
-            self.simulation.equation.tangent(self.x)
+            self.simulation.equation.tangent(self.simulation.supports.in_plane(self.x))
         matrix = csr_array((A.data, A.indices, A.indptr)).toarray()
         return matrix[np.ix_(self.free, self.free)]
 

@@ -128,15 +128,28 @@ class StepEquation:
     def respond_at(self, q1: Array) -> bool:
         """Evaluate forces and tangent of the present step at ``q1``; false if a process cannot."""
         lib.restart(self.c, lib.EXACT)
-        r, self.c.raised = np.zeros(self.share.size), 0
+        self.c.raised = 0
         try:
-            for term in self.terms:
-                term.add_residual(q1, r)
+            self.forces(q1)
         except StepFailed:
             self.c.raised = 1
+        self.tangent(q1)
+        return self.share.largest(float(self.c.raised)) == 0.0
+
+    def forces(self, q1: Array) -> Array:
+        """Return the sum of the forces of all terms at ``q1``, those of this process."""
+        r = np.zeros(self.share.size)
+        for term in self.terms:
+            term.add_residual(q1, r)
+        return r
+
+    def tangent(self, q1: Array) -> None:
+        """Fill the matrix with the derivative at ``q1``, in the axes of supports, with these held.
+
+        What functions of users raise there is in :attr:`callbacks`.
+        """
         lib.fill_tangent(self.c, doubles(q1))
         lib.hold_tangent(self.c)
-        return self.share.largest(float(self.c.raised)) == 0.0
 
     def working(self, q: Array, y: Array) -> Array:
         """Return the conjugates of residuals in a step ``y`` in the axes of supports; a new array.

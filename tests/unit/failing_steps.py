@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: MIT
+"""Steps that fail on purpose, after their last iteration."""
+
+from ufl_beam.compiled.c_library import ffi, fill
+
+
+def let_fail(simulation, fails):
+    """Let a step to the time t1 fail where ``fails(t1)`` is true."""
+    stepper = simulation._stepper
+
+    @ffi.callback("int(void *, const double *)")
+    def admits(_, q1):
+        return not fails(stepper.c.step.t1)
+
+    calls = ffi.new("admission_call[]", [(admits, ffi.NULL)])
+    fill(stepper.c, admissions=1, admission=calls, judges=1)
+    stepper._alive.append((calls, admits))
