@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from itertools import accumulate, pairwise
 from typing import Any, Protocol
@@ -11,6 +12,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index, Snapshots
 from ufl_beam.compiled.c_library import ffi, integers
+from ufl_beam.model.supports import Support
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.links import CONNECTION, FORCE, Links
 from ufl_beam.terms.material_points import Points
@@ -48,7 +50,8 @@ class KeptRows:
     """
 
     def __init__(
-        self, march: Any, ledger: Ledger, supports: Supports, support_dofs: Index,
+        self, march: Any, ledger: Ledger, supports: Supports, scene_supports: Sequence[Support],
+        support_dofs: Index,
         inelastic: Sequence[Inelastic], couplings: Sequence[Links], num_links: int,
         cell_forces: Sequence[tuple[Any, int]], q: Array,
     ) -> None:  # fmt: skip
@@ -57,6 +60,8 @@ class KeptRows:
         accounts = ledger.state, ledger.supplied, ledger.lost
         self._names = [list(account) for account in accounts]
         self._num_supports = len(support_dofs)
+        angles = [support.angle for support in scene_supports]
+        self._turned = [(i, (math.cos(a), math.sin(a))) for i, a in enumerate(angles) if a]
         kept = [one.kept()[0] for one in inelastic]
         cells = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *kept]))
         sizes = [
@@ -117,10 +122,14 @@ class KeptRows:
         ``before`` are the configurations at the beginnings of the steps, if they are asked for.
         """
         n = len(times)
+        reactions = rows[:, self._reactions].reshape(n, self._num_supports, 3)
+        for i, (c, s) in self._turned:
+            x, y = reactions[:, i, 0].copy(), reactions[:, i, 1].copy()
+            reactions[:, i, 0], reactions[:, i, 1] = c * x - s * y, s * x + c * y
         names = zip(self._names, self._entries, strict=True)
         return Snapshots(
             times, rows[:, self.q], None if self._v is None else rows[:, self._v],
-            rows[:, self._reactions].reshape(n, self._num_supports, 3),
+            reactions,
             tuple(dict(zip(of, rows[:, at].T, strict=True)) for of, at in names),
             rows[:, self._material].reshape(n, -1, MATERIAL),
             rows[:, self._connections].reshape(n, -1, CONNECTION),

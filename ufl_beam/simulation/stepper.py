@@ -202,8 +202,8 @@ class Stepper:
         inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
         links = [one for one in equation.terms if isinstance(one, Links)]
         self._links, number = links, len(share.grid.scene.links)
-        parts = ledger, equation.supports, support_dofs, inelastic, links, number
-        self._of_rows: Any = (*parts, cell_forces.kept)
+        parts = ledger, equation.supports, share.grid.scene.supports, support_dofs, inelastic
+        self._of_rows: Any = (*parts, links, number, cell_forces.kept)
         self._rows: KeptRows | None = None
         self._last: tuple[int, Array] = -1, np.zeros(0)  # step kept last; state at its end
 
