@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Functions that laws of materials are written with, for arrays and for UFL expressions.
 
-Arrays may be complex: the reference solver differentiates by complex steps, so that ``abs`` is wrong
-there and :func:`absolute` is right.  The operators + - * / and ** are those of Python.
+Arrays may be complex: the reference solver differentiates by complex steps, so that ``abs`` is
+wrong there and :func:`absolute` is right.  The operators + - * / and ** are those of Python.
 
 Example:
     >>> f = ub.law_functions
