@@ -294,7 +294,8 @@ class WorkForce(CellForce):
         """Enter what the work did in the step."""
         super().accept(q1, s)
         if isinstance(self._work, Potential):
-            self._ledger.lost["numerical"] += self.lost(q1) if self.losses else 0.0
+            if self.losses:
+                self._ledger.lost["numerical"] += self.lost(q1)
             if self._varies:
                 self._ledger.supplied[self._work.in_time] += self._gained(q1)
         else:
