@@ -46,6 +46,7 @@ class Equation(ABC):
     def note(self, error: BaseException) -> None:
         """Keep the first exception, which must not pass through C while other processes go on."""
         self.error = self.error or error
+        self.c.raised = 1
 
     @abstractmethod
     def residual(self, x: Array, r: Array) -> None:

@@ -470,6 +470,7 @@ typedef struct {
   int anew;                           /* no tangent is kept from step to step */
   double rate;                        /* of a modified Newton's method, by which residuals fall */
   int iterations, reason;             /* of snes_newton, the latest */
+  int raised;                         /* whether a function of Python has raised something since it began */
 } equation;
 
 /* Values of SNESConvergedReason. */

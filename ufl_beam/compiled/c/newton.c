@@ -156,7 +156,7 @@ void find_round_off(const equation *e, const double *q, double *forces)
 void begin_newton(equation *e, int patience, int like_last)
 {
   e->last = e->best = INFINITY;
-  e->near = e->slow = 0;
+  e->near = e->slow = e->raised = 0;
   e->patience = patience;
   if (!like_last || e->anew) e->rate = INFINITY;
 }
@@ -211,7 +211,8 @@ static int verdict(equation *e, const double *q, int iteration)
     find_round_off(e, q, e->space);
     floor = 8 * norm(e->size, e->weight, e->space);
   }
-  return judge(e, q, iteration, now, scale, floor);
+  const int found = judge(e, q, iteration, now, scale, floor);
+  return e->raised ? DIVERGED : found;
 }
 
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
