@@ -27,7 +27,7 @@ def shaken(law):
 @pytest.mark.parametrize("law", [ub.AxialBending(NP, MP), TwoRoots(NP, MP)], ids=repr)
 @pytest.mark.parametrize(
     ("scheme", "dt"),
-    [(ub.Midpoint(), 0.02), (ub.DecayingMidpoint(), 0.02), (ub.GeneralizedAlpha(), 0.05)],
+    [(ub.Midpoint(), 0.02), (ub.DecayingMidpoint(), 0.02), (ub.GeneralizedAlpha(), 0.0125)],
     ids=repr,
 )
 def test_dissipation_never_falls(law, scheme, dt):

@@ -134,7 +134,10 @@ def test_reasons_are_those_of_petsc(mine, theirs):
 @pytest.mark.serial  # with several processes PETSc's SNES calls Python
 @pytest.mark.parametrize("name", ["add_in_python", "missed_in_python"])
 def test_an_interrupt_at_the_door_of_a_callback_is_not_lost(name):
-    """It comes before the first line of what C calls, and cffi would only print it."""
+    """It comes before the first line of what C calls, and cffi would only print it.
+
+    Iterations that go on without the law of a guide may converge: the step fails all the same.
+    """
 
     def interrupt(frame, event, argument):
         if frame.f_code.co_name == name:

@@ -121,7 +121,7 @@ class ElasticBeams(CellForce):
         self.cells.put(self._change_before, ratio * self._change)
 
     def stored(self, q: Array) -> float:
-        """Elastic energy; J."""
+        """Elastic energy of all cells; J."""
         self.cells.set(self.of.q1, q)
         return self._energy.value()
 
@@ -234,7 +234,7 @@ class YieldingBeams(CellForce):
         return np.column_stack([self.cells.numbers, kept])
 
     def internal(self) -> dict[str, Array]:
-        """The internal variables."""
+        """Internal variables of all points."""
         state = self.points.state()
         return {f"cells, {state.shape[1]}": np.column_stack([self.cells.numbers, state])}
 

@@ -123,7 +123,7 @@ class LawInStep:
         return np.zeros(0)
 
     def restore(self, state: Array) -> None:
-        """Take them over."""
+        """Take over internal variables."""
 
     # -- see openings, in solver.py --------------------------------------------------------------
 
@@ -133,7 +133,7 @@ class LawInStep:
         """Let it open if its excess is so large."""
 
     def close(self) -> None:
-        """Take that back."""
+        """Take the release back."""
 
 
 # -- what is held, driven, pushed, damped --------------------------------------------------------

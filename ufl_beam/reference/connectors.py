@@ -183,7 +183,7 @@ class Connectors(Linked):
             law.enter_state(float(e))
 
     def kept(self, q: Array) -> Array:
-        """Columns of ``Connection``."""
+        """Columns of ``Connection`` of each; (num_links, 5)."""
         e = [law.motion(float(e)) for law, e in zip(self.laws, self._e0, strict=True)]
         dissipated = [law.dissipated for law in self.laws]
         return np.column_stack([e, q[self.forces_at], self.work, self.rate, dissipated])
@@ -252,13 +252,13 @@ class GuideForce(Linked):
     def _frame(self, q: Array) -> tuple[float, Array, Array, Array]:
         """Distance, normals there and over the step, derivative of the latter by the point."""
         on, slope = self._nearest(q)
-        t: Array = slope / math.hypot(*slope)
+        t = np.asarray(slope / math.hypot(*slope), np.float64)
         n = _turned(t)
         distance = float(n @ (self._point + q[self._x] - on))
         if not self._over_step:
             # The normal at the end turns by the curvature κ: dn = -κ t t.dp / (1 - κ distance).
             κ = float(n @ self._bend(self._s)) / (self._step**2 * float(slope @ slope))
-            return distance, n, n, np.outer(-κ / (1 - κ * distance) * t, t)
+            return distance, n, n, np.asarray(np.outer(-κ / (1 - κ * distance) * t, t))
         chord = on - self._on0
         length = math.hypot(*chord)
         if length > self._shortest:
@@ -273,7 +273,7 @@ class GuideForce(Linked):
             d = along / speed
             bend = self._bend(middle) / (self._step * speed) ** 2
             bend = np.asarray((bend - d * (d @ bend)) / 2)
-        return distance, n, _turned(np.asarray(d)), np.outer(_turned(bend), t)
+        return distance, n, _turned(np.asarray(d)), np.asarray(np.outer(_turned(bend), t))
 
     def again(self) -> None:
         """Begin at the point of the last step."""
@@ -291,7 +291,7 @@ class GuideForce(Linked):
         return r
 
     def tangent(self, q1: Array) -> csr_array:
-        """Their derivative."""
+        """Derivative of both by the unknowns."""
         _, n, m, dm = self._frame(q1)
         (x, y), λ = self._x, self._λ
         rows, columns = [x, x, y, y, x, y, λ, λ], [x, y, x, y, λ, λ, x, y]
@@ -324,7 +324,7 @@ class GuideForce(Linked):
         return {"guides, 7": np.array([row])}
 
     def take(self, internal: dict[str, Array], q: Array, *, goes_on: bool) -> None:
-        """Take them over."""
+        """Take over the point and its parameter."""
         table = internal.get("guides, 7", np.zeros((0, 8)))
         for row in table[table[:, 0] == self.numbers[0]]:
             self._s, self._s0, self._step = map(float, row[3:6])

@@ -63,7 +63,7 @@ class DeadLoad(LoadForce):
         self.force = self._now * self._vector
 
     def residual(self, q1: Array) -> Array:
-        """Minus the load."""
+        """Minus the load of the step."""
         return -self.force
 
     def accept(self, q1: Array, s: Array) -> None:
@@ -129,7 +129,7 @@ class Follower(LoadForce):
         return np.array([c * x - s * y, s * x + c * y, M])
 
     def residual(self, q1: Array) -> Array:
-        """Minus the load."""
+        """Minus the load of the step."""
         self.force = np.zeros(self.size)
         np.add.at(self.force, self._dofs, self._acting(q1))
         return -self.force
@@ -190,7 +190,7 @@ class FrameForce(LoadForce):
         return np.asarray(self._gyro @ (q1 - self._q0) / self._dt - self.force)
 
     def tangent(self, q1: Array) -> csr_array:
-        """Their derivative."""
+        """Derivative of both forces."""
         weight = self._growth * self.scheme.load_weight
         return csr_array(self._gyro / self._dt - weight * self._pull)
 
@@ -294,7 +294,8 @@ class WorkForce(CellForce):
         """Enter what the work did in the step."""
         super().accept(q1, s)
         if isinstance(self._work, Potential):
-            self._ledger.lost["numerical"] += self.lost(q1) if self.losses else 0.0
+            if self.losses:
+                self._ledger.lost["numerical"] += self.lost(q1)
             if self._varies:
                 self._ledger.supplied[self._work.in_time] += self._gained(q1)
         else:

@@ -108,7 +108,7 @@ def simulate(
     kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
     recorders, outputs = recorders_of(record, comm, "simulate", *kept)
     begin = time.perf_counter()
-    if newton is not None and newton.reference:
+    if isinstance(newton, Newton) and newton.reference:
         if isinstance(dt, Adaptive):
             require_plain(newton, "adaptive steps, dt = Adaptive(...)")
         if recorders or checkpoint is not None:

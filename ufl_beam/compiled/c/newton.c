@@ -256,7 +256,8 @@ static int verdict(equation *e, const double *x, int iteration)
     find_round_off(e, x, e->space);
     floor = 8 * norm_of(e, e->space);
   }
-  return judge(e, x, iteration, now, scale, floor);
+  const int found = judge(e, x, iteration, now, scale, floor);
+  return over_processes(e, LARGEST, e->raised) == OTHER ? DIVERGED : found;
 }
 
 /* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. A
