@@ -203,7 +203,7 @@ class Simulation(StateView):
     def _take(self, ends: Array, *, keep: bool = False) -> int:
         """Take steps in C; end the run where even the smallest part fails."""
         try:
-            if self._applies:
+            if self._applies and self.parts == 0:
                 self._applies = False
                 self._stepper.apply_loads(self, self.t + APPLYING * (float(ends[0]) - self.t))
             taken = self._stepper.take(self, ends, keep=keep)

@@ -39,7 +39,7 @@ class Guides(Links):
         self._rows = [A.positions(self._forces_at, d) for d in (self._x, self._y)]
         self._points = np.array([link.b.point for link in self.links])
         self._over_step = setting.scheme.average(0.0, 1.0) != 1.0
-        self._s, self._s0 = np.zeros((2, len(self.links)))
+        self._s, self._s0, self._distance = np.zeros((3, len(self.links)))
         self._on0 = self._points.copy()
         self._size = size = setting.size
         last_digit = np.spacing(size + np.abs(self._points).max(axis=1))
@@ -116,11 +116,8 @@ class Guides(Links):
         return self._frames(q)[0]
 
     def _kept_motion(self, q: Array) -> Array:
-        """Distances in an accepted state; NaN at the end of a curve, where the next step fails."""
-        try:
-            return self.motion(q)
-        except NoNumber:
-            return np.full(len(self.links), np.nan)
+        """Distances in the accepted state."""
+        return self._distance
 
     def begin(self, step: Step) -> None:
         """Begin at the points of the last step."""
@@ -176,18 +173,21 @@ class Guides(Links):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Remember the points on the curves."""
-        self._on0, t = self._nearest(self._at(q1))
-        self._steps = REACH * self._size / np.linalg.norm(t, axis=1)
+        p = self._at(q1)
+        self._on0, t = self._nearest(p)
+        length = np.linalg.norm(t, axis=1)
+        self._steps = REACH * self._size / length
+        self._distance[:] = np.sum(_turned(t.T).T * (p - self._on0), axis=1) / length
         self._s0 = self._s.copy()
 
     # -- the state -----------------------------------------------------------------------------
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The points on the curves, their parameters, and the steps of these for tangents."""
-        numbers = (self.work, self.rate, self._s, self._s0, self._steps)
+        numbers = (self._distance, self._s, self._s0, self._steps)
         rows = memory.rows("guides", self.numbers, np.column_stack([*numbers, self._on0]))
-        self.work, self.rate, self._s, self._s0, self._steps = rows[:, :5].T.copy()
-        self._on0 = rows[:, 5:].copy()
+        self._distance[:], self._s, self._s0, self._steps = rows[:, :4].T.copy()
+        self._on0 = rows[:, 4:].copy()
 
 
 def _turned(a: Array) -> Array:
