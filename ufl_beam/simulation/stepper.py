@@ -323,13 +323,12 @@ class Stepper:
         """Raise why the latest step failed; all processes call it together."""
         c, error, self._callbacks.error = self.c, self._callbacks.error, None
         failure, c.failure = c.failure, lib.SUCCEEDS
-        if c.equation.raised == lib.OTHER or failure == lib.RAISED:
+        if failure == lib.RAISED:
             self._together.settle(error)
         if c.equation.error:
             raise RuntimeError(f"PETSc failed with error {c.equation.error}")
         if failure == lib.NO_EQUILIBRIUM:
-            if error is not None:
-                self._together.settle(error)
+            self._together.settle(error)
             raise self.solver.convergence.failure()
         if failure == lib.TURNS_TOO_FAR:
             raise StepFailed(

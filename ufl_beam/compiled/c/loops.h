@@ -539,6 +539,7 @@ enum {
   SINGULAR = -3, TOO_MANY = -5, STALLED = -6, DIVERGED = -9
 };
 
+int raised_anywhere(equation *e);
 double over_processes(const equation *e, enum agreement how, double here);
 void turn_axes(int number, const turned_axes *axes, double *x, int way);
 int residual(equation *e, const double *x, double *r, void *f);

@@ -468,7 +468,7 @@ static int set_step(march *m, double t1, double end)
 static int begin_terms(march *m)
 {
   run(&m->begin, &m->step, 0, 0);
-  return (int)over_processes(m->equation, LARGEST, m->equation->raised) == NOTHING;
+  return raised_anywhere(m->equation) == NOTHING;
 }
 
 /* A guess of the end of the step, in the axes of supports: as the last ones went on, and what supports
@@ -654,7 +654,8 @@ static int solve_step(march *m, int hold)
 {
   equation *e = m->equation;
   int admitted = 1;
-  if (!solve(m, hold)) return fails(m, NO_EQUILIBRIUM);
+  if (!solve(m, hold))
+    return fails(m, raised_anywhere(e) == OTHER ? RAISED : NO_EQUILIBRIUM);
   if (!measure(m)) return 0;
   for (int k = 0; k < m->admissions; ++k) admitted &= m->admission[k].of(m->admission[k].self, m->x);
   if (m->judges && over_processes(e, LARGEST, !admitted) > 0) return fails(m, GIVES_ENERGY);
@@ -707,7 +708,7 @@ int accept_step(march *m)
   equation *e = m->equation;
   prediction *p = m->prediction;
   run(&m->accept, &m->step, m->x, m->s);
-  if (over_processes(e, LARGEST, e->raised) > 0) return fails(m, RAISED);
+  if (raised_anywhere(e)) return fails(m, RAISED);
   if (m->path) memcpy(m->path->force, e->inner_force, m->size * sizeof *m->path->force);
   accept_cell_forces(m->cell_forces);
   accept_supports(m);
@@ -727,7 +728,7 @@ int accept_step(march *m)
   m->failure = SUCCEEDS;
   ++m->parts;
   for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, m->t, p->q_before, m->q);
-  return 1;
+  return raised_anywhere(e) == NOTHING || fails(m, RAISED);
 }
 
 /* Go to a time at once or, where that fails, in parts; whether it is reached. */

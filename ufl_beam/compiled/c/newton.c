@@ -32,8 +32,8 @@ static int add_ghosts(const equation *e, void *v)
   return error ? error : petsc.VecGhostUpdateEnd(v, ADD_VALUES, REVERSE);
 }
 
-/* What a function of a user has raised on any process, see `raised`. */
-static int raised_anywhere(const equation *e) { return (int)over_processes(e, LARGEST, e->raised); }
+/* What a function of a user has raised on any process, see enum raised; all know it then. */
+int raised_anywhere(equation *e) { return e->raised = (int)over_processes(e, LARGEST, e->raised); }
 
 /* -- supports at an angle ---------------------------------------------------------------------- */
 
@@ -257,7 +257,7 @@ static int verdict(equation *e, const double *x, int iteration)
     floor = 8 * norm_of(e, e->space);
   }
   const int found = judge(e, x, iteration, now, scale, floor);
-  return over_processes(e, LARGEST, e->raised) == OTHER ? DIVERGED : found;
+  return raised_anywhere(e) == OTHER ? DIVERGED : found;
 }
 
 /* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. A
