@@ -183,6 +183,7 @@ class Simulation(StateView):
             begin, end = self.t, self.t + APPLYING * (t1 - self.t)
             attempt = partial(self._steps.attempt_loads, self, begin=begin, end=end)
             go_in_parts(begin, end, attempt, self.accept, self.give_up)
+            self.prediction.forget()
         while self.t != t1:
             end = self.controllers.next_sample(self.t, t1)
             go_in_parts(self.t, end, partial(self.attempt, end=end), self.accept, self.give_up)
