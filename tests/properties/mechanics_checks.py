@@ -217,7 +217,9 @@ def path(case):
         raise
     near = np.abs(found.factor[:, None] - expected.times[None, 1:]) < 1e-9 * end
     others, rows = np.nonzero(near)
-    assert len(rows) > 2, found.factor
+    # A path ends where the loads stop growing, perhaps before its third step.
+    assert len(rows) >= min(3, found.factor[-1] // step), found.factor
+    only(len(rows), "loads stay as they are")
     if not words.elastic:
         n = np.arange(len(rows))
         common = (rows == n) & (others == n + 1)  # and so were all factors before

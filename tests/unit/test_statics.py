@@ -60,6 +60,14 @@ def test_steady_loads(load, theta):
         assert found.energy["stored"] == pytest.approx(found.energy["loads"], rel=1e-9)
 
 
+@pytest.mark.parametrize("reference", [False, True])
+def test_the_step_after_loads_were_applied_does_not_go_on_like_that(reference):
+    """A large load is applied in many equal parts; the step after them is not cut."""
+    _, scene = cantilever(lambda b: ub.PointLoad(b.end, force=(0, 100.0)), EA=1e4, GA=4e3, EI=100.0)
+    found = run(scene, ub.ExactStatic(), dt=0.5, newton=ub.Newton(reference=reference))
+    assert found.parts == 32 + 2
+
+
 def test_a_steady_motion_and_a_steady_actuator():
     """A support and a force that are there from the start are applied in parts as well."""
     lifted = [lambda b: ub.Prescribed(b.end, v=0.6)]

@@ -458,6 +458,7 @@ class Solver:
             begin = self.t
             end = begin + APPLYING * (t1 - begin)
             self._in_parts(end, partial(self._apply_loads, begin=begin, end=end))
+            self.last_dt = math.inf  # the next guess does not go on as loads were applied
         while self.t != t1:
             end = self._next_sample(t1)
             self._in_parts(end, partial(self._attempt, end=end))

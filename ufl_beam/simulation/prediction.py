@@ -62,6 +62,10 @@ class Prediction:
         lib.enter_step(self.c, dt, doubles(q), doubles(q1))
         self.began_at(q)
 
+    def forget(self) -> None:
+        """Let the next step start from where it begins: it does not go on as the last one did."""
+        self.c.dt = math.inf
+
     def agree(self) -> None:
         """Compare the last second differences over all processes."""
         if self._in_motion:

@@ -206,6 +206,7 @@ class Simulation(StateView):
             if self._applies and self.parts == 0:
                 self._applies = False
                 self._stepper.apply_loads(self, self.t + APPLYING * (float(ends[0]) - self.t))
+                self.prediction.forget()
             taken = self._stepper.take(self, ends, keep=keep)
             self._begun_at = None
             return taken
