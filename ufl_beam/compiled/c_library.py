@@ -42,7 +42,7 @@ extern "Python" void phase_in_python(void *handle, const time_step *step, const 
                                      const double *s);
 extern "Python" void change_in_python(void *handle, const double *q1, energy_change *sum);
 extern "Python" int numbers_in_python(void *handle, scheme_numbers *numbers);
-extern "Python" double agree_in_python(void *handle, int how, double here);
+extern "Python" void agree_in_python(void *handle, int number, const int *how, double *values);
 extern "Python" int solve_in_python(void *handle, int anew);
 extern "Python" void find_conjugates_in_python(void *handle, const double *q);
 extern "Python" int find_idle_in_python(void *handle);

@@ -356,7 +356,7 @@ class Stepper:
         if self._state is not None and self._extras.ask is not None:
             self._state.t = self.c.t
             self._lend(self._state)
-            self._extras.ask()
+            self._together(self._extras.ask)
 
     def _note(self, step: Any, q1: Any, s: Any) -> None:
         """Note an accepted step."""

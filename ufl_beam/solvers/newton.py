@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any, Protocol
 
@@ -164,13 +165,16 @@ class Solver:
 
     # -- callbacks of C --------------------------------------------------------------------------
 
-    def agree(self, how: int, here: float) -> float:
-        """Agree with the other processes about a number."""
-        if how == lib.TOTAL:
-            return self._share.total(here)
-        if how == lib.LARGEST:
-            return self._share.largest(here)
-        return math.hypot(*self._share.comm.allgather(here))
+    def agree(self, how: Sequence[int], values: Array) -> None:
+        """Replace numbers by those of all processes; the largest is infinite if one is none."""
+        comm = self._share.comm
+        everywhere = np.empty((comm.size, len(values)))
+        comm.Allgather(values, everywhere)
+        for k, (kind, column) in enumerate(zip(how, everywhere.T, strict=True)):
+            if kind == lib.LARGEST:
+                values[k] = math.inf if np.isnan(column).any() else column.max()
+            else:
+                values[k] = math.hypot(*column) if kind == lib.HYPOT else column.sum()
 
     def solve(self, anew: bool) -> bool:
         """Find the change of an iteration over all processes; return whether that fails."""
@@ -319,10 +323,11 @@ class Bordered:
         return self._border.met()
 
 
-@from_c(math.nan)
-def agree_in_python(handle: Any, how: int, here: float) -> float:
+@from_c()
+def agree_in_python(handle: Any, number: int, how: Any, values: Any) -> None:
     """Callback of C, declared in c_library.py."""
-    return float(ffi.from_handle(handle)[1].agree(how, here))
+    solver = ffi.from_handle(handle)[1]
+    solver.agree(how[0:number], np.frombuffer(ffi.buffer(values, 8 * number)))
 
 
 @from_c(1)

@@ -526,7 +526,7 @@ typedef struct {
   const again_call *again;
   double *conjugate, *start, *aside; /* space: of a search; of a solution with stiffer tangents */
   void *handle;
-  double (*agree)(void *handle, int how, double here); /* over processes; none if there is one */
+  void (*agree)(void *handle, int number, const int *how, double *values); /* none on one process */
   int (*solve)(void *handle, int anew);                /* where there are several: the change */
   void (*find_conjugates)(void *handle, const double *q);
   int (*find_idle)(void *handle);
@@ -540,6 +540,7 @@ enum {
 };
 
 int raised_anywhere(equation *e);
+void agree(const equation *e, int number, const enum agreement *how, double *values);
 double over_processes(const equation *e, enum agreement how, double here);
 void turn_axes(int number, const turned_axes *axes, double *x, int way);
 int residual(equation *e, const double *x, double *r, void *f);

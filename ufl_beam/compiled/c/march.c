@@ -638,14 +638,17 @@ static int followed(march *m)
   for (int i = 0; i < e->owned; ++i) round_off += fabs(e->space[i] * m->s[i]);
   for (int k = 0; k < p->accounts; ++k)
     for (int i = 0; i < p->entries[k]; ++i) through += fabs(p->account[k][i]);
-  const double in_beams = over_processes(e, TOTAL, sum.in_beams);
-  p->work = over_processes(e, TOTAL, work);
-  p->stored = in_beams + over_processes(e, TOTAL, sum.in_connectors);
+  enum { WORK, BEAMS, CONNECTORS, EFFORT, ROUND_OFF, THROUGH, SUMS };
+  const enum agreement how[SUMS] = {TOTAL, TOTAL, TOTAL, TOTAL, TOTAL, TOTAL};
+  double of[SUMS] = {work, sum.in_beams, sum.in_connectors, sum.effort, round_off, through};
+  agree(e, SUMS, how, of);
+  p->work = of[WORK];
+  p->stored = of[BEAMS] + of[CONNECTORS];
   /* A motor that stretches a spring gives what the spring takes; their sum measures nothing. Connectors
    * count one by one, so that the size is the same on any number of processes. */
-  const double size = fabs(p->work) + fabs(in_beams) + over_processes(e, TOTAL, sum.effort);
-  const double slack = p->slack * size + over_processes(e, TOTAL, round_off) + DBL_MIN;
-  if (fabs(p->work - p->stored) <= slack + p->kink * over_processes(e, TOTAL, through)) return 1;
+  const double size = fabs(p->work) + fabs(of[BEAMS]) + of[EFFORT];
+  const double slack = p->slack * size + of[ROUND_OFF] + DBL_MIN;
+  if (fabs(p->work - p->stored) <= slack + p->kink * of[THROUGH]) return 1;
   return fails(m, LEAPS);
 }
 
@@ -715,10 +718,11 @@ int accept_step(march *m)
   memset(m->state, 0, m->states * sizeof *m->state);
   run(&m->add_state, &m->step, m->x, m->s);
   enter_step(p, m->step.dt, m->q, m->x);
-  if (e->agree && m->rates) {
-    p->both = over_processes(e, TOTAL, p->both);
-    p->now = over_processes(e, TOTAL, p->now);
-    p->step = over_processes(e, TOTAL, p->step);
+  if (m->rates) {
+    const enum agreement how[] = {TOTAL, TOTAL, TOTAL};
+    double products[] = {p->both, p->now, p->step};
+    agree(e, 3, how, products);
+    p->both = products[0], p->now = products[1], p->step = products[2];
   }
   compare_differences(p);
   double *spare = p->q_before;

@@ -6,9 +6,16 @@
 
 /* -- processes that share a scene -------------------------------------------------------------- */
 
+/* Replace numbers by those of all processes. */
+void agree(const equation *e, int number, const enum agreement *how, double *values)
+{
+  if (e->agree) e->agree(e->handle, number, (const int *)how, values);
+}
+
 double over_processes(const equation *e, enum agreement how, double here)
 {
-  return e->agree ? e->agree(e->handle, how, here) : here;
+  agree(e, 1, &how, &here);
+  return here;
 }
 
 /* Norm over the scene of forces, and moments over its size, at the degrees of freedom of this process. */
@@ -182,7 +189,8 @@ static int demands_met(const equation *e, const double *x, double scale)
  *
  * `floor` is several times the residual that the last digits of the unknowns make.
  */
-static int judge(equation *e, const double *q, int iteration, double residual, double scale, double floor)
+static int judge(equation *e, const double *q, int iteration, double residual, double scale, double floor,
+                 int switched)
 {
   const double wanted = e->rtol * scale;
   /* Small loads beside large ones, such as those that make columns buckle, are lost in a guess that
@@ -212,7 +220,6 @@ static int judge(equation *e, const double *q, int iteration, double residual, d
   }
   /* With the tangent of a row about a motion, one about a force would move the iterate by as many metres
    * as newtons are missing. */
-  const int switched = e->demanding ? over_processes(e, LARGEST, *e->switched) > 0 : 0;
   if (switched) e->near = *e->switched = 0;
   e->slow += 1;
   /* Where a connector has just been released, it is no measure for what follows that forces are in
@@ -246,9 +253,13 @@ void find_motion(equation *e, const double *x)
 /* Whether, and why, to stop at an iterate x with the latest residual. */
 static int verdict(equation *e, const double *x, int iteration)
 {
-  const double now = norm_of(e, e->residual);
-  if (!isfinite(now)) return DIVERGED;
-  const double scale = e->loads + over_processes(e, HYPOT, e->inner_size);
+  const enum agreement how[] = {HYPOT, HYPOT, LARGEST, LARGEST};
+  const double here = norm(e->size, e->weight, e->residual), switched = e->demanding ? *e->switched : 0;
+  double of_all[] = {here, e->inner_size, e->raised, switched};
+  agree(e, 4, how, of_all);
+  const double now = of_all[0], scale = e->loads + of_all[1];
+  e->raised = (int)of_all[2];
+  if (e->raised == OTHER || !isfinite(now)) return DIVERGED;
   const int nearly = iteration > 1 && now > e->rtol * scale;
   double floor = 0;
   if (nearly || e->demanding) find_motion(e, x);
@@ -256,8 +267,7 @@ static int verdict(equation *e, const double *x, int iteration)
     find_round_off(e, x, e->space);
     floor = 8 * norm_of(e, e->space);
   }
-  const int found = judge(e, x, iteration, now, scale, floor);
-  return raised_anywhere(e) == OTHER ? DIVERGED : found;
+  return judge(e, x, iteration, now, scale, floor, of_all[3] > 0);
 }
 
 /* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. A
