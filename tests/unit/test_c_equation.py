@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The equation of a step in C against the same terms called by Python."""
+"""The equation of a step: Newton's method of C and that of PETSc, and what passes through them."""
 
 import sys
 
@@ -10,7 +10,6 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.terms.supports import Supports
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
@@ -63,31 +62,12 @@ def run(scene, newton=None, scheme=None, steps=20):
     )
 
 
-@pytest.mark.serial
-@pytest.mark.parametrize("make", [elastic, inelastic, machine])
-@pytest.mark.parametrize("scheme", [ub.Midpoint(alpha=0.05), ub.GeneralizedAlpha(0.8)])
-def test_in_c_as_in_python(make, scheme, monkeypatch):
-    in_c = run(make(), scheme=scheme)
-    monkeypatch.setattr(Supports, "turned", True)  # then SNES calls Python
-    in_python = run(make(), scheme=scheme)
-    assert in_c.iterations == in_python.iterations
-    # The same operations in the same order, but for what compilers contract.
-    assert np.allclose(in_c.q, in_python.q, rtol=0, atol=1e-11)
-
-
-@pytest.mark.serial
-def test_in_c_as_in_python_in_statics(monkeypatch):
-    in_c = run(elastic(), scheme=ub.Static())
-    monkeypatch.setattr(Supports, "turned", True)
-    in_python = run(elastic(), scheme=ub.Static())
-    assert in_c.iterations == in_python.iterations
-    assert np.allclose(in_c.q, in_python.q, rtol=0, atol=1e-11)
-
-
 @pytest.mark.parametrize("options", [{"snes_type": "newtonls"}, {"snes_max_it": 25}])
-def test_options_bring_the_solver_of_petsc(options):
-    of_petsc = run(inelastic(), ub.Newton(petsc=options))
-    assert np.allclose(of_petsc.q, run(inelastic()).q, rtol=0, atol=1e-11)
+@pytest.mark.parametrize("make", [elastic, inelastic, machine])
+def test_options_bring_the_solver_of_petsc(options, make):
+    of_petsc, own = run(make(), ub.Newton(petsc=options)), run(make())
+    assert of_petsc.iterations == own.iterations
+    assert np.allclose(of_petsc.q, own.q, rtol=0, atol=1e-11)
 
 
 @pytest.mark.parametrize("make", [elastic, inelastic, machine])
@@ -131,7 +111,6 @@ def test_reasons_are_those_of_petsc(mine, theirs):
     assert getattr(lib, mine) == int(getattr(PETSc.SNES.ConvergedReason, theirs))
 
 
-@pytest.mark.serial  # with several processes PETSc's SNES calls Python
 @pytest.mark.parametrize("name", ["add_in_python", "missed_in_python"])
 def test_an_interrupt_at_the_door_of_a_callback_is_not_lost(name):
     """It comes before the first line of what C calls, and cffi would only print it.

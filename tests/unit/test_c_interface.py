@@ -22,7 +22,6 @@ from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.mechanics.point_equations import inputs as inputs_of_points
 from ufl_beam.terms import rigid_plastic
-from ufl_beam.terms.supports import Supports
 
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
 
@@ -117,12 +116,11 @@ class FailsOnce:
         self.factors.apply(b, x)
 
 
-def test_a_solve_in_python_that_fails(monkeypatch, simulation):
+def test_a_solve_of_petsc_that_fails(simulation):
     """An error of the library is a singular tangent, and cuts the step; others are raised."""
-    monkeypatch.setattr(Supports, "turned", True)  # then SNES calls Python
-    scene = simulation.scene
+    scene, newton = simulation.scene, ub.Newton(petsc={"snes_type": "newtonls"})
     for error in (lib.OF_LIBRARY, 60):
-        simulation = ub.Simulation(scene, ub.Static())
+        simulation = ub.Simulation(scene, ub.Static(), newton=newton)
         klu = simulation.solver._factors._solved
         klu._factors = FailsOnce(klu._factors, error)
         if error == lib.OF_LIBRARY:

@@ -5,14 +5,11 @@ The beams have no moment at their ends, so hinges of the section open in cells o
 """
 
 from functools import cache
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.errors import StepFailed
-from ufl_beam.terms.openings import OVER, Openings, SearchFlags
 
 LENGTH, EI, STIFF = 2.0, 1000.0, 1e6  # m, N m², N
 LAWS = [ub.Softening, ub.LinearSoftening]
@@ -146,35 +143,6 @@ def test_only_what_must_open_does():
     assert (solution.material(beam, n).hinge > 0).sum() == 1
 
 
-@pytest.mark.serial  # several processes take steps in Python
-@jumps
-@pytest.mark.parametrize("law", [None, ub.Softening(FOREVER, FOREVER), ub.Softening(10.0, 1e-3)])
-def test_only_steps_in_which_something_opens_are_solved_again(law, monkeypatch):
-    """All steps are solved in C, those without an opening once, with hinges and without."""
-    solved, opened = [], []
-
-    def counting(method, calls):
-        def counted(self, *args, **keywords):
-            calls.append(self)
-            return method(self, *args, **keywords)
-
-        return counted
-
-    solver, openings = ub.solvers.newton.Solver, ub.terms.openings.Openings
-    monkeypatch.setattr(solver, "solve", counting(solver.solve, solved))
-    monkeypatch.setattr(openings, "open", counting(openings.open, opened))
-    beam, scene = pushed(law)
-    solution = run(scene, ub.Midpoint(), 0.01)
-    assert not solved
-    if law is None or law.limit == FOREVER:
-        assert not opened
-    else:
-        energies = [solution.material(beam, n).hinge for n in range(len(solution))]
-        newly = np.sum((np.diff(energies, axis=0) > 0).any(axis=1))
-        assert newly > 0
-        assert newly <= len(opened) <= 2 * newly
-
-
 @jumps
 def test_what_flows_is_part_of_the_state():
     """A run that goes on from a state in the middle of an opening: the same to the last digit."""
@@ -196,80 +164,46 @@ def test_what_flows_is_part_of_the_state():
     assert one.iterations == other.iterations
 
 
-# -- the search ----------------------------------------------------------------------------------
+# -- the order -----------------------------------------------------------------------------------
 
 
-class Fuses:
-    """Places that open in the order of what they bear; each one that opens relieves the others."""
-
-    def __init__(self, search, bears, stiff):
-        self.search, self.bears, self.stiff = search, bears, stiff
-        self.open = np.zeros(len(bears), dtype=bool)
-
-    @property
-    def stress(self):
-        """In units of the limit."""
-        return self.bears - self.stiff * self.open.sum()
-
-    @property
-    def over(self):
-        return np.where(self.open, 0.0, self.stress - 1).clip(0.0)
-
-    def release(self, least):
-        self.open |= self.stress - 1 >= least
-
-    def hold(self):
-        self.open[:] = False
+def chain(limits):
+    """Blocks on a line behind springs that soften slowly, the last one pulled beyond the limits."""
+    section = ub.Section(EA=STIFF, GA=STIFF, EI=EI)
+    blocks = [ub.Beam((2 * i, 0), (2 * i + 1, 0), section, cells=1) for i in range(len(limits))]
+    before = [ub.ground(-1, 0), *(block.end for block in blocks)]
+    springs = [
+        ub.Slide(a, b.start, ub.Spring(1e3, softening=ub.Softening(limit, 100.0)), axis=(1, 0))
+        for a, b, limit in zip(before[:-1], blocks, limits, strict=True)
+    ]
+    guides = [ub.Prescribed(block.start, v=0.0, psi=0.0) for block in blocks]
+    pull = ub.Prescribed(blocks[-1].end, u=lambda t: 1.3e-3 * len(limits) * t)
+    return springs, ub.Scene(blocks, supports=[*guides, pull], connectors=springs)
 
 
-def search(bears, stiff, fails=lambda fuses: False):
-    """What is open in each of the solutions that are sought, and whether the step began again."""
-    search, seen, again = SearchFlags(), [], []
-    fuses = Fuses(search, np.array(bears), stiff)
-    alone = SimpleNamespace(alone=True, largest=lambda here: here)
-    openings = Openings(search, [fuses], alone)
-
-    def solve(q):
-        if again:
-            seen.append("free")
-            return q
-        seen.append(fuses.open.tolist())
-        search.flags[OVER] |= fuses.over.max() > 0
-        if fails(fuses):
-            raise StepFailed("on purpose")
-        return q + 1
-
-    try:
-        openings.solve(np.zeros(1), solve, lambda: again.append(True))
-    finally:
-        assert not fuses.open.any()
-        assert not search.flags.any()
-    return seen
-
-
-def test_nothing_opens_below_its_limit():
-    """One solution."""
-    assert search([0.5, 1.0], 0.0) == [[False, False]]
-
-
-def test_the_largest_excess_opens_first():
-    """The others only if they still bear too much, then those with less of it as well."""
-    assert search([1.2, 1.09, 0.5], 0.1) == [[False] * 3, [True, False, False]]
-    one, two = [True, False, False], [True, True, False]
-    assert search([1.2, 1.19, 0.5], 0.01) == [[False] * 3, one, two]
-    assert search([1.2, 1.1, 1.09], 0.0) == [[False] * 3, one, [True] * 3]
-    assert search([1.2, 1.2 - 1e-10, 1.1], 0.1) == [[False] * 3, two]  # alike but for a last digit
-
-
-def test_places_are_free_where_holding_them_leads_nowhere():
-    """The step begins again from its first guess; not if none has borne more than its limit."""
-    assert search([1.2], 0.0, lambda fuses: True) == [[False], "free"]
-    assert search([1.2], 0.0, lambda fuses: fuses.open.any()) == [[False], [True], "free"]
-    with pytest.raises(StepFailed, match="on purpose"):
-        search([0.9], 0.0, lambda fuses: True)
+@pytest.mark.parametrize(
+    ("limits", "opens"),
+    [
+        ([1.5, 1.4, 1.6], [False, False, False]),
+        ([1.0, 1.1, 1.2], [True, False, False]),
+        ([1.2, 1.0, 1.1], [False, True, False]),
+        ([1.0, 1.0 + 1e-6, 1.2], [True, False, False]),
+        ([1.2, 1.0, 1.0 + 1e-11], [False, True, True]),  # alike but for a last digit
+    ],
+)
+def test_the_largest_excess_opens_first(limits, opens):
+    """In one step in which all springs would bear 1.3 N; one that opens relieves the others."""
+    springs, scene = chain(limits)
+    solution = run(scene, ub.ExactStatic(), 1.0)
+    assert [solution.connector(one).dissipated[-1] > 0 for one in springs] == opens
+    force = min(*limits, 1.3)
+    assert solution.connector(springs[0]).force[-1] == pytest.approx(force, rel=0.02)
 
 
 def test_no_search_where_nothing_opens():
-    """There is no object for it."""
+    """Steps are solved once, in as many iterations as if nothing could open."""
     _, scene = pushed()
-    assert ub.Simulation(scene, ub.Static())._assembly.openings is None
+    _, closed = pushed(ub.Softening(FOREVER, FOREVER))
+    elastic = ub.Simulation(scene, ub.Midpoint())
+    assert not elastic._stepper.c.opens
+    assert run(closed, ub.Midpoint(), 0.01).iterations == run(scene, ub.Midpoint(), 0.01).iterations

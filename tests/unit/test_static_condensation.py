@@ -11,6 +11,7 @@ import pytest
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
+from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.solvers.static_condensation import Elimination
 
@@ -185,10 +186,10 @@ def test_on_several_processes_as_on_one(scheme):
     assert np.abs(alone.q - together.q).max() < 1e-8
 
 
-def test_a_singular_tangent_cuts_the_step(monkeypatch):
+def test_a_singular_tangent_cuts_the_step():
     """Also where elimination finds it; the message is that of any failure."""
     simulation = ub.Simulation(tower(), ub.Midpoint())
-    data = simulation.equation.A.data
-    monkeypatch.setattr(simulation.equation, "tangent", lambda x: data.fill(0.0))
+    c = simulation.equation.c
+    c.cells, c.product, c.stiffnesses = ffi.NULL, ffi.NULL, 0  # nothing adds to the tangent
     with pytest.raises(ub.ConvergenceError, match="found a singular tangent"):
         simulation.step_to(0.1)

@@ -13,6 +13,8 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Any, NamedTuple, Protocol
 
+from petsc4py import PETSc
+
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, Later, Snapshots
@@ -134,6 +136,10 @@ class Stepper:
         self.ahead = False
         self._equation, self._inertia, self._path, self._begun = equation, inertia, path, begun
         self._together, self._extras, self._callbacks = together, extras, equation.callbacks
+        if inertia is not None and inertia.in_c is None:
+            raise SceneError(
+                f"{scheme!r}: what it makes of velocities must be sums of multiples of them"
+            )
         # The ledger has all its entries now, to whose places phases write.
         share, phases = equation.share, [one.phases(self._callbacks) for one in equation.terms]
         self._phases = phases
@@ -181,13 +187,8 @@ class Stepper:
         if equation.supports.turned:
             fill(self.c, x=np.zeros(share.size))
         if inertia is not None:
-            rates = inertia.in_c
-            if rates is None:
-                raise SceneError(
-                    f"{scheme!r}: what it makes of velocities must be sums of multiples of them"
-                )
             handle = self._callbacks.handle(self._prepare)
-            fill(self.c, rates=rates.c, prepare=lib.run_in_python)
+            fill(self.c, rates=inertia.in_c.c, prepare=lib.run_in_python)
             self.c.handle = handle  # what `fill` keeps must not keep this object
         if path is not None:
             changes = [one.change for one in phases if one.change is not None]
@@ -326,7 +327,7 @@ class Stepper:
         if failure == lib.RAISED:
             self._together.settle(error)
         if c.equation.error:
-            raise RuntimeError(f"PETSc failed with error {c.equation.error}")
+            raise PETSc.Error(c.equation.error)
         if failure == lib.NO_EQUILIBRIUM:
             self._together.settle(error)
             raise self.solver.convergence.failure()
@@ -479,8 +480,11 @@ class _Taking:
     def __enter__(self) -> None:
         self._stepper.enter(self._state)
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
         self._stepper.leave(self._state)
+        # Python's preconditioner under PETSc: its exception is still set when C returns.
+        if isinstance(error, SystemError) and error.__cause__ is not None:
+            raise error.__cause__
 
 
 def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
