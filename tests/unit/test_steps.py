@@ -405,7 +405,7 @@ class Clipped(ub.Midpoint):
 
 
 def test_a_scheme_of_another_kind_is_refused():
-    with pytest.raises(ub.SceneError, match="Clipped.*must be sums of multiples"):
+    with pytest.raises(ub.SceneError, match=r"Clipped.*must be sums of multiples"):
         ub.Simulation(elastic(), Clipped())
 
 

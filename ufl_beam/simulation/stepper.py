@@ -136,7 +136,8 @@ class Stepper:
         self.ahead = False
         self._equation, self._inertia, self._path, self._begun = equation, inertia, path, begun
         self._together, self._extras, self._callbacks = together, extras, equation.callbacks
-        if inertia is not None and inertia.in_c is None:
+        rates = None if inertia is None else inertia.in_c
+        if inertia is not None and rates is None:
             raise SceneError(
                 f"{scheme!r}: what it makes of velocities must be sums of multiples of them"
             )
@@ -186,9 +187,9 @@ class Stepper:
             fill(self.c, found=np.zeros(share.size))
         if equation.supports.turned:
             fill(self.c, x=np.zeros(share.size))
-        if inertia is not None:
+        if rates is not None:
             handle = self._callbacks.handle(self._prepare)
-            fill(self.c, rates=inertia.in_c.c, prepare=lib.run_in_python)
+            fill(self.c, rates=rates.c, prepare=lib.run_in_python)
             self.c.handle = handle  # what `fill` keeps must not keep this object
         if path is not None:
             changes = [one.change for one in phases if one.change is not None]
@@ -204,7 +205,7 @@ class Stepper:
         links = [one for one in equation.terms if isinstance(one, Links)]
         self._links, number = links, len(share.grid.scene.links)
         parts = ledger, equation.supports, share.grid.scene.supports, support_dofs, inelastic
-        self._of_rows: Any = (*parts, links, number, cell_forces.kept)
+        self._make_rows = partial(KeptRows, self.c, *parts, links, number, cell_forces.kept)
         self._rows: KeptRows | None = None
         self._last: tuple[int, Array] = -1, np.zeros(0)  # step kept last; state at its end
 
@@ -212,7 +213,7 @@ class Stepper:
         """Let functions of Python take part in the phases of a step."""
         extras, callbacks = self._extras, self._callbacks
         if extras.stop is not None:
-            stop = callbacks.handle(lambda t: extras.stop(self.c.t, t))  # type: ignore[misc]
+            stop = callbacks.handle(lambda t: extras.stop(self.c.t, t))
             self.c.stop, self.c.stops = lib.time_in_python, stop
         if callbacks.used or extras != Extras(None, None, None, None):
             # What may raise comes first, before loops of C have accepted anything.
@@ -407,7 +408,7 @@ class Stepper:
     def _kept(self, q: Array) -> KeptRows:
         """Rows of numbers, one for each step that C keeps."""
         if self._rows is None:
-            self._rows = rows = KeptRows(self.c, *self._of_rows, q)
+            self._rows = rows = self._make_rows(q)
             fill(self.c, kinds=len(rows.kinds), width=rows.width, kept=rows.kinds)
         return self._rows
 
