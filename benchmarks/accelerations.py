@@ -32,47 +32,16 @@ class Acceleration(NamedTuple):
 
 
 ACCELERATIONS = {
-    "equation in C": Acceleration(
-        "SNES calls residual and tangent in C, which call the loops of all terms one after the "
-        "other. Without it, SNES calls Python, which calls the same loops. Several processes and "
-        "inclined supports need the part in Python anyway.",
-        by.PETSC, by.PYTHON,
-        (
-            "simulation/step_equation.py:StepEquation.leave_to_c",
-            "simulation/step_equation.py:StepEquation._in_python",
-            "solvers/equation.py:Equation.demand", "solvers/equation.py:Equation.part_in_python",
-            "solvers/equation.py:Equation.demand_in_python", "solvers/equation.py:_lent",
-            "solvers/equation.py:add_in_python", "solvers/equation.py:missed_in_python",
-            "terms/base.py:Term.loops", "terms/beams.py:ElasticBeams.loops",
-            "terms/inelastic_beams.py:InelasticBeams.loops",
-            "terms/forms_and_matrices.py:OfForms.loops",
-            "terms/forms_and_matrices.py:OfMatrix.loops", "terms/dead_loads.py:DeadLoads.loops",
-            "terms/connectors.py:Couplings.loops", "compiled/csr.py:StepProduct.loops",
-            "compiled/c/newton.c:residual", "compiled/c/newton.c:assemble",
-            "compiled/c/newton.c:snes_function", "compiled/c/newton.c:snes_jacobian",
-            "compiled/c/newton.c:snes_test", "compiled/c/newton.c:verdict",
-        ),
-    ),
     "Newton's method in C": Acceleration(
         "Newton's method with full steps as a SNES of the type \"shell\". Without it, PETSc's "
         "`newtonls` calls the same residual and tangent in C, and the factorization by Python.",
-        by.STEPS, by.PETSC,
+        by.SHIPPED, by.PETSC,
         (
-            "solvers/newton.py:Solver._leave_newton_to_c",
-            "solvers/static_condensation.py:ChainsFirst.drive",
             "compiled/c/newton.c:factor_tangent", "compiled/c/newton.c:solve_tangent",
-            "compiled/c/newton.c:snes_newton",
+            "compiled/c/newton.c:find_change", "compiled/c/newton.c:newton",
+            "compiled/c/newton.c:snes_newton", "solvers/static_condensation.py:ChainsFirst.drive",
+            "solvers/multifrontal.py:Multifrontal.drive", "solvers/klu.py:Klu.drive",
         ),
-    ),
-    "steps in C": Acceleration(
-        "The whole step is in C: what terms do before and after it, guess, SNES, ledger, and "
-        "the row that is kept, for many steps in a call. Without it, Python does so around SNES.",
-        by.SHIPPED, by.STEPS,
-        (
-            "compiled/c/march.c", "simulation/compiled_steps.py", "simulation/kept_rows.py",
-            "terms/phases.py", "terms/rates_in_c.py",
-        ),
-        (ELASTIC, LARGE, HINGED, JOINTED),
     ),
     "SIMD kernels": Acceleration(
         "Kernels of FFCx compiled a second time with vectors instead of numbers, for the "
@@ -113,7 +82,7 @@ ACCELERATIONS = {
         by.SHIPPED, by.VELOCITY,
         (
             "compiled/c/prediction.c:enter_step", "compiled/c/prediction.c:compare_differences",
-            "simulation/prediction.py:Prediction.agree",
+            "compiled/c/march.c~p->both|compare_differences",
         ),
         (ELASTIC, LARGE, SWING, HINGED, JOINTED),
     ),
@@ -122,7 +91,7 @@ ACCELERATIONS = {
         "tolerance, at most once in a row. Without it, every iteration assembles and factors a "
         "tangent.",
         by.SHIPPED, by.TANGENTS,
-        ("compiled/c/newton.c~kept|near|close|CLOSE",),
+        ("compiled/c/newton.c~e->near|\\bkept\\b|\\bclose\\b|CLOSE",),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
     "`Newton(modified=True)`": Acceleration(
@@ -136,12 +105,10 @@ ACCELERATIONS = {
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
     "tangent of the last step (`like_last`)": Acceleration(
-        "The part of this option that keeps a tangent from one step to the next.",
-        by.MODIFIED_STEPS, by.ANEW,
-        (
-            "solvers/convergence.py~like_last|rate", "solvers/newton.py~like_last",
-            "simulation/step_solver.py~like_last", "simulation/prediction.py~like_last",
-        ),
+        "The part of this option that keeps a tangent from one step to the next. Without it, each "
+        "step begins with a new one, as in runs with a checkpoint.",
+        by.MODIFIED, by.ANEW,
+        ("compiled/c/newton.c~like_last", "compiled/c/march.c~like_last"),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
 }  # fmt: skip

@@ -61,15 +61,20 @@ def microseconds(function, seconds=0.2):
 def parts(simulation):
     """Microseconds of the parts of an iteration; the call itself takes half of one."""
     solver = simulation.solver
-    x, equation = solver.iterate(), solver._equation.c
+    x, equation = solver.iterate(), simulation.equation.c
     r = np.zeros_like(x)
     at_x, at_r = doubles(x), doubles(r)
     failed = ffi.new("int *")
-    lib.assemble(equation, at_x)
+
+    def assemble():
+        lib.fill_tangent(equation, at_x)
+        lib.hold_tangent(equation)
+
+    assemble()
     return {
-        "residual": microseconds(lambda: lib.residual(equation, at_x, at_r)),
+        "residual": microseconds(lambda: lib.residual(equation, at_x, at_r, ffi.NULL)),
         "of it beams": microseconds(lambda: simulation.beams[0].add_residual(x, r)),
-        "tangent": microseconds(lambda: lib.assemble(equation, at_x)),
+        "tangent": microseconds(assemble),
         "of it beams ": microseconds(lambda: simulation.beams[0].add_tangent(x)),
         "factor": microseconds(lambda: lib.factor_tangent(equation, failed)),
         "solve": microseconds(lambda: lib.solve_tangent(equation, 0)),

@@ -7,10 +7,12 @@ from collections import Counter
 
 import numpy as np
 
-from ufl_beam.compiled.c_library import doubles, lib
+from ufl_beam.compiled.c_library import doubles, ffi, lib
 from ufl_beam.discretization.partition import bisected
 
-COLLECTIVE = ("allreduce", "Allreduce", "Iallreduce", "allgather", "Allgatherv", "bcast")
+COLLECTIVE = (
+    "allreduce", "Allreduce", "Iallreduce", "allgather", "Allgather", "Allgatherv", "bcast",
+)  # fmt: skip
 LATENCY, BANDWIDTH = 20e-6, 5e9  # s of a collective call on a cluster, B/s: assumed
 
 
@@ -26,9 +28,8 @@ class Counted:
             return function
 
         def call(*arguments, **named):
-            arrays = [x for x in arguments if isinstance(x, np.ndarray)]
             if name[0].isupper():
-                size = sum(x.nbytes for x in arrays)
+                size = next(x.nbytes for x in arguments if isinstance(x, np.ndarray))
             else:
                 size = len(pickle.dumps(arguments[0]))
             self._count.update(messages=1, bytes=size)
@@ -46,17 +47,14 @@ def count_traffic(simulation):
     simulation.together._comm = Counted(simulation.together._comm, count)
     summed = solver._factors._solved._inner
     summed._comm = Counted(summed._comm, count)
-    ghosts = 8 * len(simulation.share.ghosts)
+    ghosts, update = 8 * len(simulation.share.ghosts), lib.petsc.VecGhostUpdateBegin
 
-    def counted(update):
-        def call(vector):
-            count.update(messages=1, bytes=ghosts)
-            update(vector)
+    def counted(vector, *how):
+        count.update(messages=1, bytes=ghosts)
+        return update(vector, *how)
 
-        return call
-
-    for name in ("update_ghosts", "add_ghosts"):
-        setattr(solver._vectors, name, counted(getattr(solver._vectors, name)))
+    solver.counted = ffi.callback(ffi.typeof(update), counted)  # C calls it: it stays alive
+    lib.petsc.VecGhostUpdateBegin = solver.counted
     return count
 
 

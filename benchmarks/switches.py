@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Simulations in which an acceleration is switched off.
 
-The package has no switches: classes and functions are replaced here while a simulation is built.
+Some have an option for that.  For the others, classes and functions of the package are replaced
+while a simulation is built.
 """
 
 from contextlib import ExitStack, contextmanager
@@ -16,9 +17,7 @@ from ufl_beam.compiled import c_library
 from ufl_beam.compiled.jit import compiled
 from ufl_beam.discretization import function_spaces
 from ufl_beam.simulation import simulation as stepping
-from ufl_beam.simulation import step_solver
 from ufl_beam.simulation.prediction import Prediction
-from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers import newton, static_condensation
 from ufl_beam.solvers.klu import Klu
 
@@ -26,7 +25,7 @@ plan = static_condensation._plan
 
 
 def nothing(*_):
-    """Do nothing, in the place of a function that switches an acceleration on."""
+    """Do nothing, in the place of `vectorise`."""
 
 
 def without_chains(cell_dofs, indptr, indices, alone, *more):
@@ -37,13 +36,6 @@ def without_chains(cell_dofs, indptr, indices, alone, *more):
 def klu(inner, _):
     """KLU, called by PETSc, in the place of fronts."""
     return Klu(inner)
-
-
-class EachStepAnew(newton.Solver):
-    """Solver that makes a new tangent in the first iteration of every step."""
-
-    def solve(self, guess, loads, like_last=False):
-        return super().solve(guess, loads, like_last=False)
 
 
 class AtVelocity(Prediction):
@@ -83,10 +75,14 @@ def loop_without_kept_tangents(name, data):
 
 
 class Variant(NamedTuple):
-    """What is replaced while a simulation is built, and options of Newton's method."""
+    """What is replaced while a simulation is built, and options of Newton's method.
+
+    With ``anew`` each step begins with a new tangent.
+    """
 
     replaced: tuple[tuple[Any, str, Any], ...] = ()
-    newton: dict[str, bool] = {}  # noqa: RUF012 - of a tuple, which nothing changes
+    newton: dict[str, Any] = {}  # noqa: RUF012 - of a tuple, which nothing changes
+    anew: bool = False
 
     @contextmanager
     def switched(self):
@@ -99,39 +95,33 @@ class Variant(NamedTuple):
     def simulation(self, scene):
         """A simulation of a scene."""
         with self.switched():
-            return ub.Simulation(scene, ub.Midpoint(), newton=ub.Newton(**self.newton))
+            simulation = ub.Simulation(scene, ub.Midpoint(), newton=ub.Newton(**self.newton))
+        if self.anew:
+            simulation.solver.begin_steps_anew()
+        return simulation
 
 
-NEWTON_OF_PETSC = (newton.Solver, "_leave_newton_to_c", nothing)
-EQUATION_IN_PYTHON = (StepEquation, "leave_to_c", nothing)
 CELL_BY_CELL = (function_spaces, "vectorise", nothing)
 NO_CHAINS = (static_condensation, "_plan", without_chains)
 NO_FRONTS = (static_condensation, "Multifrontal", klu)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
-EACH_STEP_ANEW = (step_solver, "Solver", EachStepAnew)
 AT_VELOCITY = (stepping, "Prediction", AtVelocity)
-STEPS_IN_PYTHON = (stepping, "compiled_steps", nothing)
 
-SHIPPED, STEPS = "as shipped", "steps in Python"
-MODIFIED, MODIFIED_STEPS = "`modified=True`", "`modified=True`, steps in Python"
-PETSC, PYTHON = "PETSc's `newtonls`", "`newtonls`, equation in Python"
+SHIPPED, PETSC = "as shipped", "PETSc's `newtonls`"
 SCALAR, WHOLE = "cell by cell", "fronts of the whole tangent"
 LEFT = "KLU in the place of fronts"
 TANGENTS, VELOCITY = "a tangent in each iteration", "guess at the last velocity"
-ANEW = "`modified=True`, steps in Python, a tangent in each"
+MODIFIED, ANEW = "`modified=True`", "`modified=True`, a new tangent in each step"
 
 VARIANTS = {
     SHIPPED: Variant(),
-    STEPS: Variant((STEPS_IN_PYTHON,)),
-    PETSC: Variant((STEPS_IN_PYTHON, NEWTON_OF_PETSC)),
-    PYTHON: Variant((EQUATION_IN_PYTHON,)),
+    PETSC: Variant(newton={"petsc": {"snes_type": "newtonls"}}),
     SCALAR: Variant((CELL_BY_CELL,)),
     WHOLE: Variant((NO_CHAINS,)),
     LEFT: Variant((NO_FRONTS,)),
     TANGENTS: Variant((ALL_TANGENTS,)),
     VELOCITY: Variant((AT_VELOCITY,)),
-    MODIFIED: Variant((), {"modified": True}),
-    MODIFIED_STEPS: Variant((STEPS_IN_PYTHON,), {"modified": True}),
-    ANEW: Variant((STEPS_IN_PYTHON, EACH_STEP_ANEW), {"modified": True}),
+    MODIFIED: Variant(newton={"modified": True}),
+    ANEW: Variant(newton={"modified": True}, anew=True),
 }
 """Variants of a simulation by name."""
