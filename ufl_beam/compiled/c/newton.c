@@ -528,8 +528,10 @@ static int iterate(equation *e, int patience, int like_last, int careful)
   if (error) {
     if (error != OF_LIBRARY) e->error = error; /* KLU stops PETSc where it finds no pivot */
     e->reason = SINGULAR;
-  } else if (by_petsc)
+  } else if (by_petsc) {
     petsc.SNESGetConvergedReason(e->snes, &e->reason);
+    e->error = update_ghosts(e, e->x); /* PETSc copies what a process owns */
+  }
   if (e->reason <= 0 && by_petsc) unlock(e->f);
   return e->reason;
 }
