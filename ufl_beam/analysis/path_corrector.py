@@ -183,8 +183,7 @@ class PathCorrector:
         return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, fraction=1.0)
 
     def _drive(self, t: float) -> None:
-        for term in self._driven:
-            term.begin(self.step_at(t))
+        self.simulation.equation.begin(self.step_at(t), self._driven)
 
     def _driven_forces(self, q: Array, t: float) -> Array:
         """Forces of all that depends on the load factor, which is t from now on."""

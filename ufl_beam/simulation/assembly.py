@@ -85,7 +85,7 @@ class Assembly:
         if self.inertia is None or self.supports.work or slips:
             self.supports.carry_on(memory, q)
         if self.inertia is not None:
-            self.inertia.carry_on(memory, len(self.inertia.more))
+            self.inertia.carry_on(memory, len(self.inertia.rates.more))
             if isinstance(self.inertia.scheme, DecayingMidpoint):
                 self._pass_on_step(memory, q)
         for load in self.loads:
@@ -139,7 +139,7 @@ class Assembly:
         if self.inertia is not None:
             return None
         share, state = self.equation.share, (self.ledger, q, t0)
-        path = together(StaticPath, share, scheme, self.beams, self.couplings, *state)
+        path = together(StaticPath, share, scheme, self.equation, *state)
         self.cell_forces.accept()
         if not goes_on:
             r = np.asarray(path.force - sum(loads))
@@ -191,17 +191,17 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     loads = _loads(scene, fields, scheme, ledger, A)
     if scene.works:
         loads.append(together(Works, fields, scheme, ledger, A, t0))
+    supports = Supports(share, scheme, ledger, A)
+    if has_inertia(scheme):
+        supports.stop(v)
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
     others: list[Term] = [*numerical, *([inertia] if inertia else [])]
     for damping in scene.damping:
         others += damping_forces(damping, fields, *setting, inertia)
-    supports = Supports(share, scheme, ledger, A)
-    if inertia:
-        supports.stop(inertia.v)
     if scene.beams:
         ledger.state["stored"] += 0.0
     parts = share, A, beams, coupled, loads, others, supports, search
-    equation = StepEquation(*parts, in_motion=inertia is not None)
+    equation = StepEquation(*parts, inertia)
     return Assembly(
         fields, ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, equation, _cell_forces(share, equation.terms),

@@ -15,9 +15,8 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.terms.base import InternalForces
+from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.links import Links
 from ufl_beam.terms.phases import weight_of_before
 
 FAR = 1e3
@@ -27,13 +26,10 @@ KINK = 1e-6
 """Work that a kink of a law may leave unexplained, as a part of the energy that went through."""
 
 
-def add_forces_at_rest(
-    beams: Sequence[InternalForces], scheme: Scheme, q: Array, force: Array
-) -> None:
+def add_forces_at_rest(equation: StepEquation, scheme: Scheme, q: Array, force: Array) -> None:
     """Add the forces of beams at ``q``, in a step so short that nothing viscous flows."""
-    short = scheme.step(0.0, sys.float_info.min, sys.float_info.min, q)
-    for beam in beams:
-        beam.begin(short)
+    equation.begin(scheme.step(0.0, sys.float_info.min, sys.float_info.min, q), equation.beams)
+    for beam in equation.beams:
         beam.add_residual(q, force)
 
 
@@ -52,26 +48,24 @@ class StaticPath:
         self,
         share: Share,
         scheme: Scheme,
-        beams: Sequence[InternalForces],
-        couplings: Sequence[Links],
+        equation: StepEquation,
         ledger: Ledger,
         q: Array,
         t0: float,
     ) -> None:
         self._share, self._scheme, self._ledger = share, scheme, ledger
-        self._beams, self._couplings = beams, couplings
         self._rotations = share.rotations()
         self.force: Array = np.zeros(share.size)
         # Connectors have theirs among the unknowns.
-        add_forces_at_rest(beams, scheme, q, self.force)
+        add_forces_at_rest(equation, scheme, q, self.force)
         begins = scheme.step(t0, t0 + 1.0, t0 + 1.0, q)._replace(load_time=t0, motion_time=t0)
-        for coupling in couplings:
-            coupling.begin(begins)
+        equation.begin(begins, equation.couplings)
+        for coupling in equation.couplings:
             coupling.add_residual(q, self.force)
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The internal forces at the end of the last step."""
-        self.force = memory.added("internal forces", self.force)
+        self.force[:] = memory.added("internal forces", self.force)
 
     def failure(self, mechanism: bool) -> StepFailed:
         """Describe why the latest step was not followed: it leaves a mechanism, or leaps."""
@@ -94,7 +88,7 @@ class StaticPath:
         per_far[self._rotations] = 1.0
         self._c = struct(
             "static_path", slack=self._scheme.slack, far=FAR, kink=KINK, per_far=per_far,
-            force=np.zeros(self._share.size), terms=len(changes),
+            force=self.force, terms=len(changes),
             weight_of_before=weight_of_before(self._scheme.acting),
             change=ffi.new("change_call[]", list(changes)), accounts=len(parts),
             account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),

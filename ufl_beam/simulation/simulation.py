@@ -123,8 +123,8 @@ class Simulation(StateView):
             loaded = together(parts.carry_on, t0, self.q, internal if same else None)
         if start is not None:
             parts.take_over(self.q, t0, internal, same=same)
-        for term in self.terms:
-            term.add_state(self.q)
+        self.equation.start(self.q)
+        self.equation.add_state(self.q)
         for coupling in parts.couplings if start is None else ():
             coupling.put_forces(self.q)
         if parts.inertia is not None:
@@ -135,7 +135,7 @@ class Simulation(StateView):
         self.reactions_known = self._branch is not None
         self.cell_forces, self.between = parts.cell_forces, float(scheme.average(0.0, 1.0))
         if not self.reactions_known:
-            together(add_forces_at_rest, self.beams, scheme, self.q, np.zeros(share.size))
+            together(add_forces_at_rest, self.equation, scheme, self.q, np.zeros(share.size))
         goes_on = goes_on or not self.reactions_known
         forces, before = last_forces(grid, share, scheme, start) if goes_on else (None, None)
         if forces is not None or not self.reactions_known:
@@ -158,6 +158,7 @@ class Simulation(StateView):
             self.support_dofs, self.cell_forces, self.begun, together, extras,
         )  # fmt: skip
         self.solver = self._stepper.solver
+        self._stepper.begin_at(self)
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -221,10 +222,6 @@ class Simulation(StateView):
         self._stepper.watch(self._watches)
         return one
 
-    def take_back(self) -> None:
-        """Take the state back from C: what follows is in Python."""
-        self._stepper.hand_back(self)
-
     def attempt(self, t1: float, end: float | None = None) -> Trial:
         """Solve the next step, to ``t1``; the state changes if :meth:`accept` takes it.
 
@@ -246,6 +243,7 @@ class Simulation(StateView):
     def accept(self, trial: Trial) -> None:
         """Go where the latest :meth:`attempt` went."""
         self._stepper.accept(self, trial)
+        self._begun_at = None
 
     def _require_held(self, q1: Array) -> None:
         """Raise if loads do not hold in an equilibrium what nothing else holds."""
@@ -270,8 +268,6 @@ class Simulation(StateView):
     @property
     def q_before(self) -> Array:  # type: ignore[override]
         """Configuration at the beginning of the last step."""
-        if self._stepper.ahead:
-            return self._stepper.q_before()
         return self.prediction.q_before if self._begun_at is None else self._begun_at
 
     def _ask(self) -> None:
@@ -329,7 +325,7 @@ class Simulation(StateView):
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
-        if self._stepper.ahead and self.share.alone:
+        if self.share.alone:
             now: Later | Snapshots = self._stepper.now(self)
         else:
             now = Snapshots.of(self.gather())
@@ -340,7 +336,6 @@ class Simulation(StateView):
         self.settle()
         if self.t not in self.solution.times[-1:]:
             self.keep()
-        self.take_back()
         self.solution.internal = self._assembly.internal_variables(self.q, self.t)
 
     def snapshot(self) -> Solution:
@@ -349,7 +344,6 @@ class Simulation(StateView):
         now = Solution(self.scene, self.grid)
         self._describe(now)
         now.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
-        self.take_back()
         now.internal = self._assembly.internal_variables(self.q, self.t)
         return now
 
@@ -363,11 +357,10 @@ class Simulation(StateView):
         """Go on from a :meth:`state`, perhaps of other processes."""
         self._pass_on(Restoring(self.share, state))
         self.ledger.begin()
-        for term in self.terms:
-            term.add_state(self.q)
+        self.equation.add_state(self.q)
+        self._stepper.begin_at(self)
 
     def _pass_on(self, memory: Memory) -> None:
-        self.take_back()
         self.t = memory.number("t", self.t)
         self.parts = int(memory.number("parts", self.parts))
         self.solver.remember(memory)

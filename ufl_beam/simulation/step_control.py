@@ -180,23 +180,20 @@ class AdaptiveSteps:
     def _attempt(self, stop: float) -> tuple[Trial, float]:
         """Solve the next step; also its error."""
         simulation, inertia = self._simulation, self._simulation.inertia
-        simulation.take_back()
         left = stop - simulation.t
         # Two equal steps to a stop in the place of a long and a tiny one
         dt = left if self._dt >= left else min(self._dt, left / 2)
         if self._fresh:
             # Nothing to compare with: half of a step is compared with the whole.
             whole = simulation.attempt(simulation.t + dt)
-            inertia.last_step(whole.step.dt)
-            before, between = (inertia.velocities(whole.s) - inertia.v) / dt, -dt / 4
+            before, between = (inertia.velocities(whole.s, whole.step.dt) - inertia.v) / dt, -dt / 4
             dt /= 2
         else:
-            before = (inertia.v - inertia.v_before) / simulation.prediction.last_dt
+            before = (inertia.v - inertia.rates.v_before) / simulation.prediction.last_dt
             between = (dt + simulation.prediction.last_dt) / 2
         trial = simulation.attempt(stop if dt == left else simulation.t + dt)
         dt = trial.step.dt
-        inertia.last_step(dt)
-        a = (inertia.velocities(trial.s) - inertia.v) / dt
+        a = (inertia.velocities(trial.s, dt) - inertia.v) / dt
         jerk = (a - before) / between
         c2, c3 = inertia.scheme.error_weights()
         error = self._size(trial, c2 * dt**2 * a + c3 * dt**3 * jerk)

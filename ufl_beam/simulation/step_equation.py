@@ -15,6 +15,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.base import InternalForces, Term
+from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.openings import SearchFlags
@@ -35,6 +36,7 @@ class StepEquation:
         force: Internal forces in the latest residual, in statics; else empty.
         c: ``equation`` of loops.h, which a solver completes with its own numbers.
         callbacks: Python functions that take part.
+        phases: Of the terms.
     """
 
     def __init__(
@@ -47,13 +49,13 @@ class StepEquation:
         others: Sequence[Term],
         supports: Supports,
         search: SearchFlags,
-        *,
-        in_motion: bool,
+        inertia: Inertia | None,
     ) -> None:
         self.share, self.A, self.supports, self.weights = share, A, supports, share.weights()
+        in_motion, self._rates = inertia is not None, None if inertia is None else inertia.rates
         # Where nothing has inertia, the work of the internal forces is compared with energies.
         self.force = np.zeros(0 if in_motion else share.size)
-        self._beams, self._couplings, self.loads = beams, couplings, loads
+        self.beams, self.couplings, self.loads = beams, couplings, loads
         self.inner: list[InternalForces] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]
@@ -94,6 +96,8 @@ class StepEquation:
         self._alive = loops, demands, predicted
         if not in_motion:
             fill(self.c, inner_force=self.force)
+        # The ledger has all its entries now, to whose places phases write.
+        self.phases = [one.phases(callbacks) for one in self.terms]
 
     def _in_python(self, term: Term) -> tuple[Loop, Loop]:
         def add_tangent(q1: Array, _: Array) -> None:
@@ -107,10 +111,42 @@ class StepEquation:
         """Degrees of freedom that supports hold; what stands for them in A means nothing."""
         return self.supports.dofs
 
-    def begin(self, step: Step) -> None:
-        """Let all terms begin a step."""
+    def begin(self, step: Step, terms: Sequence[Term] | None = None) -> None:
+        """Let terms begin a step, by default all; beams have exact tangents in it."""
+        some = self.terms if terms is None else terms
+        before = step.q0 if step.q_before is None else step.q_before
+        q0, q_before = (np.ascontiguousarray(q) for q in (step.q0, before))
+        if self._rates is not None:
+            lib.find_numbers(self._rates.c, step.dt)
+        c = ffi.new("time_step *", {
+            "t0": step.t0, "t1": step.t1, "dt": step.dt, "load_time": step.load_time,
+            "motion_time": step.motion_time, "fraction": step.fraction, "at": step.at,
+            "ratio": step.ratio, "q0": doubles(q0), "q_before": doubles(q_before),
+        })  # fmt: skip
+        self._begun = c, q0, q_before  # as long as forms and terms know them
+        self.callbacks.note_beginning(c, ffi.NULL, ffi.NULL)
+        for term, phases in zip(self.terms, self.phases, strict=True):
+            if term in some:
+                for begin, data in phases.begin:
+                    begin(data, c, ffi.NULL, ffi.NULL)
+        for one in self.beams:
+            if one in some and one.predicted is not None:
+                of = one.predicted.c
+                of.begins, of.stale, of.exact = 0, 1, 1
+        self.callbacks.settle()
+
+    def start(self, q: Array) -> None:
+        """Take ``q`` for the accepted configuration, which no step has led to."""
         for term in self.terms:
-            term.begin(step)
+            term.start(q)
+
+    def add_state(self, q: Array) -> None:
+        """Enter the energies that the scene holds at ``q``."""
+        self.callbacks.note_end(ffi.NULL, doubles(q), doubles(q))
+        for phases in self.phases:
+            for add, data in phases.add_state:
+                add(data, ffi.NULL, doubles(q), ffi.NULL)
+        self.callbacks.settle()
 
     def tangent_at(self, x: Array, v: Array, r: Array) -> Csr:
         """Return the tangent at ``x``; add to ``r`` what it makes of a motion ``v`` of supports.
@@ -157,7 +193,7 @@ class StepEquation:
         They are the step itself, and motions of connectors in the place of their forces.
         """
         v, works = self.supports.in_plane(y), y.copy()
-        for coupling in self._couplings:
+        for coupling in self.couplings:
             coupling.put_motions(q, v, works)
         return works
 
@@ -169,10 +205,10 @@ class StepEquation:
         Both are in the axes of the plane, nothing held; the derivatives as entries of the matrix.
         """
         r = np.zeros(self.share.size)
+        self.begin(step)
         self.A.data.fill(0.0)
         for term in self.terms:
             if term.kind != "inertia":
-                term.begin(step)
                 term.add_residual(q, r)
                 term.add_tangent(q)
         return r, self.A.data.copy()
@@ -187,12 +223,12 @@ class StepEquation:
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
         """Works of the tangent of :meth:`linearise`, each column of X on its own of Y; J."""
         self.A.data.fill(0.0)
-        for term in (*self._couplings, *self.others):
+        for term in (*self.couplings, *self.others):
             if term.kind != "inertia":
                 term.add_tangent(q)
         times, works = Product(self.A), np.zeros(X.shape[1])
         for i, (x, y) in enumerate(zip(*map(np.ascontiguousarray, (X.T, Y.T)), strict=True)):
-            of_beams = sum(one.tangent_work(q, x, y) for one in self._beams)
+            of_beams = sum(one.tangent_work(q, x, y) for one in self.beams)
             works[i] = of_beams + times(x) @ y
         return works
 
@@ -201,11 +237,11 @@ class StepEquation:
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))
-            works[0, i, j] = sum(one.tangent_work(q, x, y) for one in self._beams)
-            works[1, i, j] = sum(one.work_of_change(q, u, x, y) for one in self._beams)
+            works[0, i, j] = sum(one.tangent_work(q, x, y) for one in self.beams)
+            works[1, i, j] = sum(one.work_of_change(q, u, x, y) for one in self.beams)
         for k, work in enumerate(works):
             self.A.data.fill(0.0)
-            for one in (*self._couplings, *self.loads):
+            for one in (*self.couplings, *self.loads):
                 if k == 0:
                     one.add_tangent(q)
                 else:

@@ -38,7 +38,6 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.follower_loads import FollowerLoads
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.rates_in_c import V
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
@@ -121,11 +120,8 @@ class Extras(NamedTuple):
 class Stepper:
     """Steps of a scene in C; see march.c.
 
-    From the first step until :meth:`hand_back` the state is that of C.  What there is to see of it
-    is in Python after each call: time, configuration, velocities, reactions and ledger.
-
-    Attributes:
-        ahead: Whether steps have been taken since the state was handed over or back.
+    The state is that of C.  What there is to see of it is in Python after each call: time,
+    configuration, velocities, reactions and ledger.
     """
 
     def __init__(
@@ -133,17 +129,9 @@ class Stepper:
         inertia: Inertia | None, path: StaticPath | None, support_dofs: Index,
         cell_forces: CellForces, begun: bool, together: Agreement, extras: Extras,
     ) -> None:  # fmt: skip
-        self.ahead = False
         self._equation, self._inertia, self._path, self._begun = equation, inertia, path, begun
         self._together, self._extras, self._callbacks = together, extras, equation.callbacks
-        rates = None if inertia is None else inertia.in_c
-        if inertia is not None and rates is None:
-            raise SceneError(
-                f"{scheme!r}: what it makes of velocities must be sums of multiples of them"
-            )
-        # The ledger has all its entries now, to whose places phases write.
-        share, phases = equation.share, [one.phases(self._callbacks) for one in equation.terms]
-        self._phases = phases
+        share, phases = equation.share, equation.phases
         again = [one.again for one in phases if one.again is not None]
         fill(equation.c, agains=len(again), again=ffi.new("again_call[]", again))
         least = LEAST_IN_MOTION if inertia is not None else LEAST_AT_REST
@@ -155,7 +143,7 @@ class Stepper:
                 f"{scheme!r}: `step` must take loads and motions at fixed parts of a step, and "
                 "`nodal_step` must be that of ExactStep or PlainStep, see docs/extending.md"
             )
-        self._space, rotations = np.zeros((2, share.size)), share.rotations()
+        rotations = share.rotations()
         half_tangents = rotations[: len(rotations) * turns[1]]
         self._bytes = 8 * share.size
         kinds = DeadLoads, FollowerLoads
@@ -169,7 +157,7 @@ class Stepper:
         s = np.zeros(share.size) if equation.supports.turned else solver.change
         self.c = fill(
             ffi.new("march *"),
-            equation=equation.c, size=share.size, x=solver.unknowns, s=s,
+            equation=equation.c, size=share.size, q=np.zeros(share.size), x=solver.unknowns, s=s,
             guess=np.zeros(share.size), in_parts=not has_inertia(scheme),
             load_weight=whole[0], motion_weight=whole[1], at=whole[2], limits_turn=turns[0],
             largest_turn=LARGEST_TURN, rotations=len(rotations), rotation=rotations,
@@ -187,9 +175,9 @@ class Stepper:
             fill(self.c, found=np.zeros(share.size))
         if equation.supports.turned:
             fill(self.c, x=np.zeros(share.size))
-        if rates is not None:
+        if inertia is not None:
             handle = self._callbacks.handle(self._prepare)
-            fill(self.c, rates=rates.c, prepare=lib.run_in_python)
+            fill(self.c, rates=inertia.rates.c, prepare=lib.run_in_python)
             self.c.handle = handle  # what `fill` keeps must not keep this object
         if path is not None:
             changes = [one.change for one in phases if one.change is not None]
@@ -261,7 +249,7 @@ class Stepper:
             if self._begun:
                 before = rows[:-1, kept.q]
                 if c.parts_of_last > 1:
-                    before = np.vstack([before[:-1], self.q_before()])
+                    before = np.vstack([before[:-1], state.prediction.q_before])
             states = kept.states(ends[:taken].copy(), rows[1:], before)
             state.solution.keep(states, state.parts, self.solver.iterations)
         if c.failure:
@@ -372,12 +360,9 @@ class Stepper:
 
     def _prepare(self) -> None:
         """Take from a trial step what the scheme keeps besides the velocities."""
-        inertia = self._inertia
-        if inertia is not None and inertia.in_c is not None:
+        if self._inertia is not None:
             c = self.c
-            inertia.last_step(c.step.dt)
-            inertia.prepare(self._copy(c.s))
-            inertia.in_c.enter(self._copy(c.q))
+            self._inertia.prepare(self._copy(c.s), c.step.dt)
             self._equation.supports.take()
             q1 = self._copy(c.x)
             for one in self._links:
@@ -389,10 +374,8 @@ class Stepper:
         return _Taking(self, state)
 
     def enter(self, state: Stepping) -> None:
-        """Hand the state over, unless C has it."""
+        """Prepare for steps from a state."""
         self._state = state
-        if not self.ahead:
-            self._hand_over(state)
         self.c.parts, self.c.failure, self._callbacks.error = 0, lib.SUCCEEDS, None
 
     def leave(self, state: Stepping) -> None:
@@ -418,10 +401,6 @@ class Stepper:
         of_c = ffi.new("watch *[]", [one.c for one in watches])
         fill(self.c, watches=len(watches), watch=of_c)
 
-    def q_before(self) -> Array:
-        """The configuration at the beginning of the last step, a new array."""
-        return self._copy(self.c.prediction.q_before)
-
     def now(self, state: Stepping) -> Later:
         """The state that C has."""
         kept = self._rows or self._kept(state.q)
@@ -431,7 +410,7 @@ class Stepper:
         if self._begun:
             number, before = self._last
             if number != state.parts - 1:
-                before = self.q_before()[None]
+                before = state.prediction.q_before[None]
             self._last = state.parts, row[:, kept.q]
         t = np.array([self.c.t])
         return Later(t, partial(kept.states, t, row, before))
@@ -439,37 +418,15 @@ class Stepper:
     def _copy(self, values: Any) -> Array:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
 
-    def _hand_over(self, state: Stepping) -> None:
-        c, (q, before) = self.c, self._space
-        q[:], before[:] = state.q, state.prediction.q_before
-        state.prediction.began_at(before)  # no second array of what C has
-        fill(c, q=q, prediction=state.prediction.c, t=state.t)
-        if self._path is not None:
-            ffi.memmove(c.path.force, doubles(self._path.force), self._bytes)
-        for one in self._phases:
-            one.enter(state.q)
-        self._lend(state)
-        give_back_memory(len(q))
-        self.ahead = True
+    def begin_at(self, state: Stepping) -> None:
+        """Go on from a state that no step has led to."""
+        ffi.memmove(self.c.q, doubles(state.q), self._bytes)
+        self.c.t, self._last = state.t, (-1, np.zeros(0))
+        give_back_memory(len(state.q))
 
     def _lend(self, state: Stepping) -> None:
         """Let Python copy the state when it asks for it; C leaves it alone until the next one."""
-        state.q = self._on_demand(self.c.q)
-        if self._inertia is not None:
-            self._inertia.v = self._on_demand(self.c.rates.rate[V])
-
-    def _on_demand(self, values: Any) -> Any:
-        return partial(self._copy, values)
-
-    def hand_back(self, state: Stepping) -> None:
-        """Let all of Python know the state, so that it may change it."""
-        if self.ahead:
-            self.ahead, self._last = False, (-1, np.zeros(0))
-            state.prediction.began_at(self._copy(state.prediction.c.q_before))
-            if self._path is not None:
-                self._path.force = self._copy(self.c.path.force)
-            for one in self._phases:
-                one.leave(state.q)
+        state.q = partial(self._copy, self.c.q)  # type: ignore[assignment]
 
 
 class _Taking:

@@ -12,7 +12,8 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop
+from ufl_beam.compiled.c_library import Loop, doubles
+from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.in_cells import InCells
@@ -28,12 +29,15 @@ class Term(ABC):
     kind: str
     """Kind of its forces, one of :data:`KINDS`."""
 
+    _A: Csr
+    """Matrix that takes the tangent."""
+
     def loops(self) -> tuple[Loop, Loop | None] | None:
         """Return C loops of residual and tangent with data; None where Python evaluates them."""
         return None
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """C functions of the methods below; where a term has no loops, they call the methods."""
+        """Return C functions of a step; by default they call the methods of these names below."""
         return Phases(
             [callbacks.begin(self.begin)], [callbacks.accept(self.accept)],
             [callbacks.add_state(self.add_state)],
@@ -46,12 +50,17 @@ class Term(ABC):
     def begin(self, step: Step) -> None:
         """Take note of the step that is to be solved."""
 
-    @abstractmethod
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the virtual work at ``q1`` to ``r``."""
+        """Add the virtual work at ``q1`` to ``r``; by default as C does."""
+        if (loops := self.loops()) is not None:
+            (force, data), _ = loops
+            force(data, doubles(q1), doubles(r))
 
     def add_tangent(self, q1: Array) -> None:
         """Add the derivative at ``q1`` to the matrix that the term was made with."""
+        if (loops := self.loops()) is not None and loops[1] is not None:
+            tangent, data = loops[1]
+            tangent(data, doubles(q1), doubles(self._A.data))
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
@@ -61,6 +70,9 @@ class Term(ABC):
 
         ``s`` is the step of the nodes that the virtual works are works on.
         """
+
+    def start(self, q: Array) -> None:
+        """Take ``q`` for the accepted configuration, which no step has led to."""
 
     def add_state(self, q: Array) -> None:
         """Enter the energy that the term holds in the accepted state ``q``."""

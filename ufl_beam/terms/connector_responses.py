@@ -48,7 +48,6 @@ class Response(ABC):
     in_c: Mapping[str, Any] = {}  # data of laws evaluated in C, by names in ``couplings``, loops.h
     must_dissipate = False  # True if require_dissipation has to be called before a step is accepted
     name_in_files = ""  # of the internal variables, if it is not that of the class
-    stored = 0.0  # by rigid-plastic connectors; J
     opens = False  # True if connectors open beyond a limit
     _part, _entry, _sign = "lost", "", 1.0
 

@@ -61,7 +61,6 @@ class Couplings(Links):
         self._tangent.place(A)
         self._weight_of_before = weight_of_before(scheme.acting)
         self._e, self._now, self._rows = np.zeros(n), np.zeros(n), np.zeros((n, 3))
-        self._q: Array = np.empty(0)
         self._in_c = struct(
             "couplings", number=n, link=np.arange(n, dtype=np.int32), dofs=self._dofs,
             force=self._forces_at.copy(), size=setting.size,
@@ -100,16 +99,8 @@ class Couplings(Links):
         points = struct("inelastic_term", **{k: x for k, x in of_law.items() if k not in fields})
         c = struct("coupling_term", links=self._in_c, points=points, **mine)
 
-        def enter(q: Array) -> None:
-            if q is not self._q:
-                self._q, self._e[:] = q, self.motion(q)
-            if not of_law:  # rows that stay
-                self._put(*response.rows(self._e, self._before))
-            c.hardened = response.stored
-
-        def leave(q: Array) -> None:
-            self._q, response.stored = q, c.hardened
-
+        if not of_law:  # rows that stay
+            self._put(*response.rows(self._e, self._before))
         begin = beginning((self._work, self._tangent), self._forms.q0)
         phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")
         first, accept, state = ([loop(name, c)] for name in phases)
@@ -123,7 +114,7 @@ class Couplings(Links):
                 opens["way_before"] = integers(opens["way_before"])
         if "rigid_plastic" in response.in_c:
             again = loop("begin_slips_again", c)
-        return Phases([*begin, *first], accept, state, change, enter, leave, opens, admits, again)
+        return Phases([*begin, *first], accept, state, change, opens, admits, again)
 
     def demand(self) -> Loop:
         """The loop of :meth:`excess`."""
@@ -160,8 +151,6 @@ class Couplings(Links):
         """Remember the motions at the beginning."""
         self._work.set(self._forms.q0, step.q0)
         self._tangent.set(self._forms.q0, step.q0)
-        if step.q0 is not self._q:
-            self._q, self._e[:] = step.q0, self.motion(step.q0)
         self._dt = step.dt
         self.response.begin(self._e, step)
         if self.response.steady:
@@ -208,7 +197,6 @@ class Couplings(Links):
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what was supplied or lost."""
         taken = float(lib.commit_couplings(self._in_c, doubles(q1), self._dt))
-        self._q = q1
         self.response.accept(self._e, taken)
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
@@ -230,11 +218,13 @@ class Couplings(Links):
 
     # -- the state -----------------------------------------------------------------------------
 
+    def start(self, q: Array) -> None:
+        """Begin at the motions of a configuration."""
+        self._e[:] = self.motion(q)
+        self.response.start(self._e)
+
     def add_state(self, q: Array) -> None:
         """Enter what is stored."""
-        if q is not self._q:
-            self._q, self._e[:] = q, self.motion(q)
-            self.response.start(self._e)
         self.response.add_state(self._e)
 
     def remember(self, memory: Memory, q: Array) -> None:
@@ -245,7 +235,6 @@ class Couplings(Links):
         rows = memory.rows(name, self.numbers, rows)
         self.work[:], self.rate[:], self._before[:], self._e[:] = rows[:, :4].T
         response.restore(rows[:, 4:])
-        self._q = q
 
 
 def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:

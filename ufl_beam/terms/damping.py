@@ -6,7 +6,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import partial
-from typing import Protocol
 
 import numpy as np
 import ufl
@@ -29,24 +28,14 @@ from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates, Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import Term
+from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Callbacks, Phases, knowing
-from ufl_beam.terms.rates_in_c import RatesInC
-
-
-class Inertia(Rates, Protocol):
-    """Velocities of a scene in motion, and its scheme."""
-
-    scheme: DynamicScheme
-
-    @property
-    def in_c(self) -> RatesInC | None:
-        """The velocities where C takes steps; none if it cannot."""
 
 
 def _work_and_loss(
@@ -87,14 +76,6 @@ class KelvinVoigtForces(OfForms):
         )  # fmt: skip
         return Phases([*begin, loop("begin_viscous_forms", c)], accept)
 
-    def begin(self, step: Step) -> None:
-        """Remember the configuration at the beginning."""
-        super().begin(step)
-        if step.dt != self._dt[0]:
-            self._dt[0] = step.dt
-            for kernel in self._of_step:
-                kernel.put(self._rate, np.array([self._time / step.dt]))
-
 
 @stated
 def _reference_stiffness(of: Element) -> ufl.Form:
@@ -124,7 +105,7 @@ class RayleighForces(OfMatrix):
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
         rotations = inertia.scheme.half_tangents(fields.share.rotations())
         self._times = StepProduct(C, rotations, A, fields.share.scratch)
-        self._ledger, self._inertia = ledger, inertia
+        self._ledger, self._rates, self._A = ledger, inertia.rates, A
 
     def in_cells(self) -> Sequence[InCells]:
         """Both matrices of the beams times the velocities of the step."""
@@ -139,22 +120,10 @@ class RayleighForces(OfMatrix):
             InCells(partial(mass_kernel, fields), lib.DENSITY, *at, damping.mass),
         ]
 
-    def phases(self, callbacks: Callbacks) -> Phases | None:  # type: ignore[override]
+    def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the matrix and the velocities."""
-        rates = self._inertia.in_c
-        if rates is None:
-            return None
-        of = rates.times(self._times, lost=self._ledger.lost.pointer("damping"))
+        of = self._rates.times(self._times, lost=self._ledger.lost.pointer("damping"))
         return Phases([loop("begin_rayleigh", of)], [loop("accept_rayleigh", of)])
-
-    def begin(self, step: Step) -> None:
-        """Prepare what stays constant in the step."""
-        self._dt = step.dt
-        self._times.begin(step.q0, *self._inertia.scheme.velocity(step.dt, self._inertia))
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the energy that was damped."""
-        self._ledger.lost["damping"] += self._times.A.square(s) / self._dt
 
 
 def damping_forces(
@@ -200,9 +169,8 @@ class SecondDifferences(OfForms):
         super().__init__(work, [lost], fields, A, ledger)
         self._strains = Strains(fields)
         self._cells = fields.share.cells[fields.order]
-        self._q: Array = np.empty(0)
         self._e, self._change = np.zeros((2, *self._strains.shape))
-        self._dt, self._last_dt = math.inf, np.full(1, math.inf)
+        self._last_dt = np.full(1, math.inf)
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells and their strains."""
@@ -214,29 +182,11 @@ class SecondDifferences(OfForms):
         )  # fmt: skip
         before, after = (loop(f"{name}_second_differences", c) for name in ("begin", "accept"))
 
-        def leave(q: Array) -> None:
-            self._q = q
+        return Phases([*begin, before], [*accept, after])
 
-        return Phases([*begin, before], [*accept, after], enter=self._start_at, leave=leave)
-
-    def _start_at(self, q0: Array) -> None:
-        if q0 is not self._q:
-            self._q, self._e[:] = q0, self._strains(q0)
-
-    def begin(self, step: Step) -> None:
-        """Remember the configuration at the beginning, and the changes in the step before."""
-        self._start_at(step.q0)
-        self._dt = step.dt
-        super().begin(step)
-        for kernel in self._of_step:
-            kernel.put(self._before, min(1.0, step.dt / self._last_dt[0]) * self._change)
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the energy that was lost, and keep the changes of the strains."""
-        super().accept(q1, s)
-        e1 = self._strains(q1)
-        self._change[:], self._e[:] = e1 - self._e, e1
-        self._q, self._last_dt[0] = q1, self._dt
+    def start(self, q: Array) -> None:
+        """Take the strains at ``q``."""
+        self._e[:] = self._strains(q)
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The changes of the strains in the last step, and its length."""
@@ -244,4 +194,4 @@ class SecondDifferences(OfForms):
         rows = np.column_stack([self._change, np.full(len(self._change), self._last_dt)])
         rows = memory.rows("changes of strains", self._cells, rows)
         self._change[:], self._last_dt[0] = rows[:, :-1], rows[0, -1]
-        self._q, self._e[:] = q, self._strains(q)
+        self.start(q)

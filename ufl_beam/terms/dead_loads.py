@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, loop, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
 from ufl_beam.model.time_functions import value_at
@@ -48,13 +48,9 @@ class DeadLoads(LoadTerm):
         self.dofs = np.flatnonzero(share.added(np.any(whole, axis=0) * 1.0)).astype(np.int32)
         self._vectors = [(load, vector[self.dofs]) for load, vector in vectors.values()]
         self._size = share.size
-        nothing: Array = np.zeros(len(self.dofs))
-        self._acts: Array = nothing  # now; also at the end of the step, and at that of the last one
-        self._end: Array = nothing
-        self._before = nothing
-        self._force = np.broadcast_to(0.0, share.size)  # which takes no room
-        self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs)
-        self._factors: list[float] = []
+        # In the equation, at the end of the step, and at that of the last one.
+        self._forces = np.zeros((3, len(self.dofs)))
+        self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
         # Parts of the vectors that act: now, at the end of the step, at that of the last one, and
         # in its equation.
         self._parts: Array = np.zeros((4, len(vectors)))
@@ -71,24 +67,6 @@ class DeadLoads(LoadTerm):
         )  # fmt: skip
         return ffi.gc(c, lambda _, kept=(c, along): None)  # solutions outlive the term
 
-    def begin(self, step: Step) -> None:
-        """The loads of the step; nothing is to do for those that stay."""
-        factors = self._factors_at(step.load_time)
-        if factors == self._factors and step.fraction == step.at == 1:
-            return
-        self._acts = self._end = self._times(factors)
-        self._factors = factors
-        now, end, before, _ = self._parts
-        end[:] = before + step.fraction * (factors - before) if step.fraction < 1 else factors
-        now[:] = before + step.at * (end - before) if step.at < 1 else end
-        if step.fraction < 1 or step.at < 1:
-            change = step.fraction * (self._end - self._before)
-            self._end = self._before + change
-            self._acts = self._end if step.at == 1 else self._before + step.at * change
-            self._factors = []
-        self._force = self._whole(self._acts)
-        self._in_c.values = doubles(self._acts)
-
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loop that subtracts the load vector; no tangent."""
         return loop("subtract_vector", self._in_c), None
@@ -96,47 +74,34 @@ class DeadLoads(LoadTerm):
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the vectors."""
         owners = [(load.time, load) for load, _ in self._vectors]
-        forces = np.zeros((3, len(self.dofs)))  # now, at the end of the step, before
         c = self.steps_in_c = struct(
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=len(owners),
-            force=forces[0], end=forces[1], before=forces[2],
+            force=self._forces[0], end=self._forces[1], before=self._forces[2],
             parts=[doubles(part) for part in self._parts[:3]],
-            factors=np.empty(len(owners)), factor=callbacks.of_time(owners),
+            factors=np.full(len(owners), math.nan), factor=callbacks.of_time(owners),
             vector=ffi.new("double *[]", [doubles(vector) for _, vector in self._vectors]),
             work=self._ledger.supplied.pointer("loads"),
             weight_of_before=weight_of_before(self._acting),
         )  # fmt: skip
+        return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
 
-        def enter(q: Array) -> None:
-            forces[2] = self._before
-            self._before = forces[2]  # no second array of what C has
-            for k in range(len(owners)):
-                c.factors[k] = math.nan
-            self._in_c.values = doubles(forces[0])
-
-        def leave(q: Array) -> None:
-            self._acts, self._end, self._before = forces.copy()
-            self._factors = []
-
-        begin, accept = [loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)]
-        return Phases(begin, accept, enter=enter, leave=leave)
+    @property
+    def force(self) -> Array:
+        """The forces in the latest residual; a new array."""
+        return self._whole(self._forces[0])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         factors = self._factors_at(t)
-        self._before, self._parts[:3] = self._times(factors), factors
-        return self._whole(self._before)
+        self._parts[:3] = factors
+        self._forces[:] = sum(
+            f * vector for f, (_, vector) in zip(factors, self._vectors, strict=True)
+        )
+        return self.force
 
     def _factors_at(self, t: float) -> list[float]:
         """Factors of the vectors; a vector belongs to its first load for messages."""
         return [value_at(load.time, t, load) for load, _ in self._vectors]
-
-    def _times(self, factors: list[float]) -> Array:
-        (_, vector), *others = self._vectors
-        force = factors[0] * vector
-        for factor, (_, vector) in zip(factors[1:], others, strict=True):
-            force += factor * vector
-        return force
 
     def _whole(self, forces: Array) -> Array:
         """Forces at all local degrees of freedom, from those that are loaded."""
@@ -144,23 +109,11 @@ class DeadLoads(LoadTerm):
         whole[self.dofs] = forces
         return whole
 
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract the loads from the residual."""
-        lib.subtract_vector(self._in_c, doubles(q1), doubles(r))
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the work of the loads, if there are any."""
-        self._parts[2] = self._parts[1]
-        if any(self._factors) or self._before is not self._acts:
-            work = float(self._acting(self._before, self._acts) @ s[self.dofs])
-            self._ledger.supplied["loads"] += work
-            self._before = self._end
-
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces at the end of the last step."""
-        self._before = memory.added("dead loads", self._whole(self._before))[self.dofs]
-        self._acts = self._end = self._before
-        self._factors = []
+        self._forces[:] = memory.added("dead loads", self._whole(self._forces[2]))[self.dofs]
+        for k in range(len(self._vectors)):
+            self.steps_in_c.factors[k] = math.nan
         for k, part in enumerate(self._parts[2]):
             self._parts[2, k] = memory.number(f"part of dead loads {k}", part)
 

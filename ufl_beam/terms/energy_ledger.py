@@ -35,6 +35,7 @@ class Account(MutableMapping[str, float]):
     def __init__(self) -> None:
         self._at: dict[str, int] = {}
         self.numbers: Array = np.zeros(16)
+        self._fixed = False  # C has addresses
 
     def __getitem__(self, name: str) -> float:
         return float(self.numbers[self._at[name]]) if name in self._at else 0.0
@@ -42,6 +43,8 @@ class Account(MutableMapping[str, float]):
     def __setitem__(self, name: str, value: float) -> None:
         at = self._at.setdefault(name, len(self._at))
         if at == len(self.numbers):
+            if self._fixed:
+                raise RuntimeError(f"the entry {name!r} comes after C has learnt where all are")
             self.numbers = np.append(self.numbers, np.zeros(at))
         self.numbers[at] = value
 
@@ -63,7 +66,9 @@ class Account(MutableMapping[str, float]):
         return dict(zip(self._at, numbers, strict=False))
 
     def pointer(self, name: str) -> Any:
-        """An entry as C has it; no name may come after."""
+        """An entry as C has it; there is no room for many names after it."""
+        self.setdefault(name, 0.0)
+        self._fixed = True
         return doubles(self.numbers) + self._at[name]
 
 

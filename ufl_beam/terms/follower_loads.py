@@ -8,11 +8,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import Loop, fill, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.loads import FollowerLoad
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.energy_ledger import Ledger
@@ -62,14 +62,6 @@ class FollowerLoads(LoadTerm):
         """The forces in the latest residual; a new array."""
         return self._whole(self._forces[0])
 
-    def begin(self, step: Step) -> None:
-        """The sizes of the loads in the step; a failed one leaves no forces behind."""
-        self._forces[0] = self._forces[1]
-        now, end, before = self._sizes
-        end[:] = before + step.fraction * (self._sizes_at(step.load_time) - before)
-        now[:] = before + step.at * (end - before)
-        self._turns[:] = step.q0[self._turning]
-
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops of the forces in the plane, and of their derivatives by the rotation."""
         c = self.steps_in_c
@@ -101,20 +93,6 @@ class FollowerLoads(LoadTerm):
         whole: Array = np.zeros(self._size)
         whole[self._dofs] = forces
         return whole
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract the loads from the residual."""
-        lib.subtract_follower_loads(self.steps_in_c, doubles(q1), doubles(r))
-
-    def add_tangent(self, q1: Array) -> None:
-        """Subtract the derivative by the rotation."""
-        lib.add_tangent_of_follower_loads(self.steps_in_c, doubles(q1), doubles(self._A.data))
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the work of the loads, and take their sizes."""
-        # Entries may have moved since the last step: each name that comes may need more room.
-        self.steps_in_c.work = self._ledger.supplied.pointer("loads")
-        lib.accept_follower_loads(self.steps_in_c, ffi.NULL, doubles(q1), doubles(s))
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step, and their sizes."""

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 
 import ufl
 
-from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, lib, loop
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields
-from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.in_cells import InCells
@@ -46,15 +44,10 @@ class OfForms(Term):
         return Phases(*self._loops_of_step())
 
     def _loops_of_step(self) -> tuple[list[Loop], list[Loop]]:
-        """Those of :meth:`begin` and :meth:`accept`."""
+        """Loops at the beginning of a step and at its acceptance."""
         lost = self._ledger.lost
         accept = [entering(loss, lost.pointer(self._entry)) for loss in self._losses]
         return beginning(self._of_step, self._q0), accept
-
-    def begin(self, step: Step) -> None:
-        """Remember the configuration at the beginning."""
-        for kernel in self._of_step:
-            kernel.set(self._q0, step.q0)
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops over the cells, of force and tangent."""
@@ -63,19 +56,6 @@ class OfForms(Term):
     def in_cells(self) -> Sequence[InCells]:
         """The forces of the form."""
         return [InCells(lambda: self._force, lib.STRESS, self._order)]
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces to the residual."""
-        self._force.add(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the derivative of the forces to the tangent."""
-        self._tangent.add(q1, self._A.data)
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the energy that was lost."""
-        for loss in self._losses:
-            self._ledger.lost[self._entry] += loss.value(q1)
 
 
 class OfMatrix(Term):
@@ -86,11 +66,3 @@ class OfMatrix(Term):
     def loops(self) -> tuple[Loop, Loop | None]:
         """The product, and its derivative."""
         return self._times.loops()
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces to the residual."""
-        self._times.add_force(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the derivative of the forces to the tangent."""
-        self._times.add_tangent(q1)

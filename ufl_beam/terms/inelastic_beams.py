@@ -18,7 +18,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.in_cells import InCells
@@ -86,7 +86,6 @@ class InelasticBeams(Cells):
             fields.hot_kernel(form, self._q1) for form in (forms.work, forms.tangent)
         )
         self._tangent.place(A)
-        self._q: Array = np.empty(0)
         self.must_dissipate = layout.kind.law.must_dissipate
 
         self._latest: Array = np.full(share.size, np.nan)
@@ -119,34 +118,19 @@ class InelasticBeams(Cells):
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
         if self.predicted is not None:
             begin.append(self.predicted.beginning())
-
-        def leave(q: Array) -> None:
-            self._q = q
-
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
         opens = {"cells": self._in_c} if self.points.softens else None
         change = loop("change_of_points", c)
         admits = loop("points_dissipate", c) if self.must_dissipate else None
-        return Phases(begin, *ends, change, self._start_at, leave, opens, admits)
+        return Phases(begin, *ends, change, opens, admits)
 
     # -- the step ------------------------------------------------------------------------------
 
-    def begin(self, step: Step) -> None:
-        """Remember the strains at the beginning."""
-        self._force.set(self._q0, step.q0)
-        self._tangent.set(self._q0, step.q0)
-        self._start_at(step.q0)
-        self.points.begin(step.dt)
-        if self.predicted is not None:
-            self.predicted.begin(step)
-        self._forget()
-        self.points.c.predicts = 0
-
-    def _start_at(self, q0: Array) -> None:
-        """Let the points begin at the strains of a configuration, if they are not there."""
-        if q0 is not self._q:
-            self._q = q0
-            self.points.start(self._strains(q0))
+    def start(self, q: Array) -> None:
+        """Let the points begin at the strains of a configuration."""
+        strains = self._strains(q)
+        self.points.start(strains)
+        self.points.refresh(strains)
 
     def _respond(self, q1: Array) -> None:
         """Let the points answer the strains at ``q1``."""
@@ -155,14 +139,6 @@ class InelasticBeams(Cells):
     def _forget(self) -> None:
         """Forget the latest response: the points would answer otherwise now."""
         self._latest.fill(np.nan)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the internal forces."""
-        lib.add_inelastic_force(self._in_c, doubles(q1), doubles(r))
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the stiffness, material and geometric."""
-        lib.add_inelastic_tangent(self._in_c, doubles(q1), doubles(self._A.data))
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
@@ -173,11 +149,6 @@ class InelasticBeams(Cells):
     def in_cells(self) -> Sequence[InCells]:
         """The forces of the resultants."""
         return [InCells(lambda: self._force, lib.STRESS, self._fields.order)]
-
-    def change(self, q1: Array) -> float:
-        """Energy that cells of this process store and dissipate in the step to ``q1``; J."""
-        self._respond(q1)
-        return self.points.change()
 
     def dissipation(self, q1: Array) -> float:
         """Energy that cells of this process dissipate in the step to ``q1``; J."""
@@ -203,26 +174,9 @@ class InelasticBeams(Cells):
 
     # -- the state -----------------------------------------------------------------------------
 
-    def accept(self, q1: Array, s: Array) -> None:
-        """Commit the internal variables."""
-        self._respond(q1)
-        self.points.accept()
-        self._q = q1
-        self.points.enter_losses(self._ledger)
-
-    def add_state(self, q: Array) -> None:
-        """Add the stored energy to the ledger."""
-        if q is not self._q:
-            self._q = q
-            strains = self._strains(q)
-            self.points.start(strains)
-            self.points.refresh(strains)
-        self.points.enter_stored(self._ledger)
-
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore the internal variables."""
         self.restore(self._cells, memory.rows("cells", *self.state()))
-        self._q = q
 
     # -- what solutions keep -------------------------------------------------------------------
 

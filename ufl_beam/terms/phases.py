@@ -21,20 +21,15 @@ from ufl_beam.model.time_functions import ALWAYS, Table, TimeFunction, steady, v
 class Phases(NamedTuple):
     """Loops of the type ``phase`` of loops.h, each with its data.
 
-    ``change`` is the method of that name of internal forces, of the type ``change_of_energy``.
-    Between calls of C the term is what its attributes say: ``enter`` hands them over before C takes
-    steps from the accepted configuration that it is called with, ``leave`` takes them back at the
-    one that C has come to.  ``opens`` are fields of ``openable``, if something may open;
-    ``admits`` is the check of a step before it is accepted, of the type ``admission``; ``again``
-    begins a step again, which iterates have tried.
+    ``change`` says what a step stores and dissipates, of the type ``change_of_energy``; ``opens``
+    are fields of ``openable``, if something may open; ``admits`` is the check of a step before it
+    is accepted, of the type ``admission``; ``again`` begins a step again, which iterates have tried.
     """
 
     begin: Sequence[Loop] = ()
     accept: Sequence[Loop] = ()
     add_state: Sequence[Loop] = ()
     change: Loop | None = None
-    enter: Callable[[Array], None] = lambda q: None
-    leave: Callable[[Array], None] = lambda q: None
     opens: dict[str, Any] | None = None
     admits: Loop | None = None
     again: Loop | None = None
@@ -130,6 +125,12 @@ class Callbacks:
     def note_end(self, step: Any, q1: Any, s: Any) -> None:
         """Copy the end of the step for terms."""
         self._q1, self._s = self.copy(q1), self.copy(s)
+
+    def settle(self) -> None:
+        """Raise what a function that C has called has raised."""
+        error, self.error = self.error, None
+        if error is not None:
+            raise error
 
     @property
     def end(self) -> Array:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Velocities, and what else a scheme keeps, where C takes steps without Python.
+"""Velocities, and what else a scheme keeps, as C has them.
 
 A scheme states what becomes of them in Python.  All of that is a sum of multiples; the numbers are
 found by asking the scheme what it makes of unit vectors, once for each length of a step.
@@ -7,17 +7,19 @@ found by asking the scheme what it makes of unit vectors, once for each length o
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import StepProduct
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Rates
+from ufl_beam.errors import SceneError
+from ufl_beam.mechanics.time_schemes import DynamicScheme
 
 CHANGE, V, V_BEFORE, MORE = range(4)
 """Places of the rates in C: the step or a change of velocities, velocities, ..."""
@@ -36,45 +38,86 @@ class Asked:
     last_dt: float
 
 
-class Moving(Rates, Protocol):
-    """Velocities of a scene in motion, and its scheme."""
-
-    scheme: DynamicScheme
-
-    @property
-    def ready(self) -> bool:
-        """True if a step can begin."""
-
-
 class RatesInC:
-    """The rates of a scene as C has them; attributes of ``moving`` are handed over and back.
+    """Velocities of a scene, those before the last step, and what else a scheme keeps; all in C.
+
+    They satisfy :class:`Rates`.  Arrays are copies; a new one that is set is copied, too.
 
     Attributes:
         c: ``rates`` of loops.h.
+
+    Raises:
+        SceneError: The scheme makes something else of rates than sums of multiples of them.
     """
 
-    def __init__(self, moving: Moving) -> None:
-        self._moving, self._scheme = moving, moving.scheme
-        size, number = len(moving.v), MORE + len(self._scheme.kept)
+    def __init__(self, scheme: DynamicScheme, v: Array) -> None:
+        known: Any = scheme
+        size, number = len(v), MORE + len(scheme.kept)
+        if number > lib.MOST_RATES or not _sums_of_multiples(known):
+            raise SceneError(
+                f"{scheme!r}: what it makes of velocities must be sums of multiples of them"
+            )
+        self._scheme = scheme
         # Changes are elsewhere; of velocities before the last ones new ones are not computed, and
         # new velocities take their place where nothing asks for them.
-        scheme: Any = self._scheme
-        self._asks = self._scheme.slips or _asks_for_before(scheme)
+        asks = scheme.slips or _asks_for_before(known)
         self._now = np.zeros((number - V, size))
-        self._next = np.zeros((number - V_BEFORE - (not self._asks), size))
-        self._slip = np.zeros(size if self._scheme.slips else 0)
+        self._next = np.zeros((number - V_BEFORE - (not asks), size))
+        self._slip = np.zeros(size if scheme.slips else 0)
         self._handle = ffi.new_handle(self)
         self.c = fill(ffi.new("rates *"), size=size, number=number, find=lib.numbers_in_python)
         self.c.handle = self._handle  # what `fill` keeps must not keep this object
-        self.c.after_any = _after_any(scheme)
+        self.c.after_any = _after_any(known)
+        first, *more = self._next if asks else (self._now[1], *self._next)
+        for k, (rate, new) in enumerate(
+            zip(self._now, (first, self._slip, *more), strict=True), start=V
+        ):
+            self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
+        self.c.last_dt = math.inf
+        self.v = self.v_before = v
+        self.keep()
 
-    @classmethod
-    def of(cls, moving: Moving) -> RatesInC | None:
-        """The rates, if the scheme makes sums of multiples of them."""
-        if MORE + len(moving.scheme.kept) > lib.MOST_RATES:
-            return None
-        scheme: Any = moving.scheme
-        return cls(moving) if _sums_of_multiples(scheme) else None
+    def _rate(self, k: int) -> Array:
+        """A rate as C has it; a view."""
+        return np.frombuffer(ffi.buffer(self.c.rate[k], 8 * self.c.size))
+
+    @property
+    def v(self) -> Array:
+        """Velocities."""
+        return self._rate(V).copy()
+
+    @v.setter
+    def v(self, v: Array) -> None:
+        self._rate(V)[:] = v
+
+    @property
+    def v_before(self) -> Array:
+        """Velocities before the last step."""
+        return self._rate(V_BEFORE).copy()
+
+    @v_before.setter
+    def v_before(self, v: Array) -> None:
+        self._rate(V_BEFORE)[:] = v
+
+    @property
+    def more(self) -> tuple[Array, ...]:
+        """What else the scheme keeps, as much as is known of it."""
+        return tuple(self._rate(MORE + k).copy() for k in range(self.c.more))
+
+    def keep(self, *more: Array) -> None:
+        """Set what else the scheme keeps; a step can begin if that is anything."""
+        for k, rate in enumerate(more):
+            self._rate(MORE + k)[:] = rate
+        self.c.more, self.c.ready = len(more), bool(more) or not self._scheme.kept
+
+    @property
+    def last_dt(self) -> float:
+        """Length of the last step, infinite before the first; s."""
+        return float(self.c.last_dt)
+
+    @last_dt.setter
+    def last_dt(self, dt: float) -> None:
+        self.c.last_dt = dt
 
     def find(self, numbers: Any) -> None:
         """Write the numbers of the steps that ``scheme_numbers`` of loops.h is about."""
@@ -96,31 +139,6 @@ class RatesInC:
         v, momentum = np.zeros(self.c.size), np.zeros(len(self._slip))
         of = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **entries)
         return fill(of, rates=self.c)
-
-    # -- handing over --------------------------------------------------------------------------
-
-    def enter(self, q: Array) -> None:
-        """Take the rates from Python."""
-        moving, now = self._moving, self._now
-        self.c.more, self.c.ready = len(moving.more), moving.ready
-        for k, rate in enumerate((moving.v, moving.v_before, *moving.more)):
-            now[k] = rate
-        # No second arrays of what C has; velocities are asked for between its calls.
-        moving.v_before, moving.more = now[1], tuple(now[2 : 2 + self.c.more])
-        v, *more = self._next if self._asks else (now[1], *self._next)
-        for k, (rate, new) in enumerate(zip(now, (v, self._slip, *more), strict=True), start=V):
-            self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
-        self.c.last_dt = moving.last_dt
-
-    def leave(self, q: Array) -> None:
-        """Give the rates back to Python."""
-        moving, size = self._moving, 8 * self.c.size
-        rates = [
-            np.frombuffer(ffi.buffer(self.c.rate[k], size)).copy()
-            for k in range(V, MORE + self.c.more)
-        ]
-        moving.v, moving.v_before, moving.more = rates[0], rates[1], tuple(rates[2:])
-        moving.last_dt = self.c.last_dt
 
 
 def _ask(scheme: DynamicScheme, dt: float, columns: Array, last_dt: float) -> Sequence[Array]:

@@ -104,7 +104,7 @@ class RigidPlasticResponse(Response):
         self._limit = self._at["limit"].copy()
         self._back_force, self._dissipated, self.over = np.zeros((3, n))
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
-        self._rows = np.zeros((n, 3))
+        self._rows, self._stored = np.zeros((n, 3)), np.zeros(1)
         self._slope = np.array([_slope(link, self._setting.size) for link in self._links])
         self.opens = True
 
@@ -128,6 +128,7 @@ class RigidPlasticResponse(Response):
         if self._loss:
             entries["numerical"] = ledger.lost.pointer("numerical")
         of_law = {"dt_of_law": INPUTS.index("dt"), "way_before": self._way_before}
+        of_law["hardened"] = self._stored
         return {**of_law, "loss": self._loss, **entries}
 
     # -- the step ------------------------------------------------------------------------------
@@ -152,7 +153,7 @@ class RigidPlasticResponse(Response):
     def accept(self, e1: Array, work: float) -> None:
         """Commit the slips of the step."""
         lib.commit_rigid_plastic(self._c, doubles(e1), doubles(self._sums))
-        dissipated, lost, self.stored = self._sums.tolist()
+        dissipated, lost, self._stored[0] = self._sums.tolist()
         self._way_before[:] = self._way * self._slipped
         self._ledger.lost["hinges"] += dissipated
         if self._loss:
@@ -161,7 +162,7 @@ class RigidPlasticResponse(Response):
     def add_state(self, e: Array) -> None:
         """Enter the energy that hardening stores."""
         if self._hardens:
-            self._ledger.state["hardening"] += self.stored
+            self._ledger.state["hardening"] += float(self._stored[0])
 
     # -- what has slipped ----------------------------------------------------------------------
 
@@ -196,7 +197,7 @@ class RigidPlasticResponse(Response):
     def state(self) -> Array:
         """Internal variables; (num_links, 7)."""
         stored = np.zeros(len(self._rows))
-        stored[:1] = self.stored  # of all together; to whom it belongs does not matter
+        stored[:1] = self._stored  # of all together; to whom it belongs does not matter
         return np.column_stack([*self._variables, stored])
 
     def restore(self, rows: Array) -> None:
@@ -205,7 +206,7 @@ class RigidPlasticResponse(Response):
         for mine, values in zip(self._variables, variables, strict=True):
             mine[:] = values
         self._slipped[:] = np.abs(self._way_before)
-        self.stored = float(stored.sum())
+        self._stored[0] = stored.sum()
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""

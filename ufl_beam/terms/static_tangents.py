@@ -20,15 +20,14 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, fill, loop, struct
+from ufl_beam.compiled.c_library import Loop, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme
 
 
 @stated
@@ -60,29 +59,8 @@ class PredictedStrains:
             strains=self._form.cells, at_about=self._form.position(self._about),
         )  # fmt: skip
 
-    def begin(self, step: Step) -> None:
-        """Begin a step, with exact tangents until ``restart`` of newton.c."""
-        self._q0, q_before = step.q0, step.q0 if step.q_before is None else step.q_before
-        fill(self.c, q0=self._q0, q_before=q_before, ratio=step.ratio)
-        self.c.begins, self.c.stale, self.c.exact = False, True, True
-
-    def __call__(self, q: Array) -> Array:
-        """Strains of elastic cells, in the order of the mesh, point after point; 1, 1, 1/m."""
-        if self.c.begins:
-            about = q = self._q0
-        else:
-            about = q if self.c.exact else self._last
-        e = np.zeros(self._shape)
-        self._form.set(self._about, about)
-        self._form.add(q - about, e)
-        return np.asarray(e / self._weights)
-
-    def take(self, q: Array) -> None:
-        """Predict from an iterate on, whose tangent is the latest."""
-        self._last[:], self.c.begins = q, False
-
     def beginning(self) -> Loop:
-        """The phase of :meth:`begin`."""
+        """The phase that begins a step."""
         return loop("begin_predicted_strains", self.c)
 
 
@@ -113,16 +91,6 @@ class StaticTangent:
         self.kernel.place(A)
         self.predicted, self._data = PredictedStrains(fields), A.data
 
-    def begin(self, step: Step) -> None:
-        """Begin a step; elastic cells have no branches to find by extrapolated strains."""
-        self.predicted.begin(step._replace(ratio=0.0))
-
-    def add(self, q: Array) -> None:
-        """Add the tangent at an iterate to the matrix."""
-        self.kernel.put(self._e, self.predicted(q))
-        self.kernel.add(q, self._data)
-        self.predicted.take(q)
-
     @cached_property
     def _in_c(self) -> Any:
         return struct(
@@ -131,9 +99,9 @@ class StaticTangent:
         )  # fmt: skip
 
     def loop(self) -> Loop:
-        """The loop of :meth:`add`."""
+        """The loop that adds the tangent at an iterate."""
         return loop("add_static_tangent", self._in_c)
 
     def beginning(self) -> Loop:
-        """The phase of :meth:`begin`."""
+        """The phase that begins a step; no branches are to be found by extrapolated strains."""
         return loop("begin_static_tangent", self._in_c)

@@ -693,6 +693,9 @@ typedef struct {
   void *handle;
 } rates;
 
+/* Let `now` be the numbers of steps of a length; whether that succeeds. */
+int find_numbers(rates *r, double dt);
+
 /* A constant matrix that works on rates: inertia, or Rayleigh damping. */
 typedef struct {
   step_product *product;
@@ -730,7 +733,7 @@ typedef struct {
   double *entry, sign;                /* of the work in the ledger */
   int dt_of_law;       /* where a rigid-plastic law has the step */
   int32_t *way_before; /* of rigid-plastic ones, after the last step */
-  double hardened, loss; /* stored by rigid-plastic ones; part of what backward Euler loses */
+  double *hardened, loss; /* stored by rigid-plastic ones; part of what backward Euler loses */
   const inelastic_term *points; /* of springs: entries of the ledger */
 } coupling_term;
 

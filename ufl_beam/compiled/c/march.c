@@ -202,7 +202,7 @@ static const double *sum_of_rates(const rates *r, const double *numbers, int fir
   return space;
 }
 
-static int find_numbers(rates *r, double dt)
+int find_numbers(rates *r, double dt)
 {
   for (int k = 0; k < r->known; ++k) {
     r->now = r->numbers + k;
@@ -386,7 +386,7 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
     for (int i = 0; i < p->number; ++i) t->way_before[i] = p->way[i] * p->slipped[i];
     *t->points->hinges += sums[0];
     if (t->points->numerical) *t->points->numerical += t->loss * sums[1];
-    t->hardened = sums[2];
+    *t->hardened = sums[2];
   }
 }
 
@@ -394,7 +394,7 @@ void add_energy_of_couplings(void *self, const time_step *step, const double *q1
 {
   const coupling_term *t = self;
   if (t->links->points) enter_stored(t->points, t->links->points->sum);
-  if (t->links->rigid_plastic && t->points->hardening) *t->points->hardening += t->hardened;
+  if (t->links->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
 }
 
 /* What the latest response would add to what points have stored and dissipated; see Points.change. */
