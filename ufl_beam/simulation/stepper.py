@@ -13,8 +13,6 @@ from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import Any, NamedTuple, Protocol
 
-from petsc4py import PETSc
-
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, Later, Snapshots
@@ -315,8 +313,7 @@ class Stepper:
         failure, c.failure = c.failure, lib.SUCCEEDS
         if failure == lib.RAISED:
             self._together.settle(error)
-        if c.equation.error:
-            raise PETSc.Error(c.equation.error)
+        self.solver.require_no_error()
         if failure == lib.NO_EQUILIBRIUM:
             self._together.settle(error)
             raise self.solver.convergence.failure()

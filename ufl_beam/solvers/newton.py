@@ -295,6 +295,11 @@ class Solver:
             self._idle.remember(memory)
             self._put_idle()
 
+    def require_no_error(self) -> None:
+        """Raise the error of PETSc that ended the latest solution, if one did."""
+        if self._c.error:
+            raise PETSc.Error(self._c.error)
+
     def destroy(self) -> None:
         """Give back what PETSc holds."""
         for one in (self._snes, self._x, self._matrix):
