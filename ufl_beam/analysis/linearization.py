@@ -36,7 +36,7 @@ V = TypeVar("V", Array, Complex)
 
 COUPLING_TOLERANCE = 1e-9  # couplings below this part of the largest damping do not count
 BALANCED = 1e-13  # forces below this part of stiffness times size are round-off
-AT_REST = 1e300  # length of a step in which all rates vanish; s
+AT_REST = 1e150  # length of a step in which all rates vanish, and whose square is a number; s
 
 
 def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array]:

@@ -114,10 +114,21 @@ class Scheme(Protocol):
 class Rates(Protocol):
     """Velocities, and accelerations if a scheme has them, at the beginning of a step."""
 
-    v: Array  # velocities; m/s, rad/s
-    v_before: Array  # those at the beginning of the step before
-    more: tuple[Array, ...]  # kept besides, as many as are known of :attr:`DynamicScheme.kept`
-    last_dt: float  # length of the step before; infinite if there was none; s
+    @property
+    def v(self) -> Array:
+        """Velocities; m/s, rad/s."""
+
+    @property
+    def v_before(self) -> Array:
+        """Velocities at the beginning of the step before."""
+
+    @property
+    def more(self) -> tuple[Array, ...]:
+        """What is kept besides, as much as is known of :attr:`DynamicScheme.kept`."""
+
+    @property
+    def last_dt(self) -> float:
+        """Length of the step before; infinite if there was none; s."""
 
 
 class DynamicScheme(Scheme, Protocol):

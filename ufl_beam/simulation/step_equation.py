@@ -24,6 +24,10 @@ from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 
 
+MOVING = "inertia", "damping"
+"""Kinds of terms that depend on velocities."""
+
+
 class StepEquation:
     """Sum of the virtual works of all terms, less what supports carry, at local degrees of freedom.
 
@@ -116,7 +120,7 @@ class StepEquation:
         some = self.terms if terms is None else terms
         before = step.q0 if step.q_before is None else step.q_before
         q0, q_before = (np.ascontiguousarray(q) for q in (step.q0, before))
-        if self._rates is not None:
+        if self._rates is not None and any(one.kind in MOVING for one in some):
             lib.find_numbers(self._rates.c, step.dt)
         c = ffi.new("time_step *", {
             "t0": step.t0, "t1": step.t1, "dt": step.dt, "load_time": step.load_time,

@@ -102,6 +102,10 @@ class Stepping(Protocol):
     def solution(self) -> Keeping:
         """States that were kept."""
 
+    @property
+    def q_before(self) -> Array:
+        """Configuration at the beginning of the last step."""
+
     def ask(self) -> None:
         """Ask controllers and friction for their forces and limits in the next step."""
 
@@ -193,7 +197,7 @@ class Stepper:
         parts = ledger, equation.supports, share.grid.scene.supports, support_dofs, inelastic
         self._make_rows = partial(KeptRows, self.c, *parts, links, number, cell_forces.kept)
         self._rows: KeptRows | None = None
-        self._last: tuple[int, Array] = -1, np.zeros(0)  # step kept last; state at its end
+        self._last: tuple[int, Array] = -2, np.zeros(0)  # step kept last; state at its end
 
     def _add_extras(self, loops: dict[str, list[Loop]]) -> None:
         """Let functions of Python take part in the phases of a step."""
@@ -407,7 +411,7 @@ class Stepper:
         if self._begun:
             number, before = self._last
             if number != state.parts - 1:
-                before = state.prediction.q_before[None]
+                before = state.q_before[None]
             self._last = state.parts, row[:, kept.q]
         t = np.array([self.c.t])
         return Later(t, partial(kept.states, t, row, before))
@@ -418,7 +422,8 @@ class Stepper:
     def begin_at(self, state: Stepping) -> None:
         """Go on from a state that no step has led to."""
         ffi.memmove(self.c.q, doubles(state.q), self._bytes)
-        self.c.t, self._last = state.t, (-1, np.zeros(0))
+        fill(self.c, prediction=state.prediction.c)
+        self.c.t, self._last = state.t, (-2, np.zeros(0))
         give_back_memory(len(state.q))
 
     def _lend(self, state: Stepping) -> None:

@@ -8,7 +8,7 @@ what several processes add to one degree of freedom is summed by the solver.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import ABC
 from collections.abc import Sequence
 
 from ufl_beam.arrays import Array
@@ -89,15 +89,3 @@ class InternalForces(Term):
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """C functions of the methods."""
-        return super().phases(callbacks)._replace(change=callbacks.change(self.energy_change))
-
-    def energy_change(self, q1: Array) -> tuple[float, float, float]:
-        """Numbers of ``energy_change`` of loops.h for the step to ``q1``; J."""
-        return self.change(q1), 0.0, 0.0
-
-    @abstractmethod
-    def change(self, q1: Array) -> float:
-        """Energy that is stored and dissipated on this process in the step to ``q1``; J."""

@@ -128,8 +128,8 @@ class Inertia(OfMatrix):
         lost = self._ledger.lost.pointer("numerical") if self.scheme.slips else ffi.NULL
         kinetic = self._ledger.state.pointer("kinetic")
         of = self.rates.times(self._times, kept=kinetic, lost=lost)
-        names = "begin_inertia", "accept_inertia", "add_kinetic_energy"
-        return Phases(*([loop(name, of)] for name in names))
+        begin, accept = loop("begin_inertia", of), loop("accept_inertia", of)
+        return Phases([begin], [accept], [loop("add_kinetic_energy", of)])
 
     def carry_on(self, memory: Memory, known: int) -> None:
         """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""

@@ -67,7 +67,7 @@ class Account(MutableMapping[str, float]):
 
     def pointer(self, name: str) -> Any:
         """An entry as C has it; there is no room for many names after it."""
-        self.setdefault(name, 0.0)
+        self[name] += 0.0
         self._fixed = True
         return doubles(self.numbers) + self._at[name]
 

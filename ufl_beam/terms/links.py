@@ -104,11 +104,12 @@ class Links(InternalForces):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """C functions of the methods."""
-        return super().phases(callbacks)._replace(again=callbacks.run(self.again))
+        change = callbacks.change(lambda q1: (0.0, self.change(q1), self.effort(q1)))
+        return super().phases(callbacks)._replace(again=callbacks.run(self.again), change=change)
 
-    def energy_change(self, q1: Array) -> tuple[float, float, float]:
-        """Energy that connectors take, and the sum of the sizes of their works; J."""
-        return 0.0, self.change(q1), self.effort(q1)
+    @abstractmethod
+    def change(self, q1: Array) -> float:
+        """Energy that the connectors take in the step to ``q1``; J."""
 
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""

@@ -23,7 +23,7 @@ class Phases(NamedTuple):
 
     ``change`` says what a step stores and dissipates, of the type ``change_of_energy``; ``opens``
     are fields of ``openable``, if something may open; ``admits`` is the check of a step before it
-    is accepted, of the type ``admission``; ``again`` begins a step again, which iterates have tried.
+    is accepted, of the type ``admission``; ``again`` begins a step again, which iterates tried.
     """
 
     begin: Sequence[Loop] = ()
