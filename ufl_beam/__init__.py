@@ -58,7 +58,7 @@ from ufl_beam.mechanics.energy_momentum import (
     Midway,
     PrintedMidpoint,
 )
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
+from ufl_beam.mechanics.time_schemes import Coefficients, DynamicScheme, Scheme, Step
 from ufl_beam.model import law_functions
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Body, Place, Spot, ground
@@ -137,7 +137,7 @@ __version__ = version()
 
 __all__ = [
     "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "ArmstrongFrederick", "AxialBending",
-    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Camera", "Checkpoint", "Clamped", "Connector",
+    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Camera", "Checkpoint", "Clamped", "Coefficients", "Connector",
     "Controller", "ConvergenceError", "CopiesDiffer", "Coulomb", "CriticalPoint", "Cycles",
     "Damper", "Decay", "DecayingMidpoint", "Diagram", "DisplacementControl", "DissipationControl",
     "DolfinxView", "DuvautLions", "DynamicScheme", "Energy", "Envelope", "Event", "Events",

@@ -149,23 +149,19 @@ class Weighted(ub.ExactStep, ub.Midway):
     """Midpoint rule with one weight for resultants and velocities, as in docs/extending.md."""
 
     weight: float = 0.55
-    slips = True
 
     @property
     def alpha(self):
         return self.weight - 0.5
 
-    def inertia(self, dt, rates):
-        return 1 / (self.weight * dt**2), 1 / (self.weight * dt), rates.v
-
-    def rates(self, dt, s, rates):
-        return ((s / dt - (1 - self.weight) * rates.v) / self.weight,)
-
-    def slip(self, dt, change, rates):
-        return self.alpha * change
-
-    def way_to_rest(self, dt):
-        return (1 - self.weight) * dt
+    def coefficients(self, dt, last_dt, known):  # of the step s, the velocity v0, the one before v0
+        w = self.weight
+        return ub.Coefficients(
+            inertia=(1 / (w * dt**2), -1 / (w * dt), 0.0),  # (v1 - v0) / dt
+            velocity=(1 / dt, 0.0, 0.0),  # s / dt
+            rates=((1 / (w * dt), -(1 - w) / w, 0.0),),  # v1 of s/dt = (1 - w) v0 + w v1
+            slip=(self.alpha, 0.0, 0.0),  # s/dt - (v0 + v1)/2, from v1 - v0 in the place of s
+        )
 
     def error_weights(self):
         return self.alpha, 1 / 12 + self.alpha

@@ -21,7 +21,7 @@ from ufl_beam.arrays import Array, Complex, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.errors import ModelWarning, SceneError
 from ufl_beam.mechanics.classical import Newmark, Static
-from ufl_beam.mechanics.time_schemes import Rates, Step
+from ufl_beam.mechanics.time_schemes import Coefficients, Step
 from ufl_beam.model.constraint_checks import require_no_mechanism
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
@@ -82,11 +82,9 @@ class _Standstill(Newmark):
     rings = False
     kept: tuple[str, ...] = ()  # type: ignore[assignment]
 
-    def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        return 1 / dt, 0.0, rates.v
-
-    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        return super().rates(dt, s, rates)[:1]
+    def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
+        of = super().coefficients(dt, last_dt, known)
+        return Coefficients(of.inertia, (1 / dt, 0.0, 0.0), of.rates[:1])
 
 
 class SmallMotions:

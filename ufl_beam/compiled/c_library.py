@@ -159,13 +159,6 @@ def give_back_memory(unknowns: int) -> None:
         lib.give_back_memory()
 
 
-def combined(a: float, x: Array, b: float, y: Array) -> Array:
-    """Compute ``a x + b y``; for short arrays in half the time of NumPy."""
-    out: Array = np.empty(len(x))
-    lib.combine(len(x), a, doubles(x), b, doubles(y), doubles(out))
-    return out
-
-
 def kernel(pointer: Any, of: Any) -> Any:
     """Cast an FFCx kernel, a function pointer of the cffi instance ``of``, to that of loops.h."""
     expected, found = ffi.typeof("kernel *").cname, of.typeof(pointer).cname

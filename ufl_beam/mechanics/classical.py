@@ -11,11 +11,11 @@ from typing import NamedTuple
 import numpy as np
 from ufl.core.expr import Expr
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between
+from ufl_beam.mechanics.time_schemes import Coefficients, Constant, require_between
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_laws import SofteningLaw
 
@@ -23,18 +23,11 @@ from ufl_beam.model.material_laws import SofteningLaw
 class PlainStep:
     """Base of schemes whose forces work on the increments of displacements and rotations."""
 
+    half_tangents = False
+
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """The virtual rotation itself."""
         return w
-
-    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
-        """The increments themselves, and the largest turn."""
-        s: Array = q1 - q0
-        return s, float(np.abs(s[rotations]).max(initial=0.0))
-
-    def half_tangents(self, rotations: Index) -> Index:
-        """No rotations: their steps are the increments."""
-        return rotations[:0]
 
 
 class InParts:
@@ -48,20 +41,6 @@ class InParts:
         "ub.DissipationControl(...), prescribe a displacement in the place of the load, or run "
         "dynamics"
     )
-    theta: float
-
-    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Loads act where the resultants are, on the straight way to those at the end of the step.
-
-        Parts of a step go in proportion; so loads and motions that are there at once can be reached
-        in parts as well as those that grow.
-        """
-        fraction = (t1 - t0) / (end - t0)
-        return Step(t0, t1, q0, load_time=end, motion_time=end, fraction=fraction, at=self.theta)
-
-    def way_to_rest(self, dt: float) -> float:
-        """No way to rest: everything is at rest."""
-        return 0.0
 
 
 class _AtEnd(PlainStep):
@@ -71,6 +50,8 @@ class _AtEnd(PlainStep):
     """
 
     load_weight = 1.0
+    weight_of_before = 0.5  # the trapezoidal rule, exact where forces grow in proportion
+    limits_turn = False  # a step may turn a node as far as it likes
     theta = 1.0
     alpha = 0.0
 
@@ -93,14 +74,6 @@ class _AtEnd(PlainStep):
     def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
         f = force(e1)
         return f, np.where(f != 0, 1.0, 0.0)
-
-    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
-        """The increments themselves; a step may turn a node as far as it likes."""
-        return q1 - q0, 0.0
-
-    def acting(self, before: Array, now: Array) -> Array:
-        """The mean of both ends: the trapezoidal rule, exact where forces grow in proportion."""
-        return (before + now) / 2
 
 
 @dataclass(frozen=True)
@@ -150,18 +123,10 @@ class _Accelerated(_AtEnd):
 
     dynamic = True
     slack = math.inf
-    slips = False
     has_mean_velocity = False
+    looks_back = False
     weights: Weights
     kept: tuple[str, ...]
-
-    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Loads and motions are those of the end."""
-        return Step(t0, t1, q0, load_time=t1, motion_time=t1, fraction=1.0)
-
-    def way_to_rest(self, dt: float) -> float:
-        """Unknown: friction needs a mean velocity, and scenes with it are refused."""
-        return 0.0
 
     @property
     def rings(self) -> bool:
@@ -172,52 +137,27 @@ class _Accelerated(_AtEnd):
         _, _, γ, β = self.weights
         return not 2 * β > γ > 0.5
 
-    def _beginning(self, dt: float, rates: Rates) -> tuple[Weights, Array | float, Array | float]:
-        """The weights of the step; a and ü at its beginning.
+    def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
+        """Newmark's formulas, and accelerations ü of the forces; a leads by (α_m - α_f) dt.
 
-        a leads by (α_m - α_f) dt; until it is known by how much, steps do without.
+        Until an acceleration is known, and by how much a leads, steps do without.
         """
-        if not rates.more:
-            return CONSTANT, 0.0, 0.0
-        acceleration, *lead = rates.more
-        if len(rates.more) < len(self.kept):
-            return AVERAGE, acceleration, acceleration
-        return self.weights, acceleration + dt * lead[0] if lead else acceleration, acceleration
-
-    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """Mass times the acceleration at the end."""
-        (α_m, α_f, _, β), a, acceleration = self._beginning(dt, rates)
-        factor = (1 - α_m) / ((1 - α_f) * β * dt**2)
-        v = factor * (dt * rates.v + dt**2 * (0.5 - β) * a)
-        v -= (α_m * a - α_f * acceleration) / (1 - α_f)
-        return factor, 1.0, v
-
-    def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """Velocity at the end of the step."""
-        (_, _, γ, β), a, _ = self._beginning(dt, rates)
-        return γ / (β * dt), 1.0, (γ / β - 1) * rates.v + (γ / (2 * β) - 1) * dt * a
-
-    def _end(self, dt: float, s: Array, rates: Rates) -> tuple[Array, Array, Array]:
-        """v, a and ü at the end."""
-        (α_m, α_f, γ, β), a0, acceleration = self._beginning(dt, rates)
-        a: Array = (s - dt * rates.v - dt**2 * (0.5 - β) * a0) * (1 / (β * dt**2))
-        v: Array = rates.v + dt * ((1 - γ) * a0 + γ * a)
-        forced: Array = ((1 - α_m) * a + α_m * a0 - α_f * acceleration) * (1 / (1 - α_f))
-        return v, a, forced
-
-    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """Velocities, accelerations, and what a differs from them by, over the time."""
-        v, a, acceleration = self._end(dt, s, rates)
-        if not rates.more or len(self.kept) == 1:
-            return v, acceleration
-        if len(rates.more) == len(self.kept):
-            return v, acceleration, 1 / dt * (a - acceleration)
-        lead = (self.weights.α_m - self.weights.α_f) / dt
-        return v, acceleration, lead * (acceleration - rates.more[0])
-
-    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """Zero: no such difference of velocities is known."""
-        return np.zeros_like(change)
+        s, v, _, *more = np.eye(3 + known)
+        forced = a0 = more[0] if known else 0 * s
+        α_m, α_f, γ, β = CONSTANT
+        if 0 < known < len(self.kept):
+            α_m, α_f, γ, β = AVERAGE
+        elif known:
+            α_m, α_f, γ, β = self.weights
+            a0 = forced + sum(dt * lead for lead in more[1:])
+        a = (s - dt * v - dt**2 * (0.5 - β) * a0) / (β * dt**2)
+        v1 = v + dt * ((1 - γ) * a0 + γ * a)
+        forced1 = ((1 - α_m) * a + α_m * a0 - α_f * forced) / (1 - α_f)
+        lead = (a - forced1) / dt
+        if known < len(self.kept):
+            lead = (self.weights.α_m - self.weights.α_f) / dt * (forced1 - forced)
+        kept = (forced1, lead) if known and len(self.kept) > 1 else (forced1,)
+        return Coefficients(inertia=forced1, velocity=v1, rates=(v1, *kept))
 
     def error_weights(self) -> tuple[float, float]:
         """Return the error of Taylor's series; a runs ahead of the forces by α_m - α_f steps."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ufl_beam.arrays import Array
 from ufl_beam.mechanics.energy_momentum import ExactStep, Midway
-from ufl_beam.mechanics.time_schemes import Rates, require_between
+from ufl_beam.mechanics.time_schemes import Coefficients, require_between
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,7 @@ class DecayingMidpoint(ExactStep, Midway):
     rho_inf: float = 0.5
 
     alpha = 0.0
-    slips = True
+    looks_back = True
 
     def __post_init__(self) -> None:
         require_between("DecayingMidpoint: rho_inf", self.rho_inf, 1 / 3, 1.0)
@@ -57,30 +56,16 @@ class DecayingMidpoint(ExactStep, Midway):
         # At infinity (λ + 1)/2 + c (λ - 1)²/λ = 0; λ = -rho_inf is the larger root.
         return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)
 
-    def _remembered(self, dt: float, rates: Rates) -> Array:
-        """Return the part of the last change of velocities that counts, c r Δv'."""
-        return self.part * min(1.0, dt / rates.last_dt) * (rates.v - rates.v_before)
-
-    def way_to_rest(self, dt: float) -> float:
-        """Way to v1 = 0, as if there were no previous step."""
-        return (0.5 - self.part) * dt
-
-    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """Mass times the change of velocity over the time."""
-        keep = 0.5 + self.part
-        v: Array = 1 / keep * (rates.v - self._remembered(dt, rates))
-        return 1 / (dt**2 * keep), 1 / dt, v
-
-    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """Velocities at the end of the step."""
-        keep = 0.5 + self.part
-        v: Array = 1 / dt * s - (0.5 - self.part) * rates.v + self._remembered(dt, rates)
-        v *= 1 / keep
-        return (v,)
-
-    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """Difference of velocities in proportion to second differences."""
-        return self.part * change - self._remembered(dt, rates)
+    def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
+        """Velocities, of whose changes in this step and in the last one a part counts."""
+        c, keep = self.part, 0.5 + self.part
+        r = c * min(1.0, dt / last_dt)
+        return Coefficients(
+            inertia=(1 / (dt**2 * keep), (r - 1) / (dt * keep), -r / (dt * keep)),
+            velocity=(1 / dt, 0.0, 0.0),
+            rates=((1 / (dt * keep), (c + r - 0.5) / keep, -r / keep),),
+            slip=(c, -r, r),
+        )
 
     def error_weights(self) -> tuple[float, float]:
         """The trapezoidal rule's, and what the second differences delay."""

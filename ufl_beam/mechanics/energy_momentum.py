@@ -11,12 +11,11 @@ import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import combined, doubles, integers, lib
+from ufl_beam.arrays import Array
 from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.classical import InParts, PlainStep
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import Constant, Rates, Step, require_between
+from ufl_beam.mechanics.time_schemes import Coefficients, Constant, require_between
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_laws import SofteningLaw
 
@@ -28,6 +27,8 @@ hardly more than a strain."""
 class _OverStep:
     """Base of schemes whose forces act over the step."""
 
+    weight_of_before = 0.0  # the forces in the equation of the step do its work
+    limits_turn = True
     alpha: float
 
     @property
@@ -65,10 +66,6 @@ class _OverStep:
         f = (f0 + f1) / 2 * part
         return f, np.divide(f1 - f, way, out=ends[1] / 2, where=moves)
 
-    def acting(self, before: Array, now: Array) -> Array:
-        """The forces in the equation of the step."""
-        return now
-
 
 class ExactStep(_OverStep):
     """Base of schemes in whose steps works are exact increments of energy.
@@ -81,6 +78,7 @@ class ExactStep(_OverStep):
     """
 
     exact_ledger = True
+    half_tangents = True  # with which works are exact increments; see docs/errata.md
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
         """The variation that turns the step into the increment of the strains."""
@@ -90,18 +88,6 @@ class ExactStep(_OverStep):
         """The increment of the rotation, if ``w`` is 2 tan(turn_b/2) - 2 tan(turn_a/2)."""
         tan_a, tan_b = (ufl.sin(x / 2) / ufl.cos(x / 2) for x in (turn_a, turn_b))
         return kinematics.over_tan((turn_b - turn_a) / 2) / (1 + tan_a * tan_b) * w
-
-    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
-        """(Δu, 2 tan(Δψ/2)): with it works are exact increments; see docs/errata.md."""
-        s = np.empty(len(q1))
-        turn: float = lib.step_of_nodes(
-            len(s), len(rotations), integers(rotations), doubles(s), doubles(q0), doubles(q1)
-        )
-        return s, turn
-
-    def half_tangents(self, rotations: Index) -> Index:
-        """Return all rotations: each has the step 2 tan(Δψ/2)."""
-        return rotations
 
 
 @dataclass(frozen=True)
@@ -146,15 +132,14 @@ class ExactStatic(InParts, ExactStep):
 
     @property
     def load_weight(self) -> float:
-        """Follower loads turn with the rotation where the resultants are in equilibrium."""
+        """Loads act where the resultants are in equilibrium."""
         return self.theta
 
 
 class Midway:
     """Base of dynamic schemes whose loads act in the middle of the step.
 
-    A scheme states its ``inertia``, ``rates``, ``slips`` and ``slip``, ``way_to_rest`` and
-    ``error_weights``, see :class:`DynamicScheme`.
+    A scheme states its ``coefficients`` and ``error_weights``, see :class:`DynamicScheme`.
 
     Example:
         >>> issubclass(ub.DecayingMidpoint, ub.Midway), issubclass(ub.Newmark, ub.Midway)
@@ -165,20 +150,13 @@ class Midway:
     slack = math.inf
     load_weight = 0.5
     has_mean_velocity = True
+    looks_back = False
     rings = False
     kept: tuple[str, ...] = ()
     advice = (
         "Try a smaller dt, loads and motions without jumps, or more energy taken out of high "
         "frequencies, such as Midpoint(alpha=0.05, beta=0.05) or DecayingMidpoint()"
     )
-
-    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Loads act in the middle of the step, motions arrive at its end."""
-        return Step(t0, t1, q0, load_time=(t0 + t1) / 2, motion_time=t1, fraction=1.0)
-
-    def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """The mean velocity of the step."""
-        return 1 / dt, 0.0, rates.v
 
 
 class _Velocities(Midway):
@@ -187,34 +165,16 @@ class _Velocities(Midway):
     alpha: float
     beta: float
 
-    @property
-    def slips(self) -> bool:
-        """True if ``beta`` takes any."""
-        return self.beta != 0
-
-    def _weights(self, dt: float) -> tuple[float, float]:
-        """(a, b) of the velocities v1 = a s - b v0 after the step s of the nodes."""
+    def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
+        """Velocities v1 = a s - b v0 after the step s of the nodes, and their change over dt."""
         keep = 0.5 + self.beta
-        return 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
-
-    def way_to_rest(self, dt: float) -> float:
-        """Way to v1 = a s - b v0 = 0."""
-        a, b = self._weights(dt)
-        return b / a
-
-    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """Mass times the change of velocity over the time."""
-        a, b = self._weights(dt)
-        return a / dt, (1 + b) / dt, rates.v  # P(78)
-
-    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """Velocities at the end of the step."""
-        a, b = self._weights(dt)
-        return (combined(a, s, -b, rates.v),)
-
-    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """Difference of velocities in proportion to the change; its loss is D_K of the paper."""
-        return self.beta * change  # P(88)
+        a, b = 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
+        return Coefficients(
+            inertia=(a / dt, -(1 + b) / dt, 0.0),  # P(78)
+            velocity=(1 / dt, 0.0, 0.0),
+            rates=((a, -b, 0.0),),
+            slip=(self.beta, 0.0, 0.0) if self.beta else None,  # P(88), its loss is D_K
+        )
 
     def error_weights(self) -> tuple[float, float]:
         """The trapezoidal rule's, and what both kinds of dissipation delay."""

@@ -9,9 +9,11 @@ the step are in energy_momentum.py, those whose forces act at its end in classic
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import NamedTuple, Protocol, TypeGuard
 
+import numpy as np
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
@@ -29,7 +31,7 @@ class Step(NamedTuple):
     """A step in time, as a scheme has it: its ends, and where loads and motions are taken.
 
     Example:
-        >>> step = ub.Midpoint().step(0.0, 0.1, 0.1, np.zeros(3))
+        >>> step = ub.Step.of(ub.Midpoint(), 0.0, 0.1, 0.1, np.zeros(3))
         >>> step.load_time, step.motion_time, step.dt  # s
         (0.05, 0.1, 0.1)
     """
@@ -46,6 +48,18 @@ class Step(NamedTuple):
 
     def __repr__(self) -> str:
         return one_line(self)
+
+    @classmethod
+    def of(cls, scheme: Scheme, t0: float, t1: float, end: float, q0: Array) -> Step:
+        """Return the step of a scheme from ``t0`` to ``t1``, a part of one that goes on to ``end``.
+
+        In statics parts go in proportion to the loads and motions at the end of the whole step, so
+        that those which are there at once can be reached in parts as well as those that grow.
+        """
+        w = scheme.load_weight
+        if scheme.dynamic:
+            return cls(t0, t1, q0, (1 - w) * t0 + w * t1, t1, fraction=1.0)
+        return cls(t0, t1, q0, end, end, fraction=(t1 - t0) / (end - t0), at=w)
 
     @property
     def dt(self) -> float:
@@ -69,13 +83,13 @@ class Scheme(Protocol):
 
     dynamic: bool  # True if the scene has inertia
     advice: str  # where a step finds no equilibrium
-    load_weight: float  # part of the step at whose rotation follower loads act
+    load_weight: float  # part of the step at which loads act; in statics on the straight way there
+    weight_of_before: float  # of the forces before a step among those that do its work
+    half_tangents: bool  # True if forces work on 2 tan(Δψ/2) of a rotation, else on Δψ
+    limits_turn: bool  # True if a step that turns a node by more than 0.75 π is cut
     theta: float  # part of the step at which laws of inelastic material are stated
     slack: float  # part of what a step stores and dissipates that its forces may not account for
     alpha: float  # part of twice the energy of a change of strain that is lost numerically
-
-    def step(self, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """The step from ``t0`` to ``t1``, perhaps a part of one that goes on to ``end``."""
 
     def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
         """Traction of a discontinuity whose opening grows in the step."""
@@ -98,18 +112,6 @@ class Scheme(Protocol):
     def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
         """Force of a step from e0 to e1, and its derivative, where ``force`` has slopes 0 and 1."""
 
-    def way_to_rest(self, dt: float) -> float:
-        """Way of a step at the end of which there is no velocity, over that at its beginning; s."""
-
-    def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
-        """Return the conjugates of forces and moments, and the largest turn of a node; rad.
-
-        ``rotations`` are the degrees of freedom that are rotations, as int32.
-        """
-
-    def acting(self, before: Array, now: Array) -> Array:
-        """Forces that do the work of a step, from those in its equation and in the one before."""
-
 
 class Rates(Protocol):
     """Velocities, and accelerations if a scheme has them, at the beginning of a step."""
@@ -126,9 +128,29 @@ class Rates(Protocol):
     def more(self) -> tuple[Array, ...]:
         """What is kept besides, as much as is known of :attr:`DynamicScheme.kept`."""
 
-    @property
-    def last_dt(self) -> float:
-        """Length of the step before; infinite if there was none; s."""
+
+class Coefficients(NamedTuple):
+    """Numbers of a step of a scheme with inertia.
+
+    In a row the first number multiplies the step of the nodes (Δu, 2 tan(Δψ/2)), the next ones the
+    velocities at its beginning, the velocities before the last step, and what is kept besides.
+
+    Attributes:
+        inertia: Of the acceleration that the mass is multiplied with in the equation of the step.
+        velocity: Of the velocity in the equation of the step.
+        rates: Of the velocities after the step, and of what is kept besides; as many rows.
+        slip: Of Δu/Δt less the mean of both end velocities, P(88), whose work on the change of
+            momentum is lost; its first number multiplies the change of velocities.  None: no loss.
+
+    Example:
+        >>> print(ub.Midpoint().coefficients(dt=0.1, last_dt=0.1, known=0).rates)
+        ((20.0, -1.0, 0.0),)
+    """
+
+    inertia: Sequence[float]
+    velocity: Sequence[float]
+    rates: Sequence[Sequence[float]]
+    slip: Sequence[float] | None = None
 
 
 class DynamicScheme(Scheme, Protocol):
@@ -143,28 +165,23 @@ class DynamicScheme(Scheme, Protocol):
         ...     alpha = 0.0
         >>> ub.simulate(scene, Mine(), t=(0, 1), dt=0.1)
         Traceback (most recent call last):
-        ufl_beam.errors.SceneError: scheme: Mine is not a time scheme: it lacks way_to_rest, ...
+        ufl_beam.errors.SceneError: scheme: Mine is not a time scheme: it lacks coefficients, ...
     """
 
     kept: tuple[str, ...]  # names of the rates kept besides velocities, such as accelerations
-    slips: bool  # True if it loses energy by :meth:`slip`
     has_mean_velocity: bool  # in the equation of a step; friction and rotating frames need it
+    looks_back: bool  # True if a step depends on the length of that before and its velocities
     rings: bool  # True if the accelerations of a motion that is given oscillate for ever
 
-    def half_tangents(self, rotations: Index) -> Index:
-        """Rotations whose nodal step is 2 tan(Δψ/2); for the others it is Δψ."""
+    def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
+        """Return the numbers of a step of the length ``dt``.
 
-    def inertia(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """(factor, back, v) of the force of inertia M (factor s - back v), s being the step."""
-
-    def velocity(self, dt: float, rates: Rates) -> tuple[float, float, Array]:
-        """(factor, back, v) of the velocity factor s - back v in the equation of the step."""
-
-    def rates(self, dt: float, s: Array, rates: Rates) -> tuple[Array, ...]:
-        """Velocities after the step ``s`` of the nodes, then what is kept besides."""
-
-    def slip(self, dt: float, change: Array, rates: Rates) -> Array:
-        """Return Δu/Δt less the mean of both end velocities, from their ``change``, P(88)."""
+        Args:
+            dt: Length of the step; s.
+            last_dt: Length of the step before; infinite if there was none; s.
+            known: How many of :attr:`kept` are known at the beginning.  After the step, one is
+                known for each row of rates behind the first.
+        """
 
     def error_weights(self) -> tuple[float, float]:
         """(c2, c3) of the error c2 a dt² + c3 da/dt dt³ of a step of acceleration a."""
@@ -179,3 +196,38 @@ def require_between(what: str, value: float, low: float, high: float) -> None:
     """Raise :class:`SceneError` if a number of a scheme lies outside its range."""
     if require_number(value, what, at_least=low) > high:
         raise SceneError(f"{what} = {value:g} must lie between {low:g} and {high:g}")
+
+
+def acting(scheme: Scheme, before: Array, now: Array) -> Array:
+    """Forces that do the work of a step, from those in its equation and in the one before."""
+    w = scheme.weight_of_before
+    return w * before + (1 - w) * now if w else now
+
+
+def with_half_tangents(scheme: Scheme, rotations: Index) -> Index:
+    """Rotations whose nodal step is 2 tan(Δψ/2): all or none."""
+    return rotations if scheme.half_tangents else rotations[:0]
+
+
+def nodal_step(scheme: Scheme, q0: Array, q1: Array, rotations: Index) -> Array:
+    """Step of the nodes that forces work on: (Δu, 2 tan(Δψ/2)), or (Δu, Δψ)."""
+    s, turned = q1 - q0, with_half_tangents(scheme, rotations)
+    s[turned] = 2 * np.tan(s[turned] / 2)
+    return np.asarray(s)
+
+
+def way_to_rest(scheme: Scheme, dt: float) -> float:
+    """Way of a step at the end of which there is no velocity, over that at its beginning; s.
+
+    It is that of a step with none before it; zero where nothing is known of it.
+    """
+    if not has_inertia(scheme) or not scheme.has_mean_velocity:
+        return 0.0
+    of_step, of_velocity, *_ = scheme.coefficients(dt, math.inf, 0).rates[0]
+    return -of_velocity / of_step
+
+
+def combined(row: Sequence[float], s: Array, rates: Rates) -> Array:
+    """Sum of a row of :class:`Coefficients` for the step ``s`` of the nodes."""
+    known = s, rates.v, rates.v_before, *rates.more
+    return sum(c * x for c, x in zip(row, known, strict=True) if c) + np.zeros(len(s))

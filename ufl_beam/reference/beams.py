@@ -19,7 +19,15 @@ from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, Step
+from ufl_beam.mechanics.time_schemes import (
+    DynamicScheme,
+    Rates,
+    Scheme,
+    Step,
+    combined,
+    nodal_step,
+    with_half_tangents,
+)
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.model.fibres import Layout
 from ufl_beam.reference.cells import Cells, Force, Form, Ledger, OnNodes, Strains, lumps
@@ -294,21 +302,21 @@ class Mass:
 
 
 class MatrixForce(Force):
-    """Constant matrix times ``factor s - back v``, s being the step of the nodes."""
+    """Constant matrix times the sum of a row of :class:`Coefficients`."""
 
     def __init__(self, grid: Grid, scheme: DynamicScheme, matrix: csr_array) -> None:
         self.size, self.scheme, self.matrix = grid.size, scheme, matrix
         self._rotations = grid.rotations.astype(np.int32)
-        self._half_tangents = scheme.half_tangents(self._rotations)
+        self._half_tangents = with_half_tangents(scheme, self._rotations)
 
-    def begin_at(self, q0: Array, factor: float, back: float, v: Array) -> None:
+    def begin_at(self, q0: Array, row: Sequence[float], rates: Rates) -> None:
         """Take note of the configuration and the numbers of a step."""
-        self._q0, self._factor, self._push = q0, factor, back * v
+        self._q0, self._factor = q0, row[0]
+        self._push = combined(row, np.zeros(self.size), rates)
 
     def rate(self, q1: Array) -> Array:
-        """Vector ``factor s - back v`` that the matrix is multiplied with."""
-        s, _ = self.scheme.nodal_step(self._q0, q1, self._rotations)
-        return self._factor * s - self._push
+        """Vector that the matrix is multiplied with."""
+        return self._factor * nodal_step(self.scheme, self._q0, q1, self._rotations) + self._push
 
     def residual(self, q1: Array) -> Array:
         """Forces if the step ends at ``q1``."""
@@ -338,21 +346,26 @@ class Inertia(MatrixForce):
         self.dt = self.last_dt = math.inf
         self._ledger = ledger
         self._rate: Array = np.zeros(grid.size)
-        if scheme.slips:
+        if scheme.coefficients(1.0, 1.0, len(scheme.kept)).slip is not None:
             ledger.lost["numerical"] += 0.0
 
     def begin(self, step: Step) -> None:
-        """Ask the scheme for the numbers of the step."""
+        """Take the coefficients of the step."""
         self.dt = step.dt
-        self.begin_at(step.q0, *self.scheme.inertia(step.dt, self))
+        self.of_step = self.scheme.coefficients(step.dt, self.last_dt, len(self.more))
+        self.begin_at(step.q0, self.of_step.inertia, self)
+
+    def after(self, s: Array) -> tuple[Array, ...]:
+        """Velocities after the step ``s``, and what the scheme keeps besides."""
+        return tuple(combined(row, s, self) for row in self.of_step.rates)
 
     def accept(self, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme has lost."""
         self._rate = self.rate(q1)
-        v, *more = self.scheme.rates(self.dt, s, self)
-        if self.scheme.slips:
+        v, *more = self.after(s)
+        if self.of_step.slip is not None:
             change = v - self.v
-            lost = self.scheme.slip(self.dt, change, self) @ (self.matrix @ change)
+            lost = combined(self.of_step.slip, change, self) @ (self.matrix @ change)
             self._ledger.lost["numerical"] += float(lost)
         self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self.dt
 
@@ -397,9 +410,9 @@ class RayleighForce(MatrixForce):
         self._inertia, self._ledger, self._accepted = inertia, ledger, list[OnNodes]()
 
     def begin(self, step: Step) -> None:
-        """Ask the scheme for the velocity of the step."""
+        """Take the coefficients of the velocity of the step."""
         self._dt = step.dt
-        self.begin_at(step.q0, *self.scheme.velocity(step.dt, self._inertia))
+        self.begin_at(step.q0, self._inertia.of_step.velocity, self._inertia)
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the energy that was damped."""

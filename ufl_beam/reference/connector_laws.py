@@ -17,7 +17,7 @@ import scipy  # its parts are loaded when they are used
 from ufl_beam.arrays import Array
 from ufl_beam.errors import NoNumber, SceneError, require_returned
 from ufl_beam.mechanics.slips import Slip, slip
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step, way_to_rest
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import (
     HELD,
@@ -313,7 +313,7 @@ class _Rubbing(LawInStep):
         softness = CREEP * self.length * self.setting.friction_repeats
         self._creep = softness / self._limit if self._limit > 0 else 0.0
         # With this way the velocity at the end is zero; with none, that before would come back.
-        self._way = self.setting.scheme.way_to_rest(step.dt) * self.setting.rates[self.link]
+        self._way = way_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.link]
         self.again()
 
     def again(self) -> None:

@@ -15,7 +15,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import NoNumber
 from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
-from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.mechanics.time_schemes import Step, acting
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
@@ -151,7 +151,7 @@ class Connectors(Linked):
             return float(np.where(left <= 0, 0.0, left / wanted).max())
 
     def _taken(self, q1: Array) -> Array:
-        force = self._setting.scheme.acting(self.before, q1[self.forces_at])
+        force = acting(self._setting.scheme, self.before, q1[self.forces_at])
         return np.asarray(force * (self.motion(q1) - self._e0))
 
     def change(self, q1: Array) -> float:

@@ -14,7 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import split, turn
-from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.time_functions import value_at
@@ -41,7 +41,7 @@ class LoadForce(Force):
 
     def enter_work(self, force: Array, s: Array, end: Array) -> None:
         """Enter the work of the step; ``end`` are the forces before the next one."""
-        self.ledger.supplied[self._entry] += float(self.scheme.acting(self.before, force) @ s)
+        self.ledger.supplied[self._entry] += float(acting(self.scheme, self.before, force) @ s)
         self.before = end
 
 
@@ -299,14 +299,13 @@ class WorkForce(CellForce):
             if self._varies:
                 self._ledger.supplied[self._work.in_time] += self._gained(q1)
         else:
-            work = float(self._scheme.acting(self.before, self.force) @ s)
+            work = float(acting(self._scheme, self.before, self.force) @ s)
             self._ledger.supplied[self._work.name] += work
         self.before, self._t, self._grown = self.force, self._t_end, self._grown_end
 
     def _gained(self, q1: Array) -> float:
         """Energy that a change in time brings: all of the change but that by the motion; J."""
-        acting = float(self._scheme.acting(np.array(self._t), np.array(self._at)))
-        self._put(acting)
+        self._put(float(acting(self._scheme, np.array(self._t), np.array(self._at))))
         moved = self._value(q1) - self._value(self._q0)
         self._put(self._t_end)
         return self._value(q1) - self._held - moved
@@ -333,7 +332,7 @@ class WorkForce(CellForce):
 
     def internal(self) -> dict[str, Array]:
         """Forces of the last step, which depend on its motion."""
-        counted = float(self._scheme.acting(np.ones(1), np.zeros(1))[0]) != 0.0
+        counted = self._scheme.weight_of_before != 0.0
         if isinstance(self._work, Potential) or not (self._work.takes_rates and counted):
             return {}
         return {f"work of {self._work.name}": self.before}

@@ -18,7 +18,7 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array, Snapshot
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia, nodal_step
 from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
@@ -165,7 +165,7 @@ class Solver:
                     one.put_forces(self.q)
         self._continues = not fresh
         # Forces of beams at rest: in a step so short that nothing viscous flows.
-        short = self.scheme.step(0.0, sys.float_info.min, sys.float_info.min, self.q)
+        short = Step.of(self.scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
         for beam in self.beams:
             beam.begin(short)
             self._inner_before = self._inner_before + beam.residual(self.q)
@@ -174,7 +174,7 @@ class Solver:
         if "reactions" in internal:
             self.supports.reactions = self.supports.before = internal["reactions"]
         if self.inertia is None:
-            step = self.scheme.step(self.t, self.t + 1.0, self.t + 1.0, self.q)
+            step = Step.of(self.scheme, self.t, self.t + 1.0, self.t + 1.0, self.q)
             step = step._replace(load_time=self.t, motion_time=self.t)
             for one in self.connectors:
                 one.begin(step)
@@ -494,17 +494,17 @@ class Solver:
         if inertia is not None and inertia.scheme.kept and not inertia.more:
             # Accelerations at the beginning are those of a short trial step.
             t = self.t + FIRST * (t1 - self.t)
-            q1, s = self._solve(self.scheme.step(self.t, t, t1, self.q))
-            inertia.more = inertia.scheme.rates(inertia.dt, s, inertia)[1:]
+            q1, s = self._solve(Step.of(self.scheme, self.t, t, t1, self.q))
+            inertia.more = inertia.after(s)[1:]
             self.supports.before = self.supports.reactions
             for one in self.connectors:
                 one.take_forces(q1)
-        step = self.scheme.step(self.t, t1, end, self.q)
+        step = Step.of(self.scheme, self.t, t1, end, self.q)
         self._accept(step, *self._solve(step))
 
     def _apply_loads(self, t1: float, begin: float, end: float) -> None:
         """Apply a part of the loads of the time ``begin``, in a part that turns nodes little."""
-        step = self.scheme.step(self.t, t1, end, self.q)
+        step = Step.of(self.scheme, self.t, t1, end, self.q)
         step = step._replace(load_time=begin, motion_time=begin)
         q1, s = self._solve(step)
         turn = float(np.abs(q1 - self.q)[self.grid.rotations].max(initial=0.0))
@@ -520,9 +520,10 @@ class Solver:
         guess = axes @ (q0 + step.dt / self.last_dt * (q0 - self.q_before))
         self.supports.move(guess, axes @ q0, step)
         q1 = np.asarray(axes.T @ self._equilibrium(guess, step))
-        s, turn = self.scheme.nodal_step(q0, q1, self.grid.rotations.astype(np.int32))
+        turn = float(np.abs(q1 - q0)[self.grid.rotations].max(initial=0.0))
+        s = nodal_step(self.scheme, q0, q1, self.grid.rotations)
         s[self.grid.multipliers] = 0.0
-        if not turn <= LARGEST_TURN:
+        if self.scheme.limits_turn and not turn <= LARGEST_TURN:
             raise StepFailed(
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
             )
@@ -543,7 +544,7 @@ class Solver:
             raise StepFailed("what yields and what has opened leave a mechanism")
         if math.isinf(self.scheme.slack):
             return
-        work = float(self.scheme.acting(self._inner_before, self._inner) @ s)
+        work = float(acting(self.scheme, self._inner_before, self._inner) @ s)
         in_beams = sum(beam.change(q1) for beam in self.beams)
         change = in_beams + sum(one.change(q1) for one in self.connectors)
         size = abs(work) + abs(in_beams) + sum(one.effort(q1) for one in self.connectors)

@@ -11,7 +11,7 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step, acting
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.reference.cells import Ledger
@@ -72,7 +72,7 @@ class Supports:
     def accept(self, s: Array) -> None:
         """Enter the work of supports that move in a step of the nodes."""
         if self._motions:
-            force = self._scheme.acting(self.before, self.reactions)
+            force = acting(self._scheme, self.before, self.reactions)
             self._ledger.supplied["supports"] += float(force @ (self.axes @ s))
         self.before = self.reactions
 

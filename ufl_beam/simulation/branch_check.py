@@ -14,10 +14,9 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.phases import weight_of_before
 
 FAR = 1e3
 """Largest motion of a node in a static step that is no mechanism; sizes of the scene or radians."""
@@ -28,7 +27,7 @@ KINK = 1e-6
 
 def add_forces_at_rest(equation: StepEquation, scheme: Scheme, q: Array, force: Array) -> None:
     """Add the forces of beams at ``q``, in a step so short that nothing viscous flows."""
-    equation.begin(scheme.step(0.0, sys.float_info.min, sys.float_info.min, q), equation.beams)
+    equation.begin(Step.of(scheme, 0.0, sys.float_info.min, sys.float_info.min, q), equation.beams)
     for beam in equation.beams:
         beam.add_residual(q, force)
 
@@ -58,7 +57,7 @@ class StaticPath:
         self.force: Array = np.zeros(share.size)
         # Connectors have theirs among the unknowns.
         add_forces_at_rest(equation, scheme, q, self.force)
-        begins = scheme.step(t0, t0 + 1.0, t0 + 1.0, q)._replace(load_time=t0, motion_time=t0)
+        begins = Step.of(scheme, t0, t0 + 1.0, t0 + 1.0, q)._replace(load_time=t0, motion_time=t0)
         equation.begin(begins, equation.couplings)
         for coupling in equation.couplings:
             coupling.add_residual(q, self.force)
@@ -89,7 +88,7 @@ class StaticPath:
         self._c = struct(
             "static_path", slack=self._scheme.slack, far=FAR, kink=KINK, per_far=per_far,
             force=self.force, terms=len(changes),
-            weight_of_before=weight_of_before(self._scheme.acting),
+            weight_of_before=self._scheme.weight_of_before,
             change=ffi.new("change_call[]", list(changes)), accounts=len(parts),
             account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),
             entries=np.array([len(part) for part in parts], dtype=np.int32),

@@ -23,7 +23,6 @@ from ufl_beam.terms.phases import Callbacks
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 
-
 MOVING = "inertia", "damping"
 """Kinds of terms that depend on velocities."""
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from functools import cache, partial
+from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -18,8 +18,8 @@ import numpy as np
 from ufl_beam.arrays import Array, Index, Later, Snapshots
 from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib
-from ufl_beam.errors import SceneError, StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.errors import StepFailed
+from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia, with_half_tangents
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.watches import Watch
@@ -67,9 +67,6 @@ ROOM = 2**20
 
 LONGEST = 0.05
 """Time after which C returns, so that a run can be interrupted and shows its progress; s."""
-
-LAST_DIGITS = 1e-14
-"""Difference of two numbers from the same formula, relative, that is nothing but round-off."""
 
 
 class Trial(NamedTuple):
@@ -138,15 +135,8 @@ class Stepper:
         fill(equation.c, agains=len(again), again=ffi.new("again_call[]", again))
         least = LEAST_IN_MOTION if inertia is not None else LEAST_AT_REST
         self.solver = solver = Solver(share, equation, newton, least)
-        known: Any = scheme
-        whole, turns = _whole_steps(known), _nodal_step(known)
-        if whole is None or turns is None:
-            raise SceneError(
-                f"{scheme!r}: `step` must take loads and motions at fixed parts of a step, and "
-                "`nodal_step` must be that of ExactStep or PlainStep, see docs/extending.md"
-            )
         rotations = share.rotations()
-        half_tangents = rotations[: len(rotations) * turns[1]]
+        half_tangents, in_motion = with_half_tangents(scheme, rotations), has_inertia(scheme)
         self._bytes = 8 * share.size
         kinds = DeadLoads, FollowerLoads
         loads = {type(x): x.steps_in_c for x in equation.terms if isinstance(x, kinds)}
@@ -160,8 +150,9 @@ class Stepper:
         self.c = fill(
             ffi.new("march *"),
             equation=equation.c, size=share.size, q=np.zeros(share.size), x=solver.unknowns, s=s,
-            guess=np.zeros(share.size), in_parts=not has_inertia(scheme),
-            load_weight=whole[0], motion_weight=whole[1], at=whole[2], limits_turn=turns[0],
+            guess=np.zeros(share.size), in_parts=not in_motion,
+            load_weight=scheme.load_weight, at=1.0 if in_motion else scheme.load_weight,
+            limits_turn=scheme.limits_turn,
             largest_turn=LARGEST_TURN, rotations=len(rotations), rotation=rotations,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
@@ -454,33 +445,3 @@ def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
         return False
     frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
     return frames or bool(scene.works) or any(f(t) != 0 for _, f in scene.time_functions())
-
-
-@cache
-def _whole_steps(scheme: Any) -> tuple[float, float, float] | None:
-    """Parts of a step at which loads and motions are taken, and its ``at``, if always the same."""
-    q = np.zeros(0)
-    unit = scheme.step(0.0, 1.0, 1.0, q)
-    weights = unit.load_time, unit.motion_time
-    for t0, t1 in ((0.0, 1.0), (2.0, 2.25), (-1e3, 7.0)):
-        step = scheme.step(t0, t1, t1, q)
-        for w, t in zip(weights, (step.load_time, step.motion_time), strict=True):
-            if abs((1 - w) * t0 + w * t1 - t) > LAST_DIGITS * max(abs(t0), abs(t1)):
-                return None
-        if (step.fraction, step.at) != (1.0, unit.at):
-            return None
-    return *weights, unit.at
-
-
-@cache
-def _nodal_step(scheme: Any) -> tuple[bool, bool] | None:
-    """Flags: turns of a step are limited, and are 2 tan(Δψ/2) in it; None if that is not known."""
-    if not hasattr(scheme, "half_tangents"):
-        return None
-    q0, q1, rotations = np.zeros(3), np.array([0.3, -0.7, 0.5]), np.array([1, 2], dtype=np.int32)
-    tangents = len(scheme.half_tangents(rotations)) > 0
-    s, turn = scheme.nodal_step(q0, q1, rotations)
-    turned = 2 * np.tan(q1[1:] / 2) if tangents else q1[1:]
-    if not np.allclose(s, [0.3, *turned], rtol=LAST_DIGITS, atol=0.0) or turn not in (0.0, 0.7):
-        return None
-    return turn > 0, tangents

@@ -25,7 +25,6 @@ from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.kept_states import KeptStates
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.links import DISSIPATED, WORK, Links
-from ufl_beam.terms.phases import weight_of_before
 
 STATES = 100
 """Number of successive steps in which numerical losses are added."""
@@ -63,7 +62,7 @@ class LedgerWatch:
         laws, links = [*_laws(grid.scene)], grid.scene.links
         grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
         # Other schemes integrate works with the mean of the forces at both ends.
-        grows["friction"] = grows["damping"] = weight_of_before(scheme.acting) == 0.0
+        grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
         self._grows = [name for name, certain in grows.items() if certain]
         given = any(isinstance(link.law, ForceLaw) and link.law.stored for link in links)
         self._bounded = not given and all(map(has_quadratic_energies, laws))

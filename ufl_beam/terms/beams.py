@@ -18,7 +18,7 @@ from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
+from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia, with_half_tangents
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.in_cells import InCells
@@ -101,12 +101,12 @@ class Inertia(OfMatrix):
     def __init__(
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
     ) -> None:
-        rotations = scheme.half_tangents(fields.share.rotations())
+        rotations = with_half_tangents(scheme, fields.share.rotations())
         self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
         self._fields, self._ledger, self._A, self.scheme = fields, ledger, A, scheme
-        if scheme.slips:
-            ledger.lost["numerical"] += 0.0
         self.rates = RatesInC(scheme, v)
+        if self.rates.slips:
+            ledger.lost["numerical"] += 0.0
 
     def in_cells(self) -> Sequence[InCells]:
         """The mass of the beams times the accelerations of the step."""
@@ -125,7 +125,7 @@ class Inertia(OfMatrix):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the matrix and the velocities."""
-        lost = self._ledger.lost.pointer("numerical") if self.scheme.slips else ffi.NULL
+        lost = self._ledger.lost.pointer("numerical") if self.rates.slips else ffi.NULL
         kinetic = self._ledger.state.pointer("kinetic")
         of = self.rates.times(self._times, kept=kinetic, lost=lost)
         begin, accept = loop("begin_inertia", of), loop("accept_inertia", of)
@@ -147,11 +147,11 @@ class Inertia(OfMatrix):
 
     def velocities(self, s: Array, dt: float) -> Array:
         """Velocities at the end of a step ``s`` of the nodes, of the length ``dt`` (s)."""
-        return self.scheme.rates(dt, s, self.rates)[0]
+        return self.rates.after(s, dt)[0]
 
     def prepare(self, s: Array, dt: float) -> None:
         """Take from a trial step ``s`` what the scheme keeps besides the velocities."""
-        _, *more = self.scheme.rates(dt, s, self.rates)
+        _, *more = self.rates.after(s, dt)
         self.rates.keep(*more)
 
     def remember(self, memory: Memory, q: Array) -> None:

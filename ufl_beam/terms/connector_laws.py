@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.mechanics.time_schemes import Step, way_to_rest
 from ufl_beam.model.connector_laws import (
     HELD,
     Actuator,
@@ -175,7 +175,7 @@ class _Rubbing(Response):
         self._creep = self._softness / np.where(limit > 0, limit, np.inf)
         # With this way the velocity at the end is zero; with none, that before would come back.
         rates = np.array([setting.rates[link] for link in self._links])
-        self._way = setting.scheme.way_to_rest(step.dt) * rates
+        self._way = way_to_rest(setting.scheme, step.dt) * rates
         self.again()
 
     def again(self) -> None:

@@ -23,7 +23,7 @@ from ufl_beam.model.connector_laws import HELD, ForceLaw, Law, RigidPlastic, Spr
 from ufl_beam.terms import connector_laws, force_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.phases import Callbacks, Phases, beginning, weight_of_before
+from ufl_beam.terms.phases import Callbacks, Phases, beginning
 
 LAWS = (connector_laws, force_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
@@ -59,7 +59,7 @@ class Couplings(Links):
             self._form, (forms.work, forms.tangent, forms.motion)
         )
         self._tangent.place(A)
-        self._weight_of_before = weight_of_before(scheme.acting)
+        self._weight_of_before = scheme.weight_of_before
         self._e, self._now, self._rows = np.zeros(n), np.zeros(n), np.zeros((n, 3))
         self._in_c = struct(
             "couplings", number=n, link=np.arange(n, dtype=np.int32), dofs=self._dofs,

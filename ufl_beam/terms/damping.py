@@ -28,7 +28,7 @@ from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_schemes import Scheme, with_half_tangents
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import Inertia
@@ -103,7 +103,7 @@ class RayleighForces(OfMatrix):
         C, M = fields.matrix(), mass_matrix(fields)
         K = fields.assembled(_reference_stiffness(fields.element))
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
-        rotations = inertia.scheme.half_tangents(fields.share.rotations())
+        rotations = with_half_tangents(inertia.scheme, fields.share.rotations())
         self._times = StepProduct(C, rotations, A, fields.share.scratch)
         self._ledger, self._rates, self._A = ledger, inertia.rates, A
 

@@ -20,7 +20,7 @@ from ufl_beam.model.loads import Gravity, LineLoad, Load, PointLoad
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.phases import Callbacks, Phases, weight_of_before
+from ufl_beam.terms.phases import Callbacks, Phases
 
 
 class DeadLoads(LoadTerm):
@@ -81,7 +81,7 @@ class DeadLoads(LoadTerm):
             factors=np.full(len(owners), math.nan), factor=callbacks.of_time(owners),
             vector=ffi.new("double *[]", [doubles(vector) for _, vector in self._vectors]),
             work=self._ledger.supplied.pointer("loads"),
-            weight_of_before=weight_of_before(self._acting),
+            weight_of_before=self._scheme.weight_of_before,
         )  # fmt: skip
         return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
 

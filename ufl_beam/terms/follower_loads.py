@@ -17,7 +17,7 @@ from ufl_beam.model.loads import FollowerLoad
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.phases import Callbacks, Phases, weight_of_before
+from ufl_beam.terms.phases import Callbacks, Phases
 
 
 class FollowerLoads(LoadTerm):
@@ -54,7 +54,7 @@ class FollowerLoads(LoadTerm):
             now=self._sizes[0], end=self._sizes[1], before=self._sizes[2],
             x=A.positions(x, self._turning), y=A.positions(y, self._turning),
             force=self._forces[0], force_before=self._forces[1],
-            weight_of_before=weight_of_before(scheme.acting),
+            weight_of_before=scheme.weight_of_before,
         )  # fmt: skip
 
     @property

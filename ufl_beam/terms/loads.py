@@ -18,7 +18,7 @@ from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving
 from ufl_beam.mechanics.kinematics import split, turn
-from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
@@ -31,7 +31,7 @@ class LoadTerm(Term):
     kind = "loads"
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger) -> None:
-        self._acting, self._ledger = scheme.acting, ledger
+        self._scheme, self._ledger = scheme, ledger
         self._force: Array = np.zeros(share.size)
 
     @property
@@ -140,7 +140,7 @@ class FrameForces(LoadTerm):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter the work of the centrifugal forces, and take how much of them acts."""
-        self._ledger.supplied["loads"] += float(self._acting(self._before, self._force) @ s)
+        self._ledger.supplied["loads"] += float(acting(self._scheme, self._before, self._force) @ s)
         self._before, self._grown = self._force, self._growth_at_end
         a = self._growth * self._outward * self._x
         if self._in_motion:

@@ -232,8 +232,3 @@ def knowing(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
 def entering(kernel: Any, entry: Any) -> Loop:
     """Loop that adds the value of a kernel to an entry of the ledger."""
     return loop("add_values", struct("form_value", form=kernel.cells, entry=entry))
-
-
-def weight_of_before(acting: Callable[[Array, Array], Array]) -> float:
-    """Weight of the forces before a step among those that do its work; the others have the rest."""
-    return float(acting(np.ones(1), np.zeros(1))[0])

@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Velocities, and what else a scheme keeps, as C has them.
 
-A scheme states what becomes of them in Python.  All of that is a sum of multiples; the numbers are
-found by asking the scheme what it makes of unit vectors, once for each length of a step.
+A scheme states the coefficients of a step, once for each length of a step.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cache, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -19,23 +16,10 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import StepProduct
 from ufl_beam.errors import SceneError
-from ufl_beam.mechanics.time_schemes import DynamicScheme
+from ufl_beam.mechanics.time_schemes import Coefficients, DynamicScheme, combined
 
 CHANGE, V, V_BEFORE, MORE = range(4)
 """Places of the rates in C: the step or a change of velocities, velocities, ..."""
-
-SAME = 1e-12
-"""Difference of two results of the same numbers, relative, that is nothing but round-off."""
-
-
-@dataclass
-class Asked:
-    """Rates that a scheme is asked about."""
-
-    v: Array
-    v_before: Array
-    more: tuple[Array, ...]
-    last_dt: float
 
 
 class RatesInC:
@@ -45,29 +29,26 @@ class RatesInC:
 
     Attributes:
         c: ``rates`` of loops.h.
+        slips: True if the scheme loses energy by the rates.
 
     Raises:
-        SceneError: The scheme makes something else of rates than sums of multiples of them.
+        SceneError: The scheme states no such coefficients as :class:`Coefficients` describes.
     """
 
     def __init__(self, scheme: DynamicScheme, v: Array) -> None:
-        known: Any = scheme
         size, number = len(v), MORE + len(scheme.kept)
-        if number > lib.MOST_RATES or not _sums_of_multiples(known):
-            raise SceneError(
-                f"{scheme!r}: what it makes of velocities must be sums of multiples of them"
-            )
+        self.slips = checked_coefficients(scheme).slip is not None
         self._scheme = scheme
         # Changes are elsewhere; of velocities before the last ones new ones are not computed, and
         # new velocities take their place where nothing asks for them.
-        asks = scheme.slips or _asks_for_before(known)
+        asks = self.slips or scheme.looks_back
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
-        self._slip = np.zeros(size if scheme.slips else 0)
+        self._slip = np.zeros(size if self.slips else 0)
         self._handle = ffi.new_handle(self)
         self.c = fill(ffi.new("rates *"), size=size, number=number, find=lib.numbers_in_python)
         self.c.handle = self._handle  # what `fill` keeps must not keep this object
-        self.c.after_any = _after_any(known)
+        self.c.after_any = not scheme.looks_back
         first, *more = self._next if asks else (self._now[1], *self._next)
         for k, (rate, new) in enumerate(
             zip(self._now, (first, self._slip, *more), strict=True), start=V
@@ -121,18 +102,20 @@ class RatesInC:
 
     def find(self, numbers: Any) -> None:
         """Write the numbers of the steps that ``scheme_numbers`` of loops.h is about."""
-        n, known = self.c.number, numbers.more
-        scheme: Any = self._scheme
-        of = MORE + known, numbers.dt, numbers.last_dt
-        ends, inertia, velocity, *rates, slip = _numbers(scheme, *of)
-        numbers.factor, numbers.back, numbers.factor_of_velocity, numbers.back_of_velocity = ends
-        zeros = [0.0] * (n - MORE - known)
-        for place, row in (
-            (numbers.inertia, inertia), (numbers.velocity, velocity), (numbers.slip, slip),
-            *zip(numbers.rates, rates, strict=False),
-        ):  # fmt: skip
-            place[0:n] = [*row, *zeros]
-        numbers.gives = len(rates) - 1
+        known: Any = self._scheme
+        of = _coefficients(known, numbers.dt, numbers.last_dt, numbers.more)
+        none = [0.0] * MORE
+        rows = of.inertia, of.velocity, of.slip or none, *of.rates
+        places = numbers.inertia, numbers.velocity, numbers.slip, *numbers.rates
+        for place, row in zip(places, rows, strict=False):
+            place[0 : self.c.number] = [*row, *[0.0] * (self.c.number - len(row))]
+        numbers.gives = len(of.rates) - 1
+
+    def after(self, s: Array, dt: float) -> list[Array]:
+        """Velocities after a step ``s`` of the nodes, and what the scheme keeps besides."""
+        known: Any = self._scheme
+        rows = _coefficients(known, dt, self.last_dt, self.c.more).rates
+        return [combined(row, s, self) for row in rows]
 
     def times(self, product: StepProduct, **entries: Any) -> Any:
         """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
@@ -141,54 +124,36 @@ class RatesInC:
         return fill(of, rates=self.c)
 
 
-def _ask(scheme: DynamicScheme, dt: float, columns: Array, last_dt: float) -> Sequence[Array]:
-    """Answers of a scheme for given rates: factors, forces of inertia, velocity, rates and slip."""
-    change, v, before, *more = columns
-    asked = Asked(v, before, tuple(more), last_dt)
-    factor, back, of_inertia = scheme.inertia(dt, asked)
-    factor_of_velocity, back_of_velocity, velocity = scheme.velocity(dt, asked)
-    factors = np.array([factor, back, factor_of_velocity, back_of_velocity])
-    slip = scheme.slip(dt, change, asked)
-    return (factors, of_inertia, velocity, *scheme.rates(dt, change, asked), slip)
-
-
 @lru_cache(maxsize=1024)  # steps of one size have some ten lengths, as times are rounded
-def _numbers(scheme: Any, n: int, dt: float, last_dt: float) -> Any:
-    """Answers of a scheme for unit vectors; a list of numbers each."""
-    return [x.tolist() for x in _ask(scheme, dt, np.eye(n), last_dt)]
+def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coefficients:
+    """Coefficients of a step, as lists of numbers."""
+    found = scheme.coefficients(dt, last_dt, known)
+    inertia, velocity, *rates = (list(map(float, row)) for row in (*found[:2], *found.rates))
+    slip = None if found.slip is None else list(map(float, found.slip))
+    return Coefficients(inertia, velocity, rates, slip)
 
 
-@cache
-def _after_any(scheme: Any) -> bool:
-    """Return whether the length of the last step does not matter to a scheme."""
-    n = MORE + len(scheme.kept)
-    one, *others = (_numbers(scheme, n, 0.1, last_dt) for last_dt in (0.1, 0.07, 0.4))
-    return all(other == one for other in others)
+def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
+    """Return coefficients of steps of 1 s, and refuse rows of another length.
 
-
-@cache
-def _asks_for_before(scheme: Any) -> bool:
-    """Return whether what a scheme keeps depends on the velocities before the last ones."""
-    n = MORE + len(scheme.kept)
-    answers = [_numbers(scheme, n, 0.1, last_dt) for last_dt in (0.1, 0.07, 0.4)]
-    return any(row[V_BEFORE] != 0.0 for _, _, _, *rates, _ in answers for row in rates)
-
-
-@cache
-def _sums_of_multiples(scheme: Any) -> bool:
-    """Return whether a scheme does to any rates what it does to unit vectors."""
-    n = MORE + len(scheme.kept)
-    columns = np.cos(np.arange(4.0 * n).reshape(n, 4))  # any numbers
-    for dt, last_dt in ((0.1, 0.1), (0.1, 0.07)):
-        factors, *vectors = _ask(scheme, dt, np.eye(n), last_dt)
-        same_factors, *found = _ask(scheme, dt, columns, last_dt)
-        if len(vectors) != n + 1 or not np.array_equal(factors, same_factors):
-            return False
-        for numbers, vector in zip(vectors, found, strict=True):
-            size = np.abs(numbers) @ np.abs(columns)
-            if not np.all(np.abs(numbers @ columns - vector) <= SAME * size):
-                return False
-    return True
+    Raises:
+        SceneError: They are not as :class:`Coefficients` says.
+    """
+    known: Any = scheme
+    number = len(scheme.kept)
+    try:
+        found = _coefficients(known, 1.0, 1.0, number)
+        rows = found.inertia, found.velocity, *found.rates, *([found.slip] if found.slip else [])
+        right = len(found.rates) == 1 + number and {len(row) for row in rows} == {MORE + number}
+        right = right and bool(np.isfinite(rows).all()) and found.rates[0][0] != 0.0
+    except (TypeError, ValueError, AttributeError):
+        right = False
+    if not right or MORE + number > lib.MOST_RATES:
+        raise SceneError(
+            f"{scheme!r}: coefficients(dt, last_dt, known) must return Coefficients with rows of "
+            f"3 + known numbers, {1 + number} of them in rates, see docs/extending.md"
+        )
+    return found
 
 
 @ffi.def_extern(error=0)  # type: ignore[misc, untyped-decorator, unused-ignore]

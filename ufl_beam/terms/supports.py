@@ -18,7 +18,7 @@ from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.supports import Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.phases import Callbacks, weight_of_before
+from ufl_beam.terms.phases import Callbacks
 
 
 class Supports:
@@ -60,7 +60,7 @@ class Supports:
         of_columns, of_rows = np.flatnonzero(is_held[A.indices]), A.entries_of(self.dofs)
         self.entries = np.union1d(of_columns, of_rows), A.diagonal(self.dofs)
         self.pivots: Array = np.ones(len(self.dofs))
-        self._acting, self._ledger = scheme.acting, ledger
+        self._scheme, self._ledger = scheme, ledger
         # True if values depend on time anywhere in the scene
         self.work = any(support.moving for support in share.grid.scene.supports)
         if self.work:
@@ -102,7 +102,7 @@ class Supports:
             "moving_supports", held=len(self.dofs), hold=self.dofs.astype(np.int32),
             moving=len(moves), dof=self.moving.astype(np.int32), motion=callbacks.of_time(moves),
             reactions=self.reactions, before=self._before, work=entry,
-            weight_of_before=weight_of_before(self._acting),
+            weight_of_before=self._scheme.weight_of_before,
         )  # fmt: skip
 
     def hold(self, r: Array) -> None:

@@ -22,13 +22,12 @@ from ufl_beam.discretization.state_io import Memory, Restoring, Saving
 from ufl_beam.discretization.work_forms import GROWTH, Statement, statement
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError, shorten
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step, acting
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.phases import weight_of_before
 
 AT_REST = 1e300
 """Longest step that forms are told of, in which all rates vanish; s."""
@@ -49,7 +48,7 @@ class Acting(ABC):
         self, work: Work, stated: Statement, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
     ) -> None:
         self._work, self._stated, self._fields, self._A = work, stated, fields, A
-        self._name, self._ledger, self._acting = work.name, ledger, scheme.acting
+        self._name, self._ledger, self._scheme = work.name, ledger, scheme
         self._size, self.order = fields.share.size, fields.order
         with _named(work):
             self.residual = self._kernel(stated.residual)
@@ -157,12 +156,12 @@ class Working(Acting):
 
     def pass_on(self, memory: Saving) -> None:
         """Save forces that depend on the motion of the last step, if their work is counted on."""
-        if self._work.takes_rates and weight_of_before(self._acting):
+        if self._work.takes_rates and self._scheme.weight_of_before:
             self.remember(memory)
 
     def accept(self, q1: Array, s: Array, force: Array, times: tuple[float, float]) -> None:
         """Enter the work of the step."""
-        self._ledger.supplied[self._name] += float(self._acting(self._before, force) @ s)
+        self._ledger.supplied[self._name] += float(acting(self._scheme, self._before, force) @ s)
         self._before = force
 
     def remember(self, memory: Memory) -> None:
@@ -206,7 +205,7 @@ class Storing(Acting):
             self._ledger.lost["numerical"] += lost.value(q1)
         if self._varies:
             begin, end = times
-            self._put(float(self._acting(np.array(begin), np.array(self._known["t"]))), {})
+            self._put(float(acting(self._scheme, np.array(begin), np.array(self._known["t"]))), {})
             moved = self._energy.value(q1) - self._energy.value(self._q0)
             self._put(end, {})
             gained = self._energy.value(q1) - self._held - moved

@@ -317,20 +317,6 @@ double quadratic_form(const constant_matrix *A, const double *x)
   return sum;
 }
 
-/* s = q1 - q0, with 2 tan(x/2) in the place of the increments x of the rotations; the largest |x| */
-double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
-                     const double *q0, const double *q1)
-{
-  double largest = 0;
-  for (int i = 0; i < size; ++i) s[i] = q1[i] - q0[i];
-  for (int k = 0; k < rotations; ++k) {
-    double *x = s + rotation[k];
-    if (!(fabs(*x) <= largest)) largest = fabs(*x);
-    *x = 2 * tan(*x / 2);
-  }
-  return largest;
-}
-
 /* tan(x/2) for the increment x of rotation k: forces and their tangent are asked at the same. */
 static inline double half_tangent(const step_product *p, int k, double x)
 {

@@ -123,8 +123,6 @@ int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *
                      int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices);
 void add_product(const constant_matrix *A, const double *x, double *y);
 double quadratic_form(const constant_matrix *A, const double *x);
-double step_of_nodes(int size, int rotations, const int32_t *rotation, double *s,
-                     const double *q0, const double *q1);
 void give_back_memory(void);
 double norm(int rows, const double *w, const double *f);
 double norm_of_some(int rows, const int32_t *at, const double *w, const double *f);
@@ -668,13 +666,13 @@ typedef struct {
   double *work; /* entry of the ledger */
 } dead_loads;
 
-/* What a scheme makes of a step or a change of velocities, of the velocities, of those before, and of
- * what else it keeps, in this order: numbers that each of these is multiplied by. */
+/* Coefficients of a step: rows of numbers for the step or a change of velocities, the velocities, those
+ * before, and what else a scheme keeps; see Coefficients of time_schemes.py. */
 enum { MOST_RATES = 6, MOST_KNOWN = 16 };
 typedef struct {
   double dt, last_dt;
   int more, gives; /* of the rates after those before the last: how many are known, and will be */
-  double factor, back, inertia[MOST_RATES], factor_of_velocity, back_of_velocity, velocity[MOST_RATES];
+  double inertia[MOST_RATES], velocity[MOST_RATES];
   double rates[MOST_RATES][MOST_RATES], slip[MOST_RATES];
 } scheme_numbers;
 
@@ -799,7 +797,7 @@ typedef struct {
   double t, *q, *x, *s; /* x: the end of the step in the axes of the plane; s: the step of the nodes */
   double *guess, *found; /* found: space, where places may open */
   prediction *prediction;
-  double load_weight, motion_weight, at; /* parts of the step; see step */
+  double load_weight, at; /* parts of the step; see step */
   int in_parts;          /* whether parts of a step go in proportion to loads and motions at its end */
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;

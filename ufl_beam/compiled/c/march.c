@@ -189,19 +189,6 @@ static void combine_rates(const rates *r, const double *numbers, int first, doub
   if (!begun) memset(out, 0, r->size * sizeof *out);
 }
 
-/* The same: a rate itself where that is all, else in `space`. */
-static const double *sum_of_rates(const rates *r, const double *numbers, int first, double *space)
-{
-  const double *only = 0;
-  int more = 0;
-  for (int j = first; j < r->number; ++j)
-    if (numbers[j] == 1 && !only) only = r->rate[j];
-    else more |= numbers[j] != 0;
-  if (only && !more) return only;
-  combine_rates(r, numbers, first, space);
-  return space;
-}
-
 int find_numbers(rates *r, double dt)
 {
   for (int k = 0; k < r->known; ++k) {
@@ -221,11 +208,24 @@ int find_numbers(rates *r, double dt)
   return 1;
 }
 
+/* A row for the step and the rates: factor s - back v, v being a sum of rates or one of them. */
+static void set_product(const matrix_of_rates *m, const double *row)
+{
+  step_product *p = m->product;
+  const rates *r = m->rates;
+  int last = 0, some = 0;
+  for (int j = 1; j < r->number; ++j)
+    if (row[j] != 0) last = j, ++some;
+  p->factor = row[0];
+  p->back = some == 1 ? -row[last] : -1;
+  p->v = some == 1 ? r->rate[last] : m->v;
+  if (some != 1) combine_rates(r, row, 1, m->v);
+}
+
 void begin_inertia(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  m->product->v = sum_of_rates(m->rates, m->rates->now->inertia, 1, m->v);
-  m->product->factor = m->rates->now->factor, m->product->back = m->rates->now->back;
+  set_product(m, m->rates->now->inertia);
   m->product->q0 = step->q0;
 }
 
@@ -265,9 +265,7 @@ void add_kinetic_energy(void *self, const time_step *step, const double *q1, con
 void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  m->product->v = sum_of_rates(m->rates, m->rates->now->velocity, 1, m->v);
-  m->product->factor = m->rates->now->factor_of_velocity;
-  m->product->back = m->rates->now->back_of_velocity;
+  set_product(m, m->rates->now->velocity);
   m->product->q0 = step->q0;
 }
 
@@ -459,7 +457,7 @@ static int set_step(march *m, double t1, double end)
   step->q0 = m->q, step->q_before = m->prediction->q_before, step->ratio = dt / m->prediction->dt;
   step->fraction = m->in_parts ? dt / (end - t0) : 1;
   step->load_time = m->in_parts ? end : (1 - m->load_weight) * t0 + m->load_weight * t1;
-  step->motion_time = m->in_parts ? end : (1 - m->motion_weight) * t0 + m->motion_weight * t1;
+  step->motion_time = m->in_parts ? end : t1;
   if (m->applies) step->load_time = step->motion_time = m->begin_of_run;
   return !m->rates || find_numbers(m->rates, dt);
 }
