@@ -325,7 +325,7 @@ class Simulation(StateView):
 
     def keep(self) -> None:
         """Append the state to the solution; all processes call it together."""
-        if self.share.alone:
+        if self.share.alone and (self.parts or self.reactions_known):
             now: Later | Snapshots = self._stepper.now(self)
         else:
             now = Snapshots.of(self.gather())

@@ -636,11 +636,11 @@ static int followed(march *m)
   for (int i = 0; i < e->owned; ++i) round_off += fabs(e->space[i] * m->s[i]);
   for (int k = 0; k < p->accounts; ++k)
     for (int i = 0; i < p->entries[k]; ++i) through += fabs(p->account[k][i]);
-  enum { WORK, BEAMS, CONNECTORS, EFFORT, ROUND_OFF, THROUGH, SUMS };
+  enum { OF_FORCES, BEAMS, CONNECTORS, EFFORT, ROUND_OFF, THROUGH, SUMS };
   const enum agreement how[SUMS] = {TOTAL, TOTAL, TOTAL, TOTAL, TOTAL, TOTAL};
   double of[SUMS] = {work, sum.in_beams, sum.in_connectors, sum.effort, round_off, through};
   agree(e, SUMS, how, of);
-  p->work = of[WORK];
+  p->work = of[OF_FORCES];
   p->stored = of[BEAMS] + of[CONNECTORS];
   /* A motor that stretches a spring gives what the spring takes; their sum measures nothing. Connectors
    * count one by one, so that the size is the same on any number of processes. */
