@@ -40,12 +40,12 @@ def without(*names):
 
 def test_members():
     assert members(Scheme)["theta"] is None
-    assert members(Scheme)["step"] is Scheme.step
+    assert members(Scheme)["mean"] is Scheme.mean
     assert [*members(DynamicScheme)][: len(members(Scheme))] == [*members(Scheme)]
-    assert {"kept", "inertia"} <= {*members(DynamicScheme)} - {*members(Scheme)}
+    assert {"kept", "coefficients"} <= {*members(DynamicScheme)} - {*members(Scheme)}
 
 
-@pytest.mark.parametrize("names", [("nodal_step",), ("theta", "acting"), ("step",)])
+@pytest.mark.parametrize("names", [("half_tangents",), ("theta", "mean"), ("mean",)])
 def test_a_scheme_that_lacks_something(names):
     refused(f"scheme: Mine is not a time scheme: it lacks {', '.join(names)}", without(*names))
 
@@ -60,19 +60,22 @@ def test_a_scheme_with_inertia_that_lacks_something():
     class Mine(ub.ExactStep, ub.Midway):
         alpha = 0.0
 
-    refused("lacks way_to_rest, slips, inertia, rates, slip, error_weights", Mine())
+    refused("lacks coefficients, error_weights", Mine())
 
 
 def test_a_method_with_other_arguments():
     class Mine(ub.Midpoint):
-        def slip(self, change):
-            return change
+        def coefficients(self, dt):
+            return super().coefficients(dt, dt, 0)
 
-    said = "Mine is not a time scheme: its method slip cannot be called as slip(dt, change, rates)"
+    said = (
+        "Mine is not a time scheme: its method coefficients cannot be called as "
+        "coefficients(dt, last_dt, known)"
+    )
     refused(said, Mine())
-    named = without("step")
-    type(named).step = 1.0
-    refused("its method step cannot be called as step(t0, t1, end, q0)", named)
+    named = without("mean")
+    type(named).mean = 1.0
+    refused("its method mean cannot be called as mean(f, q0, q1)", named)
 
 
 def test_more_arguments_with_defaults_are_no_fault():

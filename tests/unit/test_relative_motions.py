@@ -89,7 +89,8 @@ class Between:
 
     def gradient(self):
         """Virtual work of a unit force: the residual is linear in it."""
-        self.coupling.begin(self.scheme.step(0.0, 0.1, 0.1, self.q0))
+        step = ub.Step.of(self.scheme, 0.0, 0.1, 0.1, self.q0)
+        self.simulation.equation.begin(step, [self.coupling])
         r = np.zeros((2, len(self.q0)))
         for force, row in zip((0.0, 1.0), r, strict=True):
             q = self.q1.copy()

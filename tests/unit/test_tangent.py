@@ -9,6 +9,7 @@ import ufl
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.terms.damping import SecondDifferences
 
 # Numbers of one magnitude, so that an error in any term shows in the largest entry.
@@ -89,19 +90,18 @@ class Probe:
         for inelastic in simulation.inelastic:
             self.at_random(inelastic, random)
         simulation.ask()
-        step = scheme.step(0.0, 0.3, 0.3, simulation.q)
-        for term in simulation.terms:
-            term.begin(step)
+        simulation.equation.start(simulation.q)
+        simulation.equation.begin(ub.Step.of(scheme, 0.0, 0.3, 0.3, simulation.q))
         self.x = simulation.supports.in_axes(simulation.q + random.uniform(-turn, turn, size))
         self.free = np.setdiff1d(np.arange(size), simulation.supports.dofs)
 
     @staticmethod
     def in_motion(simulation, random):
         """Random velocities and whatever else schemes keep, as after a step."""
-        inertia = simulation.inertia
-        inertia.v, inertia.v_before = random.uniform(-1, 1, (2, len(inertia.v)))
-        inertia.more = tuple(random.uniform(-1, 1, (len(inertia.scheme.kept), len(inertia.v))))
-        inertia.last_dt = 0.2
+        rates = simulation.inertia.rates
+        rates.v, rates.v_before = random.uniform(-1, 1, (2, len(rates.v)))
+        rates.keep(*random.uniform(-1, 1, (len(simulation.scheme.kept), len(rates.v))))
+        rates.last_dt = 0.2
         numerical = (one for one in simulation.terms if isinstance(one, SecondDifferences))
         for term in numerical:
             term._change[:], term._last_dt[0] = random.uniform(-1, 1, term._change.shape), 0.2
@@ -273,7 +273,7 @@ def test_laws_show_in_the_tangent(kind):
         probe.tangent()
         (inelastic,) = probe.simulation.inelastic
         p, opening = (inelastic.points[name].copy() for name in ("state plastic", "opening"))
-        inelastic.accept(probe.simulation.supports.in_plane(probe.x), None)
+        lib.commit(inelastic.points.c)
         flow, growth = inelastic.points["state plastic"] != p, inelastic.points["opening"] > opening
         flows, opens = flows or flow.any(), opens or growth.any()
         both = both or (flow & growth).any()
