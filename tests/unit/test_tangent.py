@@ -99,9 +99,8 @@ class Probe:
     def in_motion(simulation, random):
         """Random velocities and whatever else schemes keep, as after a step."""
         rates = simulation.inertia.rates
-        rates.v, rates.v_before = random.uniform(-1, 1, (2, len(rates.v)))
+        rates.take(*random.uniform(-1, 1, (2, len(rates.v))), last_dt=0.2)
         rates.keep(*random.uniform(-1, 1, (len(simulation.scheme.kept), len(rates.v))))
-        rates.last_dt = 0.2
         numerical = (one for one in simulation.terms if isinstance(one, SecondDifferences))
         for term in numerical:
             term._change[:], term._last_dt[0] = random.uniform(-1, 1, term._change.shape), 0.2

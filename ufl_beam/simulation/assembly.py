@@ -138,8 +138,8 @@ class Assembly:
         """
         if self.inertia is not None:
             return None
-        share, state = self.equation.share, (self.ledger, q, t0)
-        path = together(StaticPath, share, scheme, self.equation, *state)
+        share, of_beginning = self.equation.share, self.equation.inner_forces
+        path = StaticPath(share, scheme, self.ledger, together(of_beginning, scheme, q, t0))
         self.cell_forces.accept()
         if not goes_on:
             r = np.asarray(path.force - sum(loads))
@@ -195,13 +195,14 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     if has_inertia(scheme):
         supports.stop(v)
     inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
+    of_motion = None if inertia is None else inertia.rates
     others: list[Term] = [*numerical, *([inertia] if inertia else [])]
     for damping in scene.damping:
-        others += damping_forces(damping, fields, *setting, inertia)
+        others += damping_forces(damping, fields, *setting, of_motion)
     if scene.beams:
         ledger.state["stored"] += 0.0
     parts = share, A, beams, coupled, loads, others, supports, search
-    equation = StepEquation(*parts, inertia)
+    equation = StepEquation(*parts, of_motion)
     return Assembly(
         fields, ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, equation, _cell_forces(share, equation.terms),

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,8 +13,7 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme, Step
-from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.terms.energy_ledger import Ledger
 
 FAR = 1e3
@@ -23,13 +21,6 @@ FAR = 1e3
 
 KINK = 1e-6
 """Work that a kink of a law may leave unexplained, as a part of the energy that went through."""
-
-
-def add_forces_at_rest(equation: StepEquation, scheme: Scheme, q: Array, force: Array) -> None:
-    """Add the forces of beams at ``q``, in a step so short that nothing viscous flows."""
-    equation.begin(Step.of(scheme, 0.0, sys.float_info.min, sys.float_info.min, q), equation.beams)
-    for beam in equation.beams:
-        beam.add_residual(q, force)
 
 
 class StaticPath:
@@ -43,24 +34,8 @@ class StaticPath:
 
     _c: Any
 
-    def __init__(
-        self,
-        share: Share,
-        scheme: Scheme,
-        equation: StepEquation,
-        ledger: Ledger,
-        q: Array,
-        t0: float,
-    ) -> None:
-        self._share, self._scheme, self._ledger = share, scheme, ledger
-        self._rotations = share.rotations()
-        self.force: Array = np.zeros(share.size)
-        # Connectors have theirs among the unknowns.
-        add_forces_at_rest(equation, scheme, q, self.force)
-        begins = Step.of(scheme, t0, t0 + 1.0, t0 + 1.0, q)._replace(load_time=t0, motion_time=t0)
-        equation.begin(begins, equation.couplings)
-        for coupling in equation.couplings:
-            coupling.add_residual(q, self.force)
+    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, force: Array) -> None:
+        self._share, self._scheme, self._ledger, self.force = share, scheme, ledger, force
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The internal forces at the end of the last step."""
@@ -84,7 +59,7 @@ class StaticPath:
         """``static_path`` of loops.h; ``changes`` are those of the terms."""
         parts = self._ledger.state, self._ledger.supplied, self._ledger.lost
         per_far = np.full(self._share.size, 1 / self._share.grid.scene.size)
-        per_far[self._rotations] = 1.0
+        per_far[self._share.rotations()] = 1.0
         self._c = struct(
             "static_path", slack=self._scheme.slack, far=FAR, kink=KINK, per_far=per_far,
             force=self.force, terms=len(changes),

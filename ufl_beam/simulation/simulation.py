@@ -26,7 +26,6 @@ from ufl_beam.output.watches import Watch
 from ufl_beam.parallel import communicator
 from ufl_beam.parameter import Parameter
 from ufl_beam.simulation.assembly import assemble
-from ufl_beam.simulation.branch_check import add_forces_at_rest
 from ufl_beam.simulation.diagnosis import no_equilibrium, require_held
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of
 from ufl_beam.simulation.prediction import Prediction
@@ -135,7 +134,7 @@ class Simulation(StateView):
         self.reactions_known = self._branch is not None
         self.cell_forces, self.between = parts.cell_forces, float(scheme.average(0.0, 1.0))
         if not self.reactions_known:
-            together(add_forces_at_rest, self.equation, scheme, self.q, np.zeros(share.size))
+            together(self.equation.forces_at_rest, scheme, self.q)
         goes_on = goes_on or not self.reactions_known
         forces, before = last_forces(grid, share, scheme, start) if goes_on else (None, None)
         if forces is not None or not self.reactions_known:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -13,13 +14,13 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.terms.base import InternalForces, Term
-from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Callbacks
+from ufl_beam.terms.rates_in_c import RatesInC
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 
@@ -52,10 +53,10 @@ class StepEquation:
         others: Sequence[Term],
         supports: Supports,
         search: SearchFlags,
-        inertia: Inertia | None,
+        rates: RatesInC | None,
     ) -> None:
         self.share, self.A, self.supports, self.weights = share, A, supports, share.weights()
-        in_motion, self._rates = inertia is not None, None if inertia is None else inertia.rates
+        in_motion, self._rates = rates is not None, rates
         # Where nothing has inertia, the work of the internal forces is compared with energies.
         self.force = np.zeros(0 if in_motion else share.size)
         self.beams, self.couplings, self.loads = beams, couplings, loads
@@ -137,6 +138,24 @@ class StepEquation:
                 of = one.predicted.c
                 of.begins, of.stale, of.exact = 0, 1, 1
         self.callbacks.settle()
+
+    def forces_at_rest(self, scheme: Scheme, q: Array) -> Array:
+        """Forces of beams at ``q``, in a step so short that nothing viscous flows."""
+        short = sys.float_info.min
+        self.begin(Step.of(scheme, 0.0, short, short, q), self.beams)
+        forces = np.zeros(self.share.size)
+        for beam in self.beams:
+            beam.add_residual(q, forces)
+        return forces
+
+    def inner_forces(self, scheme: Scheme, q: Array, t: float) -> Array:
+        """The same, with those of connectors at the time ``t``; these have theirs among ``q``."""
+        forces = self.forces_at_rest(scheme, q)
+        step = Step.of(scheme, t, t + 1.0, t + 1.0, q)._replace(load_time=t, motion_time=t)
+        self.begin(step, self.couplings)
+        for coupling in self.couplings:
+            coupling.add_residual(q, forces)
+        return forces
 
     def start(self, q: Array) -> None:
         """Take ``q`` for the accepted configuration, which no step has led to."""

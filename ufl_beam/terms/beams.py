@@ -140,10 +140,9 @@ class Inertia(OfMatrix):
     def pass_on_step(self, memory: Memory) -> None:
         """State the velocities before the last step, and its length, at each degree of freedom."""
         rates = self.rates
-        rates.v_before = memory.at_dofs(BEFORE, rates.v_before)
+        v_before = memory.at_dofs(BEFORE, rates.v_before)
         lengths = memory.at_dofs("last step", np.full(rates.c.size, rates.last_dt))
-        if len(lengths):
-            rates.last_dt = float(lengths[0])
+        rates.take(rates.v, v_before, float(lengths[0]) if len(lengths) else rates.last_dt)
 
     def velocities(self, s: Array, dt: float) -> Array:
         """Velocities at the end of a step ``s`` of the nodes, of the length ``dt`` (s)."""
@@ -157,7 +156,7 @@ class Inertia(OfMatrix):
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore velocities and the last step."""
         rates = self.rates
-        rates.v = memory.at_dofs("velocity", rates.v)
-        rates.v_before = memory.at_dofs(BEFORE, rates.v_before)
-        rates.last_dt = memory.number("step of velocity", rates.last_dt)
+        v = memory.at_dofs("velocity", rates.v)
+        v_before = memory.at_dofs(BEFORE, rates.v_before)
+        rates.take(v, v_before, memory.number("step of velocity", rates.last_dt))
         self.carry_on(memory, int(memory.number("further rates", len(rates.more))))

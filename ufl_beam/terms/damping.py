@@ -31,11 +31,11 @@ from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import Scheme, with_half_tangents
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import Term
-from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
 from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Callbacks, Phases, knowing
+from ufl_beam.terms.rates_in_c import RatesInC
 
 
 def _work_and_loss(
@@ -97,15 +97,21 @@ class RayleighForces(OfMatrix):
     kind = "damping"
 
     def __init__(
-        self, damping: Rayleigh, fields: Fields, A: Csr, ledger: Ledger, inertia: Inertia
+        self,
+        damping: Rayleigh,
+        fields: Fields,
+        scheme: Scheme,
+        A: Csr,
+        ledger: Ledger,
+        rates: RatesInC,
     ) -> None:
         self._damping, self._fields = damping, fields
         C, M = fields.matrix(), mass_matrix(fields)
         K = fields.assembled(_reference_stiffness(fields.element))
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
-        rotations = with_half_tangents(inertia.scheme, fields.share.rotations())
+        rotations = with_half_tangents(scheme, fields.share.rotations())
         self._times = StepProduct(C, rotations, A, fields.share.scratch)
-        self._ledger, self._rates, self._A = ledger, inertia.rates, A
+        self._ledger, self._rates, self._A = ledger, rates, A
 
     def in_cells(self) -> Sequence[InCells]:
         """Both matrices of the beams times the velocities of the step."""
@@ -128,17 +134,17 @@ class RayleighForces(OfMatrix):
 
 def damping_forces(
     of: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
-    inertia: Inertia | None,
+    rates: RatesInC | None,
 ) -> list[Term]:  # fmt: skip
     """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
     ledger.lost["damping"] += 0.0
     if isinstance(of, Rayleigh):
-        if inertia is None:
+        if rates is None:
             raise SceneError(
                 "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
                 "use KelvinVoigt, which acts in the time of a static run"
             )
-        return [RayleighForces(of, fields, A, ledger, inertia)]
+        return [RayleighForces(of, fields, scheme, A, ledger, rates)]
     grid = fields.share.grid
     beams = grid.scene.beams if of.beams is None else of.beams
     pairs = (zip(grid.cells_of(beam), grid.hinges(beam), strict=True) for beam in beams)

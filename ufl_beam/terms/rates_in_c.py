@@ -25,7 +25,7 @@ CHANGE, V, V_BEFORE, MORE = range(4)
 class RatesInC:
     """Velocities of a scene, those before the last step, and what else a scheme keeps; all in C.
 
-    They satisfy :class:`Rates`.  Arrays are copies; a new one that is set is copied, too.
+    They satisfy :class:`Rates`; arrays are copies.
 
     Attributes:
         c: ``rates`` of loops.h.
@@ -54,8 +54,7 @@ class RatesInC:
             zip(self._now, (first, self._slip, *more), strict=True), start=V
         ):
             self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
-        self.c.last_dt = math.inf
-        self.v = self.v_before = v
+        self.take(v, v, math.inf)
         self.keep()
 
     def _rate(self, k: int) -> Array:
@@ -67,18 +66,10 @@ class RatesInC:
         """Velocities."""
         return self._rate(V).copy()
 
-    @v.setter
-    def v(self, v: Array) -> None:
-        self._rate(V)[:] = v
-
     @property
     def v_before(self) -> Array:
         """Velocities before the last step."""
         return self._rate(V_BEFORE).copy()
-
-    @v_before.setter
-    def v_before(self, v: Array) -> None:
-        self._rate(V_BEFORE)[:] = v
 
     @property
     def more(self) -> tuple[Array, ...]:
@@ -96,9 +87,9 @@ class RatesInC:
         """Length of the last step, infinite before the first; s."""
         return float(self.c.last_dt)
 
-    @last_dt.setter
-    def last_dt(self, dt: float) -> None:
-        self.c.last_dt = dt
+    def take(self, v: Array, v_before: Array, last_dt: float) -> None:
+        """Set velocities, those before the last step, and its length."""
+        self._rate(V)[:], self._rate(V_BEFORE)[:], self.c.last_dt = v, v_before, last_dt
 
     def find(self, numbers: Any) -> None:
         """Write the numbers of the steps that ``scheme_numbers`` of loops.h is about."""
