@@ -118,7 +118,7 @@ class Rates(Protocol):
 
     @property
     def v(self) -> Array:
-        """Velocities; m/s, rad/s."""
+        """Velocities at the beginning of the step; m/s, rad/s."""
 
     @property
     def v_before(self) -> Array:
@@ -126,7 +126,7 @@ class Rates(Protocol):
 
     @property
     def more(self) -> tuple[Array, ...]:
-        """What is kept besides, as much as is known of :attr:`DynamicScheme.kept`."""
+        """Rates kept besides, as many as are known of :attr:`DynamicScheme.kept`."""
 
 
 class Coefficients(NamedTuple):

@@ -63,7 +63,7 @@ class RatesInC:
 
     @property
     def v(self) -> Array:
-        """Velocities."""
+        """Velocities of the accepted state."""
         return self._rate(V).copy()
 
     @property
@@ -73,7 +73,7 @@ class RatesInC:
 
     @property
     def more(self) -> tuple[Array, ...]:
-        """What else the scheme keeps, as much as is known of it."""
+        """Rates that the scheme keeps besides, as many as are known."""
         return tuple(self._rate(MORE + k).copy() for k in range(self.c.more))
 
     def keep(self, *more: Array) -> None:
