@@ -472,7 +472,7 @@ TABLE |= {
 RECORDS_OF_RUNS = {
     "Branch", "Buckling", "Connector", "CriticalPoint", "Cycles", "Decay", "Energy", "Envelope",
     "Event", "Extent", "Joint", "Modes", "Path", "Solution", "Study", "Support", "Tradeoff",
-    "Diagram", "DolfinxView", "Film", "Step",
+    "Coefficients", "Diagram", "DolfinxView", "Film", "Step",
 }  # fmt: skip
 """Made by runs and by functions of the package, not by users."""
 
