@@ -9,7 +9,8 @@ the first step has nothing left to do but to follow them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple, Protocol
 
@@ -337,7 +338,7 @@ class Stepper:
         """Let controllers and friction ask the scene, which has the state of C."""
         if self._state is not None and self._extras.ask is not None:
             self._state.t = self.c.t
-            self._lend(self._state)
+            self._state.q = partial(self._copy, self.c.q)  # type: ignore[assignment]
             self._together(self._extras.ask)
 
     def _note(self, step: Any, q1: Any, s: Any) -> None:
@@ -362,23 +363,23 @@ class Stepper:
 
     # -- the state -------------------------------------------------------------------------------
 
-    def _in_c(self, state: Stepping) -> _Taking:
-        return _Taking(self, state)
-
-    def enter(self, state: Stepping) -> None:
-        """Prepare for steps from a state."""
+    @contextmanager
+    def _in_c(self, state: Stepping) -> Iterator[None]:
+        """Context in which C takes steps from a state; then Python sees the one that follows."""
         self._state = state
         self.c.parts, self.c.failure, self._callbacks.error = 0, lib.SUCCEEDS, None
-
-    def leave(self, state: Stepping) -> None:
-        """Show Python the state."""
-        self._state = None
-        state.t = self.c.t
-        state.parts += self.c.parts
-        self.c.parts = 0
-        for one in self._watches:
-            one.seen = state.parts
-        self._lend(state)
+        try:
+            yield
+        except SystemError as error:
+            # Python's preconditioner under PETSc: its exception is still set when C returns.
+            raise error.__cause__ or error from None
+        finally:
+            self._state, state.t = None, self.c.t
+            state.parts += self.c.parts
+            for one in self._watches:
+                one.seen = state.parts
+            # Copied when Python asks for it; C leaves it alone until the next step.
+            state.q = partial(self._copy, self.c.q)  # type: ignore[assignment]
 
     def _kept(self, q: Array) -> KeptRows:
         """Rows of numbers, one for each step that C keeps."""
@@ -416,26 +417,6 @@ class Stepper:
         fill(self.c, prediction=state.prediction.c)
         self.c.t, self._last = state.t, (-2, np.zeros(0))
         give_back_memory(len(state.q))
-
-    def _lend(self, state: Stepping) -> None:
-        """Let Python copy the state when it asks for it; C leaves it alone until the next one."""
-        state.q = partial(self._copy, self.c.q)  # type: ignore[assignment]
-
-
-class _Taking:
-    """Context in which C takes steps."""
-
-    def __init__(self, stepper: Stepper, state: Stepping) -> None:
-        self._stepper, self._state = stepper, state
-
-    def __enter__(self) -> None:
-        self._stepper.enter(self._state)
-
-    def __exit__(self, kind: object, error: BaseException | None, trace: object) -> None:
-        self._stepper.leave(self._state)
-        # Python's preconditioner under PETSc: its exception is still set when C returns.
-        if isinstance(error, SystemError) and error.__cause__ is not None:
-            raise error.__cause__
 
 
 def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
