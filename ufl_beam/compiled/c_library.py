@@ -51,6 +51,7 @@ extern "Python" void arrive_in_python(void *handle, const double *x);
 extern "Python" int change_of_border_in_python(void *handle, const double *x);
 extern "Python" int border_is_met_in_python(void *handle);
 extern "Python" void run_in_python(void *handle);
+extern "Python" void begin_in_python(void *handle, double t, double dt);
 """
 
 

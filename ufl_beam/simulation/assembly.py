@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,7 +52,6 @@ class Assembly:
     fields: Fields  # on the cells of this process
     ledger: Ledger
     controllers: Controllers  # with their forces, and the limits of friction, in the step
-    rates: dict[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
     beams: list[Cells]  # those with material points first
     inelastic: list[InelasticBeams]  # those with material points
     yields: bool  # True if any process has such cells
@@ -66,14 +66,6 @@ class Assembly:
     def remembering(self) -> list[InelasticBeams | Links]:
         """Terms with internal variables."""
         return [*self.inelastic, *self.couplings]
-
-    def ask(self, now: Running, q: Array) -> None:
-        """Ask controllers and friction for forces and limits; note the rates of what may slip."""
-        self.controllers.ask(now)
-        if self.inertia is not None:
-            for one in self.couplings:
-                if isinstance(one.links[0].law, Coulomb):
-                    self.rates.update(zip(one.links, one.rates(q, self.inertia.v), strict=True))
 
     def internal_variables(self, q: Array, t: float) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""
@@ -181,9 +173,9 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))
 
     controllers = Controllers(share)
-    rates = dict(controllers.values)
+    rates = RatesInC(scheme, v) if has_inertia(scheme) else None
     connectors = Setting(
-        controllers.values, rates, scene.size, scheme, ledger, friction_repeats(scene), search
+        controllers.place, rates, scene.size, scheme, ledger, friction_repeats(scene), search
     )
     of_links = share, connectors, A
     coupled = together(lambda: [*couplings(*of_links), *guides(*of_links)])
@@ -191,20 +183,20 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     loads = _loads(scene, fields, scheme, ledger, A)
     if scene.works:
         loads.append(together(Works, fields, scheme, ledger, A, t0))
-    supports = Supports(share, scheme, ledger, A)
-    if has_inertia(scheme):
+    supports, inertia = Supports(share, scheme, ledger, A), None
+    if rates is not None and has_inertia(scheme):
         supports.stop(v)
-    inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
-    of_motion = None if inertia is None else inertia.rates
+        rates.take(v, v, math.inf)
+        inertia = Inertia(fields, scheme, A, ledger, rates)
     others: list[Term] = [*numerical, *([inertia] if inertia else [])]
     for damping in scene.damping:
-        others += damping_forces(damping, fields, *setting, of_motion)
+        others += damping_forces(damping, fields, *setting, rates)
     if scene.beams:
         ledger.state["stored"] += 0.0
     parts = share, A, beams, coupled, loads, others, supports, search
-    equation = StepEquation(*parts, of_motion)
+    equation = StepEquation(*parts, rates)
     return Assembly(
-        fields, ledger, controllers, rates, beams, inelastic, bool(groups), coupled, loads, inertia,
+        fields, ledger, controllers, beams, inelastic, bool(groups), coupled, loads, inertia,
         supports, equation, _cell_forces(share, equation.terms),
     )  # fmt: skip
 

@@ -5,9 +5,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 
+from ufl_beam.compiled.c_library import doubles
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.model.connector_laws import Controller, Coulomb, Running
@@ -21,32 +23,52 @@ class Controllers:
     """Forces of controllers and limits of friction in a step; the same on all processes.
 
     Attributes:
-        values: The forces and limits; N or N m.
-        fresh: Controllers that were evaluated since this was emptied.
+        numbers: The forces and limits, where C finds them; N or N m.
+        fresh: Whether controllers were evaluated since these flags were cleared; as ``numbers``.
     """
 
     def __init__(self, share: Share) -> None:
         links = share.grid.scene.links
         asked = [link for link in links if isinstance(link.law, Controller | Coulomb)]
-        self.values: dict[Connector, float] = dict.fromkeys(asked, 0.0)
-        self.fresh: set[Connector] = set()
+        self._at = {link: i for i, link in enumerate(asked)}
+        constant = [link for link in asked if isinstance(link.law, Coulomb) and not link.law.joint]
+        self.numbers, self.fresh = np.zeros(len(asked)), np.zeros(len(asked), dtype=np.int32)
+        for link in constant:
+            self.numbers[self._at[link]] = link.law.force  # type: ignore[union-attr]
         self._sampled = [link for link in asked if _sample(link)]
-        self._each_step = [link for link in asked if not _sample(link)]
-        self._numbers = np.array([i for i, x in enumerate(links) if x in self.values], dtype=int)
+        self._each_step = [x for x in asked if not _sample(x) and x not in constant]
+        self._numbers = np.array([i for i, x in enumerate(links) if x in self._at], dtype=int)
         # Of each that has a sample time: time of the first sample (s), number of the last one.
         self._samples = np.full((len(self._sampled), 2), math.nan)
 
+    @property
+    def values(self) -> dict[Connector, float]:
+        """The forces and limits by connector."""
+        return dict(zip(self._at, self.numbers.tolist(), strict=True))
+
+    @property
+    def asks(self) -> bool:
+        """True if anything is to be evaluated when steps begin."""
+        return bool(self._each_step or self._sampled)
+
+    def place(self, link: Connector) -> Any:
+        """Address of the number of a connector."""
+        return doubles(self.numbers) + self._at[link]
+
     def ask(self, now: Running) -> None:
         """Evaluate what is due at the time ``now.t``; all processes call it together."""
-        values = {link: link.law.ask(now, link) for link in self._each_step}
-        self.values.update(values)
-        self.fresh.update(values)
+        for link in self._each_step:
+            self._ask(link, now)
         for i, link in enumerate(self._sampled):
             first, number = self._due(i, now.t)
             if number != self._samples[i, 1]:
-                self.values[link] = link.law.ask(now, link)
-                self.fresh.add(link)
+                self._ask(link, now)
                 self._samples[i] = first, number
+
+    def _ask(self, link: Connector, now: Running) -> None:
+        at, law = self._at[link], link.law
+        self.numbers[at] = law.ask(now, link)  # type: ignore[union-attr]
+        self.fresh[at] = 1
 
     def _due(self, i: int, t: float) -> tuple[float, int]:
         """Time of the first sample, and the number of the one that holds from ``t`` on."""
@@ -75,14 +97,14 @@ class Controllers:
 
         Where a run begins at another time, sampling begins anew.
         """
-        if not self.values:
+        if not len(self.numbers):
             return
-        held = np.full((len(self.values), 4), math.nan)
-        held[:, 0], held[:, 3] = [*self.values.values()], t
-        sampled = [i for i, link in enumerate(self.values) if _sample(link)]
+        held = np.full((len(self.numbers), 4), math.nan)
+        held[:, 0], held[:, 3] = self.numbers, t
+        sampled = [self._at[link] for link in self._sampled]
         held[sampled, 1:3] = self._samples
         rows = memory.known_rows("asked", self._numbers, held)
-        self.values.update(zip(self.values, map(float, rows[:, 0]), strict=True))
+        self.numbers[:] = rows[:, 0]
         if np.all(rows[:, 3] == t):
             self._samples[:] = rows[sampled, 1:3]
 

@@ -105,7 +105,6 @@ class Simulation(StateView):
         q, v, internal = initial_state(grid, start)
         self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], together)
         self.fields, self.ledger, self.controllers = parts.fields, parts.ledger, parts.controllers
-        self.asked = parts.controllers.values
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
         self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
         self.equation, self.terms = parts.equation, parts.equation.terms
@@ -148,7 +147,7 @@ class Simulation(StateView):
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
         notes = bool(self._watch) or self._copies is not None
         extras = Extras(
-            self._ask if self.asked else None, self.controllers.stops,
+            self.ask if self.controllers.asks else None, self.controllers.stops,
             self._require_held if self._loose else None, self._note if notes else None,
         )  # fmt: skip
         self._applies = fresh and begins_loaded(scene, scheme, t0)
@@ -269,13 +268,9 @@ class Simulation(StateView):
         """Configuration at the beginning of the last step."""
         return self.prediction.q_before if self._begun_at is None else self._begun_at
 
-    def _ask(self) -> None:
-        self._assembly.ask(self, self.q)
-
     def ask(self) -> None:
         """Ask controllers and friction for forces and limits in the next step, on all processes."""
-        if self.asked:
-            self._assembly.ask(self, self.q)
+        self.controllers.ask(self)
 
     def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
         """End the run where it is, because even the smallest step, to ``end``, failed.

@@ -91,21 +91,18 @@ class Inertia(OfMatrix):
 
     Attributes:
         rates: Velocities, and what else the scheme keeps.
-
-    Raises:
-        SceneError: A scheme makes something else of velocities than sums of multiples of them.
     """
 
     kind = "inertia"
 
     def __init__(
-        self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
+        self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, rates: RatesInC
     ) -> None:
         rotations = with_half_tangents(scheme, fields.share.rotations())
         self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
         self._fields, self._ledger, self._A, self.scheme = fields, ledger, A, scheme
-        self.rates = RatesInC(scheme, v)
-        if self.rates.slips:
+        self.rates = rates
+        if rates.slips:
             ledger.lost["numerical"] += 0.0
 
     def in_cells(self) -> Sequence[InCells]:

@@ -1,29 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors that hold, drive, push, damp, rub and stop."""
+"""Laws of connectors that hold, drive, push, damp and rub."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.mechanics.time_schemes import Step, way_to_rest
-from ufl_beam.model.connector_laws import (
-    HELD,
-    Actuator,
-    Controller,
-    Coulomb,
-    Damper,
-    Guide,
-    Motor,
-    Stop,
-)
+from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
+from ufl_beam.model.connector_laws import HELD, Actuator, Controller, Coulomb, Damper, Guide, Motor
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.time_functions import value_at
-from ufl_beam.terms.connector_responses import Response, Rows, Setting, respond
+from ufl_beam.terms.connector_responses import Response, Setting, respond
 from ufl_beam.terms.phases import Callbacks
 
 CREEP = 1e-12
@@ -36,34 +25,16 @@ Only where several places that stick hold the same motion: so they share the for
 class _Held(Response):
     """Constraints of joints and guides: the motion is zero, and there is no work."""
 
-    steady = True
-
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
-        return {}
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        return 1.0, 0.0, 0.0
-
 
 class _Driven(Response):
     """Motors: the motion is given."""
 
-    steady = True
     _part, _entry, _sign = "supplied", "motors", -1.0
 
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
         motors = zip(self._laws, self._links, strict=True)
         wanted = callbacks.of_time([(law.motion, link) for law, link in motors])
-        return {"wanted_motion": wanted, **self._entry_in_steps()}
-
-    def begin(self, e0: Array, step: Step) -> None:
-        super().begin(e0, step)
-        t, motors = step.motion_time, zip(self._laws, self._links, strict=True)
-        wanted = np.array([value_at(law.motion, t, link) for law, link in motors])
-        self._target = e0 + step.fraction * (wanted - e0)
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        return 1.0, 0.0, self._target
+        return {"wanted_motion": wanted, **super().in_steps(callbacks)}
 
 
 @respond.register(Motor)
@@ -75,29 +46,19 @@ def _(law: Motor | Guide, links: Sequence[Connector], setting: Setting) -> Respo
 class _Given(Response):
     """Base of laws that give the force."""
 
-    steady = True
     _part, _sign = "supplied", -1.0
 
     def _prepare(self, law: Any) -> None:
-        # Acting, at the end of the step, and at that of the last one.
-        self._force, self._end, self._reached = np.zeros((3, len(self._links)))
+        self._end, self._reached = np.zeros((2, len(self._links)))  # of this step, of the last one
 
-    @abstractmethod
-    def _wanted(self, law: Any, link: Connector, step: Step) -> float:
-        """The force at the end of all parts of a step."""
+    def _wanted(self, callbacks: Callbacks) -> Any:
+        """Return ``time_function`` of loops.h of the forces."""
+        actuators = zip(self._laws, self._links, strict=True)
+        return callbacks.of_time([(law.force, link) for law, link in actuators])
 
-    def begin(self, e0: Array, step: Step) -> None:
-        super().begin(e0, step)
-        wanted = -np.array([self._wanted(link.law, link, step) for link in self._links])
-        self._end[:] = self._reached + step.fraction * (wanted - self._reached)
-        self._force[:] = self._reached + step.at * (self._end - self._reached)
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        return 0.0, 1.0, self._force
-
-    def accept(self, e1: Array, work: float) -> None:
-        super().accept(e1, work)
-        self._reached[:] = self._end
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
+        ends = {"end": self._end, "reached": self._reached}
+        return {"wanted_force": self._wanted(callbacks), **ends, **super().in_steps(callbacks)}
 
     def state(self) -> Array:
         """The forces at the end of the last step."""
@@ -113,39 +74,29 @@ class _Pushed(_Given):
 
     _entry = "loads"
 
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
-        actuators = zip(self._laws, self._links, strict=True)
-        wanted = callbacks.of_time([(law.force, link) for law, link in actuators])
-        ends = {"end": self._end, "reached": self._reached}
-        return {"wanted_force": wanted, **ends, **self._entry_in_steps()}
-
-    def _wanted(self, law: Any, link: Connector, step: Step) -> float:
-        return value_at(law.force, step.load_time, link)
-
 
 @respond.register(Controller)
 class _Controlled(_Given):
-    """Controllers: the force is what they said at the beginning of the step."""
+    """Controllers: the force is the one that they returned when the step began."""
 
     _entry = "controllers"
 
-    def _wanted(self, law: Any, link: Connector, step: Step) -> float:
-        return self._setting.asked[link]
+    def _wanted(self, callbacks: Callbacks) -> Any:
+        self._always = np.zeros(1)
+        wanted = ffi.new("time_function[]", len(self._links))
+        for place, link in zip(wanted, self._links, strict=True):
+            place.points, place.t, place.y = 1, doubles(self._always), self._setting.asked(link)
+        return wanted
 
 
 @respond.register(Damper)
 class _Damped(Response):
     """Dampers: the force is viscosity times the mean rate."""
 
-    steady = True
     _entry = "damping"
 
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
-        return {"viscosity": self._numbers("viscosity"), **self._entry_in_steps()}
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        factor = self._numbers("viscosity") / self._dt
-        return -factor, 1.0, -factor * self._e0
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
+        return {"viscosity": self._numbers("viscosity"), **super().in_steps(callbacks)}
 
 
 @respond.register(Coulomb)
@@ -155,85 +106,31 @@ class _Rubbing(Response):
     _entry = "friction"
 
     def _prepare(self, law: Any) -> None:
-        self._slip: Array = np.zeros(len(self._links))
-        self._accepted: Array = self._slip
-        self._sticks = np.zeros(len(self._links), dtype=bool)
-        self._tiny = 1e-14 * self._lengths()
-        self._softness = (CREEP if self._setting.friction_repeats else 0.0) * self._lengths()
+        n, setting = len(self._links), self._setting
+        self._slip, self._accepted, way, creep = np.zeros((4, n))
+        self._sticks, against = np.zeros((2, n), dtype=np.int32)
+        softness = CREEP if setting.friction_repeats else 0.0
+        limits = [setting.asked(link) for link in self._links]
+        self._c = struct(
+            "friction", number=n, limit=ffi.new("double *[]", limits), slip=self._slip,
+            accepted=self._accepted, way=way, creep=creep, softness=softness * self._lengths(),
+            tiny=1e-14 * self._lengths(), sticks=self._sticks, against=against,
+            switched=setting.search.switched, force=np.zeros(n), rows=np.zeros((n, 3)),
+        )  # fmt: skip
+        if setting.rates is not None:
+            fill(self._c, rates=setting.rates.c)
+        self.in_c = {"friction": self._c}
+
+    def know(self, couplings: Any) -> None:
+        rate, v = couplings.rate_of_motion, couplings.velocities
+        fill(self._c, rate=rate.cells, at_v=rate.position(v))
+
+    def about_force(self, rows: Array) -> Array:
+        return np.where(self._sticks != 0, 0.0, 1.0)
 
     def state(self) -> Array:
         """Which way each slips."""
         return self._accepted[:, None]
 
     def restore(self, rows: Array) -> None:
-        self._slip = self._accepted = rows[:, 0].copy()
-
-    def begin(self, e0: Array, step: Step) -> None:
-        super().begin(e0, step)
-        setting = self._setting
-        self._limit = limit = np.array([setting.asked[link] for link in self._links])
-        self._creep = self._softness / np.where(limit > 0, limit, np.inf)
-        # With this way the velocity at the end is zero; with none, that before would come back.
-        rates = np.array([setting.rates[link] for link in self._links])
-        self._way = way_to_rest(setting.scheme, step.dt) * rates
-        self.again()
-
-    def again(self) -> None:
-        """Slip as before the step; an attempt that failed tells nothing."""
-        self._slip = self._accepted
-        self._against = np.zeros(len(self._links), dtype=bool)
-        self._guessed = True
-
-    def accept(self, e1: Array, work: float) -> None:
-        super().accept(e1, work)
-        self._accepted = self._slip
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """Stick while the force is below the limit; slip until the sliding velocity reverses."""
-        step = e1 - self._e0
-        stuck = self._slip == 0
-        back = ~stuck & (self._slip * step < -self._tiny)
-        over = stuck & (np.abs(λ) > self._limit * (1 + 1e-12))
-        # Coming to rest must not give energy; if it did, the place is held at once in this step.
-        # The force of the guess does not decide this: it belongs to another motion.
-        if not self._guessed:
-            self._against |= stuck & (λ * self._way < 0)
-        self._guessed = False
-        self._slip = np.where(back, 0.0, np.where(over, np.sign(λ), self._slip))
-        sticks = (self._slip == 0) & (self._limit > 0)
-        if (sticks != self._sticks).any():
-            self._sticks, self._setting.search.switched[0] = sticks, 1
-        rest = self._e0 + np.where(self._against, 0.0, self._way)
-        return (
-            np.where(sticks, 1.0, 0.0),
-            np.where(sticks, -self._creep, 1.0),
-            np.where(sticks, rest, self._slip * self._limit),
-        )
-
-
-@respond.register(Stop)
-class _Stopped(Response):
-    """Contact outside an interval: elastic, so that what it takes it gives back."""
-
-    def _prepare(self, law: Any) -> None:
-        self._stiffness = self._numbers("stiffness")
-        self._ends = self._numbers("low"), self._numbers("high")
-
-    def _beyond(self, e: Array) -> Array:
-        """Length by which a motion is outside of the interval."""
-        return np.asarray(e - np.clip(e, *self._ends))
-
-    def _energy(self, e: Array) -> float:
-        return float(self._stiffness @ self._beyond(e) ** 2) / 2
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """The force that makes the work of the step what the contact stores."""
-        force, slope = self._setting.scheme.secant(self._beyond, self._e0, e1)
-        force, slope = self._stiffness * force, self._stiffness * slope
-        return -slope, 1.0, force - slope * e1
-
-    def add_state(self, e: Array) -> None:
-        self._setting.ledger.state["stored"] += self._energy(e)
-
-    def change(self, e1: Array, work: float) -> float:
-        return self._energy(e1) - self._energy(self._e0)
+        self._slip[:] = self._accepted[:] = rows[:, 0]

@@ -7,29 +7,26 @@ held has a row about e, all other laws have one about λ, linear in e around the
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from abc import ABC
+from collections.abc import Callable, Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Callbacks
-
-Rows = tuple[Any, Any, Any]
-"""α, β, γ of some connectors: arrays or numbers."""
-
+from ufl_beam.terms.rates_in_c import RatesInC
 
 class Setting(NamedTuple):
     """Arguments that all responses are made with."""
 
-    asked: Mapping[Connector, float]  # forces of controllers, limits of friction; N or N m
-    rates: Mapping[Connector, float]  # of motions with friction as the step begins; m/s or rad/s
+    asked: Callable[[Connector], Any]  # places of forces of controllers and limits of friction
+    rates: RatesInC | None  # velocities; None in statics
     size: float  # of the scene; m
     scheme: Scheme
     ledger: Ledger
@@ -44,7 +41,6 @@ class Response(ABC):
     ``_entry`` of a part of the ledger, if that has a name.
     """
 
-    steady = False  # True if the rows stay the same during a step
     in_c: Mapping[str, Any] = {}  # data of laws evaluated in C, by names in ``couplings``, loops.h
     must_dissipate = False  # True if require_dissipation has to be called before a step is accepted
     name_in_files = ""  # of the internal variables, if it is not that of the class
@@ -57,18 +53,17 @@ class Response(ABC):
         self._entries = getattr(setting.ledger, self._part)
         if self._entry:
             self._entries[self._entry] += 0.0
-        self._e0: Array = np.zeros(len(links))
         self._prepare(law)
 
     def _prepare(self, law: Any) -> None:
         """Prepare the response; called once."""
 
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
-        """Fields of ``coupling_term`` of loops.h for steps without Python; None where they need it.
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
+        """Return fields of ``coupling_term`` of loops.h.
 
         Names of entries of the ledger are those of ``inelastic_term``.
         """
-        return None
+        return self._entry_in_steps() if self._entry else {}
 
     def _entry_in_steps(self) -> dict[str, Any]:
         """Those of them that say where the work of the forces is entered."""
@@ -82,26 +77,24 @@ class Response(ABC):
         """Motions that are large: the size of the scene, or a radian."""
         return np.where([link.turns for link in self._links], 1.0, self._setting.size)
 
-    def begin(self, e0: Array, step: Step) -> None:
-        """Begin a step at the motions ``e0``."""
-        self._e0, self._dt = e0, step.dt
+    def know(self, couplings: Any) -> None:
+        """Take arrays of the connectors, and forms on them, that the laws need."""
 
-    @abstractmethod
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """α, β, γ around an iterate."""
+    @property
+    def asks_at_ends(self) -> bool:
+        """True if :meth:`take` is to be called when a step is accepted."""
+        return False
 
-    def accept(self, e1: Array, work: float) -> None:
-        """Take the end of the step as the new state; ``work`` is what the connectors have taken."""
-        if self._entry:
-            self._entries[self._entry] += self._sign * work
+    def take(self, e1: Array) -> None:
+        """Take the end of a step at the motions ``e1``, before C does; this may raise."""
 
     def about_force(self, rows: Array) -> Array:
         """Factors by which rows about the force are divided, zero for rows about the motion.
 
-        ``rows`` are the latest ones that Python has put; (num_links, 3).
+        ``rows`` are the latest ones; (num_links, 3).
         """
-        about_motion = np.array([link.holds for link in self._links]) & (rows[:, 1] != 1.0)
-        return np.where(about_motion, 0.0, 1.0)
+        of_force = rows[:, 1]
+        return np.divide(1.0, of_force, out=np.zeros(len(rows)), where=of_force != 0.0)
 
     def motion(self, e: Array) -> Array:
         """Motions of the accepted state as solutions show them; ``e`` are those of the nodes.
@@ -109,16 +102,6 @@ class Response(ABC):
         A view, which later steps change.
         """
         return e
-
-    def again(self) -> None:
-        """Begin the step again: forget what its iterates have tried."""
-
-    def add_state(self, e: Array) -> None:
-        """Enter what is stored."""
-
-    def change(self, e1: Array, work: float) -> float:
-        """Energy that the step stores, dissipates or gives away; J."""
-        return work
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Energy dissipated plastically in a step to the motions ``e1``; J."""

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import ufl
@@ -14,11 +15,10 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.dolfinx_compat import line_mesh
+from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
-from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import HELD, ForceLaw, Law, RigidPlastic, Spring
 from ufl_beam.terms import connector_laws, force_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_responses import Setting, respond
@@ -59,8 +59,10 @@ class Couplings(Links):
             self._form, (forms.work, forms.tangent, forms.motion)
         )
         self._tangent.place(A)
-        self._weight_of_before = scheme.weight_of_before
         self._e, self._now, self._rows = np.zeros(n), np.zeros(n), np.zeros((n, 3))
+        self._rows[:, 0] = 1.0  # held, until a law says something else
+        for kernel in (self._work, self._tangent):
+            kernel.put(forms.row, self._rows)
         self._in_c = struct(
             "couplings", number=n, link=np.arange(n, dtype=np.int32), dofs=self._dofs,
             force=self._forces_at.copy(), size=setting.size,
@@ -68,10 +70,10 @@ class Couplings(Links):
             work=self._work.cells, tangent=self._tangent.cells, motion=self._value.cells,
             row=self._work.position(forms.row), row_of_tangent=self._tangent.position(forms.row),
             by_cell=np.zeros(n), e0=self._e, e1=self._now, before=self._before,
-            taken=self.work, rate=self.rate, weight_of_before=self._weight_of_before,
+            taken=self.work, rate=self.rate, weight_of_before=scheme.weight_of_before,
             **self.response.in_c,
         )  # fmt: skip
-        self._asks_python = not self.response.steady and not self.response.in_c
+        self.response.know(self)
 
     def _form(self, form: ufl.Form) -> Kernel:
         """A form on the connectors, with their numbers."""
@@ -81,44 +83,56 @@ class Couplings(Links):
             kernel.put(self._forms.numbers, self._numbers)
         return kernel
 
+    @property
+    def velocities(self) -> fem.Function:
+        """Function of :attr:`rate_of_motion` that has the velocities."""
+        return self._forms.u
+
+    @property
+    def motions(self) -> tuple[Array, Array]:
+        """Motions in the accepted state and in the latest iterate, as C has them."""
+        return self._e, self._now
+
     # -- in C ----------------------------------------------------------------------------------
 
-    def loops(self) -> tuple[Loop, Loop | None] | None:
-        """C loops of the laws that are steady or of material points."""
-        if self._asks_python:
-            return None
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """C loops of forces and rows, and of their derivatives."""
         return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over what is held, driven, pushed or damped, springs and rigid-plastic ones."""
+        """Loops over the connectors; where laws of a user have a history, they are asked, too."""
         response = self.response
-        if (of_law := response.in_steps(callbacks)) is None:
-            return super().phases(callbacks)
+        of_law = response.in_steps(callbacks)
         fields = {name for name, _ in ffi.typeof("coupling_term").fields}
         mine = {name: x for name, x in of_law.items() if name in fields}
         points = struct("inelastic_term", **{k: x for k, x in of_law.items() if k not in fields})
         c = struct("coupling_term", links=self._in_c, points=points, **mine)
 
-        if not of_law:  # rows that stay
-            self._put(*response.rows(self._e, self._before))
         begin = beginning((self._work, self._tangent), self._forms.q0)
         phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")
         first, accept, state = ([loop(name, c)] for name in phases)
         admits = loop("springs_dissipate", c) if response.must_dissipate else None
         change, opens, again = loop("change_of_couplings", c), None, None
+        if response.asks_at_ends:
+            accept.insert(0, callbacks.phase(self._ask_at_end))
         if response.opens:
             names = ("points", "slips", "way_before")
             found = {**response.in_c, "slips": response.in_c.get("rigid_plastic"), **of_law}
             opens = {name: found[name] for name in names if found.get(name) is not None}
             if "way_before" in opens:
                 opens["way_before"] = integers(opens["way_before"])
-        if "rigid_plastic" in response.in_c:
-            again = loop("begin_slips_again", c)
+        if response.in_c.keys() & {"rigid_plastic", "friction", "asked"}:
+            again = loop("begin_couplings_again", c)
         return Phases([*begin, *first], accept, state, change, opens, admits, again)
 
     def demand(self) -> Loop:
-        """The loop of :meth:`excess`."""
+        """The loop that says how much an iterate misses of the laws."""
         return loop("missed_by_couplings", self._in_c)
+
+    def _ask_at_end(self, step: Any, q1: Any, s: Any) -> None:
+        """Let laws of a user take the end of a step, before anything is accepted."""
+        lib.find_motions(self._in_c, q1)
+        self.response.take(self._now)
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -128,83 +142,40 @@ class Couplings(Links):
         return self._now.copy()
 
     @cached_property
-    def _rate(self) -> Kernel:
+    def rate_of_motion(self) -> Kernel:
         """The rates of the motions; friction asks for them."""
         return self._form(self._forms.rate)
 
     def rates(self, q: Array, v: Array) -> Array:
         """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
         rates = np.zeros(len(self.links))
-        self._rate.set(self._forms.u, v)
-        self._rate.add(q, rates)
+        self.rate_of_motion.set(self._forms.u, v)
+        self.rate_of_motion.add(q, rates)
         return rates
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Put minus the change of the motions where the row is about the force."""
-        about_force = self.response.about_force(self._rows)
+        about_force = self.response.about_force(self.rows(q))
         if about_force.any():
             works[self._forces_at] = np.where(
                 about_force != 0.0, -about_force * self.rates(q, v), works[self._forces_at]
             )
 
-    def begin(self, step: Step) -> None:
-        """Remember the motions at the beginning."""
-        self._work.set(self._forms.q0, step.q0)
-        self._tangent.set(self._forms.q0, step.q0)
-        self._dt = step.dt
-        self.response.begin(self._e, step)
-        if self.response.steady:
-            self._put(*self.response.rows(self._e, self._before))
-
-    def _put(self, *rows: Array | float) -> None:
-        for column, numbers in enumerate(rows):
-            self._rows[:, column] = numbers
-        for kernel in (self._work, self._tangent):
-            kernel.put(self._forms.row, self._rows)
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces on the nodes, and the rows of the laws."""
-        if self._asks_python:
-            self._put(*self.response.rows(self.motion(q1), self.force(q1)))
-        lib.add_couplings_force(self._in_c, doubles(q1), doubles(r))
-
-    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
-        """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``force``."""
-        missed: float = lib.missed_by_couplings(self._in_c, doubles(q), doubles(r), force, moved)
-        return missed
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the derivative; the rows are those of the latest residual."""
-        self._tangent.add(q1, self._A.data)
+    def rows(self, q: Array) -> Array:
+        """Rows of the laws around ``q``; (num_links, 3)."""
+        lib.find_rows(self._in_c, doubles(q), doubles(self._rows))
+        return self._rows
 
     def _kept_motion(self, q: Array) -> Array:
         """Motions of the accepted state as solutions show them."""
         return self.response.motion(self._e)
 
-    def _taken(self, q1: Array) -> Array:
-        weight = self._weight_of_before
-        force = weight * self._before + (1 - weight) * self.force(q1)
-        return np.asarray(force * (self.motion(q1) - self._e))
-
-    def change(self, q1: Array) -> float:
-        """Energy that the connectors take in the step to ``q1``; J."""
-        return self.response.change(self.motion(q1), float(self._taken(q1).sum()))
-
-    def effort(self, q1: Array) -> float:
-        """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
-        return float(np.abs(self._taken(q1)).sum())
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter what was supplied or lost."""
-        taken = float(lib.commit_couplings(self._in_c, doubles(q1), self._dt))
-        self.response.accept(self._e, taken)
-
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         change, e = self._tangent_change, self.motion(q1)
-        self._put(*self.response.rows(e, self.force(q1)))
+        rows = self.rows(q1)
         bends = self.response.bends(e)[:, None]
-        for function, values in ((self._forms.row, self._rows), (self._forms.bend, bends)):
+        for function, values in ((self._forms.row, rows), (self._forms.bend, bends)):
             if change.uses(function):
                 change.put(function, values)
         change.set(self._forms.u, u)
@@ -222,10 +193,6 @@ class Couplings(Links):
         """Begin at the motions of a configuration."""
         self._e[:] = self.motion(q)
         self.response.start(self._e)
-
-    def add_state(self, q: Array) -> None:
-        """Enter what is stored."""
-        self.response.add_state(self._e)
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Motions, forces and works, and what the laws remember."""

@@ -97,6 +97,11 @@ class Asked:
             ) from None
         return force, state
 
+    @property
+    def stores(self) -> bool:
+        """True if the law states an energy."""
+        return self._stored is not None
+
     def stored(self, motion: float) -> float:
         """The energy that can be had back; J."""
         if self._stored is None:
@@ -170,48 +175,63 @@ class AskedLaws(Response):
     def _prepare(self, law: Any) -> None:
         numbers = zip(self._links, self._laws, self._lengths(), strict=True)
         self._each = [Asked(*each, self._setting.scheme.load_weight) for each in numbers]
-        self._held = 0.0
+        n = len(self._links)
+        self._held, self._force, self._rows = np.zeros(1), np.zeros(n), np.zeros((n, 3))
+        self._rows[:, 1] = 1.0
+        self._c = struct("asked_laws", force=self._force, rows=self._rows, held=self._held)
+        self.in_c = {"asked": self._c}
+        self._setting.ledger.state["stored"] += 0.0
 
-    def begin(self, e0: Array, step: Step) -> None:
-        """Begin a step at the motions ``e0``."""
-        super().begin(e0, step)
-        t, part = step.load_time, step.fraction * step.at
-        if part != 1.0:  # a path, whose parts are one, has no beginning in time
-            t = step.t0 + part * (t - step.t0)
-        for i, one in enumerate(self._each):
-            one.begin(e0[i], t, step.dt)
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
+        """The functions, which C calls."""
+        handle = callbacks.handle
+        fill(
+            self._c, begin=lib.begin_in_python, find_rows=lib.run_in_python, again=lib.run_in_python
+        )
+        self._c.begin_self, self._c.rows_self = handle(self._begin), handle(self._find_rows)
+        self._c.again_self = handle(self._again)
+        return {**super().in_steps(callbacks), "stored": self._setting.ledger.state.pointer("stored")}
 
-    def again(self) -> None:
-        """Forget the iterates of the step."""
+    def know(self, couplings: Any) -> None:
+        """Take the arrays of motions in the accepted state and in the iterate."""
+        self._e0, self._e1 = couplings.motions
+
+    def _begin(self, t: float, dt: float) -> None:
+        for one, e0 in zip(self._each, self._e0.tolist(), strict=True):
+            one.begin(e0, t, dt)
+
+    def _again(self) -> None:
         for one in self._each:
             one.again()
 
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """The laws around the iterate."""
-        lines = [one.line(e1[i], λ[i]) for i, one in enumerate(self._each)]
-        slope, intercept = np.array(lines).T
-        return -slope, 1.0, intercept
+    def _find_rows(self) -> None:
+        """Put the laws around the iterate into the rows of C."""
+        motions = zip(self._each, self._e1.tolist(), self._force.tolist(), strict=True)
+        for row, (one, e1, λ) in zip(self._rows, motions, strict=True):
+            slope, intercept = one.line(e1, λ)
+            row[0], row[2] = -slope, intercept
 
     def bends(self, e1: Array) -> Array:
         """Derivatives of the slopes."""
         return np.array([one.bend(e1[i]) for i, one in enumerate(self._each)])
 
-    def accept(self, e1: Array, work: float) -> None:
-        """Enter what is not stored of the work, and take the internal variables."""
-        before = self._held
-        for i, one in enumerate(self._each):
-            if one.state.size:
-                one.state = one.after(e1[i])
-        self._held = self._energy(e1)
-        super().accept(e1, work - (self._held - before))
+    @property
+    def asks_at_ends(self) -> bool:
+        """True if something is to do when a step is accepted."""
+        return any(one.state.size or one.stores for one in self._each)
 
-    def _energy(self, e: Array) -> float:
-        return sum([one.stored(e[i]) for i, one in enumerate(self._each)], 0.0)
+    def take(self, e1: Array) -> None:
+        """Take the internal variables after a step to the motions, and enter what is stored."""
+        states = [one.after(x) for one, x in zip(self._each, e1.tolist(), strict=True)]
+        before = float(self._held[0])
+        for one, state in zip(self._each, states, strict=True):
+            one.state = state
+        self.start(e1)
+        self._entries[self._entry] -= float(self._held[0]) - before
 
-    def add_state(self, e: Array) -> None:
-        """Enter the stored energy."""
-        self._held = self._energy(e)
-        self._setting.ledger.state["stored"] += self._held
+    def start(self, e: Array) -> None:
+        """Find the energy that is stored at these motions."""
+        self._held[0] = sum(one.stored(x) for one, x in zip(self._each, e.tolist(), strict=True))
 
     def state(self) -> Array:
         """Internal variables of the accepted state."""

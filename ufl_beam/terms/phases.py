@@ -200,6 +200,12 @@ def run_in_python(handle: Any) -> None:
 
 
 @from_c()
+def begin_in_python(handle: Any, t: float, dt: float) -> None:
+    """Callback of C, declared in c_library.py."""
+    ffi.from_handle(handle)[1](t, dt)
+
+
+@from_c()
 def phase_in_python(handle: Any, step: Any, q1: Any, s: Any) -> None:
     """Callback of C, declared in c_library.py."""
     ffi.from_handle(handle)[1](step, q1, s)

@@ -119,7 +119,7 @@ class RigidPlasticResponse(Response):
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
 
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
         """The laws, and what they enter."""
         ledger = self._ledger
         entries = {"hinges": ledger.lost.pointer("hinges")}
@@ -130,39 +130,6 @@ class RigidPlasticResponse(Response):
         of_law = {"dt_of_law": INPUTS.index("dt"), "way_before": self._way_before}
         of_law["hardened"] = self._stored
         return {**of_law, "loss": self._loss, **entries}
-
-    # -- the step ------------------------------------------------------------------------------
-
-    def begin(self, e0: Array, step: Step) -> None:
-        """Connectors that slipped in the last step go on."""
-        self._at["dt"][:] = step.dt
-        self.again()
-
-    def again(self) -> None:
-        """Go on from the accepted state."""
-        self._way[:] = self._way_before
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """Rows of the latest iterate, which C has set."""
-        return self._rows[:, 0], self._rows[:, 1], self._rows[:, 2]
-
-    def about_force(self, rows: Array) -> Array:
-        """Factors of the rows of those that slip, see rigid_plastic.c."""
-        return np.where(self._way == 0, 0.0, -self._slope)
-
-    def accept(self, e1: Array, work: float) -> None:
-        """Commit the slips of the step."""
-        lib.commit_rigid_plastic(self._c, doubles(e1), doubles(self._sums))
-        dissipated, lost, self._stored[0] = self._sums.tolist()
-        self._way_before[:] = self._way * self._slipped
-        self._ledger.lost["hinges"] += dissipated
-        if self._loss:
-            self._ledger.lost["numerical"] += self._loss * lost
-
-    def add_state(self, e: Array) -> None:
-        """Enter the energy that hardening stores."""
-        if self._hardens:
-            self._ledger.state["hardening"] += float(self._stored[0])
 
     # -- what has slipped ----------------------------------------------------------------------
 

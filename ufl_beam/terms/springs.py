@@ -41,31 +41,12 @@ class _Sprung(Response):
         self.in_c = {"points": self.points.c}
         self.opens = self.points.softens
 
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any] | None:
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
         return self.points.in_steps(self._setting.ledger)
 
     def _at(self, e: Array) -> Array:
         self._strains[:, 0] = e
         return self._strains
-
-    def begin(self, e0: Array, step: Step) -> None:
-        self.points.begin(step.dt)
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        r, D = self.points.respond(self._at(e1))
-        return -D[:, 0], 1.0, r[:, 0] - D[:, 0] * e1
-
-    def accept(self, e1: Array, work: float) -> None:
-        self.points.respond(self._at(e1))
-        self.points.accept()
-        self.points.enter_losses(self._setting.ledger)
-
-    def add_state(self, e: Array) -> None:
-        self.points.enter_stored(self._setting.ledger)
-
-    def change(self, e1: Array, work: float) -> float:
-        self.points.respond(self._at(e1))
-        return self.points.change()
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         self.points.respond(self._at(e1))

@@ -34,15 +34,62 @@ static void set_rows_of_springs(const couplings *c)
   }
 }
 
-/* The laws of springs and rigid-plastic connectors around their motions at q. */
+/* Rows of dry friction at the motions e1: a connector sticks while the force is below the limit, and slips
+ * until the sliding velocity reverses. */
+static void find_rows_of_friction(friction *f, const double *e0, const double *e1, const double *force)
+{
+  for (int i = 0; i < f->number; ++i) {
+    const double step = e1[i] - e0[i], λ = force[i], limit = *f->limit[i];
+    double *slip = f->slip + i, *row = f->rows + 3 * i;
+    const int stuck = *slip == 0, back = !stuck && *slip * step < -f->tiny[i];
+    /* To come to rest must not give energy; if it did, the place is held at once in this step. The force
+     * of the guess does not decide this: it belongs to another motion. */
+    if (!f->guessed) f->against[i] |= stuck && λ * f->way[i] < 0;
+    if (back) *slip = 0;
+    else if (stuck && fabs(λ) > limit * (1 + 1e-12)) *slip = λ < 0 ? -1 : 1;
+    const int sticks = *slip == 0 && limit > 0;
+    if (sticks != f->sticks[i]) f->sticks[i] = sticks, *f->switched = 1;
+    row[0] = sticks, row[1] = sticks ? -f->creep[i] : 1;
+    row[2] = sticks ? e0[i] + (f->against[i] ? 0 : f->way[i]) : *slip * limit;
+  }
+  f->guessed = 0;
+}
+
+static void get_forces(const couplings *c, const double *q, double *force)
+{
+  for (int i = 0; i < c->number; ++i) force[i] = q[c->force[i]];
+}
+
+/* The laws that depend on iterates, around the motions at q. */
 static void set_rows(const couplings *c, const double *q)
 {
-  if (!c->points && !c->rigid_plastic) return;
+  const double *rows = 0;
+  if (!c->points && !c->rigid_plastic && !c->friction && !c->asked) return;
   find_motions(c, q);
   if (c->points) set_rows_of_springs(c);
-  if (!c->rigid_plastic) return;
-  set_rows_of_rigid_plastic(c, q);
-  for (int k = 0; k < c->number; ++k) put_row(c, k, c->rigid_plastic->rows + 3 * c->link[k]);
+  if (c->rigid_plastic) {
+    set_rows_of_rigid_plastic(c, q);
+    rows = c->rigid_plastic->rows;
+  } else if (c->friction) {
+    get_forces(c, q, c->friction->force);
+    find_rows_of_friction(c->friction, c->e0, c->e1, c->friction->force);
+    rows = c->friction->rows;
+  } else if (c->asked) {
+    get_forces(c, q, c->asked->force);
+    c->asked->find_rows(c->asked->rows_self);
+    rows = c->asked->rows;
+  }
+  for (int k = 0; rows && k < c->number; ++k) put_row(c, k, rows + 3 * c->link[k]);
+}
+
+/* Rows of all connectors around their motions at q; as step begins have put those that stay in it. */
+void find_rows(const couplings *c, const double *q, double *rows)
+{
+  set_rows(c, q);
+  for (int k = 0; k < c->number; ++k) {
+    const double *row = in_cell(c->work, k, c->row);
+    for (int i = 0; i < 3; ++i) rows[3 * c->link[k] + i] = row[i * c->work->lanes];
+  }
 }
 
 void add_couplings_force(void *self, const double *q, double *r)

@@ -282,12 +282,25 @@ typedef struct {
   double *rows;                /* of each connector, three */
 } rigid_plastic;
 
+typedef struct friction friction;
+
+/* Connectors whose laws are functions of a user, see force_laws.py. */
+typedef struct {
+  double *force, *rows; /* forces in the iterate; rows of the laws around it, three of each */
+  double *held;         /* energy that they store */
+  void *begin_self, *rows_self, *again_self; /* data of the functions */
+  void (*begin)(void *self, double t, double dt);
+  void (*find_rows)(void *self), (*again)(void *self);
+} asked_laws;
+
 /* Connectors of one motion as cells, with their forces as unknowns. Their laws are rows
  * a e + b f = c in the motion e and the force f; those of springs come of points. */
 typedef struct {
   const cells *work, *tangent, *motion;
   points *points;                  /* or none */
-  rigid_plastic *rigid_plastic; /* or none; if neither, the rows stay during a step */
+  rigid_plastic *rigid_plastic;    /* or none */
+  friction *friction;              /* or none */
+  asked_laws *asked;               /* or none; if none of all these, the rows stay during a step */
   int number;
   const int32_t *link, *force;     /* of each cell; where each link's force is among the unknowns */
   int row, row_of_tangent;         /* where the coefficients of work and tangent have the rows */
@@ -302,6 +315,7 @@ typedef struct {
 void find_motions(const couplings *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums);
+void find_rows(const couplings *c, const double *q, double *rows);
 void add_couplings_force(void *self, const double *q, double *r);
 double missed_by_couplings(void *self, const double *q, const double *r, double scale,
                            double moved);
@@ -691,6 +705,22 @@ typedef struct {
   void *handle;
 } rates;
 
+/* Dry friction: connectors that stick (0), or slip one way or the other (-1, 1). */
+struct friction {
+  int number;
+  const cells *rate;           /* rates of the motions */
+  int at_v;                    /* where its coefficients have the velocities */
+  const rates *rates;          /* in motion */
+  const double *const *limit;  /* of the force of each; N or N m */
+  double *slip, *accepted;     /* in the latest iterate, and in the accepted state */
+  double *way, *creep;         /* in the step: of what comes to rest at its end; for a unit of force */
+  double *softness, *tiny;     /* creep at the limit; step that is nothing but round-off */
+  int32_t *sticks, *against;   /* in the latest iterate; whether to come to rest would give energy */
+  int32_t *switched;           /* see equation */
+  int guessed;                 /* whether the next iterate is the guess */
+  double *force, *rows;        /* in the iterate; of each, three */
+};
+
 /* Let `now` be the numbers of steps of a length; whether that succeeds. */
 int find_numbers(rates *r, double dt);
 
@@ -854,7 +884,7 @@ void begin_inelastic(void *self, const time_step *step, const double *q1, const 
 void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s);
 void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s);
 void begin_couplings(void *self, const time_step *step, const double *q1, const double *s);
-void begin_slips_again(void *self);
+void begin_couplings_again(void *self);
 void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s);
 int points_dissipate(void *self, const double *q1);

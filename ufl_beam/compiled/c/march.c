@@ -345,12 +345,47 @@ static void put_rows_of_step(const coupling_term *t, const time_step *step)
   }
 }
 
+static void begin_friction_again(friction *f)
+{
+  memcpy(f->slip, f->accepted, f->number * sizeof *f->slip);
+  memset(f->against, 0, f->number * sizeof *f->against);
+  f->guessed = 1;
+}
+
+/* With its way the velocity of what sticks is zero at the end; with none, that before would come back. */
+static void begin_friction(const couplings *c, const time_step *step)
+{
+  friction *f = c->friction;
+  double way_to_rest = 0;
+  memset(c->by_cell, 0, c->number * sizeof *c->by_cell);
+  if (f->rates) {
+    const double *of = f->rates->now->rates[0]; /* v1 = of step, v and v before: as if there was none before */
+    way_to_rest = -(of[1] + of[2]) / of[0];
+    set_cells(f->rate, f->rates->rate[1], f->at_v);
+    add_cells((void *)f->rate, step->q0, c->by_cell);
+  }
+  for (int k = 0; k < c->number; ++k) {
+    const int i = c->link[k];
+    const double limit = *f->limit[i];
+    f->way[i] = way_to_rest * c->by_cell[k];
+    f->creep[i] = limit > 0 ? f->softness[i] / limit : 0;
+  }
+  begin_friction_again(f);
+}
+
 void begin_couplings(void *self, const time_step *step, const double *q1, const double *s)
 {
   const coupling_term *t = self;
   const couplings *c = t->links;
   const rigid_plastic *p = c->rigid_plastic;
-  if (t->entry) put_rows_of_step(t, step);
+  if (t->entry && !c->friction && !c->asked) put_rows_of_step(t, step);
+  if (c->friction) begin_friction(c, step);
+  if (c->asked) {
+    /* Parts of a step go in proportion to its loads; a path, whose parts are one, has no beginning. */
+    const double part = step->fraction * step->at;
+    const double t1 = part == 1 ? step->load_time : step->t0 + part * (step->load_time - step->t0);
+    c->asked->begin(c->asked->begin_self, t1, step->dt);
+  }
   if (c->points) begin_points(c->points, t->points->dt, step->dt);
   for (int i = 0; p && i < p->number; ++i) {
     p->w[i * p->width + t->dt_of_law] = step->dt;
@@ -358,11 +393,14 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
   }
 }
 
-void begin_slips_again(void *self)
+void begin_couplings_again(void *self)
 {
   const coupling_term *t = self;
-  const rigid_plastic *p = t->links->rigid_plastic;
-  memcpy(p->way, t->way_before, p->number * sizeof *p->way);
+  const couplings *c = t->links;
+  if (c->rigid_plastic)
+    memcpy(c->rigid_plastic->way, t->way_before, c->rigid_plastic->number * sizeof *t->way_before);
+  if (c->friction) begin_friction_again(c->friction);
+  if (c->asked) c->asked->again(c->asked->again_self);
 }
 
 void accept_couplings(void *self, const time_step *step, const double *q1, const double *s)
@@ -372,6 +410,7 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
   const double taken = commit_couplings(c, q1, step->dt);
   if (t->entry) *t->entry += t->sign * taken;
   if (t->reached) memcpy(t->reached, t->end, c->number * sizeof *t->end);
+  if (c->friction) memcpy(c->friction->accepted, c->friction->slip, c->number * sizeof(double));
   if (c->points) {
     respond_springs(c);
     commit(c->points);
@@ -392,6 +431,7 @@ void add_energy_of_couplings(void *self, const time_step *step, const double *q1
 {
   const coupling_term *t = self;
   if (t->links->points) enter_stored(t->points, t->links->points->sum);
+  if (t->links->asked) *t->points->stored += *t->links->asked->held;
   if (t->links->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
 }
 
