@@ -90,10 +90,6 @@ class _AtEnd(PlainStep):
     def average(self, before: Expr, now: Expr) -> Expr:
         return now
 
-    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
-        f = force(e1)
-        return f, np.where(f != 0, 1.0, 0.0)
-
     def nodal_step(self, q0: Array, q1: Array, rotations: Index) -> tuple[Array, float]:
         """The increments themselves; a step may turn a node as far as it likes."""
         return q1 - q0, 0.0

@@ -95,9 +95,6 @@ class Scheme(Protocol):
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """Variation of a relative rotation whose virtual motion is ``w``."""
 
-    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
-        """Force of a step from e0 to e1, and its derivative, where ``force`` has slopes 0 and 1."""
-
     def way_to_rest(self, dt: float) -> float:
         """Way of a step at the end of which there is no velocity, over that at its beginning; s."""
 

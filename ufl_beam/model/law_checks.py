@@ -3,14 +3,17 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Mapping
 from dataclasses import fields
 from numbers import Real
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, shorten
+from ufl_beam.errors import SceneError, require_number, require_text, shorten
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.material_law import MaterialLaw, State
+from ufl_beam.model.works import ENTRIES, LOSSES
 
 
 def require_bulk_law(law: object, what: str) -> None:
@@ -38,9 +41,7 @@ def require_law(law: object, what: str) -> None:
     if not isinstance(law, MaterialLaw):
         raise SceneError(f"{what} = {shorten(law)} is not a Hardening or another MaterialLaw")
     kind = type(law).__name__
-    parameters = getattr(type(law), "__dataclass_params__", None)
-    if parameters is None or not parameters.frozen or not parameters.eq:
-        raise SceneError(f"{what}: {kind} must be a dataclass: @dataclass(frozen=True)")
+    _require_dataclass(law, f"{what}: {kind}")
     if taken := sorted(RESERVED & {field.name for field in fields(law)}):  # type: ignore[arg-type]
         raise SceneError(
             f"{what}: {kind}: a field cannot have the name {' or '.join(taken)}, which every "
@@ -67,6 +68,73 @@ def require_law(law: object, what: str) -> None:
     )
     state = State({name: np.full(1, float(x)) for name, x in law.variables.items()})
     _try(tried, state, f"{what}: {kind}", (*ways, "increments")[0])
+
+
+def require_connector_law(law: ConnectorLaw, what: str) -> None:
+    """Raise :class:`SceneError` unless a law of a connector is complete; it is called at no motion.
+
+    Its methods are compiled when a run begins.
+    """
+    what = f"{what}: {type(law).__name__}"
+    _require_dataclass(law, what)
+    reserved = {*vars(ConnectorLaw), *ConnectorLaw.__annotations__}
+    if taken := sorted(reserved & set(law.numbers())):
+        raise SceneError(
+            f"{what}: a field cannot have the name {' or '.join(taken)}, which every ConnectorLaw "
+            "gives to something else"
+        )
+    for name, value in law.numbers().items():
+        require_number(value, f"{what}: {name}")
+    stated = {n for n in CALLED if getattr(type(law), n) is not getattr(ConnectorLaw, n)}
+    if not stated & {"energy", "resistance"}:
+        raise SceneError(f"{what} has neither energy nor resistance; define one of both methods")
+    if law.variables and "increments" not in stated:
+        raise SceneError(f"{what} has variables and no increments; define this method")
+    require_text(law.entry, f"{what}.entry")
+    if not law.entry or (law.entry in ENTRIES and law.entry not in LOSSES):
+        raise SceneError(
+            f"{what}.entry = {law.entry!r} is no name for what is lost; there are "
+            f"{', '.join(LOSSES)}, or take a name of your own"
+        )
+    for name, value in law.variables.items():
+        require_number(value, f"{what}.variables[{name!r}]")
+    motion, state = np.zeros(1), law.initially()
+    calls = {"energy": (motion, state)}
+    calls |= dict.fromkeys(CALLED[1:], (motion, motion, state, 1.0))  # type: ignore[arg-type]
+    for name, arguments in calls.items():
+        try:
+            with np.errstate(all="ignore"):
+                found = getattr(law, name)(*arguments)
+        except Exception as error:
+            raise SceneError(f"{what}.{name} fails at no motion: {error}{place_of(law)}") from error
+        if name == "increments":
+            _require_names(found, law, f"{what}.{name}")
+        for of, value in found.items() if name == "increments" else [("", found)]:
+            number = isinstance(value, Real | np.ndarray) and np.size(value) == 1
+            if not number or not np.all(np.isfinite(value)):
+                raise SceneError(
+                    f"{what}.{name} returns {f'{of} = ' * bool(of)}{shorten(value)} at no motion; "
+                    f"it must return a number there{place_of(law)}"
+                )
+
+
+CALLED = ("energy", "resistance", "increments")
+"""Methods that a law of a connector may define."""
+
+
+def place_of(law: object) -> str:
+    """Return file and line of the class of a law in brackets, if they are known."""
+    try:
+        file, (_, line) = inspect.getsourcefile(type(law)), inspect.getsourcelines(type(law))
+    except (OSError, TypeError):
+        return ""
+    return f" ({file}, line {line})"
+
+
+def _require_dataclass(law: object, what: str) -> None:
+    parameters = getattr(type(law), "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen or not parameters.eq:
+        raise SceneError(f"{what} must be a dataclass: @dataclass(frozen=True)")
 
 
 RESERVED = frozenset({*vars(MaterialLaw), *MaterialLaw.__annotations__})
@@ -101,7 +169,7 @@ def _try(law: MaterialLaw, state: State, what: str, way: str) -> None:
             raise SceneError(f"{what}.stress must return one stress for each of {law.resultants}")
 
 
-def _require_names(found: object, law: MaterialLaw, what: str) -> None:
+def _require_names(found: object, law: MaterialLaw | ConnectorLaw, what: str) -> None:
     """Raise :class:`SceneError` unless a method returned the variables of a law by name."""
     if not isinstance(found, Mapping):
         raise SceneError(

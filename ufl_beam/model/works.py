@@ -22,9 +22,12 @@ from ufl_beam.model.named_parameters import parameters_by_name
 from ufl_beam.model.time_functions import TimeFunction, require_time_function
 from ufl_beam.one_line import bracketed
 
+LOSSES = ("damping", "friction", "functions", "connectors", "contact")
+"""Entries of the energy ledger of what connectors and dampers lose."""
+
 ENTRIES = (
     *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
-    *("numerical", "plastic", "hinges", "damping", "friction", "functions"),
+    *("numerical", "plastic", "hinges", *LOSSES),
 )
 """Names that entries of the energy ledger have already."""
 

@@ -15,7 +15,8 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_laws import Controller, Coulomb, Damper, ForceLaw, Spring
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_laws import Controller, Coulomb, Damper, ForceLaw, Spring, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
 from ufl_beam.model.material_law import MaterialLaw

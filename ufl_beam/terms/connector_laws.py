@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors that hold, drive, push, damp, rub and stop."""
+"""Laws of connectors that hold, drive, push, damp and rub."""
 
 from __future__ import annotations
 
@@ -19,7 +19,6 @@ from ufl_beam.model.connector_laws import (
     Damper,
     Guide,
     Motor,
-    Stop,
 )
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.time_functions import value_at
@@ -209,31 +208,3 @@ class _Rubbing(Response):
             np.where(sticks, -self._creep, 1.0),
             np.where(sticks, rest, self._slip * self._limit),
         )
-
-
-@respond.register(Stop)
-class _Stopped(Response):
-    """Contact outside an interval: elastic, so that what it takes it gives back."""
-
-    def _prepare(self, law: Any) -> None:
-        self._stiffness = self._numbers("stiffness")
-        self._ends = self._numbers("low"), self._numbers("high")
-
-    def _beyond(self, e: Array) -> Array:
-        """Length by which a motion is outside of the interval."""
-        return np.asarray(e - np.clip(e, *self._ends))
-
-    def _energy(self, e: Array) -> float:
-        return float(self._stiffness @ self._beyond(e) ** 2) / 2
-
-    def rows(self, e1: Array, λ: Array) -> Rows:
-        """The force that makes the work of the step what the contact stores."""
-        force, slope = self._setting.scheme.secant(self._beyond, self._e0, e1)
-        force, slope = self._stiffness * force, self._stiffness * slope
-        return -slope, 1.0, force - slope * e1
-
-    def add_state(self, e: Array) -> None:
-        self._setting.ledger.state["stored"] += self._energy(e)
-
-    def change(self, e1: Array, work: float) -> float:
-        return self._energy(e1) - self._energy(self._e0)

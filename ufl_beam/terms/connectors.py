@@ -19,13 +19,14 @@ from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
 from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import HELD, ForceLaw, Law, RigidPlastic, Spring
-from ufl_beam.terms import connector_laws, force_laws, rigid_plastic, springs
+from ufl_beam.terms import compiled_laws, connector_laws, force_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.phases import Callbacks, Phases, beginning, weight_of_before
 
-LAWS = (connector_laws, force_laws, rigid_plastic, springs)
+LAWS = (compiled_laws, connector_laws, force_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
 
 
@@ -35,6 +36,8 @@ def _kind(law: Law) -> object:
         return law
     if isinstance(law, ForceLaw):
         return ForceLaw, len(law.state)
+    if isinstance(law, ConnectorLaw):
+        return type(law), law.elastic
     return type(law), law is HELD, isinstance(law, RigidPlastic) and type(law.law)
 
 
@@ -85,13 +88,13 @@ class Couplings(Links):
     # -- in C ----------------------------------------------------------------------------------
 
     def loops(self) -> tuple[Loop, Loop | None] | None:
-        """C loops of the laws that are steady or of material points."""
+        """C loops of the laws that are steady, compiled, or of material points."""
         if self._asks_python:
             return None
         return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over what is held, driven, pushed or damped, springs and rigid-plastic ones."""
+        """Loops over what needs no Python in a step."""
         response = self.response
         if (of_law := response.in_steps(callbacks)) is None:
             return super().phases(callbacks)
