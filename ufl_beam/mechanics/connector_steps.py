@@ -40,7 +40,10 @@ def law_step(
     variables before it as "state ...", and the numbers of the law as "number ...".
     """
     law = law.of({name: at[f"number {name}"] for name in law.numbers()})
-    e0, e1, dt, θ, part = (*(at[n] for n in ("before", "motion", "dt", "theta")), scheme.load_weight)
+    e0, e1, dt, θ, part = (
+        *(at[n] for n in ("before", "motion", "dt", "theta")),
+        scheme.load_weight,
+    )
     e, rate = (1 - θ) * e0 + θ * e1, (e1 - e0) / dt
     names = () if frozen else tuple(law.variables)
     old = State({name: at[f"state {name}"] for name in law.variables})

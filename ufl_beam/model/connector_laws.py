@@ -198,6 +198,7 @@ class Stop(Record, ConnectorLaw):
     entry = "contact"
 
     def energy(self, motion: Values, state: State) -> Values:
+        """Energy of the depth; J."""
         below, above = positive(self.low - motion), positive(motion - self.high)
         return self.stiffness * (below**2 + above**2) / 2
 
@@ -324,6 +325,7 @@ RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
 def resists(law: Law) -> bool:
     """Return whether a law resists every motion; others bear nothing, or what they are told."""
     return law.resists if isinstance(law, ConnectorLaw) else isinstance(law, RESISTING)
+
 
 HELD = Motor(Constant(0.0))
 """The law of what a joint holds."""

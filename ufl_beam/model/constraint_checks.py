@@ -353,13 +353,13 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
                 for (law, _), k in zip(layout.laws, first[:-1], strict=True)
             ]
     for link in scene.connectors:
-        if isinstance(law := link.law, ConnectorLaw):
-            least = LAST_DIGITS * (1.0 if link.turns else size)
-            here, there = (law.elastic_force(np.full(1, e), law.initially()) for e in (0.0, least))
-            if abs(here[0]) > abs(there - here)[0]:
+        if isinstance(link.law, ConnectorLaw):
+            ends, state = (0.0, LAST_DIGITS * (1.0 if link.turns else size)), link.law.initially()
+            here, there = (link.law.elastic_force(np.full(1, e), state)[0] for e in ends)
+            if abs(here) > abs(there - here):
                 raise SceneError(
-                    f"{what}: {type(law).__name__} of {link} bears a force at no motion, so that "
-                    f"the undeformed scene is not in equilibrium; {instead}"
+                    f"{what}: {type(link.law).__name__} of {link} bears a force at no motion, "
+                    f"so that the undeformed scene is not in equilibrium; {instead}"
                 )
     for owner, law, C, strains in laws:
         if law.stressed(tuple(C), tuple(LAST_DIGITS * strains)):

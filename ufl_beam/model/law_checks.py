@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from numbers import Real
 
@@ -110,7 +110,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
         if name == "increments":
             _require_names(found, law, f"{what}.{name}")
         for of, value in found.items() if name == "increments" else [("", found)]:
-            number = isinstance(value, Real | np.ndarray) and np.size(value) == 1
+            number = isinstance(value, Real) or np.shape(value) == (1,)
             if not number or not np.all(np.isfinite(value)):
                 raise SceneError(
                     f"{what}.{name} returns {f'{of} = ' * bool(of)}{shorten(value)} at no motion; "
@@ -120,6 +120,20 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
 
 CALLED = ("energy", "resistance", "increments")
 """Methods that a law of a connector may define."""
+
+
+def require_limit(law: ConnectorLaw, what: str) -> None:
+    """Raise :class:`SceneError` unless increments of a law have a limit for ever longer steps."""
+    motion, rest = np.full(1, 0.5), np.zeros(1)
+    with np.errstate(all="ignore"):
+        changes = law.increments(motion, rest, law.initially(), np.inf) if law.variables else {}
+    for name, change in changes.items():
+        if not np.all(np.isfinite(change)):
+            raise SceneError(
+                f"{what}: {type(law).__name__}.increments returns {name} = {shorten(change)} for "
+                "dt = inf, and steps of a path are infinitely slow; state it so that it has a "
+                f"limit, as a / (b / dt + c){place_of(law)}"
+            )
 
 
 def place_of(law: object) -> str:
@@ -196,6 +210,21 @@ def judges_dissipation(law: MaterialLaw) -> bool:
     return not law.active and (stated or has_quadratic_energies(law))
 
 
+def judges_loss(law: ConnectorLaw) -> bool:
+    """Return whether what a law of a connector loses is its own dissipation, whatever the step.
+
+    With variables it is, up to an error of the step, unless the energy is quadratic.
+    """
+
+    def energy(factor: float) -> list[float]:
+        draw = np.random.default_rng(0).uniform
+        state = State({name: factor * draw(-1.0, 1.0, 1) for name in law.variables})
+        with np.errstate(all="ignore"):
+            return [float(np.sum(law.energy(factor * draw(-1.0, 1.0, 1), state)))]
+
+    return not law.active and (not law.variables or _quadratic(energy))
+
+
 def has_quadratic_energies(law: MaterialLaw) -> bool:
     """Return whether the energies of a law are quadratic in strains and variables."""
     C = tuple(np.ones(1) for _ in law.resultants or "x")
@@ -210,5 +239,10 @@ def has_quadratic_energies(law: MaterialLaw) -> bool:
             found = tried.elastic_energy(strain, state), tried.hardening_energy(state)
         return [float(np.sum(x)) for x in found]
 
+    return _quadratic(energies)
+
+
+def _quadratic(energies: Callable[[float], list[float]]) -> bool:
+    """Return whether energies of some numbers times a factor go with its square."""
     # Twice the numbers have the same digits.
     return bool(np.allclose(energies(2.0), 4.0 * np.array(energies(1.0)), rtol=1e-12, atol=0.0))

@@ -254,7 +254,7 @@ class _Stated(LawInStep):
         elastic = end = self._elastic(e1, z)
         if self._part != 1.0:
             # By Gauss's rule; where the work of that is not the change of the energy, from this.
-            mean = self.setting.scheme.mean(lambda e: self._elastic(e, z), self.e0, e1)  # type: ignore[arg-type, return-value]
+            mean = self.setting.scheme.mean(lambda e: self._elastic(e, z), self.e0, e1)
             before, now = self._energy(self.e0, z), self._energy(e1, z)
             if abs(now - before - mean * way) > 2**-48 * (abs(before) + abs(now)):
                 mean = (now - before) / way
@@ -307,7 +307,9 @@ class _Stated(LawInStep):
         return self._elastic(self.e0, self._z)
 
     def state(self) -> Array:
-        return np.array([*(float(z[0]) for z in vars(self._z).values()), self._held, self.dissipated])
+        return np.array(
+            [*(float(z[0]) for z in vars(self._z).values()), self._held, self.dissipated]
+        )
 
     def restore(self, state: Array) -> None:
         *variables, self._held, self.dissipated = map(float, state)

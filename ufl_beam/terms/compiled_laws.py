@@ -177,9 +177,7 @@ class CompiledLaws(Response):
 
     def borne(self) -> Array | None:
         """Forces of the energies where :meth:`start` has begun."""
-        return np.asarray(
-            self._numbers_at().elastic_force(self._at["before"], self._variables())
-        )
+        return np.asarray(self._numbers_at().elastic_force(self._at["before"], self._variables()))
 
     def freeze(self) -> None:
         """Keep the variables from now on."""
