@@ -25,8 +25,8 @@ from ufl_beam.errors import (
 )
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_law_checks import require_limit
 from ufl_beam.model.connector_laws import Controller, Coulomb
-from ufl_beam.model.law_checks import require_limit
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import Content, above, below, require_arrays

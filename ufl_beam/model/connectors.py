@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, arm, require_anchors
 from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_law_checks import require_connector_law
 from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
 from ufl_beam.model.curves import Point
-from ufl_beam.model.law_checks import require_connector_law
 from ufl_beam.model.records import Record
 from ufl_beam.one_line import bracketed
 

@@ -18,18 +18,10 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.model.bodies import Member
+from ufl_beam.model.ledger_entries import ENTRIES
 from ufl_beam.model.named_parameters import parameters_by_name
 from ufl_beam.model.time_functions import TimeFunction, require_time_function
 from ufl_beam.one_line import bracketed
-
-LOSSES = ("damping", "friction", "functions", "connectors", "contact")
-"""Entries of the energy ledger of what connectors and dampers lose."""
-
-ENTRIES = (
-    *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
-    *("numerical", "plastic", "hinges", *LOSSES),
-)
-"""Names that entries of the energy ledger have already."""
 
 
 @dataclass(frozen=True, eq=False)

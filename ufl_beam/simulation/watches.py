@@ -16,6 +16,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_law_checks import judges_loss
 from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
@@ -26,10 +27,10 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation, judges_loss
+from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
+from ufl_beam.model.ledger_entries import ENTRIES
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.works import ENTRIES
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.kept_states import KeptStates
 from ufl_beam.simulation.solution import Solution

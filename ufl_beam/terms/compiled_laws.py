@@ -17,7 +17,7 @@ from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.connector_steps import law_step
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.law_checks import place_of
+from ufl_beam.model.connector_law_checks import place_of
 from ufl_beam.model.material_law import State
 from ufl_beam.terms.connector_responses import Response, Rows, respond
 from ufl_beam.terms.phases import Callbacks, weight_of_before
