@@ -62,6 +62,7 @@ from ufl_beam.mechanics.time_schemes import Coefficients, DynamicScheme, Scheme,
 from ufl_beam.model import law_functions
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import Body, Place, Spot, ground
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
     Actuator,
     Controller,
@@ -138,8 +139,8 @@ __version__ = version()
 __all__ = [
     "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "ArmstrongFrederick", "AxialBending",
     "Beam", "Body", "BoucWen", "Branch", "Buckling", "Camera", "Checkpoint", "Clamped",
-    "Coefficients", "Connector", "Controller", "ConvergenceError", "CopiesDiffer", "Coulomb",
-    "CriticalPoint", "Cycles", "Damper", "Decay", "DecayingMidpoint", "Diagram",
+    "Coefficients", "Connector", "ConnectorLaw", "Controller", "ConvergenceError", "CopiesDiffer",
+    "Coulomb", "CriticalPoint", "Cycles", "Damper", "Decay", "DecayingMidpoint", "Diagram",
     "DisplacementControl", "DissipationControl", "DolfinxView", "DuvautLions", "DynamicScheme",
     "Energy", "Envelope", "Event", "Events", "ExactStatic", "ExactStep", "Extent", "Extremes",
     "Fatigue", "Fibres", "Film", "FollowerLoad", "ForceLaw", "GeneralizedAlpha", "Gerber",

@@ -24,6 +24,8 @@ from ufl_beam.errors import (
     require_switch,
 )
 from ufl_beam.mechanics.classical import Static
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_law_checks import require_limit
 from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
@@ -211,6 +213,8 @@ def _require_driven(scene: Scene, t0: float) -> None:
                 f"{link}: dry friction sticks or slides in steps of time, and a path has none; use "
                 "simulate(scene, Static(), ...), or a Spring that yields"
             )
+        if isinstance(link.law, ConnectorLaw):
+            require_limit(link.law, str(link))
     for work in scene.works:
         if "v" in work.asked:
             raise SceneError(

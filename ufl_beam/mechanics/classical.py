@@ -71,10 +71,6 @@ class _AtEnd(PlainStep):
     def average(self, before: Expr, now: Expr) -> Expr:
         return now
 
-    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
-        f = force(e1)
-        return f, np.where(f != 0, 1.0, 0.0)
-
 
 @dataclass(frozen=True)
 class Static(InParts, _AtEnd):

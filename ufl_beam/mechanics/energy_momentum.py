@@ -57,15 +57,6 @@ class _OverStep:
         values = (f(q0 + float(1 + x) / 2 * (q1 - q0)) for x in points)
         return sum((float(w) / 2 * f for w, f in zip(weights, values, strict=True)), 0)
 
-    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
-        """The mean force over the way, so that its work is what f²/2 grows by."""
-        f0, f1, way = force(e0), force(e1), e1 - e0
-        ends = (f0 != 0) + 0.0, (f1 != 0) + 0.0
-        moves = way != 0
-        part = np.divide(f1 - f0, way, out=(ends[0] + ends[1]) / 2, where=moves)
-        f = (f0 + f1) / 2 * part
-        return f, np.divide(f1 - f, way, out=ends[1] / 2, where=moves)
-
 
 class ExactStep(_OverStep):
     """Base of schemes in whose steps works are exact increments of energy.

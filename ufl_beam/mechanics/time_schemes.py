@@ -109,9 +109,6 @@ class Scheme(Protocol):
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """Variation of a relative rotation whose virtual motion is ``w``."""
 
-    def secant(self, force: Callable[[Array], Array], e0: Array, e1: Array) -> tuple[Array, Array]:
-        """Force of a step from e0 to e1, and its derivative, where ``force`` has slopes 0 and 1."""
-
 
 class Rates(Protocol):
     """Velocities, and accelerations if a scheme has them, at the beginning of a step."""

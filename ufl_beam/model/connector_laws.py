@@ -11,16 +11,18 @@ from numbers import Real
 from typing import Annotated, Any, Protocol
 
 from ufl_beam.errors import SceneError, closed, require_function, require_number, require_returned
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.curves import Curve
 from ufl_beam.model.force_laws import ForceLaw as ForceLaw
 from ufl_beam.model.law_checks import require_bulk_law
-from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.law_functions import Values, larger, positive
+from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.material_laws import AnySoftening, HingeLaw, require_hinge_law
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.time_functions import Constant, Timed
 from ufl_beam.one_line import one_line
 
-OWN_LAW = "use a ForceLaw of your own"
+OWN_LAW = "state a ConnectorLaw of your own"
 """Message of classes that are closed."""
 
 
@@ -163,15 +165,21 @@ class Damper(Record):
 
 @closed(OWN_LAW)
 @dataclass(frozen=True)
-class Stop(Record):
-    """Elastic stop: a contact force where the motion leaves an interval.
+class Stop(Record, ConnectorLaw):
+    """Stop: a contact force where the motion leaves an interval, elastic or damped.
+
+    At a depth δ the force is stiffness δ (1 + damping dδ/dt), and never pulls (Hunt and Crossley
+    1975).  It begins and ends at zero.  The lost energy is the entry "contact" of the ledger.
 
     Args:
         low, high: Ends of the interval; m or rad.
         stiffness: Of the contact; N/m or N m/rad.
+        damping: s/m or s/rad.  A mass that arrives with the small velocity v leaves with the part
+            1 - 2/3 damping v of it.
 
     Raises:
-        SceneError: An interval that does not contain the undeformed scene, or no stiffness.
+        SceneError: An interval that does not contain the undeformed scene, no stiffness, or a
+            negative damping.
 
     Example:
         >>> buffer = ub.Slide(ub.ground(2, 0), beam.end, ub.Stop(1e9, low=-0.01), axis=(0, 1))
@@ -185,6 +193,31 @@ class Stop(Record):
     _: KW_ONLY
     low: float = -math.inf
     high: float = math.inf
+    damping: NotNegative = 0.0
+
+    entry = "contact"
+
+    def energy(self, motion: Values, state: State) -> Values:
+        """Energy of the depth; J."""
+        below, above = positive(self.low - motion), positive(motion - self.high)
+        return self.stiffness * (below**2 + above**2) / 2
+
+    def resistance(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
+        """Force of the damping, which takes at most all of the elastic one."""
+        below, above = positive(self.low - motion), positive(motion - self.high)
+        above = above * larger(self.damping * rate, -1.0)
+        below = below * larger(-self.damping * rate, -1.0)
+        return self.stiffness * (above - below)
+
+    @property
+    def elastic(self) -> bool:
+        """True without damping."""
+        return self.damping == 0.0
+
+    @property
+    def resists(self) -> bool:
+        """False: nothing is borne within the interval."""
+        return False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -278,7 +311,7 @@ class Guide(Record):
 
 
 Law = (
-    Guide | Motor | Actuator | Controller | Spring | Damper | Stop | ForceLaw | Coulomb
+    Guide | Motor | Actuator | Controller | Spring | Damper | ConnectorLaw | ForceLaw | Coulomb
     | RigidPlastic
 )  # fmt: skip
 
@@ -286,7 +319,13 @@ HOLDING = (Motor, Guide)
 """Laws that prescribe the motion."""
 
 RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
-"""Laws that resist every motion; others bear nothing, or what they are told."""
+"""Laws that resist every motion; see :func:`resists`."""
+
+
+def resists(law: Law) -> bool:
+    """Return whether a law resists every motion; others bear nothing, or what they are told."""
+    return law.resists if isinstance(law, ConnectorLaw) else isinstance(law, RESISTING)
+
 
 HELD = Motor(Constant(0.0))
 """The law of what a joint holds."""

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 
 from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, arm, require_anchors
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_law_checks import require_connector_law
 from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
 from ufl_beam.model.curves import Point
+from ufl_beam.model.records import Record
 from ufl_beam.one_line import bracketed
 
 Factors = tuple[float, float, float]
@@ -53,6 +56,8 @@ class Connector:
     def __post_init__(self) -> None:
         require_anchors(self.kind, self.a, self.b)
         require_kind(self.law, Law.__args__, f"{self}: law")
+        if isinstance(self.law, ConnectorLaw) and not isinstance(self.law, Record):
+            require_connector_law(self.law, f"{self}: law")
 
     def __str__(self) -> str:
         return f"{self.kind}({self.a}, {self.b})"

@@ -14,6 +14,7 @@ from scipy.sparse.linalg import eigsh
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, NodeDof, node
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
     HOLDING,
     RESISTING,
@@ -22,6 +23,7 @@ from ufl_beam.model.connector_laws import (
     RigidPlastic,
     Spring,
     Stop,
+    resists,
 )
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
@@ -98,7 +100,7 @@ def _determines(link: Connector) -> bool:
     """Return true if a connector determines its motion where nothing has mass."""
     if isinstance(link.law, Stop):
         return link.law.low == 0.0 or link.law.high == 0.0
-    return isinstance(link.law, (*RESISTING, Damper, Coulomb))
+    return isinstance(link.law, (*RESISTING, ConnectorLaw, Damper, Coulomb))
 
 
 def _fixed(scene: Scene) -> set[NodeDof]:
@@ -264,7 +266,7 @@ def _of_supports(supports: Iterable[Support]) -> Iterator[tuple[object, Row]]:
 
 def _constraints(
     scene: Scene,
-    acts: Callable[[Connector], bool] = lambda link: isinstance(link.law, RESISTING),
+    acts: Callable[[Connector], bool] = lambda link: resists(link.law),
     also: Iterable[tuple[Anchor, int]] = (),
 ) -> csr_array:
     """Matrix of constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
@@ -350,6 +352,15 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
                 (beam.name, law, stiffness[k], of_points[k])
                 for (law, _), k in zip(layout.laws, first[:-1], strict=True)
             ]
+    for link in scene.connectors:
+        if isinstance(link.law, ConnectorLaw):
+            ends, state = (0.0, LAST_DIGITS * (1.0 if link.turns else size)), link.law.initially()
+            here, there = (link.law.elastic_force(np.full(1, e), state)[0] for e in ends)
+            if abs(here) > abs(there - here):
+                raise SceneError(
+                    f"{what}: {type(link.law).__name__} of {link} bears a force at no motion, "
+                    f"so that the undeformed scene is not in equilibrium; {instead}"
+                )
     for owner, law, C, strains in laws:
         if law.stressed(tuple(C), tuple(LAST_DIGITS * strains)):
             raise SceneError(

@@ -3,9 +3,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import fields
 from numbers import Real
+from typing import Any
 
 import numpy as np
 
@@ -38,9 +39,7 @@ def require_law(law: object, what: str) -> None:
     if not isinstance(law, MaterialLaw):
         raise SceneError(f"{what} = {shorten(law)} is not a Hardening or another MaterialLaw")
     kind = type(law).__name__
-    parameters = getattr(type(law), "__dataclass_params__", None)
-    if parameters is None or not parameters.frozen or not parameters.eq:
-        raise SceneError(f"{what}: {kind} must be a dataclass: @dataclass(frozen=True)")
+    require_dataclass(law, f"{what}: {kind}")
     if taken := sorted(RESERVED & {field.name for field in fields(law)}):  # type: ignore[arg-type]
         raise SceneError(
             f"{what}: {kind}: a field cannot have the name {' or '.join(taken)}, which every "
@@ -69,6 +68,13 @@ def require_law(law: object, what: str) -> None:
     _try(tried, state, f"{what}: {kind}", (*ways, "increments")[0])
 
 
+def require_dataclass(law: object, what: str) -> None:
+    """Raise :class:`SceneError` unless the class of a law is a frozen dataclass."""
+    parameters = getattr(type(law), "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen or not parameters.eq:
+        raise SceneError(f"{what} must be a dataclass: @dataclass(frozen=True)")
+
+
 RESERVED = frozenset({*vars(MaterialLaw), *MaterialLaw.__annotations__})
 """Names that a field of a law cannot have."""
 
@@ -94,14 +100,14 @@ def _try(law: MaterialLaw, state: State, what: str, way: str) -> None:
         except Exception as error:
             raise SceneError(f"{what}.{name} fails at no strain: {error}") from error
         if name == way:
-            _require_names(found, law, f"{what}.{name}")
+            require_names(found, law, f"{what}.{name}")
         elif name == "stress" and not np.all(np.isfinite(law.as_tuple(found))):
             raise SceneError(f"{what}.stress is {shorten(found)} at no strain; it must be a number")
         elif name == "stress" and len(law.as_tuple(found)) != len(law.resultants or "x"):
             raise SceneError(f"{what}.stress must return one stress for each of {law.resultants}")
 
 
-def _require_names(found: object, law: MaterialLaw, what: str) -> None:
+def require_names(found: object, law: Any, what: str) -> None:
     """Raise :class:`SceneError` unless a method returned the variables of a law by name."""
     if not isinstance(found, Mapping):
         raise SceneError(
@@ -142,5 +148,10 @@ def has_quadratic_energies(law: MaterialLaw) -> bool:
             found = tried.elastic_energy(strain, state), tried.hardening_energy(state)
         return [float(np.sum(x)) for x in found]
 
+    return quadratic(energies)
+
+
+def quadratic(energies: Callable[[float], list[float]]) -> bool:
+    """Return whether energies of some numbers times a factor go with its square."""
     # Twice the numbers have the same digits.
     return bool(np.allclose(energies(2.0), 4.0 * np.array(energies(1.0)), rtol=1e-12, atol=0.0))

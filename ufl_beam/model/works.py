@@ -18,15 +18,10 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.model.bodies import Member
+from ufl_beam.model.ledger_entries import ENTRIES
 from ufl_beam.model.named_parameters import parameters_by_name
 from ufl_beam.model.time_functions import TimeFunction, require_time_function
 from ufl_beam.one_line import bracketed
-
-ENTRIES = (
-    *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
-    *("numerical", "plastic", "hinges", "damping", "friction", "functions"),
-)
-"""Names that entries of the energy ledger have already."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -123,8 +123,7 @@ class Events(Recorder):
         forces = np.abs(simulation.connections()[self._links, 1])
         # Forces above which they touch, or slide; the limit of friction is known to some digits
         links = (simulation.scene.links[link] for link in self._links)
-        asked = simulation.controllers.values
-        limits = [(1 - 1e-9) * asked.get(link, 0.0) for link in links]
+        limits = [(1 - 1e-9) * simulation.asked.get(link, 0.0) for link in links]
         return in_cells, np.asarray(forces > limits)
 
     def write(self, simulation: StateView) -> None:

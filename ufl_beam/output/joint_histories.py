@@ -31,7 +31,8 @@ class Connection(NamedTuple):
         work: That the connector has taken since the beginning: what springs store and dissipate,
             what dampers and friction dissipate, and minus what motors supply; (n+1,); J.
         rate: Mean rate of the motion in the step that ends there; (n+1,); m/s or rad/s.
-        dissipated: Energy that yielding, softening and plastic hinges have dissipated; (n+1,); J.
+        dissipated: Energy that yielding, softening and plastic hinges have dissipated, or that a
+            :class:`ConnectorLaw` has lost; (n+1,); J.
     """
 
     motion: Any

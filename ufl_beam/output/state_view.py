@@ -46,7 +46,6 @@ class StateView(ABC):
 
     scene: Scene
     comm: MPI.Intracomm  # all processes of the run
-    asked: dict[Connector, float]  # forces of controllers, and limits of friction; N or N m
     scheme: Scheme
     grid: Grid
     share: Share  # degrees of freedom of this process
@@ -66,6 +65,11 @@ class StateView(ABC):
     inelastic: list[InelasticBeams]
     solver: Solver  # Newton's method
     _has_inelastic: bool
+
+    @property
+    @abstractmethod
+    def asked(self) -> dict[Connector, float]:
+        """Forces of controllers, and limits of friction; N or N m."""
 
     @property
     @abstractmethod

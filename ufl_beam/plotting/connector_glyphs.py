@@ -15,6 +15,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model import connector_laws as laws
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.plotting.geometry import directions
 from ufl_beam.plotting.style import FRONT, INK, MIDDLE, ORANGE, UPON, WHITE, Stroke, with_unit
 
@@ -45,6 +46,10 @@ _CYLINDER = [
     _line((-0.6, 0), (0, 0), weight=2.2, layer=UPON),
     Stroke(_HEAD, INK, 1.0, ORANGE, UPON),
 ]
+_STATED = [
+    *_BOXED,
+    _line((-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35), layer=UPON),
+]
 
 # Along a line; what drives is orange, filled if its motion is given.
 STRAIGHT: dict[type, list[Stroke]] = {
@@ -72,10 +77,8 @@ STRAIGHT: dict[type, list[Stroke]] = {
         *_CYLINDER,
         _line((0.9, 0), (0.9, 1.15), (-0.25, 1.15), (-0.25, 0.6), weight=1.0),
     ],
-    laws.ForceLaw: [
-        *_BOXED,
-        _line((-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35), layer=UPON),
-    ],
+    laws.ForceLaw: _STATED,
+    ConnectorLaw: _STATED,
     laws.RigidPlastic: [  # nothing below a limit, flow at it
         *_BOXED,
         _line((-0.55, -0.35), (0, -0.35), (0, 0.35), (0.55, 0.35), layer=UPON),
@@ -97,12 +100,20 @@ AROUND: dict[type, Glyph] = {
     laws.Spring: Glyph([_line((2, CENTRE), (2, -2.1), (-2, 0))], sweep=4.3 * math.pi),
     **{
         law: Glyph([*STRAIGHT[law], *_SPOKES])  # the straight one, with a spoke at both ends
-        for law in (laws.Damper, laws.Stop, laws.Coulomb, laws.ForceLaw, laws.RigidPlastic)
+        for law in (
+            *(laws.Damper, laws.Stop, laws.Coulomb, laws.ForceLaw, ConnectorLaw),
+            laws.RigidPlastic,
+        )
     },
     laws.Motor: _turning(ORANGE),
     laws.Actuator: _turning(WHITE),
     laws.Controller: _turning(WHITE, _box(-2.0, -1.4, 0.5, WHITE), tail=-1.4),
 }
+
+
+def kind_of(law: laws.Law) -> type:
+    """Class by which a law has its glyph; those of a user have one."""
+    return ConnectorLaw if type(law) not in STRAIGHT else type(law)
 
 
 def along(stroke: Stroke, a: Array, b: Array, across: Array, body: float) -> Stroke:
@@ -152,5 +163,7 @@ def law_in_words(law: laws.Law, turns: bool) -> str:
             return f"friction {' + '.join(words)}"
         case laws.RigidPlastic():
             return f"rigid up to {with_unit(float(law.law.limit), force)}"
+        case ConnectorLaw():
+            return type(law).__name__
         case _:
             return type(law).__name__.lower()

@@ -20,7 +20,7 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.joint_histories import turned
-from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT, along, around
+from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT, along, around, kind_of
 from ufl_beam.plotting.geometry import (
     directions,
     in_frame,
@@ -156,12 +156,12 @@ def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
         a, b = a + inwards + offset * across, b - inwards + offset * across
     # It takes the same part of the way at all times, so it stretches with the motion.
     body = min(0.66, 6.0 * unit / max(length, unit))
-    for stroke in STRAIGHT[type(connector.law)]:
+    for stroke in STRAIGHT[kind_of(connector.law)]:
         yield along(stroke, a, b, across, body)
 
 
 def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
-    glyph, pin = AROUND[type(connector.law)], pose.at(connector.b)
+    glyph, pin = AROUND[kind_of(connector.law)], pose.at(connector.b)
     radius = (1.6 + pose.stage.offsets[connector]) * pose.stage.unit
     a, b = pose.turn(connector.a), pose.turn(connector.b)
     first, sweep = (b, 0.0) if glyph.spins else (a, b - a)

@@ -19,6 +19,7 @@ from ufl_beam.errors import NoNumber, SceneError, require_returned
 from ufl_beam.mechanics.slips import Slip, slip
 from ufl_beam.mechanics.time_schemes import Scheme, Step, way_to_rest
 from ufl_beam.model.bodies import Place
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
     HELD,
     Actuator,
@@ -29,10 +30,10 @@ from ufl_beam.model.connector_laws import (
     Motor,
     RigidPlastic,
     Spring,
-    Stop,
 )
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.fibres import Layout
+from ufl_beam.model.material_law import State
 from ufl_beam.model.material_laws import Hardening
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.model.time_functions import value_at
@@ -209,29 +210,110 @@ class _Damped(LawInStep):
         return -factor, 1.0, -factor * self.e0
 
 
-class _Stopped(LawInStep):
-    """Stop: elastic contact outside an interval."""
+class _Stated(LawInStep):
+    """Law that states an energy and a resistance, such as a stop."""
 
-    saved_as = "_Stopped"
+    def __init__(self, link: Connector, setting: Setting) -> None:
+        super().__init__(link, setting)
+        law, scheme, ledger = self.law, setting.scheme, setting.ledger
+        self.saved_as = f"{type(law).__qualname__}{[*law.variables]}"
+        self._z: State = law.initially()
+        self._held, self._loses, self._part = 0.0, not law.elastic, scheme.load_weight
+        self._delayed = scheme.weight_of_before == 0 and self._part > 0.5
+        ledger.state["stored"] += 0.0
+        if self._loses:
+            ledger.lost[law.entry] += 0.0
+        if self._delayed:
+            ledger.lost["numerical"] += 0.0
 
-    def _beyond(self, e: Array) -> Array:
-        return np.asarray(e - np.clip(e, self.law.low, self.law.high))
+    def _at_law(self, e1: float) -> tuple[Array, Array, dict[str, Array]]:
+        """Motion and rate at the time of the law, and changes of the variables until then."""
+        θ = self.setting.scheme.theta
+        e, rate = np.array([[(1 - θ) * self.e0 + θ * e1], [(e1 - self.e0) / self.dt]])
+        changes = self.law.increments(e, rate, self._z, θ * self.dt) if self.law.variables else {}
+        return e, rate, dict(changes)
 
-    def _energy(self, e: float) -> float:
-        return float(self.law.stiffness * self._beyond(np.array(e)) ** 2) / 2
+    def _after(self, changes: Mapping[str, Array], part: float) -> State:
+        """Variables after a part of the step."""
+        before, of_θ = vars(self._z), part / self.setting.scheme.theta
+        return State({name: z + of_θ * changes[name] for name, z in before.items()})
+
+    def _energy(self, e: float, z: State) -> float:
+        return float(np.sum(self.law.energy(np.array([e]), z)))
+
+    def _elastic(self, e: float, z: State) -> float:
+        """Derivative of the energy by the motion."""
+        energy = self.law.energy(np.array([e + 1e-30j]), z)
+        return float(np.sum(np.imag(energy))) / 1e-30
+
+    def _force(self, e1: float) -> float:
+        """Force of a step to ``e1``: of the energy where loads act, and the resistance."""
+        e, rate, changes = self._at_law(e1)
+        resistance = self.law.resistance(e, rate, self._after(changes, self._theta), self.dt)
+        z, way = self._after(changes, self._part), e1 - self.e0
+        elastic = end = self._elastic(e1, z)
+        if self._part != 1.0:
+            # By Gauss's rule; where the work of that is not the change of the energy, from this.
+            mean = self.setting.scheme.mean(lambda e: self._elastic(e, z), self.e0, e1)
+            before, now = self._energy(self.e0, z), self._energy(e1, z)
+            if abs(now - before - mean * way) > 2**-48 * (abs(before) + abs(now)):
+                mean = (now - before) / way
+            elastic = mean + (2 * self._part - 1) * (end - mean)
+        return elastic + float(np.sum(resistance))
+
+    @property
+    def _theta(self) -> float:
+        return self.setting.scheme.theta
 
     def row(self, e1: float, λ: float) -> Row:
-        """The force that makes the work of the step what the contact stores."""
-        ends = np.array([self.e0]), np.array([e1])
-        force, slope = self.setting.scheme.secant(self._beyond, *ends)
-        f, D = self.law.stiffness * float(force[0]), self.law.stiffness * float(slope[0])
-        return -D, 1.0, f - D * e1
+        """The law around an iterate, its slope by central differences."""
+        with np.errstate(all="ignore"):
+            force = self._force(e1)
+            ε = 6e-6 * max(abs(e1 - self.e0), 1e-3 * max(abs(e1), 1e-3 * self.length))
+            D = (self._force(e1 + ε) - self._force(e1 - ε)) / (2 * ε)
+        return -D, 1.0, force - D * e1
+
+    def accept(self, e1: float, work: float) -> None:
+        """Take the variables; what is neither stored nor lost by the scheme is lost."""
+        _, _, changes = self._at_law(e1)
+        old, new, ledger = self._z, self._after(changes, 1.0), self.setting.ledger
+        held, numerical = self._energy(e1, new), 0.0
+        if self._delayed:
+            growth = self._elastic(e1, new) * (e1 - self.e0)
+            for name, z in vars(new).items():
+                moved = State({**vars(new), name: z + 1e-30j})
+                by_z = float(np.sum(np.imag(self.law.energy(np.array([e1]), moved)))) / 1e-30
+                growth += by_z * float((z - getattr(old, name))[0])
+            numerical = (2 * self._part - 1) * (self._energy(self.e0, old) - held + growth)
+            ledger.lost["numerical"] += numerical
+        if self._loses:
+            lost = work - (held - self._held) - numerical
+            ledger.lost[self.law.entry] += lost
+            self.dissipated += lost
+        self._held, self._z = held, new
+
+    def start(self, e: float) -> None:
+        self.e0, self._held = e, self._energy(e, self._z)
 
     def enter_state(self, e: float) -> None:
-        self.setting.ledger.state["stored"] += self._energy(e)
+        self.setting.ledger.state["stored"] += self._held
 
     def change(self, e1: float, work: float) -> float:
-        return self._energy(e1) - self._energy(self.e0)
+        if self._loses:
+            return work
+        return self._energy(e1, self._z) - self._held
+
+    def borne(self) -> float | None:
+        return self._elastic(self.e0, self._z)
+
+    def state(self) -> Array:
+        return np.array(
+            [*(float(z[0]) for z in vars(self._z).values()), self._held, self.dissipated]
+        )
+
+    def restore(self, state: Array) -> None:
+        *variables, self._held, self.dissipated = map(float, state)
+        self._z = State({n: np.array([z]) for n, z in zip(vars(self._z), variables, strict=True)})
 
 
 class _Sprung(LawInStep):
@@ -594,11 +676,13 @@ class _Asked(LawInStep):
 
 
 LAWS: dict[type, type[LawInStep]] = {
-    Motor: _Driven, Actuator: _Pushed, Controller: _Controlled, Damper: _Damped, Stop: _Stopped,
+    Motor: _Driven, Actuator: _Pushed, Controller: _Controlled, Damper: _Damped,
     Spring: _Sprung, Coulomb: _Rubbing, RigidPlastic: _Slipping, ForceLaw: _Asked,
 }  # fmt: skip
 
 
 def law_in_step(link: Connector, setting: Setting) -> LawInStep:
     """Law of a connector in a step."""
+    if isinstance(link.law, ConnectorLaw):
+        return _Stated(link, setting)
     return (_Held if link.law is HELD else LAWS[type(link.law)])(link, setting)

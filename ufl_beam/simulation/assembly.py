@@ -16,8 +16,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_laws import Coulomb, Running
-from ufl_beam.model.connectors import Connector
+from ufl_beam.model.connector_laws import Coulomb
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
@@ -40,6 +39,7 @@ from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import FrameForces, LoadTerm
 from ufl_beam.terms.material_points import expect_entries
 from ufl_beam.terms.openings import SearchFlags
+from ufl_beam.terms.rates_in_c import RatesInC
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.tangent_derivatives import Cells
 from ufl_beam.terms.works import Works

@@ -34,7 +34,7 @@ class Controllers:
         constant = [link for link in asked if isinstance(link.law, Coulomb) and not link.law.joint]
         self.numbers, self.fresh = np.zeros(len(asked)), np.zeros(len(asked), dtype=np.int32)
         for link in constant:
-            self.numbers[self._at[link]] = link.law.force  # type: ignore[union-attr]
+            self.numbers[self._at[link]] = link.law.force
         self._sampled = [link for link in asked if _sample(link)]
         self._each_step = [x for x in asked if not _sample(x) and x not in constant]
         self._numbers = np.array([i for i, x in enumerate(links) if x in self._at], dtype=int)

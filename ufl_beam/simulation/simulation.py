@@ -18,6 +18,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten, warn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
@@ -267,6 +268,11 @@ class Simulation(StateView):
     def q_before(self) -> Array:  # type: ignore[override]
         """Configuration at the beginning of the last step."""
         return self.prediction.q_before if self._begun_at is None else self._begun_at
+
+    @property
+    def asked(self) -> dict[Connector, float]:
+        """Forces of controllers, and limits of friction; N or N m."""
+        return self.controllers.values
 
     def ask(self) -> None:
         """Ask controllers and friction for forces and limits in the next step, on all processes."""

@@ -15,12 +15,22 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_laws import Controller, Coulomb, Damper, ForceLaw, Spring
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_law_checks import judges_loss
+from ufl_beam.model.connector_laws import (
+    Controller,
+    Coulomb,
+    Damper,
+    ForceLaw,
+    Law,
+    Spring,
+    Stop,
+)
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
+from ufl_beam.model.ledger_entries import ENTRIES
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.works import ENTRIES
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.kept_states import KeptStates
 from ufl_beam.simulation.solution import Solution
@@ -62,9 +72,15 @@ class LedgerWatch:
         laws, links = [*_laws(grid.scene)], grid.scene.links
         grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
         # Other schemes integrate works with the mean of the forces at both ends.
-        grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
+        exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
+        at_once = scheme.theta == scheme.load_weight  # elastic forces and variables
+        stated = [link.law for link in links if isinstance(link.law, ConnectorLaw)]
+        for law in stated:
+            certain = exact and (at_once or not law.variables) and judges_loss(law)
+            grows[law.entry] = grows.get(law.entry, exact) and certain
         self._grows = [name for name, certain in grows.items() if certain]
         given = any(isinstance(link.law, ForceLaw) and link.law.stored for link in links)
+        given = given or not all(isinstance(law, Stop) for law in stated)
         self._bounded = not given and all(map(has_quadratic_energies, laws))
         self._in_motion = has_inertia(scheme)
         self._throughput = self._most = 0.0
@@ -135,19 +151,20 @@ class LedgerWatch:
             f"{self._where(name, states, n)}the dissipated energy, the entry {name!r} of the "
             f"ledger, falls by {fall:.3g} J between t = {before:.6g} and {after:.6g} s. No law of "
             "the scene gives dissipated energy back: a step found a wrong state there, and what "
-            "follows is wrong. Use smaller steps; check the equations of a law of your own"
+            "follows is wrong. Use smaller steps; check the equations of a law of your own, or let "
+            "one that is to give energy have active = True"
         )
 
     def _where(self, name: str, states: KeptStates, n: int) -> str:
         """Cell or connector whose dissipated energy falls most in a step."""
         kind = {"friction": Coulomb, "damping": Damper}.get(name)
-        taken = states.connections[:, :, WORK if kind else DISSIPATED]
-        falls = {
-            f"{link}: ": taken[n, i] - taken[n + 1, i]
-            for i, link in enumerate(self._grid.scene.links)
-            if kind is None or isinstance(link.law, kind)
-        }
-        if kind is None:
+        falls: dict[str, float] = {}
+        for i, link in enumerate(self._grid.scene.links):
+            entry = link.law.entry if isinstance(link.law, ConnectorLaw) else ""
+            if entry == name if entry else kind is None or isinstance(link.law, kind):
+                taken = states.connections[:, i, WORK if kind and not entry else DISSIPATED]
+                falls[f"{link}: "] = taken[n] - taken[n + 1]
+        if name in ("hinges", "plastic"):
             cells = states.materials[:, :, [0, 5 if name == "plastic" else 6]]
             for (cell, before), (_, after) in zip(cells[n], cells[n + 1], strict=True):
                 place = self._grid.middle(int(cell))
@@ -167,11 +184,13 @@ def _laws(scene: Scene) -> Iterator[MaterialLaw]:
 
 
 class ForceWatch:
-    """Watches forces of controllers and force laws for a change of direction at every step."""
+    """Watches forces of controllers and force laws for a change of direction at every step.
+
+    Laws of connectors that are active are force laws, too.
+    """
 
     def __init__(self, couplings: Sequence[Links], controllers: Controllers, size: float) -> None:
-        kinds = Controller, ForceLaw
-        self._couplings = [one for one in couplings if isinstance(one.links[0].law, kinds)]
+        self._couplings = [one for one in couplings if _may_drive(one.links[0].law)]
         self._links = [link for one in self._couplings for link in one.links]
         self._controllers, n = controllers, len(self._links)
         self._length = np.array([1.0 if link.turns else size for link in self._links])
@@ -185,14 +204,13 @@ class ForceWatch:
         """Judge the forces in the step to an accepted state; yield warnings, one a connector."""
         if dt == math.inf:
             return  # a path has no time in which a force could alternate
-        values, fresh = self._controllers.values, self._controllers.fresh
-        if math.isinf(dt):  # a path has no time
-            return
+        values, of_these = self._controllers.values, self._controllers.fresh
+        fresh = {link for link, new in zip(values, of_these, strict=True) if new}
         of_laws = np.concatenate([one.force(q) for one in self._couplings])
         moved = np.abs(np.concatenate([one.rate for one in self._couplings])) * dt
         force = np.array([values.get(x, λ) for x, λ in zip(self._links, of_laws, strict=True)])
         new = np.array([link in fresh or link not in values for link in self._links])
-        fresh.clear()
+        of_these.fill(0)
         change = np.where(new, force - self._force, self._change)
         self._largest = np.maximum(self._largest, np.abs(force))
         large = (np.abs(change) >= LARGE * self._largest) & (moved >= MOVED * self._length)
@@ -204,6 +222,11 @@ class ForceWatch:
             yield _alternates(self._links[i], t)
 
 
+def _may_drive(law: Law) -> bool:
+    """Return whether the force of a law may give energy."""
+    return law.active if isinstance(law, ConnectorLaw) else isinstance(law, Controller | ForceLaw)
+
+
 def _alternates(link: Connector, t: float) -> str:
     """Describe a force that changes its direction at every step until ``t``."""
     sampled = isinstance(link.law, Controller) and link.law.sample
@@ -211,7 +234,7 @@ def _alternates(link: Connector, t: float) -> str:
         f"{link}: the force changed its direction at each of the {ALTERNATIONS} "
         f"{'samples' if sampled else 'steps'} before t = {t:.6g} s"
     )
-    if isinstance(link.law, ForceLaw):
+    if not isinstance(link.law, Controller):
         return (
             f"{said}: it drives a motion that is too fast for the steps. Use smaller ones, or a "
             "scheme that damps such motions, as Midpoint(alpha=0.05, beta=0.05) does"

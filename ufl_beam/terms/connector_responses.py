@@ -7,7 +7,6 @@ held has a row about e, all other laws have one about λ, linear in e around the
 
 from __future__ import annotations
 
-from abc import ABC
 from collections.abc import Callable, Mapping, Sequence
 from functools import singledispatch
 from typing import Any, NamedTuple
@@ -22,6 +21,7 @@ from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Callbacks
 from ufl_beam.terms.rates_in_c import RatesInC
 
+
 class Setting(NamedTuple):
     """Arguments that all responses are made with."""
 
@@ -34,7 +34,7 @@ class Setting(NamedTuple):
     search: SearchFlags  # of all points of the scene
 
 
-class Response(ABC):
+class Response:
     """Connectors whose laws are of one kind, that of ``law``; motions and forces are arrays.
 
     By default nothing is stored, yields or is remembered; the work of the forces is entered in

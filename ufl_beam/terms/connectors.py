@@ -19,13 +19,14 @@ from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import HELD, ForceLaw, Law, RigidPlastic, Spring
-from ufl_beam.terms import connector_laws, force_laws, rigid_plastic, springs
+from ufl_beam.terms import compiled_laws, connector_laws, force_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.phases import Callbacks, Phases, beginning
 
-LAWS = (connector_laws, force_laws, rigid_plastic, springs)
+LAWS = (compiled_laws, connector_laws, force_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
 
 
@@ -35,6 +36,8 @@ def _kind(law: Law) -> object:
         return law
     if isinstance(law, ForceLaw):
         return ForceLaw, len(law.state)
+    if isinstance(law, ConnectorLaw):
+        return type(law), law.elastic
     return type(law), law is HELD, isinstance(law, RigidPlastic) and type(law.law)
 
 

@@ -10,11 +10,12 @@ import numpy as np
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import fill, lib, struct
 from ufl_beam.errors import NoNumber, SceneError, require_returned, shorten
-from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.force_laws import ForceLaw
-from ufl_beam.terms.connector_responses import Response, Rows, respond
+from ufl_beam.terms.connector_responses import Response, respond
+from ufl_beam.terms.phases import Callbacks
 
 MISSED = 0.5
 """Part of what the iterate before has missed of a law, from which on a step went too far."""
@@ -190,7 +191,10 @@ class AskedLaws(Response):
         )
         self._c.begin_self, self._c.rows_self = handle(self._begin), handle(self._find_rows)
         self._c.again_self = handle(self._again)
-        return {**super().in_steps(callbacks), "stored": self._setting.ledger.state.pointer("stored")}
+        return {
+            **super().in_steps(callbacks),
+            "stored": self._setting.ledger.state.pointer("stored"),
+        }
 
     def know(self, couplings: Any) -> None:
         """Take the arrays of motions in the accepted state and in the iterate."""
@@ -222,7 +226,7 @@ class AskedLaws(Response):
 
     def take(self, e1: Array) -> None:
         """Take the internal variables after a step to the motions, and enter what is stored."""
-        states = [one.after(x) for one, x in zip(self._each, e1.tolist(), strict=True)]
+        states = [one.after(float(x)) for one, x in zip(self._each, e1, strict=True)]
         before = float(self._held[0])
         for one, state in zip(self._each, states, strict=True):
             one.state = state
@@ -231,7 +235,7 @@ class AskedLaws(Response):
 
     def start(self, e: Array) -> None:
         """Find the energy that is stored at these motions."""
-        self._held[0] = sum(one.stored(x) for one, x in zip(self._each, e.tolist(), strict=True))
+        self._held[0] = sum([one.stored(float(x)) for one, x in zip(self._each, e, strict=True)])
 
     def state(self) -> Array:
         """Internal variables of the accepted state."""

@@ -82,13 +82,12 @@ class Links(InternalForces):
         """Return the C function of :meth:`excess` with its data, if there is one."""
         return None
 
-    @abstractmethod
     def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
-        """Largest residual of a law, without dimension, see :meth:`Equation.missed`."""
+        """Largest residual of a law, without dimension; used where C has no :meth:`demand`."""
+        return 0.0
 
     def again(self) -> None:
         """Begin the step again: forget what its iterates have tried."""
-        self.response.again()
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Put what laws of forces work on in the step ``v`` from ``q`` in the place of forces."""
@@ -107,9 +106,9 @@ class Links(InternalForces):
         change = callbacks.change(lambda q1: (0.0, self.change(q1), self.effort(q1)))
         return super().phases(callbacks)._replace(again=callbacks.run(self.again), change=change)
 
-    @abstractmethod
     def change(self, q1: Array) -> float:
         """Energy that the connectors take in the step to ``q1``; J."""
+        return 0.0
 
     def effort(self, q1: Array) -> float:
         """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""

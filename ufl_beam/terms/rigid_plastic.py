@@ -18,13 +18,13 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.mechanics.slips import slip
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_laws import Hardening, SofteningLaw
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.terms.connector_responses import Response, Rows, respond
+from ufl_beam.terms.connector_responses import Response, respond
 from ufl_beam.terms.openings import NOTHING, SPENT
 from ufl_beam.terms.phases import Callbacks
 

@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.connector_laws import Spring
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.material_laws import Hardening
-from ufl_beam.terms.connector_responses import Response, Rows, respond
+from ufl_beam.terms.connector_responses import Response, respond
 from ufl_beam.terms.material_points import Points, expect_entries
 from ufl_beam.terms.phases import Callbacks
 

@@ -60,16 +60,64 @@ static void get_forces(const couplings *c, const double *q, double *force)
   for (int i = 0; i < c->number; ++i) force[i] = q[c->force[i]];
 }
 
+/* The compiled laws around their motions e1. */
+static void find_rows_of_laws(const connector_laws *p, const double *e1)
+{
+  double *w = p->w, s[2];
+  for (int i = 0; i < p->number; ++i, w += p->width) {
+    double *row = p->rows + 3 * i;
+    w[LAW_MOTION] = e1[i];
+    ask(p->force, w, 2, s);
+    row[0] = -s[1], row[1] = 1, row[2] = s[0] - s[1] * e1[i];
+  }
+}
+
+/* A number of a law. */
+double ask_law(kernel *law, const double *w)
+{
+  double s;
+  ask(law, w, 1, &s);
+  return s;
+}
+
+/* What the law of connector i brings at the end of a step to the motion e1. */
+static const double *end_of_law(const connector_laws *p, int i, double e1)
+{
+  double *w = p->w + i * p->width;
+  w[LAW_MOTION] = e1;
+  ask(p->end, w, LAW_OUTPUTS + p->variables, p->answer);
+  return p->answer;
+}
+
+/* Take the motion e1 as the new state of connector i, which has taken a work. */
+static void commit_law(const connector_laws *p, int i, double e1, double work)
+{
+  const double *s = end_of_law(p, i, e1);
+  if (p->loses) {
+    const double lost = work - (s[LAW_STORED] - p->stored[i]) - s[LAW_NUMERICAL];
+    p->lost[i] += lost;
+    p->sum[0] += lost;
+  }
+  p->sum[1] += s[LAW_NUMERICAL];
+  p->stored[i] = s[LAW_STORED];
+  double *w = p->w + i * p->width;
+  memcpy(w + LAW_INPUTS, s + LAW_OUTPUTS, p->variables * sizeof *s);
+  w[LAW_BEFORE] = e1;
+}
+
 /* The laws that depend on iterates, around the motions at q. */
 static void set_rows(const couplings *c, const double *q)
 {
   const double *rows = 0;
-  if (!c->points && !c->rigid_plastic && !c->friction && !c->asked) return;
+  if (!c->points && !c->rigid_plastic && !c->laws && !c->friction && !c->asked) return;
   find_motions(c, q);
   if (c->points) set_rows_of_springs(c);
   if (c->rigid_plastic) {
     set_rows_of_rigid_plastic(c, q);
     rows = c->rigid_plastic->rows;
+  } else if (c->laws) {
+    find_rows_of_laws(c->laws, c->e1);
+    rows = c->laws->rows;
   } else if (c->friction) {
     get_forces(c, q, c->friction->force);
     find_rows_of_friction(c->friction, c->e0, c->e1, c->friction->force);
@@ -138,8 +186,10 @@ double commit_couplings(const couplings *c, const double *q, double dt)
 {
   double sum = 0;
   find_motions(c, q);
+  if (c->laws) memset(c->laws->sum, 0, 2 * sizeof *c->laws->sum);
   for (int i = 0; i < c->number; ++i) {
     const double work = taken_by(c, i, q);
+    if (c->laws) commit_law(c->laws, i, c->e1[i], work);
     c->taken[i] += work;
     c->rate[i] = (c->e1[i] - c->e0[i]) / dt;
     c->before[i] = q[c->force[i]];

@@ -292,6 +292,21 @@ typedef struct {
   void (*begin)(void *self, double t, double dt);
   void (*find_rows)(void *self), (*again)(void *self);
 } asked_laws;
+/* The first inputs of a law of connectors, then come its variables before the step, and its numbers;
+ * and what the end of a step brings, then come its variables there. */
+enum law_input { LAW_MOTION, LAW_BEFORE, LAW_DT, LAW_THETA, LAW_INPUTS };
+enum law_output { LAW_STORED, LAW_NUMERICAL, LAW_OUTPUTS };
+
+/* Connectors with compiled laws, see compiled_laws.py. */
+typedef struct {
+  kernel *force, *end;        /* force and its derivative by the motion; what the end of a step brings */
+  int number, width, variables;
+  int loses;                  /* whether what is not stored of a work is lost, or the ledger is open by it */
+  double *w;                  /* what the kernels know, `width` numbers of each connector */
+  double *stored, *lost;      /* energy in the accepted state; lost by each since the beginning */
+  double *rows, *answer;      /* of each connector, three; space for an answer */
+  double *sum;                /* lost in the last step, and by the scheme */
+} connector_laws;
 
 /* Connectors of one motion as cells, with their forces as unknowns. Their laws are rows
  * a e + b f = c in the motion e and the force f; those of springs come of points. */
@@ -299,6 +314,7 @@ typedef struct {
   const cells *work, *tangent, *motion;
   points *points;                  /* or none */
   rigid_plastic *rigid_plastic;    /* or none */
+  connector_laws *laws;            /* or none */
   friction *friction;              /* or none */
   asked_laws *asked;               /* or none; if none of all these, the rows stay during a step */
   int number;
@@ -316,6 +332,7 @@ void find_motions(const couplings *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums);
 void find_rows(const couplings *c, const double *q, double *rows);
+double ask_law(kernel *law, const double *w);
 void add_couplings_force(void *self, const double *q, double *r);
 double missed_by_couplings(void *self, const double *q, const double *r, double scale,
                            double moved);
@@ -762,7 +779,8 @@ typedef struct {
   int dt_of_law;       /* where a rigid-plastic law has the step */
   int32_t *way_before; /* of rigid-plastic ones, after the last step */
   double *hardened, loss; /* stored by rigid-plastic ones; part of what backward Euler loses */
-  const inelastic_term *points; /* of springs: entries of the ledger */
+  double *lost;           /* entry of compiled laws */
+  const inelastic_term *points; /* entries of the ledger of springs, rigid-plastic ones and laws */
 } coupling_term;
 
 /* Energy stored and dissipated in a step, and the sum of the sizes of the works on connectors. */

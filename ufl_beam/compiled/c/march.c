@@ -378,7 +378,12 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
   const coupling_term *t = self;
   const couplings *c = t->links;
   const rigid_plastic *p = c->rigid_plastic;
+  const connector_laws *l = c->laws;
   if (t->entry && !c->friction && !c->asked) put_rows_of_step(t, step);
+  for (int i = 0; l && i < l->number; ++i) {
+    double *w = l->w + i * l->width;
+    w[LAW_DT] = step->dt, w[LAW_BEFORE] = c->e0[i];
+  }
   if (c->friction) begin_friction(c, step);
   if (c->asked) {
     /* Parts of a step go in proportion to its loads; a path, whose parts are one, has no beginning. */
@@ -411,6 +416,8 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
   if (t->entry) *t->entry += t->sign * taken;
   if (t->reached) memcpy(t->reached, t->end, c->number * sizeof *t->end);
   if (c->friction) memcpy(c->friction->accepted, c->friction->slip, c->number * sizeof(double));
+  if (t->lost) *t->lost += c->laws->sum[0];
+  if (c->laws && t->points->numerical) *t->points->numerical += c->laws->sum[1];
   if (c->points) {
     respond_springs(c);
     commit(c->points);
@@ -430,8 +437,10 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
 void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s)
 {
   const coupling_term *t = self;
+  const connector_laws *l = t->links->laws;
   if (t->links->points) enter_stored(t->points, t->links->points->sum);
   if (t->links->asked) *t->points->stored += *t->links->asked->held;
+  for (int i = 0; l && i < l->number; ++i) *t->points->stored += l->stored[i];
   if (t->links->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
 }
 
@@ -461,7 +470,8 @@ void change_of_couplings(void *self, const double *q1, energy_change *sum)
   find_motions(c, q1);
   for (int i = 0; i < c->number; ++i) {
     const double work = taken_by(c, i, q1);
-    taken += work;
+    const int loses = !c->laws || c->laws->loses;
+    taken += loses ? work : end_of_law(c->laws, i, c->e1[i])[LAW_STORED] - c->laws->stored[i];
     sum->effort += fabs(work);
   }
   if (c->points) {

@@ -1,0 +1,116 @@
+# SPDX-License-Identifier: MIT
+"""Base of the laws of connectors that a user states: energy, resistance, internal variables."""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any, ClassVar
+
+import numpy as np
+
+from ufl_beam.model.material_law import State, Values
+
+IMAGINARY = 1e-30
+"""Part of a complex step, which leaves all digits to a derivative."""
+
+
+class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but one of two
+    """Base of the laws of connectors; a law of one's own is a frozen dataclass of it.
+
+    The fields of the dataclass are the numbers of the law.  Its methods are written with the
+    functions of ``ub.law_functions``.  A law states an energy, a resistance, or both: the force
+    that resists the growth of the motion is the derivative of the energy by the motion, plus the
+    resistance.  Work that is not stored is lost.  See docs/extending_laws.md.
+
+    Attributes:
+        variables: Internal variables, and their values before anything has happened.
+        entry: Entry of the ledger, in ``lost``, of what is not stored.
+        active: True of a law that may give energy, such as a drive.  Else runs warn if the energy
+            that it has lost falls.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @dataclass(frozen=True)
+        ... class Buffer(ub.ConnectorLaw):
+        ...     stiffness: float  # N/m
+        ...     cubic: float  # N/m³
+        ...     damping: float  # N s²/m²
+        ...     def energy(self, motion, state):
+        ...         return self.stiffness * motion**2 / 2 + self.cubic * motion**4 / 4
+        ...     def resistance(self, motion, rate, state, dt):
+        ...         return self.damping * ub.law_functions.absolute(rate) * rate
+        >>> buffer = ub.Slide(ub.ground(2, 0), beam.end, Buffer(1e6, 1e9, 1e4), axis=(0, 1))
+        >>> caught = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[buffer])
+        >>> run = ub.simulate(caught, ub.Midpoint(), t=(0, 0.5), dt=0.005)
+        >>> bool(run.energy.lost["connectors"][-1] > 0), bool(run.energy.worst < 1e-9)
+        (True, True)
+    """
+
+    variables: ClassVar[Mapping[str, float]] = {}
+    entry: ClassVar[str] = "connectors"
+    active: ClassVar[bool] = False
+
+    def energy(self, motion: Values, state: State) -> Values:
+        """Energy that can be had back, zero by default; J.
+
+        Args:
+            motion: m or rad.
+            state: Internal variables, as attributes.
+        """
+        return 0.0
+
+    def resistance(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
+        """Force beside that of the energy, zero by default; N or N m.
+
+        Args:
+            motion: At the time of the step at which the law holds; m or rad.
+            rate: Mean rate of the step; m/s or rad/s.
+            state: Internal variables at the time of the motion.
+            dt: Length of the step; s.
+        """
+        return 0.0
+
+    def increments(
+        self, motion: Values, rate: Values, state: State, dt: Values
+    ) -> Mapping[str, Values]:
+        """Changes of the variables over a backward-Euler step of length dt, in closed form.
+
+        Args:
+            motion: At the end of the step; m or rad.
+            rate: Mean rate; m/s or rad/s.
+            state: Variables at its beginning.
+            dt: s; infinite on a path.
+        """
+        return {}
+
+    @property
+    def elastic(self) -> bool:
+        """True if the law loses nothing."""
+        return not self.variables and type(self).resistance is ConnectorLaw.resistance
+
+    @property
+    def resists(self) -> bool:
+        """True if the law resists every motion, as a spring does."""
+        return type(self).energy is not ConnectorLaw.energy
+
+    def numbers(self) -> dict[str, Any]:
+        """Numbers of the law by name, its fields."""
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+
+    def of(self, numbers: Mapping[str, Values]) -> ConnectorLaw:
+        """Return the law with arrays or symbols in the place of its numbers."""
+        law = copy.copy(self)
+        vars(law).update(numbers)
+        return law
+
+    def initially(self) -> State:
+        """Internal variables before anything has happened, each (1,)."""
+        return State({name: np.full(1, float(x)) for name, x in self.variables.items()})
+
+    def elastic_force(self, motion: Values, state: State) -> Values:
+        """Derivative of the energy by the motion at arrays of real numbers; N or N m."""
+        with np.errstate(all="ignore"):
+            return np.imag(self.energy(motion + IMAGINARY * 1j, state)) / IMAGINARY + 0 * motion

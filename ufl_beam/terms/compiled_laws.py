@@ -1,0 +1,155 @@
+# SPDX-License-Identifier: MIT
+"""Responses of connectors whose laws are stated as energy and resistance, compiled to C."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import ufl
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles, fill, in_order, lib, names, struct
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.errors import SceneError
+from ufl_beam.mechanics.connector_steps import law_step
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.connector_law_checks import place_of
+from ufl_beam.model.material_law import State
+from ufl_beam.terms.connector_responses import Response, respond
+from ufl_beam.terms.phases import Callbacks
+
+
+def inputs(law: ConnectorLaw) -> tuple[str, ...]:
+    """Names of the inputs of a compiled law; loops.h explains their order."""
+    of_law = (*(f"state {name}" for name in law.variables), *(f"number {n}" for n in law.numbers()))
+    return (*names("law_input", "law_"), *of_law)
+
+
+class LawForms:
+    """Compiled law of a connector, for all numbers.
+
+    Attributes:
+        force: Force and its derivative by the motion at the end of the step.
+        end: ``law_output`` of loops.h, then the variables at the end.
+    """
+
+    def __init__(self, law: ConnectorLaw, scheme: Scheme) -> None:
+        self._law, self._scheme, self._pointwise = law, scheme, Pointwise(inputs(law))
+        motion = ufl.variable(self._pointwise.at["motion"])
+        self._at = {**self._pointwise.at, "motion": motion}
+        try:
+            force, *numbers, variables = law_step(law, self._at, scheme)
+            self.force = self._pointwise.compile(force, ufl.diff(force, motion))
+            by_name = dict(zip(("stored", "numerical"), numbers, strict=True))
+            end = in_order("law_output", by_name, "law_")
+            self.end = self._pointwise.compile(*end, *variables)
+        except Exception as error:
+            raise SceneError(
+                f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
+                f"written with + - * / ** and the functions of ub.law_functions{place_of(law)}"
+            ) from error
+
+    @cached_property
+    def frozen(self) -> tuple[Any, Any]:
+        """The same force, and its second derivative, while the variables stay as they are."""
+        motion, compile = self._at["motion"], self._pointwise.compile
+        force = law_step(self._law, self._at, self._scheme, frozen=True).force
+        slope = ufl.diff(force, motion)
+        return compile(force, slope), compile(ufl.diff(slope, motion))
+
+
+_law_forms = stated(LawForms)
+
+
+@respond.register(ConnectorLaw)
+class CompiledLaws(Response):
+    """Connectors whose laws are of one class, with numbers of their own."""
+
+    def _prepare(self, law: Any) -> None:
+        setting, n, ledger = self._setting, len(self._links), self._setting.ledger
+        self._law, self._loses = law, not law.elastic
+        self.name_in_files = f"{type(law).__qualname__}{[*law.variables]}"
+        ledger.state["stored"] += 0.0
+        if self._loses:
+            ledger.lost[law.entry] += 0.0
+        exact = setting.scheme.weight_of_before == 0.0
+        self._delayed = exact and setting.scheme.load_weight > 0.5
+        if self._delayed:
+            ledger.lost["numerical"] += 0.0
+        columns = inputs(law)
+        w = self._w = np.zeros((n, len(columns)))
+        self._at = {name: w[:, k] for k, name in enumerate(columns)}
+        self._at["theta"][:], self._at["dt"][:] = setting.scheme.theta, 1.0
+        for name, value in law.variables.items():
+            self._at[f"state {name}"][:] = value
+        for name in law.numbers():
+            self._at[f"number {name}"][:] = self._numbers(name)
+        self._held, self._lost = np.zeros((2, n))
+        self._rows, self._sum = np.zeros((n, 3)), np.zeros(2)
+        self._forms = _law_forms(law.of(dict.fromkeys(law.numbers(), 1.0)), setting.scheme)
+        outputs = int(lib.LAW_OUTPUTS) + len(law.variables)
+        self._c = struct(
+            "connector_laws", number=n, width=len(columns), variables=len(law.variables),
+            force=self._forms.force, end=self._forms.end, loses=self._loses, w=w,
+            stored=self._held, lost=self._lost, rows=self._rows, answer=np.zeros(outputs),
+            sum=self._sum,
+        )  # fmt: skip
+        self.in_c = {"laws": self._c}
+
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
+        """Entries of the ledger."""
+        ledger = self._setting.ledger
+        entries = {"stored": ledger.state.pointer("stored")}
+        if self._loses:
+            entries["lost"] = ledger.lost.pointer(self._law.entry)
+        if self._delayed:
+            entries["numerical"] = ledger.lost.pointer("numerical")
+        return entries
+
+    def dissipated(self) -> Sequence[Array]:
+        """What is lost."""
+        return (self._lost,)
+
+    def bends(self, e1: Array) -> Array:
+        """Minus the second derivatives of the forces; variables stay."""
+        self._at["motion"][:] = e1
+        return np.array([-lib.ask_law(self._forms.frozen[1], doubles(w)) for w in self._w])
+
+    # -- the state -----------------------------------------------------------------------------
+
+    def _variables(self) -> State:
+        return State({name: self._at[f"state {name}"] for name in self._law.variables})
+
+    def _numbers_at(self) -> ConnectorLaw:
+        """The law with the numbers of all connectors."""
+        law: ConnectorLaw = self._law
+        return law.of({name: self._at[f"number {name}"] for name in law.numbers()})
+
+    def state(self) -> Array:
+        """Internal variables, stored energy, and what was lost; (num_links, k)."""
+        of_law = [self._at[f"state {name}"] for name in self._law.variables]
+        return np.column_stack([*of_law, self._held, self._lost])
+
+    def restore(self, rows: Array) -> None:
+        """Take over the variables of :meth:`state`."""
+        *of_law, self._held[:], self._lost[:] = rows.T
+        for name, values in zip(self._law.variables, of_law, strict=True):
+            self._at[f"state {name}"][:] = values
+
+    def start(self, e: Array) -> None:
+        """Begin at motions that no step has led to."""
+        self._at["before"][:] = e
+        with np.errstate(all="ignore"):
+            self._held[:] = self._numbers_at().energy(e, self._variables())
+
+    def borne(self) -> Array | None:
+        """Forces of the energies where :meth:`start` has begun."""
+        return np.asarray(self._numbers_at().elastic_force(self._at["before"], self._variables()))
+
+    def freeze(self) -> None:
+        """Keep the variables from now on."""
+        fill(self._c, force=self._forms.frozen[0])
