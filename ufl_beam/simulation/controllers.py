@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.compiled.c_library import doubles
+from ufl_beam.compiled.c_library import doubles, integers
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.model.connector_laws import Controller, Coulomb, Running
@@ -54,6 +54,10 @@ class Controllers:
     def place(self, link: Connector) -> Any:
         """Address of the number of a connector."""
         return doubles(self.numbers) + self._at[link]
+
+    def fresh_place(self, link: Connector) -> Any:
+        """Address of the flag of a connector in :attr:`fresh`."""
+        return integers(self.fresh) + self._at[link]
 
     def ask(self, now: Running) -> None:
         """Evaluate what is due at the time ``now.t``; all processes call it together."""

@@ -146,10 +146,10 @@ class Simulation(StateView):
         self._watches: list[Watch] = []
         self._describe(self.solution)
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
-        notes = bool(self._watch) or self._copies is not None
         extras = Extras(
             self.ask if self.controllers.asks else None, self.controllers.stops,
-            self._require_held if self._loose else None, self._note if notes else None,
+            self._require_held if self._loose else None,
+            None if self._copies is None else self._copies.note, self._watch.c,
         )  # fmt: skip
         self._applies = fresh and begins_loaded(scene, scheme, t0)
         self._stepper = Stepper(
@@ -209,6 +209,7 @@ class Simulation(StateView):
                 self.prediction.forget()
             taken = self._stepper.take(self, ends, keep=keep)
             self._begun_at = None
+            self.warn(self._watch.told(), here=not self.share.alone)
             return taken
         except StepFailed as failure:
             self.give_up(failure, float(self._stepper.c.failed_end))
@@ -243,18 +244,12 @@ class Simulation(StateView):
         """Go where the latest :meth:`attempt` went."""
         self._stepper.accept(self, trial)
         self._begun_at = None
+        self.warn(self._watch.told(), here=not self.share.alone)
 
     def _require_held(self, q1: Array) -> None:
         """Raise if loads do not hold in an equilibrium what nothing else holds."""
         if self._loose:
             self._loose = require_held(self.equation, self.solver, q1, self._loose)
-
-    def _note(self, q1: Array, t: float, dt: float) -> None:
-        """Take note of the end of a step."""
-        if self._copies is not None:
-            self._copies.note(t, q1)
-        if self._watch:
-            self.warn(self._watch.judge(q1, t, dt), here=not self.share.alone)
 
     def warn(self, found: Iterable[str], *, here: bool = False) -> None:
         """Warn, and note in the solution, of what it does not say; by one process or ``here``."""

@@ -114,7 +114,8 @@ class Extras(NamedTuple):
     ask: Callable[[], None] | None  # controllers and friction, when a step begins
     stop: Callable[[float, float], float] | None  # the next sample of a controller after a time
     require: Callable[[Array], None] | None  # that an accepted state is held; raises if not
-    note: Callable[[Array, float, float], None] | None  # (q1, t1, dt) of an accepted step
+    note: Callable[[float, Array], None] | None  # (t1, q1) of an accepted step
+    forces: Any  # `force_watch` of loops.h
 
 
 class Stepper:
@@ -173,6 +174,8 @@ class Stepper:
             handle = self._callbacks.handle(self._prepare)
             fill(self.c, rates=inertia.rates.c, prepare=lib.run_in_python)
             self.c.handle = handle  # what `fill` keeps must not keep this object
+        if extras.forces is not None:
+            fill(self.c, forces=extras.forces)
         if path is not None:
             changes = [one.change for one in phases if one.change is not None]
             fill(self.c, path=path.in_c(changes))
@@ -197,7 +200,7 @@ class Stepper:
         if extras.stop is not None:
             stop = callbacks.handle(lambda t: extras.stop(self.c.t, t))
             self.c.stop, self.c.stops = lib.time_in_python, stop
-        if callbacks.used or extras != Extras(None, None, None, None):
+        if callbacks.used or any(extras[:4]):
             # What may raise comes first, before loops of C have accepted anything.
             mine = [one for one in loops["accept"] if one[0] == lib.phase_in_python]
             others = [one for one in loops["accept"] if one[0] != lib.phase_in_python]
@@ -344,7 +347,7 @@ class Stepper:
     def _note(self, step: Any, q1: Any, s: Any) -> None:
         """Note an accepted step."""
         if self._extras.note is not None:
-            self._extras.note(self._callbacks.end, step.t1, step.dt)
+            self._extras.note(step.t1, self._callbacks.end)
 
     def _note_loads(self, *_: Any) -> None:
         """Take the sizes of loads that have no loops, for the scale of convergence."""

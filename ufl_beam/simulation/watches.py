@@ -9,10 +9,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import doubles, ffi, struct
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_law import ConnectorLaw
@@ -22,7 +23,6 @@ from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
     ForceLaw,
-    Law,
     Spring,
     Stop,
 )
@@ -186,45 +186,45 @@ def _laws(scene: Scene) -> Iterator[MaterialLaw]:
 class ForceWatch:
     """Watches forces of controllers and force laws for a change of direction at every step.
 
-    Laws of connectors that are active are force laws, too.
+    Attributes:
+        c: ``force_watch`` of loops.h; None if there are no such laws.
     """
 
+    c: Any = None
+
     def __init__(self, couplings: Sequence[Links], controllers: Controllers, size: float) -> None:
-        self._couplings = [one for one in couplings if _may_drive(one.links[0].law)]
-        self._links = [link for one in self._couplings for link in one.links]
-        self._controllers, n = controllers, len(self._links)
-        self._length = np.array([1.0 if link.turns else size for link in self._links])
-        self._force, self._change, self._largest = np.zeros((3, n))
-        self._count: Index = np.zeros(n, dtype=int)
+        kinds = Controller, ForceLaw
+        found = [
+            (link, one, k) for one in couplings for k, link in enumerate(one.links)
+            if isinstance(link.law, kinds)
+        ]  # fmt: skip
+        self._links, n = [link for link, *_ in found], len(found)
+        if not n:
+            return
+        controlled = [isinstance(link.law, Controller) for link in self._links]
+        values, fresh = (
+            [place(x) if of else ffi.NULL for x, of in zip(self._links, controlled, strict=True)]
+            for place in (controllers.place, controllers.fresh_place)
+        )
+        self._told, none = np.full(n, math.nan), np.zeros((3, n))
+        self.c = struct(
+            "force_watch", number=n, most=ALTERNATIONS, large=LARGE, moved=MOVED,
+            dof=np.array([one.forces_at[k] for _, one, k in found], dtype=np.int32),
+            value=ffi.new("double *[]", values), fresh=ffi.new("int32_t *[]", fresh),
+            rate=ffi.new("double *[]", [doubles(one.rate) + k for _, one, k in found]),
+            length=np.array([1.0 if link.turns else size for link in self._links]),
+            force=none[0], change=none[1], largest=none[2], told=self._told,
+            count=np.zeros(n, dtype=np.int32),
+        )  # fmt: skip
+        self._alive = couplings, controllers
 
-    def __bool__(self) -> bool:
-        return bool(self._links)
-
-    def judge(self, q: Array, t: float, dt: float) -> Iterator[str]:
-        """Judge the forces in the step to an accepted state; yield warnings, one a connector."""
-        if dt == math.inf:
-            return  # a path has no time in which a force could alternate
-        values, of_these = self._controllers.values, self._controllers.fresh
-        fresh = {link for link, new in zip(values, of_these, strict=True) if new}
-        of_laws = np.concatenate([one.force(q) for one in self._couplings])
-        moved = np.abs(np.concatenate([one.rate for one in self._couplings])) * dt
-        force = np.array([values.get(x, λ) for x, λ in zip(self._links, of_laws, strict=True)])
-        new = np.array([link in fresh or link not in values for link in self._links])
-        of_these.fill(0)
-        change = np.where(new, force - self._force, self._change)
-        self._largest = np.maximum(self._largest, np.abs(force))
-        large = (np.abs(change) >= LARGE * self._largest) & (moved >= MOVED * self._length)
-        turns = large & (change * self._change < 0.0)
-        self._count = np.where(new, np.where(turns, self._count + 1, 0), self._count)
-        self._force, self._change = force, change
-        for i in np.flatnonzero(new & (self._count == ALTERNATIONS)):
-            self._largest[i] = np.inf  # it is told once
-            yield _alternates(self._links[i], t)
-
-
-def _may_drive(law: Law) -> bool:
-    """Return whether the force of a law may give energy."""
-    return law.active if isinstance(law, ConnectorLaw) else isinstance(law, Controller | ForceLaw)
+    def told(self) -> Iterator[str]:
+        """Yield warnings that have not been told, one a connector."""
+        if self.c is not None and self.c.tells:
+            self.c.tells = 0
+            for link, t in zip(self._links, map(float, self._told), strict=True):
+                if not math.isnan(t):
+                    yield _alternates(link, t)
 
 
 def _alternates(link: Connector, t: float) -> str:

@@ -783,6 +783,20 @@ typedef struct {
   const inelastic_term *points; /* entries of the ledger of springs, rigid-plastic ones and laws */
 } coupling_term;
 
+/* Forces of laws of a user, which may change their direction at every step; see watches.py. */
+typedef struct {
+  int number, most;            /* changes in a row that are one too many */
+  double large, moved;         /* parts of the largest force, and of `length`, that count */
+  const int32_t *dof;          /* where each force is among the unknowns */
+  const double *const *value;  /* of a controller: its force; else none */
+  int32_t *const *fresh;       /* whether it was evaluated since this was cleared */
+  const double *const *rate;   /* of the motions in the last step */
+  const double *length;
+  double *force, *change, *largest, *told; /* told: time from which on it is too often; not a number before */
+  int32_t *count;              /* changes in a row so far */
+  int tells;                   /* whether any was told since this was cleared */
+} force_watch;
+
 /* Energy stored and dissipated in a step, and the sum of the sizes of the works on connectors. */
 typedef struct {
   double in_beams, in_connectors, effort;
@@ -869,6 +883,7 @@ typedef struct {
   const kept_numbers *kept;
   cell_forces *cell_forces;
   int watches;
+  force_watch *forces; /* of laws of a user; or none */
   const watch *const *watch;
   int parts, parts_of_last; /* steps and parts of steps in the latest call; in its last step */
   int failure;            /* of the latest step; see enum failure */

@@ -753,6 +753,25 @@ static void accept_supports(march *m)
   memcpy(p->before, p->reactions, p->held * sizeof *p->before);
 }
 
+/* Note forces that change their direction at each step or sample. */
+static void watch_forces(force_watch *w, const march *m)
+{
+  for (int i = 0; i < w->number; ++i) {
+    const double force = w->value[i] ? *w->value[i] : m->q[w->dof[i]];
+    if (w->value[i] && !*w->fresh[i]) continue;
+    if (w->value[i]) *w->fresh[i] = 0;
+    const double change = force - w->force[i];
+    w->largest[i] = fmax(w->largest[i], fabs(force));
+    const int large = fabs(change) >= w->large * w->largest[i];
+    const int moves = fabs(*w->rate[i]) * m->step.dt >= w->moved * w->length[i];
+    w->count[i] = large && moves && change * w->change[i] < 0 ? w->count[i] + 1 : 0;
+    w->force[i] = force, w->change[i] = change;
+    if (w->count[i] != w->most || w->told[i] == w->told[i]) continue;
+    w->told[i] = m->t;
+    w->tells = 1;
+  }
+}
+
 /* Take the end of the step for the state; whether no function of a user has raised anything. */
 int accept_step(march *m)
 {
@@ -779,6 +798,7 @@ int accept_step(march *m)
   m->t = m->step.t1;
   m->failure = SUCCEEDS;
   ++m->parts;
+  if (m->forces && !isinf(m->step.dt)) watch_forces(m->forces, m);
   for (int k = 0; k < m->watches; ++k) watch_step(m->watch[k], 1, m->t, p->q_before, m->q);
   return raised_anywhere(e) == NOTHING || fails(m, RAISED);
 }
