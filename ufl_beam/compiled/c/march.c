@@ -387,8 +387,8 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
   if (c->friction) begin_friction(c, step);
   if (c->asked) {
     /* Parts of a step go in proportion to its loads; a path, whose parts are one, has no beginning. */
-    const double part = step->fraction * step->at;
-    const double t1 = part == 1 ? step->load_time : step->t0 + part * (step->load_time - step->t0);
+    const double way = step->fraction * step->at;
+    const double t1 = way == 1 ? step->load_time : step->t0 + way * (step->load_time - step->t0);
     c->asked->begin(c->asked->begin_self, t1, step->dt);
   }
   if (c->points) begin_points(c->points, t->points->dt, step->dt);
