@@ -164,6 +164,27 @@ def test_thinned_saved_and_continued(scheme, shared_path):
             assert np.array_equal(more.diagram(beam, 0), whole.diagram(beam))
 
 
+@pytest.mark.parametrize("goes_on", [ub.Midpoint(), ub.Midpoint(0.02), ub.DecayingMidpoint()])
+@pytest.mark.parametrize("loaded", [False, True])
+def test_the_first_forces_of_a_run_that_goes_on(goes_on, loaded, shared_path):
+    """They are the last ones before it, from memory or a file, in diagrams and envelopes."""
+    scene, _ = two_beams("weight")
+    times = {"dt": 0.01, "progress": False}
+    half = ub.simulate(scene, ub.Midpoint(), t=(0, 0.05), **times)
+    start = half
+    if loaded:
+        half.save(shared_path / "half.h5")
+        start = ub.load(shared_path / "half.h5", scene=scene)
+    extremes = ub.Extremes()
+    more = ub.simulate(scene, goes_on, t=(0.05, 0.06), start=start, record=extremes, **times)
+    for beam in scene.beams:
+        first, last = more.diagram(beam, 0), half.diagram(beam)
+        assert np.array_equal(first, last)
+        of_steps = np.array([first[1:], more.diagram(beam, 1)[1:]])[..., [0, -1]]  # at both ends
+        low = extremes.section_forces(beam).low[[0, -1]].T
+        assert low == pytest.approx(of_steps.min(axis=0), rel=1e-12, abs=SOLVED)
+
+
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(), ub.DecayingMidpoint()], ids=str)
 def test_as_in_the_reference_path(scheme):
     scene, joint = two_beams("virtual work", "yielding")

@@ -117,9 +117,11 @@ def last_forces(
 ) -> tuple[Array | None, Array | None]:
     """Forces of cells in the last step of ``start``, and the local configuration at its beginning.
 
-    None without a start, with other cells, and after steps of another scheme.
+    None without a start, with other cells, and after steps in another part of which forces were in
+    equilibrium.
     """
-    if start is None or start.scheme != scheme or not same_unknowns(start.grid, grid):
+    between = float(scheme.average(0.0, 1.0))
+    if start is None or start.between != between or not same_unknowns(start.grid, grid):
         return None, None
     cells, before = start.last_forces()
     return np.ascontiguousarray(cells[:, share.cells]), None if before is None else before[

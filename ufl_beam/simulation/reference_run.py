@@ -37,14 +37,15 @@ def simulate_by_reference(
     options: dict[str, Any] = {"max_iterations": newton.max_iterations, "petsc": newton.petsc}
     solver = Solver(grid, scheme, t0, q, v, rtol=newton.rtol, **options)
     same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
+    between = float(scheme.average(0.0, 1.0))
     solver.start(None if start is None else internal, same=same)
-    if start is not None and start.scheme == scheme and same_unknowns(start.grid, grid):
+    if start is not None and start.between == between and same_unknowns(start.grid, grid):
         goes_on = same and "reactions" in internal and not len(start.v)
         if goes_on or has_inertia(scheme):
             solver.given, before = start.last_forces()
             solver.q_before = q if before is None else before
     solution = Solution(scene, grid)
-    solution.between = float(scheme.average(0.0, 1.0))
+    solution.between = between
     solution.find_cell_forces(scheme, None)
     solution.every, solution.building = every, time.perf_counter() - begin
 
