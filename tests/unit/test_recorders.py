@@ -433,3 +433,22 @@ def test_files_do_not_depend_on_the_number_of_ranks(shared_path, on_first_rank):
             # Section forces are of the order of 100 N
             tolerance = 1e-7 if name in "NVM" else 1e-9
             assert np.abs(found.of(name) - other.of(name)).max() < tolerance
+
+
+@pytest.mark.parametrize("degree", [1, 3])
+def test_rows_of_displacements_follow_the_beam(degree):
+    """Hinges and inner nodes change nothing: the last row is that of the end."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=500.0, rhoA=2.0, rhoI=0.01)
+    hinges = {0.0: ub.Hardening(20.0, 50.0), 0.5: ub.Hardening(10.0, 50.0)} if degree == 1 else {}
+    beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges=hinges)
+    load = ub.PointLoad(beam.end, force=(0.0, -20.0), time=ub.ramp(0.1))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    extremes, mesh = ub.Extremes(), ub.Mesh(degree=degree)
+    run = ub.simulate(
+        scene, ub.Midpoint(), t=(0, 0.1), dt=5e-3, record=extremes, mesh=mesh, progress=False
+    )
+    low = extremes.displacement(beam).low
+    assert len(low) == 4 * degree + 1
+    for row, s in ((0, 0.0), (2 * degree, 0.5), (-1, 1.0)):
+        assert np.array_equal(low[row], run.displacement(beam.at(s)).min(axis=0))
+    assert (np.diff(low[:, 1]) < 0).all()  # it bends down, further from row to row

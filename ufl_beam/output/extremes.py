@@ -170,8 +170,12 @@ class Extremes(Recorder):
     def displacement(self, one: Member | Body) -> Extent:
         """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
 
+        Rows follow a beam from start to end: its vertices, between them the inner nodes of a mesh
+        of higher degree.  At a hinge ψ is that of :meth:`Solution.displacement` at the place.
+
         Raises:
             SceneError: It is not in the scene, or nothing was run.
         """
-        dofs = self.grid.nodes_of(one)[1]
-        return self._extents[1].of(dofs)
+        if isinstance(one, Body):
+            return self._extents[1].of(self.grid.node(one.middle).reshape(1, 3))
+        return self._extents[1].of(self.grid.dofs[self.grid.nodes_along(one)])
