@@ -53,7 +53,8 @@ class SavedFunction:
         if n == len(self.times) or self.times[n] != t:
             raise SceneError(
                 f"the function {self.name} is not known at t = {t:g}: a file of a solution has "
-                "the values of functions at its times only; build the scene with the function"
+                "the values of functions at its times only; load it with your own scene, which has "
+                "the function: ub.load(path, scene=scene)"
             )
         return self.values[n]
 

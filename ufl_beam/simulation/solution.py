@@ -257,7 +257,8 @@ class Solution(Rich):
         """Section forces along a beam, by equilibrium of its cells, at the n-th kept time.
 
         They belong to the equation of the step that ends at that time, with inertia, damping, loads
-        and works: at a support they are its :meth:`reaction`.  ``points`` are those of each cell,
+        and works: at a support they are its :meth:`reaction`, in the axes of the section, which
+        turns with the beam.  ``points`` are those of each cell,
         equally spaced, both ends included; V is linear between them under a uniform load.
 
         The initial state of a static run bears nothing unless it has a ``start=``.  That of a
@@ -303,8 +304,9 @@ class Solution(Rich):
     def material_at(self, place: Place) -> Material:
         """Material states in the cell at a place at all kept times; arrays begin with (n+1,).
 
-        Where a plastic hinge is at the place, M, the jump and the energy are those of the hinge; M
-        is the moment during the step that ends at each time.
+        Where a plastic hinge is at the place, ``forces[:, 2]``, ``jump`` and ``hinge`` are its
+        moment during the step that ends at each time, its rotation and the energy that it has
+        dissipated.  The other forces are those in the middle of the cell.
 
         Raises:
             SceneError: The scene is elastic, or the beam of the place is not in it.

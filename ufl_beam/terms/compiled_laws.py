@@ -111,7 +111,7 @@ class CompiledLaws(Response):
         return entries
 
     def dissipated(self) -> Sequence[Array]:
-        """What is lost."""
+        """Energy that each connector has lost; J."""
         return (self._lost,)
 
     def bends(self, e1: Array) -> Array:
