@@ -104,10 +104,6 @@ class Table:
         return float(np.interp(t, self.times, self.values))
 
 
-ALWAYS = Table((0.0,), (1.0,))
-""":func:`steady` as a table."""
-
-
 def require_time_function(function: TimeFunction, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless ``function`` gives a number at t = 0."""
     if not callable(function):

@@ -32,9 +32,7 @@ from ufl_beam.solvers.newton import Border, Solver
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.follower_loads import FollowerLoads
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 
@@ -140,10 +138,7 @@ class Stepper:
         rotations = share.rotations()
         half_tangents, in_motion = with_half_tangents(scheme, rotations), has_inertia(scheme)
         self._bytes = 8 * share.size
-        kinds = DeadLoads, FollowerLoads
-        loads = {type(x): x.steps_in_c for x in equation.terms if isinstance(x, kinds)}
-        dead, following = (loads.get(kind, ffi.NULL) for kind in kinds)
-        self._loads = [x for x in equation.loads if not isinstance(x, kinds)]
+        loads = [one.vector for one in equation.loads]
         multipliers = share.multipliers().astype(np.int32)
         opens = [one.opens for one in phases if one.opens is not None]
         places = ffi.new("openable[]", opens)
@@ -158,7 +153,7 @@ class Stepper:
             largest_turn=LARGEST_TURN, rotations=len(rotations), rotation=rotations,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
-            loads=dead, follower_loads=following,
+            loads=len(loads), load=ffi.new("vector *[]", loads),
             supports=equation.supports.in_c(self._callbacks),
             states=len(ledger.state), state=ledger.state.numbers, cell_forces=cell_forces.c,
             opens=int(share.largest(float(bool(opens)))), places=len(opens), place=places,
@@ -208,7 +203,6 @@ class Stepper:
                 mine.insert(0, callbacks.accept(lambda q1, s: extras.require(q1)))  # type: ignore[misc]
             loops["accept"] = [callbacks.phase(callbacks.note_end), *mine, *others]
             loops["begin"].insert(0, callbacks.phase(callbacks.note_beginning))
-            loops["begin"].append(callbacks.phase(self._note_loads))
         if extras.ask is not None:
             loops["begin"].insert(0, callbacks.phase(self._ask))
         if extras.note is not None:
@@ -348,11 +342,6 @@ class Stepper:
         """Note an accepted step."""
         if self._extras.note is not None:
             self._extras.note(step.t1, self._callbacks.end)
-
-    def _note_loads(self, *_: Any) -> None:
-        """Take the sizes of loads that have no loops, for the scale of convergence."""
-        sizes = [self.solver.convergence.size(one.force) for one in self._loads]
-        self.c.loads_in_python = sum(sizes)
 
     def _prepare(self) -> None:
         """Take from a trial step what the scheme keeps besides the velocities."""

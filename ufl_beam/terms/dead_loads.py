@@ -31,7 +31,7 @@ class DeadLoads(LoadTerm):
     """
 
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
-        super().__init__(share, scheme, ledger)
+        super().__init__(scheme, ledger)
         # Loads of one time function are one vector; functions need not be hashable.
         vectors: dict[int, tuple[Load, Array]] = {}
         in_cells: dict[int, Array] = {}
@@ -50,7 +50,7 @@ class DeadLoads(LoadTerm):
         self._size = share.size
         # In the equation, at the end of the step, and at that of the last one.
         self._forces = np.zeros((3, len(self.dofs)))
-        self._in_c = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
+        self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
         # Parts of the vectors that act: now, at the end of the step, at that of the last one, and
         # in its equation.
         self._parts: Array = np.zeros((4, len(vectors)))
@@ -69,12 +69,12 @@ class DeadLoads(LoadTerm):
 
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loop that subtracts the load vector; no tangent."""
-        return loop("subtract_vector", self._in_c), None
+        return loop("subtract_vector", self.vector), None
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the vectors."""
         owners = [(load.time, load) for load, _ in self._vectors]
-        c = self.steps_in_c = struct(
+        c = self._c = struct(
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=len(owners),
             force=self._forces[0], end=self._forces[1], before=self._forces[2],
             parts=[doubles(part) for part in self._parts[:3]],
@@ -85,11 +85,6 @@ class DeadLoads(LoadTerm):
         )  # fmt: skip
         return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
 
-    @property
-    def force(self) -> Array:
-        """The forces in the latest residual; a new array."""
-        return self._whole(self._forces[0])
-
     def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         factors = self._factors_at(t)
@@ -97,7 +92,7 @@ class DeadLoads(LoadTerm):
         self._forces[:] = sum(
             f * vector for f, (_, vector) in zip(factors, self._vectors, strict=True)
         )
-        return self.force
+        return self._whole(self._forces[0])
 
     def _factors_at(self, t: float) -> list[float]:
         """Factors of the vectors; a vector belongs to its first load for messages."""
@@ -113,7 +108,7 @@ class DeadLoads(LoadTerm):
         """The forces at the end of the last step."""
         self._forces[:] = memory.added("dead loads", self._whole(self._forces[2]))[self.dofs]
         for k in range(len(self._vectors)):
-            self.steps_in_c.factors[k] = math.nan
+            self._c.factors[k] = math.nan
         for k, part in enumerate(self._parts[2]):
             self._parts[2, k] = memory.number(f"part of dead loads {k}", part)
 

@@ -21,16 +21,12 @@ from ufl_beam.terms.phases import Callbacks, Phases
 
 
 class FollowerLoads(LoadTerm):
-    """Forces that turn with the cross-section they act on.
-
-    Attributes:
-        steps_in_c: ``follower_loads`` of loops.h.
-    """
+    """Forces that turn with the cross-section they act on."""
 
     def __init__(
         self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
-        super().__init__(share, scheme, ledger)
+        super().__init__(scheme, ledger)
         here = [i for i, load in enumerate(loads) if share.computes(load.place)]
         self._numbers, self._loads = np.array(here, dtype=np.int64), [loads[i] for i in here]
         places = [share.local(share.at(load.place)) for load in self._loads]
@@ -47,7 +43,8 @@ class FollowerLoads(LoadTerm):
         self._turns, self._size, self._A = np.zeros(len(here)), share.size, A
         # In the latest residual, and in that of the last step.
         self._forces = np.zeros((2, len(self._dofs)))
-        self.steps_in_c = struct(
+        self.vector = struct("vector", size=len(self._dofs), dof=self._dofs, values=self._forces[0])
+        self._c = struct(
             "follower_loads", number=len(here), size=len(self._dofs), dof=self._dofs,
             at=np.searchsorted(self._dofs, dofs).astype(np.int32), given=self._given,
             turning=self._turning, turn0=self._turns, part=scheme.load_weight,
@@ -57,21 +54,15 @@ class FollowerLoads(LoadTerm):
             weight_of_before=scheme.weight_of_before,
         )  # fmt: skip
 
-    @property
-    def force(self) -> Array:
-        """The forces in the latest residual; a new array."""
-        return self._whole(self._forces[0])
-
     def loops(self) -> tuple[Loop, Loop | None]:
         """C loops of the forces in the plane, and of their derivatives by the rotation."""
-        c = self.steps_in_c
-        return loop("subtract_follower_loads", c), loop("add_tangent_of_follower_loads", c)
+        loops = "subtract_follower_loads", "add_tangent_of_follower_loads"
+        force, tangent = (loop(name, self._c) for name in loops)
+        return force, tangent
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the loads."""
-        c = fill(
-            self.steps_in_c, factor=callbacks.of_time([(load.time, load) for load in self._loads])
-        )
+        c = fill(self._c, factor=callbacks.of_time([(load.time, load) for load in self._loads]))
         c.work = self._ledger.supplied.pointer("loads")
         begin, accept = (loop(f"{name}_follower_loads", c) for name in ("begin", "accept"))
         return Phases([begin], [accept])
@@ -82,7 +73,7 @@ class FollowerLoads(LoadTerm):
         self._turns[:] = q[self._turning]
         self.add_residual(q, np.zeros(self._size))
         self._forces[1] = self._forces[0]
-        return self.force
+        return self._whole(self._forces[0])
 
     def _sizes_at(self, t: float) -> Array:
         factors = np.array([value_at(load.time, t, load) for load in self._loads])

@@ -3,26 +3,28 @@
 
 from __future__ import annotations
 
+import math
 from abc import abstractmethod
 from collections.abc import Sequence
 from functools import partial
+from typing import Any
 
 import numpy as np
 import ufl
 
-from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, lib
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel, mass_matrix
-from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving
 from ufl_beam.mechanics.kinematics import split, turn
-from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.in_cells import InCells
+from ufl_beam.terms.phases import Callbacks, Phases
 
 
 class LoadTerm(Term):
@@ -30,14 +32,11 @@ class LoadTerm(Term):
 
     kind = "loads"
 
-    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger) -> None:
-        self._scheme, self._ledger = scheme, ledger
-        self._force: Array = np.zeros(share.size)
+    vector: Any
+    """``vector`` of loops.h: forces whose size is part of the scale of convergence."""
 
-    @property
-    def force(self) -> Array:
-        """The forces in the latest residual; a new array where they have changed."""
-        return self._force
+    def __init__(self, scheme: Scheme, ledger: Ledger) -> None:
+        self._scheme, self._ledger = scheme, ledger
 
     @abstractmethod
     def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
@@ -79,78 +78,54 @@ class FrameForces(LoadTerm):
         self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
         share = fields.share
-        super().__init__(share, scheme, ledger)
-        self._before = self._force
+        super().__init__(scheme, ledger)
         S, G = mass_matrix(fields), turned_mass_matrix(fields)
+        coriolis = 2 * frame.rate if has_inertia(scheme) else 0.0
         S.data[np.isin(S.rows(), share.rotations())] = 0.0
         S.data *= frame.rate**2
-        G.data *= 2 * frame.rate if has_inertia(scheme) else 0.0
-        self._slope: Array | None = None  # of the forces of the step
-        self._S, self._G, self._pull, self._turn = S.data, G.data, Product(S), Product(G)
-        self._from_centre, self._fields = _positions(fields, frame.about), fields
-        # Accelerations by places, and in motion by displacements of the other direction.
-        self._outward, self._across = np.zeros((2, share.size))
-        self._other: Index = np.arange(share.size)
-        u, v = share.translations()
-        self._other[u], self._other[v] = v, u
-        self._outward[u] = self._outward[v] = -(frame.rate**2)
-        self._across[u], self._across[v] = -2 * frame.rate, 2 * frame.rate
-        self._in_motion = has_inertia(scheme)
-        self._accelerations = np.zeros(share.size)
-        self._place = ffi.new("double *[1]", [doubles(self._accelerations)])
-        self._A, self._share_of_end, self._grown = A, scheme.load_weight, 0.0
+        G.data *= coriolis
+        self._matrices, self._A, self._fields = (Product(S), Product(G)), A, fields
+        x, y = (np.ascontiguousarray(of, dtype=np.int32) for of in share.translations())
+        change, place, space, self._force, self._before, rest = np.zeros((6, share.size))
+        self._accelerations = rest, ffi.new("double *[1]", [doubles(rest)])
+        self.vector = struct("vector", size=share.size, values=self._force)
+        self._c = struct(
+            "rotating_frame", size=share.size, entries=len(A.data), places=len(x), x=x, y=y,
+            pull=self._matrices[0].c, turn=self._matrices[1].c, pulls=S.data, turns=G.data,
+            from_centre=_positions(fields, frame.about), rate=frame.rate, coriolis=coriolis,
+            part=scheme.load_weight, weight_of_before=scheme.weight_of_before, change=change,
+            place=place, space=space, force=self._force, before=self._before,
+            accelerations=self._accelerations[1],
+        )  # fmt: skip
 
-    def begin(self, step: Step) -> None:
-        """Remember the beginning, and how much of the forces acts."""
-        self._q0, self._dt = step.q0, step.dt
-        growth = step.fraction * (1.0 - self._grown)
-        self._growth, self._growth_at_end = self._grown + step.at * growth, self._grown + growth
-        self._at_beginning = self._from_centre + step.q0
-        self._slope = None
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """C loops of both forces, and of their derivatives."""
+        return loop("subtract_frame_forces", self._c), loop("add_tangent_of_frame", self._c)
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops over the degrees of freedom."""
+        self._c.work = self._ledger.supplied.pointer("loads")
+        return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
 
     def in_cells(self) -> Sequence[InCells]:
         """The mass of the beams times the accelerations of the frame."""
         form = partial(mass_kernel, self._fields)
-        return [InCells(form, lib.DENSITY, self._fields.order, self._place)]
-
-    def _put_accelerations(self, a: Array) -> None:
-        """Note the accelerations, where forces in cells find them."""
-        ffi.memmove(self._place[0], doubles(a), a.nbytes)
+        return [InCells(form, lib.DENSITY, self._fields.order, self._accelerations[1])]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The forces at ``q``; take that state as one that is in equilibrium with them."""
-        self._grown = 1.0
-        self._put_accelerations(self._outward * (self._from_centre + q))
-        self._force = self._before = self._pull(self._from_centre + q)
-        return self._force
-
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Subtract centrifugal and Coriolis forces from the residual."""
-        self._change = q1 - self._q0
-        self._x = self._at_beginning + self._share_of_end * self._change
-        self._force = self._growth * self._pull(self._x)
-        r -= self._force
-        r += self._turn(self._change) / self._dt
-
-    def add_tangent(self, q1: Array) -> None:
-        """Subtract the derivative of the forces from the tangent."""
-        if self._slope is None:
-            self._slope = self._G / self._dt - self._growth * self._share_of_end * self._S
-        self._A.data += self._slope
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the work of the centrifugal forces, and take how much of them acts."""
-        self._ledger.supplied["loads"] += float(acting(self._scheme, self._before, self._force) @ s)
-        self._before, self._grown = self._force, self._growth_at_end
-        a = self._growth * self._outward * self._x
-        if self._in_motion:
-            a += self._across / self._dt * self._change.take(self._other)
-        self._put_accelerations(a)
+        self._c.grown = 1.0
+        still = np.zeros(len(q))
+        step = struct("time_step", q0=q, dt=math.inf, fraction=1.0, at=1.0)
+        lib.begin_frame(self._c, step, ffi.NULL, ffi.NULL)
+        self.add_residual(q, np.zeros(len(q)))
+        lib.accept_frame(self._c, step, doubles(q), doubles(still))
+        return self._force.copy()
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The forces in the equation of the last step, and how much of them acts."""
-        self._force = self._before = memory.added("rotating frame", self._before)
-        self._grown = memory.number("growth of the rotating frame", self._grown)
+        self._force[:] = self._before[:] = memory.added("rotating frame", self._before)
+        self._c.grown = memory.number("growth of the rotating frame", self._c.grown)
 
 
 def _positions(fields: Fields, about: tuple[float, float]) -> Array:

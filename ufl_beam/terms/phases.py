@@ -15,7 +15,7 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
-from ufl_beam.model.time_functions import ALWAYS, Table, TimeFunction, steady, value_at
+from ufl_beam.model.time_functions import Constant, Table, TimeFunction, steady, value_at
 
 
 class Phases(NamedTuple):
@@ -80,7 +80,9 @@ class Callbacks:
         of_time = ffi.new("time_function[]", len(functions))
         for place, (function, owner) in zip(of_time, functions, strict=True):
             if function is steady:
-                function = ALWAYS
+                function = Constant(1.0)
+            if isinstance(function, Constant):
+                function = Table((0.0,), (function.value,))
             if isinstance(function, Table):
                 points = [np.array(x, dtype=np.float64) for x in (function.times, function.values)]
                 place.points, (place.t, place.y) = len(points[0]), map(doubles, points)

@@ -317,6 +317,30 @@ double quadratic_form(const constant_matrix *A, const double *x)
   return sum;
 }
 
+void subtract_frame_forces(void *self, const double *q, double *r)
+{
+  const rotating_frame *f = self;
+  for (int i = 0; i < f->size; ++i) {
+    f->change[i] = q[i] - f->q0[i];
+    f->place[i] = f->from_centre[i] + f->q0[i] + f->part * f->change[i];
+  }
+  memset(f->force, 0, f->size * sizeof *f->force);
+  memset(f->space, 0, f->size * sizeof *f->space);
+  add_product(f->pull, f->place, f->force);
+  add_product(f->turn, f->change, f->space);
+  for (int i = 0; i < f->size; ++i) {
+    f->force[i] *= f->growth;
+    r[i] = r[i] - f->force[i] + f->space[i] / f->dt;
+  }
+}
+
+void add_tangent_of_frame(void *self, const double *q, double *tangent)
+{
+  const rotating_frame *f = self;
+  const double part = f->growth * f->part;
+  for (int i = 0; i < f->entries; ++i) tangent[i] += f->turns[i] / f->dt - part * f->pulls[i];
+}
+
 /* tan(x/2) for the increment x of rotation k: forces and their tangent are asked at the same. */
 static inline double half_tangent(const step_product *p, int k, double x)
 {

@@ -74,9 +74,10 @@ typedef struct {
   int at_e; /* where it has the strains */
 } static_tangent;
 
+/* Some numbers of a vector, or all of them. */
 typedef struct {
   int size;
-  const int32_t *dof;
+  const int32_t *dof; /* or none */
   const double *values;
 } vector;
 
@@ -113,6 +114,8 @@ void add_static_tangent(void *self, const double *q, double *tangent);
 void subtract_vector(void *self, const double *q, double *b);
 void subtract_follower_loads(void *self, const double *q, double *r);
 void add_tangent_of_follower_loads(void *self, const double *q, double *tangent);
+void subtract_frame_forces(void *self, const double *q, double *r);
+void add_tangent_of_frame(void *self, const double *q, double *tangent);
 void add_step_force(void *self, const double *q, double *r);
 void add_step_tangent(void *self, const double *q, double *tangent);
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
@@ -685,17 +688,56 @@ typedef struct {
 /* Vectors times functions of time at some degrees of freedom, see DeadLoads. */
 typedef struct {
   int size, vectors;
-  int changed, whole; /* since norm was computed; whether the latest step went all the way to its loads */
+  int whole; /* whether the latest step went all the way to its loads */
   const int32_t *dof;
   const double *const *vector;
   const time_function *factor;
   double *factors; /* of the latest step; not numbers before the first */
   double *force, *end, *before;
   double *parts[3]; /* of the vectors in these */
-  double norm, weight_of_before;
+  double weight_of_before;
   int acts; /* whether a force, now or before, is not zero */
   double *work; /* entry of the ledger */
 } dead_loads;
+
+/* Centrifugal and Coriolis forces, see FrameForces. */
+typedef struct {
+  int size, entries, places;
+  const int32_t *x, *y;             /* displacements of each place */
+  const constant_matrix *pull, *turn; /* that make forces of places, and of velocities */
+  const double *pulls, *turns;      /* the same as entries of the tangent */
+  const double *from_centre;        /* places at rest */
+  double rate, coriolis, part, weight_of_before; /* coriolis: twice the rate, or 0 in statics */
+  const double *q0;
+  double dt, growth, grown, grown_at_end; /* of the forces: in the equation, before and after the step */
+  double *change, *place, *space;   /* change: of q; place: at which forces act */
+  double *force, *before;           /* in the latest residual, in that of the last step */
+  double *const *accelerations, *work;
+} rotating_frame;
+
+/* The first numbers of a work: time, length of the step, part that acts; then come those of its user. */
+enum work_number { WORK_TIME, WORK_STEP, WORK_PART, WORK_NUMBERS };
+
+/* A work of a user on cells, see works.py. */
+typedef struct {
+  const cells *residual;
+  int forms, numbers;
+  const form_of_step *form;     /* all of its forms, and where they have q0, or -1 */
+  const int32_t *at;            /* forms x numbers: where they have these, or -1 */
+  double *number;               /* as forms have them */
+  const time_function *of_time; /* numbers of the user */
+  double *before;               /* forces in the equation of the last step; of virtual works */
+  form_value *energy, *lost;    /* of a potential, or none */
+  double *supplied;             /* entry of what it, or a change of a potential in time, supplies; or none */
+} user_work;
+
+typedef struct {
+  int size, works;
+  user_work *const *work;
+  double weight_of_before;
+  double t, grown, t_at_end, grown_at_end; /* time and part that acts, in the state and after the step */
+  double *force, *space; /* force: of all works in the equation of the last step */
+} user_works;
 
 /* Coefficients of a step: rows of numbers for the step or a change of velocities, the velocities, those
  * before, and what else a scheme keeps; see Coefficients of time_schemes.py. */
@@ -869,9 +911,8 @@ typedef struct {
   int admissions, judges; /* checks of laws; whether there are any on any process */
   const admission_call *admission;
   static_path *path;  /* in statics */
-  dead_loads *loads;  /* or none */
-  const follower_loads *follower_loads; /* or none */
-  double loads_in_python; /* size of loads that have no loop, on all processes */
+  int loads;
+  const vector *const *load; /* their forces */
   moving_supports *supports;
   int opens, places;  /* opens: whether something may open, on any process */
   const openable *place;
@@ -905,6 +946,11 @@ void begin_dead_loads(void *self, const time_step *step, const double *q1, const
 void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
 void begin_follower_loads(void *self, const time_step *step, const double *q1, const double *s);
 void accept_follower_loads(void *self, const time_step *step, const double *q1, const double *s);
+void begin_frame(void *self, const time_step *step, const double *q1, const double *s);
+void accept_frame(void *self, const time_step *step, const double *q1, const double *s);
+void begin_works(void *self, const time_step *step, const double *q1, const double *s);
+void accept_works(void *self, const time_step *step, const double *q1, const double *s);
+void add_energy_of_works(void *self, const time_step *step, const double *q1, const double *s);
 void begin_viscous_forms(void *self, const time_step *step, const double *q1, const double *s);
 void begin_second_differences(void *self, const time_step *step, const double *q1, const double *s);
 void accept_second_differences(void *self, const time_step *step, const double *q1, const double *s);

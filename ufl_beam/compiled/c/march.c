@@ -121,7 +121,7 @@ void begin_dead_loads(void *self, const time_step *step, const double *q1, const
     l->parts[1][k] = whole ? l->factors[k] : before + change;
     l->parts[0][k] = step->at == 1 ? l->parts[1][k] : before + step->at * change;
   }
-  l->changed = 1, l->acts = 0;
+  l->acts = 0;
   for (int i = 0; i < l->size; ++i) l->end[i] = l->factors[0] * l->vector[0][i];
   for (int k = 1; k < l->vectors; ++k)
     for (int i = 0; i < l->size; ++i) l->end[i] += l->factors[k] * l->vector[k][i];
@@ -171,6 +171,114 @@ void accept_follower_loads(void *self, const time_step *step, const double *q1, 
   *f->work += work;
   memcpy(f->force_before, f->force, f->size * sizeof *f->force);
   memcpy(f->before, f->end, 3 * (size_t)f->number * sizeof *f->end);
+}
+
+void begin_frame(void *self, const time_step *step, const double *q1, const double *s)
+{
+  rotating_frame *f = self;
+  const double growth = step->fraction * (1 - f->grown);
+  f->growth = f->grown + step->at * growth, f->grown_at_end = f->grown + growth;
+  f->q0 = step->q0, f->dt = step->dt;
+}
+
+void accept_frame(void *self, const time_step *step, const double *q1, const double *s)
+{
+  rotating_frame *f = self;
+  const double a = f->weight_of_before, out = -f->growth * (f->rate * f->rate), across = f->coriolis / f->dt;
+  double work = 0, *to = *f->accelerations;
+  for (int i = 0; i < f->size; ++i) work += (a * f->before[i] + (1 - a) * f->force[i]) * s[i];
+  *f->work += work;
+  memcpy(f->before, f->force, f->size * sizeof *f->force);
+  f->grown = f->grown_at_end;
+  for (int k = 0; k < f->places; ++k) {
+    const int x = f->x[k], y = f->y[k];
+    to[x] = out * f->place[x] - across * f->change[y];
+    to[y] = out * f->place[y] + across * f->change[x];
+  }
+}
+
+/* Give a number to the forms of a work that have it, if it has changed. */
+static void put_number(const user_work *w, int k, double value)
+{
+  if (value == w->number[k]) return;
+  w->number[k] = value;
+  for (int j = 0; j < w->forms; ++j) {
+    const cells *form = w->form[j].form;
+    const int at = w->at[j * w->numbers + k];
+    if (at < 0) continue;
+    for (int c = 0; c < form->number; c += form->lanes)
+      for (int l = 0; l < form->lanes; ++l) in_cell(form, c, at)[l] = value;
+  }
+}
+
+static void put_time(const user_work *w, double t)
+{
+  put_number(w, WORK_TIME, t);
+  for (int k = WORK_NUMBERS; k < w->numbers; ++k) put_number(w, k, value_at(w->of_time + k - WORK_NUMBERS, t));
+}
+
+/* Longest step that works are told of, in which all rates vanish. */
+static const double AT_REST = 1e300;
+
+void begin_works(void *self, const time_step *step, const double *q1, const double *s)
+{
+  user_works *all = self;
+  const double growth = step->fraction * (1 - all->grown), t = all->t;
+  all->t_at_end = t + step->fraction * (step->motion_time - t), all->grown_at_end = all->grown + growth;
+  for (int k = 0; k < all->works; ++k) {
+    const user_work *w = all->work[k];
+    for (int j = 0; j < w->forms; ++j)
+      if (w->form[j].at >= 0) set_cells(w->form[j].form, step->q0, w->form[j].at);
+    put_time(w, t + step->at * step->fraction * (step->load_time - t));
+    put_number(w, WORK_STEP, fmin(step->dt, AT_REST));
+    put_number(w, WORK_PART, all->grown + step->at * growth);
+  }
+}
+
+/* What the scheme lost of a potential in a step, and what a change in time supplied. */
+static void account_for(const user_work *w, const user_works *all, const double *q0, const double *q1)
+{
+  const double a = all->weight_of_before;
+  if (w->lost) add_values(w->lost, 0, q1, 0);
+  if (!w->supplied) return;
+  put_time(w, a * all->t + (1 - a) * w->number[WORK_TIME]);
+  const cells *energy = w->energy->form;
+  const double moved = value_of_cells(energy, q1) - value_of_cells(energy, q0);
+  put_time(w, all->t_at_end);
+  *w->supplied += value_of_cells(energy, q1) - w->energy->held - moved;
+}
+
+void accept_works(void *self, const time_step *step, const double *q1, const double *s)
+{
+  user_works *all = self;
+  const double a = all->weight_of_before;
+  double *r = all->space;
+  memset(all->force, 0, all->size * sizeof *r);
+  for (int k = 0; k < all->works; ++k) {
+    const user_work *w = all->work[k];
+    memset(r, 0, all->size * sizeof *r);
+    add_cells((void *)w->residual, q1, r);
+    for (int i = 0; i < all->size; ++i) all->force[i] -= r[i];
+    if (w->energy) account_for(w, all, step->q0, q1);
+    else {
+      double work = 0;
+      for (int i = 0; i < all->size; ++i) work += (a * w->before[i] - (1 - a) * r[i]) * s[i];
+      *w->supplied += work;
+      for (int i = 0; i < all->size; ++i) w->before[i] = -r[i];
+    }
+  }
+  all->t = all->t_at_end, all->grown = all->grown_at_end;
+}
+
+void add_energy_of_works(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const user_works *all = self;
+  for (int k = 0; k < all->works; ++k) {
+    const user_work *w = all->work[k];
+    if (!w->energy) continue;
+    put_time(w, all->t);
+    add_values(w->energy, step, q1, s);
+  }
 }
 
 /* out = sum of numbers times rates, from the one with number `first` on */
@@ -540,18 +648,14 @@ static void guess(march *m)
 }
 
 /* Size of the loads in the step, on all processes. */
-static double size_of_loads(march *m)
+static double size_of_loads(const march *m)
 {
   const equation *e = m->equation;
-  dead_loads *l = m->loads;
-  const follower_loads *f = m->follower_loads;
-  double size = m->loads_in_python;
-  if (l && l->changed) {
-    l->norm = norm_of_some(l->size, l->dof, e->weight, l->force);
-    l->changed = 0;
+  double size = 0;
+  for (int k = 0; k < m->loads; ++k) {
+    const vector *l = m->load[k];
+    size += over_processes(e, HYPOT, norm_of_some(l->size, l->dof, e->weight, l->values));
   }
-  if (l) size += over_processes(e, HYPOT, l->norm);
-  if (f) size += over_processes(e, HYPOT, norm_of_some(f->size, f->dof, e->weight, f->force));
   return size;
 }
 
