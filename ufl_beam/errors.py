@@ -8,6 +8,7 @@ import math
 import numbers
 import os
 import sys
+import traceback
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -163,6 +164,14 @@ def warn(message: str) -> None:
     warnings.warn(message, ModelWarning, stacklevel=level)
 
 
+def raised_at(error: BaseException) -> str:
+    """Place of the user's code that raised an error, " (file, line n)"; empty if there is none."""
+    for frame in traceback.extract_tb(error.__traceback__):
+        if not frame.filename.startswith(PACKAGE):
+            return f" ({frame.filename}, line {frame.lineno})"
+    return ""
+
+
 def shorten(value: object) -> str:
     """Format a value for a message: its ``repr`` in one line, cut to a readable length."""
     try:
@@ -206,6 +215,12 @@ def require_number(
     if number < at_least:
         raise SceneError(f"{what} = {number:g} must be at least {at_least:g}")
     return number
+
+
+def require_from_zero_to_infinity(value: Any, what: str) -> None:
+    """Raise :class:`SceneError` unless ``value`` is a non-negative number or infinity."""
+    if not is_infinite(value):
+        require_number(value, what, at_least=0.0)
 
 
 def require_returned(value: object, function: str, at: str, *, finite: bool = False) -> float:

@@ -145,10 +145,14 @@ def _percent(part: float) -> str:
 
 
 def _fall(layout: Layout | None, scheme: Scheme) -> float:
-    """First fall of the resistance per opening, over θ times the stiffness of the points; 1/m."""
+    """Fall of the resistance per opening, over θ times the stiffness of the points; 1/m.
+
+    It is that at the opening where the traction falls most.
+    """
     law = None if layout is None else layout.softening
     if layout is None or law is None or law.limit == 0:
         return 0.0
-    opening = TINY * law.energy / law.limit
-    fall = (law.limit - scheme.resistance(law, np.zeros(1), np.array([opening]))[0]) / opening
+    growth, begins = TINY * law.energy / law.limit, np.array([law.steepest[1]])
+    after = scheme.resistance(law, begins, np.array([growth]))
+    (fall,) = (law.traction(begins) - after) / growth
     return float(fall / (scheme.theta * layout.stiffness[layout.breaking].min()))
