@@ -139,9 +139,8 @@ class MaterialPoints:
         """Make the entries of the ledger."""
         layout, scheme, ledger = self._layout, self._scheme, self._ledger
         # What has broken may have a stress at the ends of a step, and none where its law holds.
-        self._releases = (self.softens and scheme.theta < 1) or (
-            scheme.average(0.0, 1.0) != 1.0 and curved(layout.kind)
-        )
+        over_step = scheme.average(0.0, 1.0) != 1.0
+        self._releases = over_step and (self.softens or curved(layout.kind))
         if layout.yields:
             ledger.state["hardening"] += 0.0
             ledger.lost["plastic"] += 0.0

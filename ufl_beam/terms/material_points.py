@@ -69,11 +69,10 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
 def releases(layout: Layout, scheme: Scheme) -> bool:
     """Return whether points lose energy numerically beside what ``alpha`` of a scheme takes.
 
-    In the middle of a step no stress is left in what has broken, but perhaps at its ends.  Where
-    elasticity is not linear, the stress of a step is not the mean over it.
+    No stress is left in what has broken but perhaps at the ends of a step.  Where elasticity is not
+    linear, the stress of a step is not the mean over it.
     """
-    breaks = layout.softening is not None and scheme.theta < 1
-    return breaks or (scheme.average(0.0, 1.0) != 1.0 and curved(layout.kind))
+    return scheme.average(0.0, 1.0) != 1.0 and (layout.softening is not None or curved(layout.kind))
 
 
 class PointForms:
