@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import numbers
 import os
@@ -11,7 +12,6 @@ import sys
 import traceback
 import warnings
 from collections.abc import Callable
-from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -166,8 +166,9 @@ def warn(message: str) -> None:
 
 def raised_at(error: BaseException) -> str:
     """Place of the user's code that raised an error, " (file, line n)"; empty if there is none."""
+    library = (PACKAGE, functools.__file__)  # that of functions of ub.law_functions
     for frame in traceback.extract_tb(error.__traceback__):
-        if not frame.filename.startswith(PACKAGE):
+        if not frame.filename.startswith(library):
             return f" ({frame.filename}, line {frame.lineno})"
     return ""
 
@@ -310,7 +311,7 @@ def require_function(value: Any, what: str, of: str) -> None:
         raise SceneError(f"{what} = {shorten(value)} must be a function of {of}")
 
 
-@cache
+@functools.cache
 def _memory() -> int:
     """Memory of this machine; B."""
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

@@ -2,6 +2,7 @@
 """Softening laws of one's own: in cells, hinges, connectors, springs and fibres; refusals."""
 
 import inspect
+import warnings
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -200,19 +201,19 @@ def scene_of(name, place):
 
 each_scheme = pytest.mark.parametrize(
     "scheme",
-    [ub.Static(), ub.ExactStatic(), ub.Midpoint(), ub.Midpoint(0.1), ub.Newmark()],
+    [ub.Static(), ub.ExactStatic(), ub.Midpoint(), ub.Midpoint(0.1), ub.GeneralizedAlpha(0.5)],
     ids=str,
 )
 
 
 @pytest.mark.parametrize("place", [*PLACES, "fibres"])
 @pytest.mark.parametrize("name", CRACKS)
-@each_scheme
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(0.1)], ids=str)
 def test_both_solvers_agree(name, place, scheme):
     """To and fro; works and losses to 1e-9; the ledger closes."""
     runs = [
         ub.simulate(
-            scene_of(name, place), scheme, t=(0, 1), dt=0.025, progress=False,
+            scene_of(name, place), scheme, t=(0, 1), dt=1 / 30, progress=False,
             newton=ub.Newton(rtol=1e-12, reference=reference),
         )
         for reference in (False, True)
@@ -224,7 +225,7 @@ def test_both_solvers_agree(name, place, scheme):
             assert np.abs(mine[entry] - other[entry]).max() < 1e-9 * through
     assert np.abs(runs[0].q - runs[1].q).max() < 1e-9
     assert runs[0].energy.lost["hinges"][-1] > 1e-2 * through
-    if isinstance(scheme, ub.Midpoint | ub.ExactStatic):
+    if scheme.dynamic:
         assert max(run.energy.worst for run in runs) < 1e-9
 
 
@@ -240,7 +241,7 @@ def test_an_exponential_law_of_ones_own_is_softening(place, scheme):
         newton = ub.Newton(rtol=1e-13)
         runs.append(ub.simulate(scene, scheme, t=(0, 1), dt=0.02, newton=newton, progress=False))
     one, other = runs
-    assert np.abs(one.q - other.q).max() < 1e-12
+    assert np.abs(one.q - other.q).max() < 1e-12 * max(1.0, np.abs(one.q).max())
     lost, same = (run.energy.lost["hinges"] for run in runs)
     assert np.abs(lost - same).max() < 1e-12 * one.energy.throughput
 
@@ -275,24 +276,24 @@ def test_files_want_the_class(place, tmp_path):
 def test_modes_of_what_is_left(place):
     """A hinge that is open is a joint, with a law that ends and with one that fades."""
     found = []
-    for law in (Petersson(T, G), Fading(T, 0.05, 8.0), ub.LinearSoftening(T, G)):
+    for law in (Petersson(T, G), Exponential(T, G), ub.LinearSoftening(T, G)):
         scene = turned(law, lambda t: 5.0 * t, place, rho=1.0)
         run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, progress=False)
         found.append(ub.modes(scene, 2, at=run).frequencies)
     assert found[0] == pytest.approx(found[2], rel=1e-6)
-    assert found[1] == pytest.approx(found[2], rel=1e-3)
+    assert found[1] == pytest.approx(found[2], rel=1e-6)
 
 
 def test_events_and_pictures():
     """Opening, and 99.9 % of an energy that quadrature has found."""
-    scene = turned(LAWS["rising"], lambda t: 2.0 * t)
+    law = LAWS["rising"]
+    scene = turned(law, lambda t: 2.0 * t)
     events = ub.Events()
     run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, record=events, progress=False)
     assert [event.what for event in events.found] == ["opens", "is free"]
-    t, _, dissipated = (*response(run, "cell")[:2], response(run, "cell")[2])
-    assert len(t) == len(run.times)
-    free = events.found[-1].t
-    assert dissipated[run.times < free].max() < 0.999 * 30.0
+    _, _, dissipated = response(run, "cell")
+    before = run.times < events.found[-1].time
+    assert dissipated[before].max() < 0.999 * law.energy <= dissipated[~before].min()
     ub.plot_hinge(run, scene.beams[0].start)
     ub.plot(scene)
 
@@ -318,18 +319,16 @@ def test_of_two_members_the_one_that_may_bear_more_keeps_its_hinge():
 def test_jumps_where_the_traction_falls_most():
     """[closed] The steepest fall of the traction is twice EI over the length of the cell."""
     law = Rising(T, 2 * np.exp(-1.5) * T / EI)
-    for end, warned in ((0.11, False), (1.0, True)):
-        scene = turned(law, lambda t, end=end: end * t)
-        with pytest.warns(ub.ModelWarning) if warned else _quiet() as found:
-            ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, progress=False, newton=ub.Newton())
-        if warned:
-            assert any("falls 2 times as fast" in str(one.message) for one in found)
-
-
-def _quiet():
-    import contextlib
-
-    return contextlib.nullcontext([])
+    said = []
+    for end in (0.11, 1.0):
+        scene = turned(law, lambda t, end=end: end * t, rho=0.01)
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.01, progress=False)
+        assert run.energy.lost["hinges"][-1] > 0
+        said.append([str(one.message) for one in found])
+    assert not any("did so in a jump" in one for one in said[0])
+    assert any("its resistance falls 2 times as fast" in one for one in said[1])
 
 
 # -- refusals ------------------------------------------------------------------------------------
@@ -448,7 +447,7 @@ REFUSED = [
     (Thawed(), "must be a dataclass: @dataclass"),
     (Mine(ub.Normal(1.0, 0.1, seed=1)), r"t = Normal\(.*\) is a distribution"),
     (Mine("1"), "t = '1' is no number"),
-    (5.0, "= 5.0 is not a Softening or LinearSoftening or SofteningLaw"),
+    (5.0, "= 5.0 is not a Softening or .*LinearSoftening or SofteningLaw"),
 ]
 
 

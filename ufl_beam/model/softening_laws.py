@@ -42,6 +42,9 @@ The difference loses four digits there.  Quadrature over a smaller step is exact
 1e-10 of the energy where a kink is inside.
 """
 
+MOST = 10_000
+"""Intervals of the quadrature of an energy that are halved at once; of a noisy law all would be."""
+
 DECADES = 20
 """Openings are looked at from ten to minus this power up to ten to this power; m or rad."""
 
@@ -286,23 +289,28 @@ def course(law: SofteningLaw) -> Course:
             f"{kind}: its traction is {limit:g} at zero opening; it must be positive, as nothing "
             "opens below it. For a hinge that never resists give Softening(0.0, 1.0)"
         )
+    _require_no_drive(kind, edges, t)
     energy = _integral(law, edges) + _tail(kind, edges, t)
     unit = energy / limit
     some = np.append(0.0, unit * np.logspace(-6, 6, 4001))
     tractions = _called(law, "traction", some)
-    for at, values in ((edges, t), (some, tractions)):
-        if (negative := values < 0).any():
-            raise SceneError(
-                f"{kind}: its traction is {values[negative][0]:.6g} at the opening "
-                f"{at[negative][0]:.6g}, and a hinge would drive its opening; let it end at zero, "
-                "such as by ub.law_functions.positive"
-            )
+    _require_no_drive(kind, some, tractions)
     _require_slope(law, limit, unit)
     _require_integral(law, unit, energy)
     falls = -np.diff(tractions) / np.diff(some)
     worst = {int(np.argmax(falls)), int(np.argmax(np.abs(np.diff(tractions))))}
     steepest = max(_slope(law, some[i], some[i + 1], limit, unit) for i in worst)
     return Course(limit, energy, float(tractions.max()), steepest)
+
+
+def _require_no_drive(kind: str, openings: Array, t: Array) -> None:
+    """Raise :class:`SceneError` where a traction is negative."""
+    if (negative := t < 0).any():
+        raise SceneError(
+            f"{kind}: its traction is {t[negative][0]:.6g} at the opening "
+            f"{openings[negative][0]:.6g}, and a hinge would drive its opening; let it end at "
+            "zero, such as by ub.law_functions.positive"
+        )
 
 
 def _called(law: SofteningLaw, method: str, openings: Array) -> Array:
@@ -349,7 +357,7 @@ def _integral(law: SofteningLaw, edges: Array) -> float:
         exact = np.abs(whole - halves) <= 1e-15 * (total + np.abs(halves).sum())
         total += float(halves[exact].sum())
         a, b, middle = a[~exact], b[~exact], middle[~exact]
-        if not len(a):
+        if not len(a) or len(a) > MOST:
             break
         a, b = np.append(a, middle), np.append(middle, b)
     return total + float(lobatto(a, b).sum())
