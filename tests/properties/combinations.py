@@ -44,6 +44,7 @@ STIFF = "EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=0.01"
 HEAD = """import math
 import ufl_beam as ub
 from own_parts import *
+from own_parts import LAWS, SOFTENING
 """
 
 
@@ -235,7 +236,8 @@ class Combination:
         """Public names that the script uses."""
         found = set(re.findall(r"ub\.(\w+)", self.source))
         found |= {"ground"} if self.has("ub.ground") else set()
-        found |= {"law_functions", "MaterialLaw"} if self.has("Dashpot", "PowerLaw") else set()
+        found |= {"law_functions", "MaterialLaw"} if self.has(*LAWS) else set()
+        found |= {"law_functions", "SofteningLaw"} if self.has(*SOFTENING) else set()
         own = {"ExactStep", "Midway", "Scheme", "DynamicScheme", "Step"}
         return found | (own if self.has("Weighted") else set())
 

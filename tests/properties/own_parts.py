@@ -130,6 +130,10 @@ class RisesFirst(ub.SofteningLaw):
         return self.t * (1 + 4 * x) * f.exp(-2 * x)
 
 
+LAWS, SOFTENING = ("Dashpot", "PowerLaw"), ("Bilinear", "RisesFirst")
+"""Names of the material laws and of the softening laws."""
+
+
 # -- laws of connectors ------------------------------------------------------------------------
 
 
