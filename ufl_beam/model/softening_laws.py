@@ -314,7 +314,7 @@ def _require_no_drive(kind: str, openings: Array, t: Array) -> None:
 
 
 def _called(law: SofteningLaw, method: str, openings: Array) -> Array:
-    """What a law answers at some openings, as finite numbers."""
+    """Call a method of a law with openings; raise :class:`SceneError` unless it returns numbers."""
     what = f"{type(law).__name__}.{method}"
     try:
         with np.errstate(all="ignore"):
