@@ -142,21 +142,18 @@ def response(run, place):
 
 @each_law
 @each_place
-@pytest.mark.parametrize("reference", [False, True])
-def test_moment_is_the_traction(law, place, reference):
+def test_moment_is_the_traction(law, place):
     """[closed] Under a growing rotation; opened, it has dissipated the integral of the traction."""
     scene = turned(law, lambda t: 2.0 * t, place)
-    run = ub.simulate(
-        scene, ub.Static(), t=(0, 1), dt=0.01, newton=ub.Newton(reference=reference), progress=False
-    )
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.025, progress=False)
     M, opening, dissipated = response(run, place)
     open_ = opening > 1e-9
-    assert np.count_nonzero(open_) > 80
+    assert np.count_nonzero(open_) > 30
     assert M[open_] == pytest.approx(law.traction(opening[open_]), abs=1e-9 * T)
     ends = np.array([quad(lambda x: law.traction(np.array([x]))[0], *xs, limit=200, epsabs=1e-9)[0]
         for xs in pairwise([0.0, *np.clip(KINKS, 0.0, opening[-1]), opening[-1]])])  # fmt: skip
-    # A kink in a step of 0.02 rad: 1/100 of the change of the slope times the square of the step
-    tolerance = 2e-3 if isinstance(law, Kinked) else 1e-7
+    # A kink in a step of 0.05 rad: 1/100 of the change of the slope times the square of the step
+    tolerance = 1e-2 if isinstance(law, Kinked) else 1e-7
     assert dissipated[-1] == pytest.approx(ends.sum(), abs=tolerance)
 
 
@@ -213,7 +210,7 @@ def test_both_solvers_agree(name, place, scheme):
     """To and fro; works and losses to 1e-9; the ledger closes."""
     runs = [
         ub.simulate(
-            scene_of(name, place), scheme, t=(0, 1), dt=1 / 30, progress=False,
+            scene_of(name, place), scheme, t=(0, 1), dt=1 / 20, progress=False,
             newton=ub.Newton(rtol=1e-12, reference=reference),
         )
         for reference in (False, True)
