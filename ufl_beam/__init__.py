@@ -93,10 +93,11 @@ from ufl_beam.model.joints import (
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, PointLoad, RotatingFrame
 from ufl_beam.model.masses import PointMass, Velocity
 from ufl_beam.model.material_law import MaterialLaw
-from ufl_beam.model.material_laws import DuvautLions, Hardening, LinearSoftening, Perzyna, Softening
+from ufl_beam.model.material_laws import DuvautLions, Hardening, Perzyna
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
+from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningLaw
 from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
 from ufl_beam.model.time_functions import Table, ramp
 from ufl_beam.model.works import Potential, VirtualWork
@@ -150,12 +151,12 @@ __all__ = [
     "Perzyna", "Pinned", "Place", "PointLoad", "PointMass", "Potential", "Prescribed",
     "PrintedMidpoint", "Prismatic", "RambergOsgood", "Rayleigh", "Recorder", "Release", "Revolute",
     "Rigid", "RigidLink", "RigidPlastic", "Roller", "RotatingFrame", "SNCurve", "Scene",
-    "SceneError", "Scheme", "Section", "Simulation", "Slide", "Softening", "Solution", "Spot",
-    "Spring", "Static", "Step", "Stop", "Stretch", "Study", "Support", "Table", "Tradeoff",
-    "TradeoffError", "TruncatedNormal", "Turn", "Velocity", "VirtualWork", "Weibull", "animate",
-    "buckling", "damping", "damping_ratio", "fit_decay", "follow", "ground", "law_functions",
-    "load", "logarithmic_decrement", "modes", "peaks", "picture", "plot", "plot_cycles",
-    "plot_damage", "plot_dissipation", "plot_energy", "plot_extremes", "plot_hinge", "plot_history",
-    "plot_modes", "plot_moment_curvature", "plot_shapes", "plot_tradeoff", "rainflow", "ramp",
-    "render", "say", "simulate", "study", "tradeoff",
+    "SceneError", "Scheme", "Section", "Simulation", "Slide", "Softening", "SofteningLaw",
+    "Solution", "Spot", "Spring", "Static", "Step", "Stop", "Stretch", "Study", "Support", "Table",
+    "Tradeoff", "TradeoffError", "TruncatedNormal", "Turn", "Velocity", "VirtualWork", "Weibull",
+    "animate", "buckling", "damping", "damping_ratio", "fit_decay", "follow", "ground",
+    "law_functions", "load", "logarithmic_decrement", "modes", "peaks", "picture", "plot",
+    "plot_cycles", "plot_damage", "plot_dissipation", "plot_energy", "plot_extremes", "plot_hinge",
+    "plot_history", "plot_modes", "plot_moment_curvature", "plot_shapes", "plot_tradeoff",
+    "rainflow", "ramp", "render", "say", "simulate", "study", "tradeoff",
 ]  # fmt: skip

@@ -4,13 +4,14 @@
 from __future__ import annotations
 
 import contextlib
+import functools
 import math
 import numbers
 import os
 import sys
+import traceback
 import warnings
 from collections.abc import Callable
-from functools import cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -163,6 +164,15 @@ def warn(message: str) -> None:
     warnings.warn(message, ModelWarning, stacklevel=level)
 
 
+def raised_at(error: BaseException) -> str:
+    """Place of the user's code that raised an error, " (file, line n)"; empty if there is none."""
+    library = (PACKAGE, functools.__file__)  # that of functions of ub.law_functions
+    for frame in traceback.extract_tb(error.__traceback__):
+        if not frame.filename.startswith(library):
+            return f" ({frame.filename}, line {frame.lineno})"
+    return ""
+
+
 def shorten(value: object) -> str:
     """Format a value for a message: its ``repr`` in one line, cut to a readable length."""
     try:
@@ -206,6 +216,12 @@ def require_number(
     if number < at_least:
         raise SceneError(f"{what} = {number:g} must be at least {at_least:g}")
     return number
+
+
+def require_from_zero_to_infinity(value: Any, what: str) -> None:
+    """Raise :class:`SceneError` unless ``value`` is a non-negative number or infinity."""
+    if not is_infinite(value):
+        require_number(value, what, at_least=0.0)
 
 
 def require_returned(value: object, function: str, at: str, *, finite: bool = False) -> float:
@@ -295,7 +311,7 @@ def require_function(value: Any, what: str, of: str) -> None:
         raise SceneError(f"{what} = {shorten(value)} must be a function of {of}")
 
 
-@cache
+@functools.cache
 def _memory() -> int:
     """Memory of this machine; B."""
     return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")

@@ -20,7 +20,7 @@ from combination_case import (
     only,
     results,
 )  # fmt: skip
-from own_parts import LargestCurvature
+from own_parts import LAWS, SOFTENING, LargestCurvature
 
 import ufl_beam as ub
 from ufl_beam.reference.solver import Solver
@@ -140,7 +140,7 @@ def saved(case):
 
     Guide curves are saved as points, so that the directions of their forces have fewer digits.
     """
-    only(not case.combination.has("Dashpot", "PowerLaw"), "own laws cannot be saved")
+    only(not case.combination.has(*LAWS, *SOFTENING), "own laws cannot be saved")
     before, scene = case.whole.solution, case.whole.names["scene"]
     before.save(case.folder / "solution.h5")
     after = ub.load(case.folder / "solution.h5")

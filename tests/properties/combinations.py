@@ -16,6 +16,7 @@ from functools import cached_property
 import features_of_forces  # noqa: F401 - adds its features
 import numpy as np
 from features import FEATURES, PLAIN, Feature
+from own_parts import LAWS, SOFTENING
 
 STATICS = ("Static()", "ExactStatic()", "Static()", "ExactStatic(0.7)")
 DYNAMICS = (
@@ -235,7 +236,8 @@ class Combination:
         """Public names that the script uses."""
         found = set(re.findall(r"ub\.(\w+)", self.source))
         found |= {"ground"} if self.has("ub.ground") else set()
-        found |= {"law_functions", "MaterialLaw"} if self.has("Dashpot", "PowerLaw") else set()
+        found |= {"law_functions", "MaterialLaw"} if self.has(*LAWS) else set()
+        found |= {"law_functions", "SofteningLaw"} if self.has(*SOFTENING) else set()
         own = {"Coefficients", "ExactStep", "Midway", "Scheme", "DynamicScheme", "Step"}
         return found | (own if self.has("Weighted") else set())
 

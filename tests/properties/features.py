@@ -56,6 +56,14 @@ def bulk_law(d, limit, stiffness):
     ])  # fmt: skip
 
 
+def own_softening(d, limit, energy):
+    """A softening law of one's own with about a limit and an energy."""
+    return d.one([
+        f"Bilinear({limit:.4g}, {energy:.4g})",
+        f"RisesFirst({limit:.4g}, {energy / (1.5 * limit):.4g})",
+    ])  # fmt: skip
+
+
 # -- sections ----------------------------------------------------------------------------------
 
 
@@ -126,6 +134,11 @@ def hinge_in_cells(d):
 
 
 @feature("section", "any section", elastic=False)
+def own_hinge_in_cells(d):
+    d.yields(0, f"hinge={own_softening(d, d.some(5, 9), d.some(2, 9))}")
+
+
+@feature("section", "any section", elastic=False)
 def fibres(d):
     mean = d.some(4e4, 1e5)
     limit = d.one([
@@ -152,6 +165,11 @@ def hinges(d):
         f"ub.LinearSoftening({M:.4g}, {d.some(2, 9):.4g})",
         f"ub.Hardening({M:.4g}, modulus={d.some(5, 30):.4g})",
     ]) + "}"  # fmt: skip
+
+
+@feature("hinges", elastic=False)
+def own_hinges(d):
+    d.beams[0]["hinges"] = f"{{0.0: {own_softening(d, d.some(3, 9), d.some(2, 9))}}}"
 
 
 # -- axes, joints, supports --------------------------------------------------------------------

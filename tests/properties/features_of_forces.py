@@ -4,7 +4,7 @@
 See :mod:`features`, whose list they extend.
 """
 
-from features import bulk_law, feature
+from features import bulk_law, feature, own_softening
 
 # -- connectors --------------------------------------------------------------------------------
 
@@ -43,6 +43,12 @@ def spring_yields(d):
 def spring_breaks(d):
     kind = d.one(["Softening", "LinearSoftening"])
     _connect(d, f"ub.Spring(200.0, softening=ub.{kind}({d.some(1, 5):.4g}, {d.some(0.5, 2):.4g}))")
+
+
+@feature(elastic=False)
+def own_law_of_breaking(d):
+    law = own_softening(d, d.some(1, 5), d.some(0.5, 2))
+    _connect(d, d.one([f"ub.Spring(200.0, softening={law})", f"ub.RigidPlastic({law})"]))
 
 
 @feature(statics=False)

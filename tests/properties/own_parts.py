@@ -97,6 +97,43 @@ class PowerLaw(ub.MaterialLaw):
         return self.C * (strain - state.plastic) ** 2 / 2
 
 
+@dataclass(frozen=True)
+class Bilinear(ub.SofteningLaw):
+    """Two straight lines, with the energy, as in docs/extending_laws.md."""
+
+    t: float
+    G: float
+
+    def _lines(self):
+        first, last = 0.8 * self.G / self.t, 3.6 * self.G / self.t
+        slope = self.t / 3 / (last - first)
+        return ((self.t - slope * last) / first, first), (slope, last)
+
+    def traction(self, opening):
+        return sum(slope * f.positive(end - opening) for slope, end in self._lines())
+
+    def energy_to(self, opening):
+        return sum(
+            slope * (end**2 - f.positive(end - opening) ** 2) / 2 for slope, end in self._lines()
+        )
+
+
+@dataclass(frozen=True)
+class RisesFirst(ub.SofteningLaw):
+    """Up by a third or so, then down; its energy by quadrature."""
+
+    t: float
+    width: float
+
+    def traction(self, opening):
+        x = opening / self.width
+        return self.t * (1 + 4 * x) * f.exp(-2 * x)
+
+
+LAWS, SOFTENING = ("Dashpot", "PowerLaw"), ("Bilinear", "RisesFirst")
+"""Names of the material laws and of the softening laws."""
+
+
 # -- laws of connectors ------------------------------------------------------------------------
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Material laws for tests: by residuals, in closed form, with one variable, several or none."""
+"""Laws for tests: of materials, by residuals and in closed form; of softening."""
 
 from dataclasses import dataclass
 from typing import ClassVar
@@ -185,3 +185,70 @@ class YieldingEigenstrain(SameHardening):
 
     def elastic_energy(self, strain, state):
         return super().elastic_energy(strain - self.e0, state)
+
+
+# -- softening -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Exponential(ub.SofteningLaw):
+    """The traction of `Softening`; its energy by quadrature."""
+
+    limit: float
+    energy: float
+
+    def traction(self, opening):
+        return self.limit * f.exp(-self.limit / self.energy * opening)
+
+
+@dataclass(frozen=True)
+class Petersson(ub.SofteningLaw):
+    """Concrete: down to a third at 0.8 G/t, to zero at 3.6 G/t; two straight lines and a sum."""
+
+    t: float
+    G: float
+
+    def _lines(self):
+        first, last = 0.8 * self.G / self.t, 3.6 * self.G / self.t
+        slope = self.t / 3 / (last - first)
+        return ((self.t - slope * last) / first, first), (slope, last)
+
+    def traction(self, opening):
+        return sum(slope * f.positive(end - opening) for slope, end in self._lines())
+
+    def energy_to(self, opening):
+        return sum(
+            slope * (end**2 - f.positive(end - opening) ** 2) / 2 for slope, end in self._lines()
+        )
+
+
+@dataclass(frozen=True)
+class Kinked(Petersson):
+    """The same traction, its energy by quadrature."""
+
+    def energy_to(self, opening):
+        return None
+
+
+@dataclass(frozen=True)
+class Fading(ub.SofteningLaw):
+    """Down by a power, never to zero."""
+
+    t: float
+    width: float
+    n: float
+
+    def traction(self, opening):
+        return self.t * (1 + opening / self.width) ** -self.n
+
+
+@dataclass(frozen=True)
+class Rising(ub.SofteningLaw):
+    """Up to a peak at width/4 first; its integral is 3/2 t width."""
+
+    t: float
+    width: float
+
+    def traction(self, opening):
+        x = opening / self.width
+        return self.t * (1 + 4 * x) * f.exp(-2 * x)

@@ -9,11 +9,11 @@ import ufl_beam as ub
 from ufl_beam.model.connector_laws import Law
 from ufl_beam.model.damping import Damping
 from ufl_beam.model.loads import Load
-from ufl_beam.model.material_laws import AnySoftening
 
 CLOSED = [
-    *Law.__args__, *Load.__args__, *Damping.__args__, *AnySoftening.__args__,
-    *(ub.VirtualWork, ub.Potential, ub.Perzyna, ub.DuvautLions, ub.Table),
+    *Law.__args__, *Load.__args__, *Damping.__args__,
+    *(ub.Softening, ub.LinearSoftening, ub.VirtualWork, ub.Potential, ub.Perzyna),
+    *(ub.DuvautLions, ub.Table),
 ]  # fmt: skip
 """Classes by which terms, forms, ledger and events choose what they compute."""
 

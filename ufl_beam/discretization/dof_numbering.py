@@ -22,10 +22,10 @@ from ufl_beam.errors import SceneError, require_kind, shorten
 from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import points_along
-from ufl_beam.model.material_laws import AnySoftening
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
+from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.one_line import counted
 
@@ -216,7 +216,7 @@ class Grid:
         x, y = (self.points[end] - self.points[start]).T
         return np.asarray(np.sqrt(x * x + y * y))
 
-    def hinges(self, beam: Member) -> list[AnySoftening | None]:
+    def hinges(self, beam: Member) -> list[SofteningLaw | None]:
         """Law of the hinge that may open in the middle of each cell of a beam."""
         return [beam.section.hinge] * len(self.cells_of(beam))
 

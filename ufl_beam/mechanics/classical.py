@@ -17,7 +17,7 @@ from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Coefficients, Constant, require_between
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import SofteningLaw
+from ufl_beam.model.softening_laws import SofteningLaw
 
 
 class PlainStep:

@@ -17,7 +17,7 @@ from ufl_beam.mechanics.classical import InParts, PlainStep
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Coefficients, Constant, require_between
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import SofteningLaw
+from ufl_beam.model.softening_laws import SofteningLaw
 
 WAY = 4
 """Points of Gauss's rule over the way of a step; it is exact up to degree 7, and four forces cost

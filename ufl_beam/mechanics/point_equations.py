@@ -21,7 +21,7 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.fibres import Kind, Layout
 from ufl_beam.model.law_functions import Values, absolute, positive
 from ufl_beam.model.material_law import MaterialLaw, State
-from ufl_beam.model.material_laws import SofteningLaw
+from ufl_beam.model.softening_laws import SofteningLaw
 
 At = Mapping[str, Values]
 """Numbers of points by name, see :func:`inputs`."""
@@ -40,12 +40,13 @@ def prefixed(prefix: str, names: Mapping[str, object] | tuple[str, ...]) -> tupl
 def inputs(layout: Layout) -> tuple[str, ...]:
     """Inputs of the law of a point, as they are stored; loops.h explains their order."""
     law, numbers = layout.kind
+    softening = layout.softening.numbers() if layout.softening is not None else {}
     return (
         *names("point_input"),
         *rows(law, "strain"), *rows(law, "before"), *rows(law, "stiffness"),
         *prefixed("state", law.variables),
         *(prefixed("new", law.variables) if law.solves else ()),
-        *prefixed("number", numbers), "softening limit", "softening energy",
+        *prefixed("number", numbers), *prefixed("softening", softening),
     )  # fmt: skip
 
 
@@ -101,7 +102,7 @@ class PointEquations:
     def softening(self, at: At) -> SofteningLaw | None:
         """The law of the discontinuity with the numbers of points."""
         law = self._softening
-        return law and law.of(at["softening limit"], at["softening energy"])
+        return law and law.of({name: at[f"softening {name}"] for name in law.numbers()})
 
     def resistance(self, at: At, growth: Values) -> Values:
         """Resistance of a discontinuity that grows in the step."""

@@ -20,7 +20,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_laws import SofteningLaw
+from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.one_line import one_line
 
 Constant = Callable[[float], Expr]

@@ -20,8 +20,8 @@ from ufl_beam.errors import (
     warn,
 )
 from ufl_beam.model.bodies import TOGETHER, Member, Place
+from ufl_beam.model.connector_laws import HingeLaw, require_hinge_law
 from ufl_beam.model.curves import Arc, Curve, Point, Polyline, Straight, point_of
-from ufl_beam.model.material_laws import HingeLaw, require_hinge_law
 from ufl_beam.model.sections import Section
 
 

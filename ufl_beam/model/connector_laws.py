@@ -10,15 +10,29 @@ from functools import partial
 from numbers import Real
 from typing import Annotated, Any, Protocol
 
-from ufl_beam.errors import SceneError, closed, require_function, require_number, require_returned
+from ufl_beam.errors import (
+    SceneError,
+    closed,
+    require_from_zero_to_infinity,
+    require_function,
+    require_kind,
+    require_number,
+    require_returned,
+)
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.curves import Curve
 from ufl_beam.model.force_laws import ForceLaw as ForceLaw
 from ufl_beam.model.law_checks import require_bulk_law
 from ufl_beam.model.law_functions import Values, larger, positive
 from ufl_beam.model.material_law import MaterialLaw, State
-from ufl_beam.model.material_laws import AnySoftening, HingeLaw, require_hinge_law
+from ufl_beam.model.material_laws import DuvautLions, Hardening
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
+from ufl_beam.model.softening_laws import (
+    LinearSoftening,
+    Softening,
+    SofteningLaw,
+    require_softening,
+)
 from ufl_beam.model.time_functions import Constant, Timed
 from ufl_beam.one_line import one_line
 
@@ -141,7 +155,7 @@ class Spring(Record):
 
     stiffness: Positive
     law: Annotated[MaterialLaw | None, require_bulk_law] = None
-    softening: Instance[AnySoftening | None] = None
+    softening: Annotated[SofteningLaw | None, require_softening] = None
 
 
 @closed(OWN_LAW)
@@ -276,6 +290,40 @@ class Coulomb(Record):
         return self.force + self.coefficient * simulation.press(self.joint)
 
 
+OWN_HINGE = (
+    "join both sides by Turn(a, b, law) with Spring(stiffness, law=) or a ForceLaw of your own"
+)
+
+HingeLaw = SofteningLaw | Hardening
+"""Laws of a plastic hinge of zero length, which has no elasticity of its own."""
+
+
+def require_hinge_law(law: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless a rigid-plastic hinge can follow a law."""
+    if isinstance(law, MaterialLaw) and not isinstance(law, Hardening):
+        raise SceneError(
+            f"{what}: {type(law).__name__} is the law of an elastic stiffness, and a hinge of zero "
+            "length has none; use it as Section(bending=), or join both sides by "
+            "Turn(a, b, Spring(stiffness, law=))"
+        )
+    if isinstance(law, SofteningLaw):
+        require_softening(law, what)
+        return
+    require_kind(law, (Softening, Hardening, LinearSoftening, SofteningLaw), what)
+    if isinstance(law, Hardening):
+        if type(law) is not Hardening:
+            raise SceneError(
+                f"{what}: {type(law).__name__} is a subclass of Hardening, and a hinge of zero "
+                f"length would ignore what is its own; {OWN_HINGE}"
+            )
+        require_from_zero_to_infinity(law.limit, f"{what}: limit")
+        if isinstance(law.viscosity, DuvautLions):
+            raise SceneError(
+                f"{what}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
+                "rigid before it flows; use Perzyna(eta)"
+            )
+
+
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class RigidPlastic(Record):
@@ -286,8 +334,8 @@ class RigidPlastic(Record):
     rotations with this law.
 
     Args:
-        law: :class:`Softening` or :class:`Hardening`; limit in N m or N, moduli in N m/rad or N/m,
-            fracture energy in J.
+        law: A :class:`SofteningLaw` or :class:`Hardening`; limit in N m or N, moduli in N m/rad or
+            N/m, fracture energy in J.
 
     Raises:
         SceneError: A law of another kind, or one that relaxes an elastic stress.

@@ -15,8 +15,8 @@ from ufl_beam.errors import SceneError, require_array, require_count, require_ki
 from ufl_beam.model.law_checks import require_bulk_law
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import MaterialLaw
-from ufl_beam.model.material_laws import AnySoftening
-from ufl_beam.model.records import Instance, Record
+from ufl_beam.model.records import Record
+from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 from ufl_beam.one_line import one_line
 
 Below = Callable[[Array], Array]
@@ -49,7 +49,7 @@ class Layout:
     stiffness: Values  # elastic; (n,); of interacting resultants, strains and stiffness have rows
     laws: tuple[tuple[MaterialLaw, int], ...]  # with the number of points in a row that follow them
     rest: Values  # stiffness (axial, shear, bending) of what has no points; (3,)
-    softening: AnySoftening | None  # law of the discontinuities, if points can break
+    softening: SofteningLaw | None  # law of the discontinuities, if points can break
     breaking: slice  # the points that can
     hinges: bool = False  # True if the discontinuity is one hinge, a jump of rotation
 
@@ -124,7 +124,7 @@ class Fibres(Record):
     law: Annotated[MaterialLaw, require_bulk_law]
     _: KW_ONLY
     number: Annotated[int, require_count] = 20
-    softening: Instance[AnySoftening | None] = None
+    softening: Annotated[SofteningLaw | None, require_softening] = None
 
     __repr__ = one_line
 

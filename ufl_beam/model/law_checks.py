@@ -3,14 +3,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields
 from numbers import Real
 from typing import Any
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, shorten
+from ufl_beam.errors import SceneError, raised_at, shorten
 from ufl_beam.model.material_law import MaterialLaw, State
 
 
@@ -98,13 +99,28 @@ def _try(law: MaterialLaw, state: State, what: str, way: str) -> None:
             with np.errstate(all="ignore"):
                 found = getattr(law, name)(*arguments)
         except Exception as error:
-            raise SceneError(f"{what}.{name} fails at no strain: {error}") from error
+            raise SceneError(
+                f"{what}.{name} fails at no strain: {error}{raised_at(error)}"
+            ) from error
         if name == way:
             require_names(found, law, f"{what}.{name}")
         elif name == "stress" and not np.all(np.isfinite(law.as_tuple(found))):
             raise SceneError(f"{what}.stress is {shorten(found)} at no strain; it must be a number")
         elif name == "stress" and len(law.as_tuple(found)) != len(law.resultants or "x"):
             raise SceneError(f"{what}.stress must return one stress for each of {law.resultants}")
+
+
+@contextmanager
+def traced(law: object) -> Iterator[None]:
+    """Raise :class:`SceneError` naming a law that cannot be called with symbols of UFL."""
+    try:
+        yield
+    except Exception as error:
+        raise SceneError(
+            f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}"
+            f"{raised_at(error)}. Laws are written with + - * / ** and the functions of "
+            "ub.law_functions"
+        ) from error
 
 
 def require_names(found: object, law: Any, what: str) -> None:

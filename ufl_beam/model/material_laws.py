@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of a material point in one dimension: yielding, hardening, viscous flow, softening.
+"""Laws of a material point in one dimension: yielding, hardening, viscous flow.
 
 A point is a resultant of a cross-section (strain 1 or curvature 1/m against N or N m) or a fibre
 (strain against Pa).  The laws are plain functions of arrays, and of UFL expressions as well: UFL
@@ -9,29 +9,24 @@ derives their tangents and FFCx compiles them for the time loop, see
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, closed, is_infinite, require_kind, require_number
-from ufl_beam.model.law_functions import Values, below, exp, positive, sign, where
+from ufl_beam.errors import (
+    SceneError,
+    closed,
+    require_from_zero_to_infinity,
+    require_kind,
+    require_number,
+)
+from ufl_beam.model.law_functions import Values, below, positive, sign, where
 from ufl_beam.model.material_law import MaterialLaw, State
 
-
-def _require_from_zero_to_infinity(value: float, what: str) -> None:
-    """Raise :class:`SceneError` unless ``value`` is a non-negative number or infinity."""
-    if not is_infinite(value):
-        require_number(value, what, at_least=0.0)
-
-
 OWN_LAW = "state a MaterialLaw of your own"
-OWN_HINGE = (
-    "join both sides by Turn(a, b, law) with Spring(stiffness, law=) or a ForceLaw of your own"
-)
-"""Messages of classes that are closed."""
+"""Message of classes that are closed."""
 
 
 # -- bulk --------------------------------------------------------------------------------------
@@ -54,7 +49,7 @@ class Perzyna:
     eta: float
 
     def __post_init__(self) -> None:
-        _require_from_zero_to_infinity(self.eta, "Perzyna: eta")
+        require_from_zero_to_infinity(self.eta, "Perzyna: eta")
 
     def coefficient(self, stiffness: Values) -> Values:
         """Overstress per rate of plastic strain, the same for any stiffness."""
@@ -79,7 +74,7 @@ class DuvautLions:
     tau: float
 
     def __post_init__(self) -> None:
-        _require_from_zero_to_infinity(self.tau, "DuvautLions: tau")
+        require_from_zero_to_infinity(self.tau, "DuvautLions: tau")
 
     def coefficient(self, stiffness: Values) -> Values:
         """Overstress per rate of plastic strain: tau times the stiffness of plastic flow."""
@@ -112,7 +107,7 @@ class Hardening(MaterialLaw):
 
     def __post_init__(self) -> None:
         if not hasattr(self.limit, "draw"):
-            _require_from_zero_to_infinity(self.limit, "Hardening: limit")
+            require_from_zero_to_infinity(self.limit, "Hardening: limit")
         for name in ("modulus", "kinematic"):
             value = getattr(self, name)
             require_number(value, f"Hardening: {name}")
@@ -177,148 +172,12 @@ class Hardening(MaterialLaw):
         return np.inf
 
     @property
+    def steepest(self) -> tuple[float, float]:
+        """Largest fall of the stress, and where: none, as it never softens."""
+        return 0.0, 0.0
+
+    @property
     def bounded(self) -> bool:
         """True if the stress never exceeds the limit."""
         viscous = bool(np.any(self.viscosity.coefficient(np.ones(1)) > 0.0))
         return self.modulus == self.kinematic == 0.0 and not viscous
-
-
-# -- softening ---------------------------------------------------------------------------------
-
-BROKEN = 70.0
-"""Exponent of the decay of a traction from which on it is zero, some 1e-30 of the limit.
-
-Far below round-off; but numbers that underflow would be forces and stiffnesses made of noise.
-"""
-
-
-@dataclass(frozen=True)
-class SofteningLaw(ABC):
-    """Base of the laws of hinges and cracks that lose their resistance."""
-
-    limit: float
-    energy: float
-
-    def __post_init__(self) -> None:
-        _require_from_zero_to_infinity(self.limit, f"{type(self).__name__}: limit")
-        require_number(self.energy, f"{type(self).__name__}: energy", positive=True)
-
-    @property
-    def bounded(self) -> bool:
-        """True if the traction never exceeds the limit."""
-        return True
-
-    @property
-    def opens(self) -> bool:
-        """True if it ever opens."""
-        return self.limit < np.inf
-
-    def numbers(self, C: Values) -> dict[str, Any]:
-        """Limit and fracture energy; they do not depend on a stiffness ``C``."""
-        return {"limit": self.limit, "energy": self.energy}
-
-    def of(self, limit: Values, energy: Values) -> SofteningLaw:
-        """Return the same law with other numbers, or with symbols."""
-        law = object.__new__(type(self))
-        vars(law).update(limit=limit, energy=energy)
-        return law
-
-    @abstractmethod
-    def traction(self, ξ: Values) -> Values:
-        """Resistance after the accumulated opening ξ."""
-
-    @abstractmethod
-    def mean_traction(self, ξ: Values, a: Values) -> Values:
-        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
-
-
-@closed(OWN_HINGE)
-class Softening(SofteningLaw):
-    """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
-
-    Args:
-        limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
-            perfect joint, infinity never opens.
-        energy: Fracture energy, dissipated by a complete opening: J; for fibres J/m².
-
-    Raises:
-        SceneError: A negative limit, or an energy that is not positive.
-
-    Example:
-        >>> law = ub.Softening(limit=5e4, energy=1e3)  # N m, J
-        >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after openings in rad; N m
-        [50000. 18394.  6767.]
-    """
-
-    def traction(self, ξ: Values) -> Values:
-        """Resistance after the accumulated opening ξ."""
-        decay = self.limit / self.energy * ξ
-        return where(below(decay, BROKEN), self.limit * exp(-decay), 0.0)  # P(52)!
-
-    def mean_traction(self, ξ: Values, a: Values) -> Values:
-        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
-        return self.traction(ξ) * _mean_of_decay(self.limit / self.energy * a)
-
-
-@closed(OWN_HINGE)
-class LinearSoftening(SofteningLaw):
-    """Linear softening of a hinge or crack, to zero at the opening 2 energy / limit.
-
-    Args and errors are those of :class:`Softening`.
-
-    Example:
-        >>> law = ub.LinearSoftening(limit=5e4, energy=1e3)  # N m, J
-        >>> print(law.traction(np.array([0.0, 0.02, 0.04])))  # after openings in rad; N m
-        [50000. 25000.     0.]
-    """
-
-    def traction(self, ξ: Values) -> Values:
-        """Resistance after the accumulated opening ξ."""
-        return positive(self.limit - self.limit**2 / (2 * self.energy) * ξ)
-
-    def mean_traction(self, ξ: Values, a: Values) -> Values:
-        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
-        now, slope = self.traction(ξ), self.limit**2 / (2 * self.energy)
-        ends = below(now - slope * a, 0.0)
-        safe = where(ends, slope * a, 1.0)
-        return where(ends, now**2 / (2 * safe), now - slope * a / 2)
-
-
-AnySoftening = Softening | LinearSoftening
-
-
-def _mean_of_decay(x: Values) -> Values:
-    """Mean of exp(-x) from 0 to x, smooth at zero: (1 - exp(-x))/x, its series below 0.1."""
-    small = below(x, 0.1)
-    series = 1.0
-    for k in range(12, 1, -1):
-        series = 1 - x / k * series
-    safe = where(small, 1.0, x)
-    return where(small, series, (1 - exp(-safe)) / safe)
-
-
-HingeLaw = AnySoftening | Hardening
-"""Laws of a plastic hinge of zero length, which has no elasticity of its own."""
-
-
-def require_hinge_law(law: object, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless a rigid-plastic hinge can follow a law."""
-    if isinstance(law, MaterialLaw) and not isinstance(law, Hardening):
-        raise SceneError(
-            f"{what}: {type(law).__name__} is the law of an elastic stiffness, and a hinge of zero "
-            "length has none; use it as Section(bending=), or join both sides by "
-            "Turn(a, b, Spring(stiffness, law=))"
-        )
-    require_kind(law, (Softening, Hardening, LinearSoftening), what)
-    if isinstance(law, Hardening):
-        if type(law) is not Hardening:
-            raise SceneError(
-                f"{what}: {type(law).__name__} is a subclass of Hardening, and a hinge of zero "
-                f"length would ignore what is its own; {OWN_HINGE}"
-            )
-        _require_from_zero_to_infinity(law.limit, f"{what}: limit")
-        if isinstance(law.viscosity, DuvautLions):
-            raise SceneError(
-                f"{what}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
-                "rigid before it flows; use Perzyna(eta)"
-            )

@@ -7,9 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Anchor, Node, NodeDof, Place, merged, node
-from ufl_beam.model.connector_laws import RigidPlastic
+from ufl_beam.model.connector_laws import HingeLaw, RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import HingeLaw
 
 
 def plastic_hinges(

@@ -18,8 +18,9 @@ from ufl_beam.errors import SceneError, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
 from ufl_beam.model.law_checks import require_bulk_law, require_interaction
 from ufl_beam.model.material_law import MaterialLaw
-from ufl_beam.model.material_laws import AnySoftening, Hardening
+from ufl_beam.model.material_laws import Hardening
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
+from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 from ufl_beam.one_line import one_line
 
 ResultantLaw = Annotated[MaterialLaw | None, require_bulk_law]
@@ -70,7 +71,7 @@ class Section(Record):
     axial: ResultantLaw = None
     shear: ResultantLaw = None
     bending: ResultantLaw = None
-    hinge: Instance[AnySoftening | None] = None
+    hinge: Annotated[SofteningLaw | None, require_softening] = None
     fibres: Instance[PlacedFibres | None] = None
     interaction: Annotated[MaterialLaw | None, require_interaction] = None
     massless_by_default: bool = field(init=False, repr=False)
@@ -96,7 +97,7 @@ class Section(Record):
             )
         self.layout(self.hinge)  # refuses laws that do not go together
 
-    def layout(self, hinge: AnySoftening | None) -> Layout | None:
+    def layout(self, hinge: SofteningLaw | None) -> Layout | None:
         """Material points of a cell with a hinge of this law; none if the cell is elastic."""
         if self.fibres is not None:
             return self.fibres.layout(self.GA)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import Member
-from ufl_beam.model.material_laws import HingeLaw
+from ufl_beam.model.connector_laws import HingeLaw
 from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.plotting.style import BLUE, ORANGE, WHITE, shade
 from ufl_beam.simulation.solution import Solution

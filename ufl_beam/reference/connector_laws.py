@@ -16,7 +16,7 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import NoNumber, SceneError, require_returned
-from ufl_beam.mechanics.slips import Slip, slip
+from ufl_beam.mechanics.slips import Slip, numbers, slip
 from ufl_beam.mechanics.time_schemes import Scheme, Step, way_to_rest
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_law import ConnectorLaw
@@ -446,10 +446,7 @@ class _Slipping(LawInStep):
         super().__init__(link, setting)
         law, scheme, ledger = law_of(link), setting.scheme, setting.ledger
         self._law = law
-        self.at: dict[str, Any] = dict.fromkeys(
-            ("energy", "modulus", "kinematic", "viscosity"), 0.0
-        )
-        self.at |= {name: float(x) for name, x in law.numbers(np.ones(())).items()}
+        self.at: dict[str, Any] = {name: float(x) for name, x in numbers(law).items()}
         self.at |= {"slipped": 0.0, "start": 0.0, "θ": scheme.theta, "dt": 1.0}
         self._limit, self._back_force, self._stored = float(law.limit), 0.0, 0.0
         self._way = self._way_before = 0  # of the slip in the iterate, and in the last step
@@ -559,7 +556,7 @@ def _slope(link: Connector, size: float) -> float:
     law = law_of(link)
     if not 0.0 < law.limit < np.inf:
         return 1.0
-    steepest = law.limit * (law.limit / law.energy)
+    steepest, _ = law.steepest
     early = law.limit / (EARLY * (1.0 if link.turns else size))
     least = WEAK * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
     return float(max(early, least) + (2 * steepest if steepest < np.inf else 0.0))

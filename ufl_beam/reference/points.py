@@ -117,12 +117,12 @@ class MaterialPoints:
         for name, initial in self._law.variables.items():
             at[f"state {name}"][:] = initial
         at["length"][:], at["theta"][:], at["dt"][:] = length[:, None], scheme.theta, 1.0
-        at["softening energy"][:], at["traction"][:] = 1.0, np.inf
+        at["traction"][:] = np.inf
         self.softens, softening = layout.softening is not None, layout.softening
         if softening is not None:
-            for name in ("limit", "energy"):
-                at[f"softening {name}"][:, layout.breaking] = getattr(softening, name)
-        self._equations = PointEquations(layout.kind, softening and softening.of(1.0, 1.0), scheme)
+            for name, value in softening.numbers().items():
+                at[f"softening {name}"][:] = value
+        self._equations = PointEquations(layout.kind, softening, scheme)
         # Strains of the points by component are B times those of the cell.
         self._B = np.asarray(layout.strains).reshape(n, -1, 3)
         self.strains: Array = np.zeros((cells, 3))
@@ -139,9 +139,8 @@ class MaterialPoints:
         """Make the entries of the ledger."""
         layout, scheme, ledger = self._layout, self._scheme, self._ledger
         # What has broken may have a stress at the ends of a step, and none where its law holds.
-        self._releases = (self.softens and scheme.theta < 1) or (
-            scheme.average(0.0, 1.0) != 1.0 and curved(layout.kind)
-        )
+        over_step = scheme.average(0.0, 1.0) != 1.0
+        self._releases = over_step and (self.softens or curved(layout.kind))
         if layout.yields:
             ledger.state["hardening"] += 0.0
             ledger.lost["plastic"] += 0.0

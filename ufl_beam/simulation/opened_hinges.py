@@ -46,11 +46,13 @@ class Opened:
             beginning, -1 of those that stayed closed; (num_cells,).
         shear: |V| at the kept time before that one, or at that one where the run began in between;
             (num_cells,); N.
+        dissipated: By hinges and cracks at the end; (num_cells,); J.
     """
 
     def __init__(self, grid: Grid, material: Blocks) -> None:
         self._grid = grid
         self.first, self.shear = np.full(len(grid.cells), -1), np.zeros(len(grid.cells))
+        self.dissipated = np.zeros(len(grid.cells))
         if not len(material):
             return
         last = material.last
@@ -59,6 +61,7 @@ class Opened:
             return
         cells = last[open_now, 0].astype(np.int64)
         dissipated, V = (material[:, open_now, k] for k in (6, 2))
+        self.dissipated[cells] = last[open_now, 6]
         self.first[cells] = first = (dissipated > 0).argmax(axis=0)
         # After an opening in a jump V is that of vibrations.
         n = np.where(first > 1, first - 1, first)
@@ -119,8 +122,10 @@ class Opened:
         for beam in grid.scene.beams:
             cells, laws = grid.cells_of(beam), grid.hinges(beam)
             fall = {law: _fall(beam.section.layout(law), scheme) for law in set(laws)}
+            falls, energies = np.array([fall[law] for law in laws]).T
+            opened = (self.first[cells] > 0) & (self.dissipated[cells] >= energies)
             lengths = grid.lengths(cells)
-            ratios = np.where(self.first[cells] > 0, lengths, 0.0) * [fall[law] for law in laws]
+            ratios = np.where(opened, lengths, 0.0) * falls
             worst = int(np.argmax(ratios))
             ratio, length, t = ratios[worst], lengths[worst], times[self.first[cells[worst]]]
             if ratio > 1:
@@ -144,11 +149,17 @@ def _percent(part: float) -> str:
     return f"{100 * part:.2g} %" if part <= 1 else "more than 100 %"
 
 
-def _fall(layout: Layout | None, scheme: Scheme) -> float:
-    """First fall of the resistance per opening, over θ times the stiffness of the points; 1/m."""
+def _fall(layout: Layout | None, scheme: Scheme) -> tuple[float, float]:
+    """Fall of the resistance per opening, over θ times the stiffness of the points; 1/m.
+
+    It is that at the opening where the traction falls most; with the least energy that a cell
+    dissipates before; J.
+    """
     law = None if layout is None else layout.softening
     if layout is None or law is None or law.limit == 0:
-        return 0.0
-    opening = TINY * law.energy / law.limit
-    fall = (law.limit - scheme.resistance(law, np.zeros(1), np.array([opening]))[0]) / opening
-    return float(fall / (scheme.theta * layout.stiffness[layout.breaking].min()))
+        return 0.0, 0.0
+    growth, begins = TINY * law.energy / law.limit, np.array([law.steepest[1]])
+    after = scheme.resistance(law, begins, np.array([growth]))
+    (fall,) = (law.traction(begins) - after) / growth
+    before = law.mean_traction(0 * begins, begins) * begins * layout.weights[layout.breaking].min()
+    return float(fall / (scheme.theta * layout.stiffness[layout.breaking].min())), float(before[0])

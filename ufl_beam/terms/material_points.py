@@ -20,7 +20,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
-from ufl_beam.errors import SceneError, StepFailed
+from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import (
     End,
     PointEquations,
@@ -32,8 +32,9 @@ from ufl_beam.mechanics.point_equations import (
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, Layout
+from ufl_beam.model.law_checks import traced
 from ufl_beam.model.material_law import MaterialLaw
-from ufl_beam.model.material_laws import SofteningLaw
+from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import NOTHING, SPENT, SearchFlags
 
@@ -68,11 +69,10 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
 def releases(layout: Layout, scheme: Scheme) -> bool:
     """Return whether points lose energy numerically beside what ``alpha`` of a scheme takes.
 
-    In the middle of a step no stress is left in what has broken, but perhaps at its ends.  Where
-    elasticity is not linear, the stress of a step is not the mean over it.
+    No stress is left in what has broken but perhaps at the ends of a step.  Where elasticity is not
+    linear, the stress of a step is not the mean over it.
     """
-    breaks = layout.softening is not None and scheme.theta < 1
-    return breaks or (scheme.average(0.0, 1.0) != 1.0 and curved(layout.kind))
+    return scheme.average(0.0, 1.0) != 1.0 and (layout.softening is not None or curved(layout.kind))
 
 
 class PointForms:
@@ -98,7 +98,14 @@ class PointForms:
         unknown = prefixed("new", law.variables) if law.solves else ()
         free = {name: ufl.variable(pointwise.at[name]) for name in (*self._strains, *unknown)}
         self._at = at = {**pointwise.at, **free}
-        try:
+        self.resistance = ffi.NULL
+        if softening is not None:
+            with traced(softening):
+                a = ufl.variable(pointwise.at["growth"])
+                resistance = equations.resistance({**pointwise.at, "growth": a}, a)
+                slope = ufl.diff(resistance, a)
+            self.resistance = pointwise.compile(resistance, slope)
+        with traced(law):
             stress = tuple(map(ufl.as_ufl, equations.stress(at)))
             answer = [*stress, *self._derivatives(stress, self._strains)]
             if law.solves:
@@ -117,19 +124,9 @@ class PointForms:
                 stored = ufl.as_ufl(equations.stored(at))
                 slopes = tuple(self._derivatives((stored,), unknown))
                 self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
-        except Exception as error:
-            raise SceneError(
-                f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
-                "written with + - * / ** and the functions of ub.law_functions"
-            ) from error
         self.law = pointwise.compile(*answer)
         end = in_order("point_output", dict(zip(End._fields, numbers, strict=False)))
         self.end = pointwise.compile(*end, *stress, *changes)
-        self.resistance = ffi.NULL
-        if softening is not None:
-            a = ufl.variable(pointwise.at["growth"])
-            resistance = equations.resistance({**pointwise.at, "growth": a}, a)
-            self.resistance = pointwise.compile(resistance, ufl.diff(resistance, a))
 
     @cached_property
     def elastic(self) -> Any:
@@ -189,7 +186,7 @@ class Points:
         self._at = {name: storage[:, :, i] for i, name in enumerate(self.names)}
         self._kept = kept_inputs(law)
         self._components = len(law.resultants or "x")
-        softening = layout.softening and layout.softening.of(1.0, 1.0)
+        softening = layout.softening and layout.softening.kind()
         self._equations = PointEquations(layout.kind, softening, scheme)
         stiffness = np.reshape(layout.stiffness, (len(layout.weights), -1)).T
         for name, value in zip(rows(law, "stiffness"), stiffness, strict=True):
@@ -202,12 +199,10 @@ class Points:
         self._at["theta"][:] = scheme.theta
         self.dt: Array = np.ones(1)
         self._at["dt"][:] = self.dt
-        self._at["softening energy"][:] = 1.0
         self._at["traction"][:] = np.inf
         if layout.softening is not None:
-            for name in ("limit", "energy"):
-                value = getattr(layout.softening, name)
-                self._at[f"softening {name}"][:, layout.breaking] = value
+            for name, value in layout.softening.numbers().items():
+                self._at[f"softening {name}"][:] = value
             self._resist()
 
         self.kept = np.zeros((cells, int(lib.POINT_KEPT)))
@@ -367,7 +362,7 @@ class Points:
         """
         breaking, softening = self._layout.breaking, self._layout.softening
         if softening is not None:
-            borne, limit = (self[name][:, breaking] for name in ("traction", "softening limit"))
+            borne, limit = self["traction"][:, breaking], softening.limit
             spent = np.isfinite(limit) & (borne <= SPENT * limit)
             self["stiffness"][:, breaking] *= np.where(spent, NOTHING, 1.0)
         self["traction"][:] = np.inf

@@ -8,6 +8,7 @@ the law, a function of the slip that grows in the step; see rigid_plastic.c.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -17,35 +18,43 @@ import ufl
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
-from ufl_beam.mechanics.slips import slip
+from ufl_beam.mechanics.slips import numbers, slip
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.material_laws import Hardening, SofteningLaw
+from ufl_beam.model.law_checks import traced
+from ufl_beam.model.material_laws import Hardening
 from ufl_beam.model.plastic_hinges import law_of
+from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.connector_responses import Response, respond
 from ufl_beam.terms.openings import NOTHING, SPENT
 from ufl_beam.terms.phases import Callbacks
 
-INPUTS = (
-    *names("slip_input", "slip_"),
-    *("θ", "dt", "limit", "energy", "modulus", "kinematic", "viscosity"),
-)
-"""Inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated slip
-and motion at t_n, which loops.h names as well; numbers of the scheme and the law."""
+INPUTS = (*names("slip_input", "slip_"), "θ", "dt")
+"""First inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated
+slip and motion at t_n, which loops.h names as well; numbers of the scheme.  Then come those of the
+law."""
 
 
 class SlipForms:
     """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
 
     def __init__(self, law: SofteningLaw | Hardening, scheme: Scheme) -> None:
-        self._pointwise = pointwise = Pointwise(INPUTS)
+        self._pointwise = pointwise = Pointwise((*INPUTS, *numbers(law)))
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
-        end = slip(law, at, scheme)._asdict()
-        force = end.pop("force")
-        self.force = pointwise.compile(force, ufl.diff(force, at["slip"]))
+        with traced(law):
+            end = slip(law, at, scheme)._asdict()
+            force = end.pop("force")
+            slope = ufl.diff(force, at["slip"])
+        self._response = force, slope
+        self.force = pointwise.compile(*self._response)
         self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
+
+    @cached_property
+    def spent(self) -> Any:
+        """Force and its derivative next to nothing."""
+        return self._pointwise.compile(*(NOTHING * x for x in self._response))
 
 
 _slip_forms = stated(SlipForms)
@@ -69,10 +78,10 @@ def _slope(link: Connector, size: float) -> float:
     law = law_of(link)
     if not 0.0 < law.limit < np.inf:
         return 1.0
-    steepest = law.limit * (law.limit / law.energy)
+    steepest, _ = law.steepest
     early = law.limit / (EARLY * (1.0 if link.turns else size))
     least = WEAK * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
-    return max(early, least) + (2 * steepest if steepest < np.inf else 0.0)
+    return float(max(early, least)) + (2 * steepest if steepest < np.inf else 0.0)
 
 
 @respond.register(RigidPlastic)
@@ -95,23 +104,24 @@ class RigidPlasticResponse(Response):
             ledger.state["hardening"] += 0.0
         if self._loss:
             ledger.lost["numerical"] += 0.0
-        self._storage = np.zeros((n, len(INPUTS)))
-        self._at = {name: self._storage[:, i] for i, name in enumerate(INPUTS)}
+        inputs = (*INPUTS, *numbers(law.law))
+        self._storage = np.zeros((n, len(inputs)))
+        self._at = {name: self._storage[:, i] for i, name in enumerate(inputs)}
         for i, link in enumerate(self._links):
-            for name, value in law_of(link).numbers(np.ones(())).items():
+            for name, value in numbers(law_of(link)).items():
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
-        self._limit = self._at["limit"].copy()
+        self._limit = self._at["number limit"].copy()
         self._back_force, self._dissipated, self.over = np.zeros((3, n))
         self._slipped, self._way, self._way_before = np.zeros((3, n), dtype=np.int32)
         self._rows, self._stored = np.zeros((n, 3)), np.zeros(1)
         self._slope = np.array([_slope(link, self._setting.size) for link in self._links])
         self.opens = True
 
-        kind = Hardening(1.0) if isinstance(law.law, Hardening) else law.law.of(1.0, 1.0)
+        kind = Hardening(1.0) if isinstance(law.law, Hardening) else law.law.kind()
         self._forms, self._sums = _slip_forms(kind, scheme), np.zeros(3)
         self._c = struct(
-            "rigid_plastic", number=n, width=len(INPUTS), w=self._storage,
+            "rigid_plastic", number=n, width=len(inputs), w=self._storage,
             force=self._forms.force, end=self._forms.end, search=self._setting.search.flags,
             limit=self._limit, back_force=self._back_force, dissipated=self._dissipated,
             slope=self._slope, excess=self.over, slipped=self._slipped, way=self._way,
@@ -181,6 +191,7 @@ class RigidPlasticResponse(Response):
 
     def freeze(self) -> None:
         """Hold from now on, but for connectors that bear nothing any more: these are free."""
-        spent = self._limit <= SPENT * self._at["limit"]
+        spent = self._limit <= SPENT * self._at["number limit"]
         self._limit[:] = np.where(spent, 0.0, np.inf)
-        self._at["limit"][spent] *= NOTHING
+        if not self._hardens:
+            self._c.force = self._forms.spent

@@ -1,0 +1,478 @@
+# SPDX-License-Identifier: MIT
+"""Softening laws of one's own: in cells, hinges, connectors, springs and fibres; refusals."""
+
+import inspect
+import warnings
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from bars import LENGTH, Bars
+from laws_of_ones_own import Exponential, Fading, Kinked, Petersson, Rising
+from scipy.integrate import quad
+
+import ufl_beam as ub
+from ufl_beam.model.softening_laws import SMALL
+
+f = ub.law_functions
+
+T, G, EI = 100.0, 30.0, 1e3
+"""Limit, energy and bending stiffness of hinges; no law of LAWS snaps back in a metre of it."""
+
+LAWS = {
+    "exponential": Exponential(T, G),
+    "Petersson": Petersson(T, G),
+    "kinked": Kinked(T, G),
+    "fading": Fading(T, 0.6, 3.0),
+    "rising": Rising(T, 0.2),
+}
+KINKS = [0.8 * G / T, 3.6 * G / T]
+
+each_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
+
+
+# -- laws ------------------------------------------------------------------------------------------
+
+
+@each_law
+def test_numbers_that_follow_from_the_traction(law):
+    """[closed] Limit and energy; whether the traction exceeds its limit."""
+    assert law.limit == pytest.approx(T, rel=1e-15)
+    assert law.energy == pytest.approx(G, rel=1e-14)
+    assert law.opens
+    assert law.bounded == (not isinstance(law, Rising))
+
+
+@pytest.mark.parametrize(
+    ("name", "fall", "at"),
+    [
+        ("exponential", T * T / G, 0.0),
+        ("Petersson", 2 / 3 * T / KINKS[0], None),
+        ("fading", 3 * T / 0.6, 0.0),
+        ("rising", 4 * np.exp(-1.5) * T / 0.2, 0.15),
+    ],
+)
+def test_the_steepest_fall(name, fall, at):
+    """[closed] By differences over 1e-6 of energy/limit; a place has half the digits."""
+    found, place = LAWS[name].steepest
+    assert found == pytest.approx(fall, rel=1e-5)
+    assert at is None or place == pytest.approx(at, abs=2e-3 * G / T)
+
+
+def mean(law, ξ, a):
+    return float(law.mean_traction(np.array([ξ]), np.array([a]))[0])
+
+
+@pytest.mark.parametrize("a", [1e-14, 1e-9, 0.99 * SMALL, 1.01 * SMALL, 1e-3, 0.1, 0.5, 1.0, 2.0])
+@pytest.mark.parametrize("ξ", [0.0, 0.3, 0.79, 3.5, 4.0])
+@each_law
+def test_mean_traction_is_the_mean(law, ξ, a):
+    """To 1e-11 of the limit, but by quadrature for steps that are long or have kinks.
+
+    With a kink 1/100 of the change of the slope times the step.
+    """
+    long = a > 0.5 and isinstance(law, Fading | Rising)
+    ξ, a = ξ * G / T, a * G / T
+    ends = [min(max((x - ξ) / a, 0.0), 1.0) for x in KINKS]
+
+    def at(part):
+        return float(law.traction(np.array([ξ + part * a]))[0])
+
+    parts = pairwise([0.0, *ends, 1.0])
+    exact = sum(quad(at, *part, epsabs=1e-12 * T, epsrel=1e-12)[0] for part in parts)
+    kinked = isinstance(law, Kinked) and any(0.0 < end < 1.0 for end in ends)
+    tolerance = 0.01 * T / (G / T) * a if kinked else (1e-5 if long else 1e-11) * T
+    assert mean(law, ξ, a) == pytest.approx(exact, abs=tolerance)
+
+
+@each_law
+def test_no_growth_has_the_traction_as_its_mean(law):
+    ξ = np.array([0.0, 0.1, 0.24, 0.5, 2.0])
+    assert law.mean_traction(ξ, 0 * ξ) == pytest.approx(law.traction(ξ), rel=1e-14)
+
+
+@each_law
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(), ub.Midpoint(0.2)], ids=str)
+def test_tangents_of_points(law, scheme):
+    """Against central differences, from closed over the peak to open."""
+    some = Bars(1, ub.Hardening(np.inf), law, scheme, C=2e3)
+    for strain in np.linspace(0.013, 3.0, 31):
+        ε = 1e-6
+        (_, D), *sides = (some.respond([strain + x]) for x in (0.0, -ε, ε))
+        central = (sides[1][0] - sides[0][0]) / (2 * ε)
+        assert D[0] == pytest.approx(central[0], abs=1e-5 * 2e3)
+        some.step([strain])
+    assert some["opening"][0] > 2.5 * LENGTH
+
+
+# -- scenes ----------------------------------------------------------------------------------------
+
+
+def turned(law, motion, place="cell", rho=0.0):
+    """A beam of a metre whose end is turned, or whose bar is pulled: one hinge, spring or crack."""
+    whole = {"EA": 1e6, "GA": 1e6, "EI": EI, "rhoA": rho, "rhoI": 1e-3 * rho}
+    hinge = law if place == "cell" else None
+    hinges = {0.0: law} if place == "hinge" else {0.0: None, 1.0: None}
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(**whole, hinge=hinge), cells=1, hinges=hinges)
+    supports = [ub.Prescribed(beam.end, psi=motion)]
+    if place in ("cell", "hinge"):
+        return ub.Scene([beam], supports=[ub.Clamped(beam.start), *supports])
+    of_link = ub.RigidPlastic(law) if place == "connector" else ub.Spring(1e3, softening=law)
+    link = ub.Turn(ub.ground(0, 0), beam.start, of_link)
+    return ub.Scene([beam], supports=[ub.Pinned(beam.start), *supports], connectors=[link])
+
+
+PLACES = ["cell", "hinge", "connector", "spring"]
+each_place = pytest.mark.parametrize("place", PLACES)
+
+
+def response(run, place):
+    """Moment, opening and dissipated energy at the kept times."""
+    scene = run.scene
+    beam = scene.beams[0]
+    if place == "cell":
+        at = run.material_at(beam.at(0.5))
+        return at.forces[:, 2], at.jump, at.hinge
+    link = scene.hinges[0] if place == "hinge" else scene.connectors[0]
+    found = run.connector(link)
+    M = found.force
+    return M, found.motion - (M / 1e3 if place == "spring" else 0.0), found.dissipated
+
+
+@each_law
+@each_place
+def test_moment_is_the_traction(law, place):
+    """[closed] Under a growing rotation; opened, it has dissipated the integral of the traction."""
+    scene = turned(law, lambda t: 2.0 * t, place)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.025, progress=False)
+    M, opening, dissipated = response(run, place)
+    open_ = opening > 1e-9
+    assert np.count_nonzero(open_) > 30
+    assert M[open_] == pytest.approx(law.traction(opening[open_]), abs=1e-9 * T)
+    ends = np.array([quad(lambda x: law.traction(np.array([x]))[0], *xs, limit=200, epsabs=1e-9)[0]
+        for xs in pairwise([0.0, *np.clip(KINKS, 0.0, opening[-1]), opening[-1]])])  # fmt: skip
+    # A kink in a step of 0.05 rad: 1/100 of the change of the slope times the square of the step
+    tolerance = 1e-2 if isinstance(law, Kinked) else 1e-7
+    assert dissipated[-1] == pytest.approx(ends.sum(), abs=tolerance)
+
+
+@each_place
+@pytest.mark.parametrize("scheme", [ub.ExactStatic(), ub.Midpoint(), ub.Midpoint(0.3)], ids=str)
+def test_complete_opening_takes_the_energy(place, scheme):
+    """With the energy stated to round-off; by quadrature up to the kinks; the ledger closes."""
+    rho = 0.01 if scheme.dynamic else 0.0
+    for law, tolerance in ((LAWS["Petersson"], 1e-10), (LAWS["kinked"], 1e-3)):
+        scene = turned(law, lambda t: 2.0 * t, place, rho=rho)
+        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01, progress=False)
+        assert run.energy.worst < 1e-9
+        assert run.energy.lost["hinges"][-1] == pytest.approx(G, rel=tolerance)
+        assert response(run, place)[0][-1] == pytest.approx(0.0, abs=1e-9 * T)
+
+
+SWING = ub.Table([0.0, 0.4, 0.7, 1.0], [0.0, 0.5, -0.3, 0.8])
+
+
+def pulled(law):
+    """A bar of fibres to and fro, with a moment."""
+    fibres = ub.Fibres(ub.Hardening(np.inf), number=4, softening=law)
+    section = ub.Section.rectangle(0.1, 0.1, E=1e6, nu=0.2, rho=1.0, fibres=fibres)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=2)
+    ends = [ub.Prescribed(beam.end, u=lambda t: 5e-3 * SWING(t), psi=lambda t: 0.02 * SWING(t))]
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start), *ends])
+
+
+CRACKS = {
+    "exponential": Exponential(1e3, 2.0),
+    "Petersson": Petersson(1e3, 2.0),
+    "fading": Fading(1e3, 4e-3, 3.0),
+    "rising": Rising(1e3, 2e-3),
+}
+
+
+def scene_of(name, place):
+    if place == "fibres":
+        return pulled(CRACKS[name])
+    return turned(LAWS[name], SWING, place, rho=0.01)
+
+
+each_scheme = pytest.mark.parametrize(
+    "scheme",
+    [ub.Static(), ub.ExactStatic(), ub.Midpoint(), ub.Midpoint(0.1), ub.GeneralizedAlpha(0.5)],
+    ids=str,
+)
+
+
+@pytest.mark.parametrize("place", [*PLACES, "fibres"])
+@pytest.mark.parametrize("name", CRACKS)
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(0.1)], ids=str)
+def test_both_solvers_agree(name, place, scheme):
+    """To and fro; works and losses to 1e-9; the ledger closes."""
+    runs = [
+        ub.simulate(
+            scene_of(name, place), scheme, t=(0, 1), dt=1 / 20, progress=False,
+            newton=ub.Newton(rtol=1e-12, reference=reference),
+        )
+        for reference in (False, True)
+    ]  # fmt: skip
+    through = runs[0].energy.throughput
+    for kind in ("state", "lost"):
+        mine, other = (getattr(run.energy, kind) for run in runs)
+        for entry in mine:
+            assert np.abs(mine[entry] - other[entry]).max() < 1e-9 * through
+    assert np.abs(runs[0].q - runs[1].q).max() < 1e-9
+    assert runs[0].energy.lost["hinges"][-1] > 1e-2 * through
+    if scheme.dynamic:
+        assert max(run.energy.worst for run in runs) < 1e-9
+
+
+@pytest.mark.parametrize("place", [*PLACES, "fibres"])
+@each_scheme
+def test_an_exponential_law_of_ones_own_is_softening(place, scheme):
+    """To 1e-12 of motions and energies."""
+    of = CRACKS if place == "fibres" else LAWS
+    mine = of["exponential"]
+    runs = []
+    for law in (mine, ub.Softening(mine.limit, mine.energy)):
+        scene = pulled(law) if place == "fibres" else turned(law, SWING, place, rho=0.01)
+        newton = ub.Newton(rtol=1e-13)
+        runs.append(ub.simulate(scene, scheme, t=(0, 1), dt=0.02, newton=newton, progress=False))
+    one, other = runs
+    assert np.abs(one.q - other.q).max() < 1e-12 * max(1.0, np.abs(one.q).max())
+    lost, same = (run.energy.lost["hinges"] for run in runs)
+    assert np.abs(lost - same).max() < 1e-12 * one.energy.throughput
+
+
+@pytest.mark.parametrize("place", [*PLACES, "fibres"])
+def test_a_run_that_goes_on_is_the_whole_one(place):
+    scheme, of = ub.Midpoint(), {"dt": 0.02, "progress": False}
+    scene = scene_of("rising", place)
+    whole = ub.simulate(scene, scheme, t=(0, 1), **of)
+    half = ub.simulate(scene, scheme, t=(0, 0.5), **of)
+    rest = ub.simulate(scene, scheme, t=(0.5, 1), start=half, **of)
+    # The tolerance of Newton's method, 1e-9 of the forces
+    assert np.abs(rest.q[-1] - whole.q[-1]).max() < 1e-7 * np.abs(whole.q).max()
+
+
+@pytest.mark.parametrize("place", ["cell", "hinge"])
+def test_files_want_the_class(place, tmp_path):
+    """They have numbers and no code; a checkpoint is of one run, and of one law."""
+    scene, of = scene_of("Petersson", place), {"t": (0, 1), "dt": 0.05, "progress": False}
+    path, checkpoint = tmp_path / "run.h5", ub.Checkpoint(tmp_path / "point.h5", every=5)
+    run = ub.simulate(scene, ub.Static(), checkpoint=checkpoint, **of)
+    run.save(path)
+    assert (ub.load(path, scene=scene).q == run.q).all()
+    with pytest.raises(ub.SceneError, match="class Petersson of your own"):
+        ub.load(path)
+    other = turned(Petersson(T, G * 1.1), SWING, place, rho=0.01)
+    with pytest.raises(ub.SceneError, match="G is 33"):
+        ub.simulate(other, ub.Static(), checkpoint=checkpoint, **of)
+
+
+@pytest.mark.parametrize("place", ["cell", "hinge"])
+def test_modes_of_what_is_left(place):
+    """A hinge that is open is a joint, with a law that ends and with one that fades."""
+    found = []
+    for law in (Petersson(T, G), Exponential(T, G), ub.LinearSoftening(T, G)):
+        scene = turned(law, lambda t: 5.0 * t, place, rho=1.0)
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, progress=False)
+        found.append(ub.modes(scene, 2, at=run).frequencies)
+    assert found[0] == pytest.approx(found[2], rel=1e-6)
+    assert found[1] == pytest.approx(found[2], rel=1e-6)
+
+
+def test_events_and_pictures():
+    """Opening, and 99.9 % of an energy that quadrature has found."""
+    law = LAWS["rising"]
+    scene = turned(law, lambda t: 2.0 * t)
+    events = ub.Events()
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, record=events, progress=False)
+    assert [event.what for event in events.found] == ["opens", "is free"]
+    _, _, dissipated = response(run, "cell")
+    before = run.times < events.found[-1].time
+    assert dissipated[before].max() < 0.999 * law.energy <= dissipated[~before].min()
+    ub.plot_hinge(run, scene.beams[0].start)
+    ub.plot(scene)
+
+
+def test_of_two_members_the_one_that_may_bear_more_keeps_its_hinge():
+    """A law that rises beyond its limit may leave the weaker hinge to the other member."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=EI)
+
+    def hinges(*laws):
+        one = ub.Beam((0, 0), (1, 0), section, hinges={1.0: laws[0]})
+        two = ub.Beam((1, 0), (1, 1), section, hinges={0.0: laws[1]})
+        scene = ub.Scene(
+            [one, two], joints=[ub.Rigid(one.end, two.start)], supports=[ub.Clamped(one.start)],
+            loads=[ub.PointLoad(two.end, force=(1.0, 0.0))],
+        )  # fmt: skip
+        return len(scene.hinges)
+
+    strong = ub.Softening(1.2 * T, G)
+    assert hinges(Petersson(T, G), strong) == 1
+    assert hinges(Rising(T, 0.2), strong) == 2
+
+
+def test_jumps_where_the_traction_falls_most():
+    """[closed] The steepest fall of the traction is twice EI over the length of the cell."""
+    law = Rising(T, 2 * np.exp(-1.5) * T / EI)
+    said = []
+    for end in (0.11, 1.0):
+        scene = turned(law, lambda t, end=end: end * t, rho=0.01)
+        with warnings.catch_warnings(record=True) as found:
+            warnings.simplefilter("always")
+            run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.01, progress=False)
+        assert run.energy.lost["hinges"][-1] > 0
+        said.append([str(one.message) for one in found])
+    assert not any("did so in a jump" in one for one in said[0])
+    assert any("its resistance falls 2 times as fast" in one for one in said[1])
+
+
+# -- refusals ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Mine(ub.SofteningLaw):
+    t: float = 1.0
+
+    def traction(self, opening):
+        return self.t * f.exp(-opening)
+
+
+def line_of(kind, words):
+    """Line of this file in which a class says something."""
+    lines, first = inspect.getsourcelines(kind)
+    return first + next(i for i, line in enumerate(lines) if words in line)
+
+
+@dataclass(frozen=True)
+class FromNothing(Mine):
+    def traction(self, opening):
+        return self.t * opening * f.exp(-opening)
+
+
+@dataclass(frozen=True)
+class BelowZero(Mine):
+    def traction(self, opening):
+        return self.t * (1 - 2 * opening) * f.exp(-opening)
+
+
+@dataclass(frozen=True)
+class Lasting(Mine):
+    def traction(self, opening):
+        return self.t / (1 + opening)
+
+
+@dataclass(frozen=True)
+class Jumping(Mine):
+    def traction(self, opening):
+        return f.where(f.below(opening, 1.0), self.t, 0.0) + 0.0 * opening
+
+
+@dataclass(frozen=True)
+class Vertical(Mine):
+    def traction(self, opening):
+        return self.t * f.exp(-f.sqrt(opening))
+
+
+@dataclass(frozen=True)
+class NoNumber(Mine):
+    def traction(self, opening):
+        return f.log(opening)
+
+
+@dataclass(frozen=True)
+class Misspelt(Mine):
+    def traction(self, opening):
+        return self.tt * opening
+
+
+@dataclass(frozen=True)
+class OneNumber(Mine):
+    def traction(self, opening):
+        return np.ones(3)
+
+
+@dataclass(frozen=True)
+class WrongEnergy(Mine):
+    def energy_to(self, opening):
+        return self.t * f.exp(-opening)
+
+
+@dataclass(frozen=True)
+class WrongLimit(Mine):
+    limit: float = 2.0
+
+
+@dataclass(frozen=True)
+class WrongTotal(Mine):
+    energy: float = 2.0
+
+
+@dataclass(frozen=True)
+class Taken(Mine):
+    bounded: float = 1.0
+
+
+@dataclass
+class Thawed(ub.SofteningLaw):
+    t: float = 1.0
+
+    def traction(self, opening):
+        return self.t * f.exp(-opening)
+
+
+@dataclass(frozen=True)
+class OfNumPy(Mine):
+    def traction(self, opening):
+        return self.t * np.exp(-opening)
+
+
+REFUSED = [
+    (FromNothing(), "traction is 0 at zero opening; it must be positive"),
+    (BelowZero(), r"traction is -\S+ at the opening \S+, and a hinge would drive"),
+    (Lasting(), "energy is not finite; let it fall to zero, or faster than 1/opening"),
+    (Jumping(), r"traction jumps from 1 to 0 at the opening 1"),
+    (Vertical(), "infinite slope at zero opening"),
+    (NoNumber(), "traction is -inf at the opening 0"),
+    (Misspelt(), rf"no attribute 'tt' \({__file__}, line {line_of(Misspelt, 'self.tt')}\)"),
+    (OneNumber(), "one number for each|broadcast"),
+    (WrongEnergy(), "energy_to is 1 at the opening 0, but the integral of the traction is 0"),
+    (WrongLimit(), "limit = 2, but the traction at zero opening is 1"),
+    (WrongTotal(), "energy = 2, but the integral of it is 1"),
+    (Taken(), "field cannot have the name bounded"),
+    (Thawed(), "must be a dataclass: @dataclass"),
+    (Mine(ub.Normal(1.0, 0.1, seed=1)), r"t = Normal\(.*\) is a distribution"),
+    (Mine("1"), "t = '1' is no number"),
+    (5.0, "= 5.0 is not a Softening or .*LinearSoftening or SofteningLaw"),
+]
+
+
+@pytest.mark.parametrize(("law", "words"), REFUSED, ids=lambda x: type(x).__name__)
+def test_laws_that_cannot_soften_are_refused(law, words):
+    """Where they are given, with the name of the law and what to do."""
+    whole = {"EA": 1.0, "GA": 1.0, "EI": 1.0}
+    for make in (
+        lambda: ub.Section(**whole, hinge=law),
+        lambda: ub.Beam((0, 0), (1, 0), ub.Section(**whole), hinges={0.5: law}),
+        lambda: ub.RigidPlastic(law),
+        lambda: ub.Spring(1.0, softening=law),
+        lambda: ub.Fibres(ub.Hardening(np.inf), number=2, softening=law),
+    ):
+        with pytest.raises(ub.SceneError, match=words) as error:
+            make()
+        assert isinstance(law, float) or type(law).__name__ in str(error.value)
+
+
+@pytest.mark.parametrize("place", ["cell", "hinge"])
+def test_a_law_that_ufl_cannot_trace_is_refused(place):
+    """Before the first step, with the line of the law."""
+    scene = turned(OfNumPy(100.0), lambda t: t, place)
+    at = rf"OfNumPy: .* UFL: .*\({__file__}, line {line_of(OfNumPy, 'np.exp')}\)"
+    with pytest.raises(ub.SceneError, match=at):
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+
+
+def test_numbers_are_replaced():
+    """A dataclass as others."""
+    assert replace(LAWS["Petersson"], G=60.0).energy == pytest.approx(60.0, rel=1e-14)

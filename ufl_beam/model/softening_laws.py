@@ -1,0 +1,435 @@
+# SPDX-License-Identifier: MIT
+"""Base of the laws of hinges and cracks that soften: traction over the opening."""
+
+from __future__ import annotations
+
+import copy
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+from functools import lru_cache
+from numbers import Real
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import (
+    SceneError,
+    closed,
+    raised_at,
+    require_from_zero_to_infinity,
+    require_kind,
+    require_number,
+    shorten,
+)
+from ufl_beam.model.law_functions import Values, below, exp, positive, where
+
+OWN_LAW = "state a SofteningLaw of your own"
+"""Message of classes that are closed."""
+
+GAUSS = 6
+"""Points of Gauss-Legendre quadrature of a traction over a step.
+
+The error of an exponential traction is 1e-12 of its mean in a step that opens by twice
+energy/limit, after which 86 % of the energy is dissipated, and 1e-17 in one that opens by half.
+"""
+
+SMALL = 1e-4
+"""Growth, as a part of energy/limit, from which on the mean traction is a difference of energies.
+
+The difference loses four digits there.  Quadrature over a smaller step is exact to round-off, or to
+1e-10 of the energy where a kink is inside.
+"""
+
+MOST = 10_000
+"""Intervals of the quadrature of an energy that are halved at once; of a noisy law all would be."""
+
+DECADES = 20
+"""Openings are looked at from ten to minus this power up to ten to this power; m or rad."""
+
+
+class SofteningLaw(ABC):
+    """Base of the laws of hinges and cracks that lose their resistance.
+
+    A law of one's own is a frozen dataclass, whose fields are its numbers.  Its methods are written
+    with the functions of ``ub.law_functions``, for they are called with arrays and with UFL
+    expressions.  The traction is positive at zero opening, where the hinge opens; it may rise
+    before it falls, and vanishes in the end.  See docs/extending_laws.md.
+
+    Attributes:
+        limit: Traction at zero opening; a field of the law, or found from :meth:`traction`.
+        energy: Integral of the traction over all openings, the fracture energy; a field of the law,
+            or found by quadrature.
+
+    Example:
+        >>> from dataclasses import dataclass
+        >>> @dataclass(frozen=True)
+        ... class PowerLaw(ub.SofteningLaw):
+        ...     limit: float  # N m
+        ...     width: float  # rad
+        ...     n: float
+        ...     def traction(self, opening):
+        ...         return self.limit * (1 + opening / self.width) ** -self.n
+        >>> law = PowerLaw(limit=5e4, width=0.02, n=3.0)
+        >>> print(f"{law.energy:.6g}")  # limit width / (n - 1); J
+        500
+        >>> breaks = ub.Section(EA=4e9, GA=1e9, EI=1.4e7, rhoA=157.0, hinge=law)
+    """
+
+    limit: Values
+    energy: Values
+
+    @abstractmethod
+    def traction(self, opening: Values) -> Values:
+        """Resistance after an accumulated opening; N m, N or Pa."""
+
+    def energy_to(self, opening: Values) -> Values | None:
+        """Energy dissipated up to an opening, the integral of the traction; None: by quadrature."""
+        return None
+
+    def mean_traction(self, opening: Values, growth: Values) -> Values:
+        """Mean resistance while the opening grows; its product with the growth is dissipated.
+
+        It is the difference of :meth:`energy_to` over the growth; where a law states none, and in
+        steps so small that digits would be lost, that of Gauss-Legendre quadrature.
+        """
+        points, weights = np.polynomial.legendre.leggauss(GAUSS)
+        terms = zip(points.tolist(), weights.tolist(), strict=True)
+        mean = sum(w / 2 * self.traction(opening + (1 + x) / 2 * growth) for x, w in terms)
+        before, after = self.energy_to(opening), self.energy_to(opening + growth)
+        if before is None or after is None:
+            return mean
+        large = below(SMALL * self.energy, growth * self.limit)
+        return where(large, (after - before) / where(large, growth, 1.0), mean)
+
+    def __getattr__(self, name: str) -> Any:
+        if name in ("limit", "energy"):
+            return getattr(course(self), name)
+        raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
+
+    @property
+    def opens(self) -> bool:
+        """True if it ever opens."""
+        return bool(self.limit < np.inf)
+
+    @property
+    def bounded(self) -> bool:
+        """True if the traction never exceeds the limit."""
+        return bool(course(self).largest <= self.limit)
+
+    @property
+    def steepest(self) -> tuple[float, float]:
+        """Largest fall of the traction per opening, and an opening at which it falls so."""
+        return course(self).steepest
+
+    def numbers(self) -> dict[str, Any]:
+        """Numbers of the law by name: its fields, and limit and energy."""
+        own = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+        return {"limit": self.limit, "energy": self.energy} | own
+
+    def of(self, numbers: Mapping[str, Values]) -> SofteningLaw:
+        """Return the law with other numbers, arrays or symbols."""
+        law = copy.copy(self)
+        vars(law).update(numbers)
+        return law
+
+    def kind(self) -> SofteningLaw:
+        """Return the law with numbers that do not matter."""
+        return self.of(dict.fromkeys(self.numbers(), 1.0))
+
+
+# -- laws of the package -------------------------------------------------------------------------
+
+BROKEN = 70.0
+"""Exponent of the decay of a traction from which on it is zero, some 1e-30 of the limit.
+
+Far below round-off; but numbers that underflow would be forces and stiffnesses made of noise.
+"""
+
+
+@dataclass(frozen=True)
+class _OfLimitAndEnergy(SofteningLaw):
+    """Base of the laws of two numbers, whose means are closed forms."""
+
+    limit: float
+    energy: float
+
+    def __post_init__(self) -> None:
+        require_from_zero_to_infinity(self.limit, f"{type(self).__name__}: limit")
+        require_number(self.energy, f"{type(self).__name__}: energy", positive=True)
+
+    @property
+    def bounded(self) -> bool:
+        """True: the traction only falls."""
+        return True
+
+    @property
+    def steepest(self) -> tuple[float, float]:
+        """Fall of the traction per opening when it opens; linear softening has half of it."""
+        return self.limit * (self.limit / self.energy), 0.0
+
+
+@closed(OWN_LAW)
+class Softening(_OfLimitAndEnergy):
+    """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
+
+    Args:
+        limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
+            perfect joint, infinity never opens.
+        energy: Fracture energy, dissipated by a complete opening: J; for fibres J/m².
+
+    Raises:
+        SceneError: A negative limit, or an energy that is not positive.
+
+    Example:
+        >>> law = ub.Softening(limit=5e4, energy=1e3)  # N m, J
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after openings in rad; N m
+        [50000. 18394.  6767.]
+    """
+
+    def traction(self, ξ: Values) -> Values:
+        """Resistance after the accumulated opening ξ."""
+        decay = self.limit / self.energy * ξ
+        return where(below(decay, BROKEN), self.limit * exp(-decay), 0.0)  # P(52)!
+
+    def mean_traction(self, ξ: Values, a: Values) -> Values:
+        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
+        return self.traction(ξ) * _mean_of_decay(self.limit / self.energy * a)
+
+
+@closed(OWN_LAW)
+class LinearSoftening(_OfLimitAndEnergy):
+    """Linear softening of a hinge or crack, to zero at the opening 2 energy / limit.
+
+    Args and errors are those of :class:`Softening`.
+
+    Example:
+        >>> law = ub.LinearSoftening(limit=5e4, energy=1e3)  # N m, J
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])))  # after openings in rad; N m
+        [50000. 25000.     0.]
+    """
+
+    def traction(self, ξ: Values) -> Values:
+        """Resistance after the accumulated opening ξ."""
+        return positive(self.limit - self.limit**2 / (2 * self.energy) * ξ)
+
+    def mean_traction(self, ξ: Values, a: Values) -> Values:
+        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
+        now, slope = self.traction(ξ), self.limit**2 / (2 * self.energy)
+        ends = below(now - slope * a, 0.0)
+        safe = where(ends, slope * a, 1.0)
+        return where(ends, now**2 / (2 * safe), now - slope * a / 2)
+
+
+def _mean_of_decay(x: Values) -> Values:
+    """Mean of exp(-x) from 0 to x, smooth at zero: (1 - exp(-x))/x, its series below 0.1."""
+    small = below(x, 0.1)
+    series = 1.0
+    for k in range(12, 1, -1):
+        series = 1 - x / k * series
+    safe = where(small, 1.0, x)
+    return where(small, series, (1 - exp(-safe)) / safe)
+
+
+def require_softening(law: object, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` unless a discontinuity can follow a law."""
+    require_kind(law, (Softening, LinearSoftening, SofteningLaw), what)
+    if isinstance(law, _OfLimitAndEnergy):
+        return
+    kind = type(law).__name__
+    parameters = getattr(type(law), "__dataclass_params__", None)
+    if parameters is None or not parameters.frozen or not parameters.eq:
+        raise SceneError(f"{what}: {kind} must be a dataclass: @dataclass(frozen=True)")
+    names = {field.name for field in fields(law)}  # type: ignore[arg-type]
+    if taken := sorted(names & {*vars(SofteningLaw)}):
+        raise SceneError(
+            f"{what}: {kind}: a field cannot have the name {' or '.join(taken)}, which every "
+            "SofteningLaw gives to something else"
+        )
+    for name in names:
+        value = getattr(law, name)
+        if hasattr(value, "draw"):
+            raise SceneError(
+                f"{what}: {kind}: {name} = {shorten(value)} is a distribution; numbers of "
+                "softening are the same in all cells; draw those of the bulk, Hardening(limit)"
+            )
+        if not isinstance(value, Real) or isinstance(value, bool):
+            raise SceneError(
+                f"{what}: {kind}: {name} = {shorten(value)} is no number; fields of a law are its "
+                "numbers, what else it knows can be a class variable"
+            )
+    try:
+        course(law)
+    except SceneError as error:
+        raise SceneError(f"{what}: {error}") from error.__cause__
+
+
+# -- numbers that follow from the traction -------------------------------------------------------
+
+
+class Course(NamedTuple):
+    """Course of a traction over all openings."""
+
+    limit: float
+    energy: float
+    largest: float  # traction
+    steepest: tuple[float, float]  # fall per opening, and an opening at which it falls so
+
+
+@lru_cache(maxsize=256)
+def course(law: SofteningLaw) -> Course:
+    """Follow a law from zero to full opening; raise :class:`SceneError` if it cannot soften so."""
+    kind = type(law).__name__
+    edges = np.append(0.0, np.logspace(-DECADES, DECADES, 16 * DECADES + 1))
+    t = _called(law, "traction", edges)
+    limit = float(t[0])
+    if limit <= 0:
+        raise SceneError(
+            f"{kind}: its traction is {limit:g} at zero opening; it must be positive, as nothing "
+            "opens below it. For a hinge that never resists give Softening(0.0, 1.0)"
+        )
+    _require_no_drive(kind, edges, t)
+    energy = _integral(law, edges) + _tail(kind, edges, t)
+    unit = energy / limit
+    some = np.append(0.0, unit * np.logspace(-6, 6, 4001))
+    tractions = _called(law, "traction", some)
+    _require_no_drive(kind, some, tractions)
+    _require_slope(law, limit, unit)
+    _require_integral(law, unit, energy)
+    falls = -np.diff(tractions) / np.diff(some)
+    worst = {int(np.argmax(falls)), int(np.argmax(np.abs(np.diff(tractions))))}
+    steepest = max(_slope(law, some[i], some[i + 1], limit, unit) for i in worst)
+    return Course(limit, energy, float(tractions.max()), steepest)
+
+
+def _require_no_drive(kind: str, openings: Array, t: Array) -> None:
+    """Raise :class:`SceneError` where a traction is negative."""
+    if (negative := t < 0).any():
+        raise SceneError(
+            f"{kind}: its traction is {t[negative][0]:.6g} at the opening "
+            f"{openings[negative][0]:.6g}, and a hinge would drive its opening; let it end at "
+            "zero, such as by ub.law_functions.positive"
+        )
+
+
+def _called(law: SofteningLaw, method: str, openings: Array) -> Array:
+    """Call a method of a law with openings; raise :class:`SceneError` unless it returns numbers."""
+    what = f"{type(law).__name__}.{method}"
+    try:
+        with np.errstate(all="ignore"):
+            found = getattr(law, method)(openings) + 0 * openings
+    except Exception as error:
+        raise SceneError(
+            f"{what} fails: {error}{raised_at(error)}. It is called with arrays of openings, real "
+            "or complex, and written with + - * / ** and the functions of ub.law_functions"
+        ) from error
+    if np.shape(found) != openings.shape:
+        raise SceneError(
+            f"{what} answers {len(openings)} openings with an array of shape {np.shape(found)}; it "
+            "must return one number for each"
+        )
+    if (bad := ~np.isfinite(found)).any():
+        raise SceneError(
+            f"{what} is {found[bad][0]} at the opening {openings[bad][0]:.6g}; it must be a number "
+            "at all openings from zero on"
+        )
+    return np.asarray(found)
+
+
+def _integral(law: SofteningLaw, edges: Array) -> float:
+    """Integral of a traction; intervals are halved until quadrature is exact to round-off.
+
+    Lobatto's rule has points at both ends, where a kink is seen that is close to them.
+    """
+    polynomial = np.polynomial.Legendre.basis(GAUSS)
+    x = np.array([-1.0, *polynomial.deriv().roots(), 1.0])
+    w = 2 / (GAUSS * (GAUSS + 1) * polynomial(x) ** 2)
+
+    def lobatto(a: Array, b: Array) -> Array:
+        at = a[:, None] + (b - a)[:, None] * (1 + x) / 2
+        return _called(law, "traction", at.ravel()).reshape(at.shape) @ w * (b - a) / 2
+
+    a, b, total = edges[:-1], edges[1:], 0.0
+    for _ in range(60):
+        whole, middle = lobatto(a, b), (a + b) / 2
+        halves = lobatto(a, middle) + lobatto(middle, b)
+        exact = np.abs(whole - halves) <= 1e-15 * (total + np.abs(halves).sum())
+        total += float(halves[exact].sum())
+        a, b, middle = a[~exact], b[~exact], middle[~exact]
+        if not len(a) or len(a) > MOST:
+            break
+        a, b = np.append(a, middle), np.append(middle, b)
+    return total + float(lobatto(a, b).sum())
+
+
+def _tail(kind: str, openings: Array, t: Array) -> float:
+    """Energy beyond the last opening, of a traction that falls there by a power."""
+    if t[-1] == 0:
+        return 0.0
+    power = np.log(t[-17] / t[-1]) / np.log(openings[-1] / openings[-17])
+    if power <= 1.01:
+        raise SceneError(
+            f"{kind}: its traction is still {t[-1]:.6g} at the opening {openings[-1]:g}, so that "
+            "its energy is not finite; let it fall to zero, or faster than 1/opening. For a "
+            "hinge that never breaks give Hardening(limit)"
+        )
+    return float(t[-1] * openings[-1] / (power - 1))
+
+
+def _require_slope(law: SofteningLaw, limit: float, unit: float) -> None:
+    """Raise :class:`SceneError` unless the traction has a slope at zero opening."""
+    tiny = 1e-200
+    with np.errstate(all="ignore"):
+        slope = _called(law, "traction", np.array([1j * tiny])).imag[0] / tiny
+    if not abs(slope) * unit < 1e9 * limit:
+        raise SceneError(
+            f"{type(law).__name__}: its traction has an infinite slope at zero opening, for which "
+            "there is no tangent; let it begin with a finite one"
+        )
+
+
+def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:
+    """Raise :class:`SceneError` unless ``energy_to`` and stated numbers are of the traction."""
+    kind = type(law).__name__
+    if law.energy_to(np.zeros(1)) is not None:
+        for opening in (0.0, *(unit * np.array([0.1, 0.5, 1.0, 2.0, 5.0]))):
+            (stated,) = _called(law, "energy_to", np.array([opening]))
+            found = _integral(law, np.linspace(0.0, opening, 17)) if opening else 0.0
+            if abs(stated - found) > 1e-6 * energy:
+                raise SceneError(
+                    f"{kind}: energy_to is {stated:.6g} at the opening {opening:.6g}, but the "
+                    f"integral of the traction is {found:.6g}; make both agree, or leave it out"
+                )
+    (first,) = _called(law, "traction", np.zeros(1))
+    for name, found in (("limit", first), ("energy", energy)):
+        if name in vars(law) or hasattr(type(law), name):
+            stated = getattr(law, name)
+            if not abs(stated - found) <= 1e-6 * found:
+                means = "traction at zero opening" if name == "limit" else "integral of it"
+                raise SceneError(
+                    f"{kind}: {name} = {stated:.6g}, but the {means} is {found:.6g}; make both "
+                    "agree, or call the number otherwise"
+                )
+
+
+def _slope(law: SofteningLaw, a: float, b: float, limit: float, unit: float) -> tuple[float, float]:
+    """Steepest fall in an interval, found by halving it, and where it begins."""
+
+    def traction(opening: float) -> float:
+        return float(_called(law, "traction", np.array([opening]))[0])
+
+    at_a, at_b = traction(a), traction(b)
+    while b - a > 1e-6 * unit or abs(at_b - at_a) > 1e-3 * limit:
+        middle = (a + b) / 2
+        if not a < middle < b:
+            raise SceneError(
+                f"{type(law).__name__}: its traction jumps from {at_a:.6g} to {at_b:.6g} at the "
+                f"opening {a:.6g}, for which there is no tangent; let it change over an opening"
+            )
+        at_middle = traction(middle)
+        if abs(at_middle - at_a) >= abs(at_b - at_middle):
+            b, at_b = middle, at_middle
+        else:
+            a, at_a = middle, at_middle
+    return (at_a - at_b) / (b - a), a
