@@ -281,6 +281,15 @@ def test_modes_of_what_is_left(place):
     assert found[1] == pytest.approx(found[2], rel=1e-6)
 
 
+@pytest.mark.parametrize("reference", [False, True])
+def test_a_spring_that_never_breaks(reference):
+    """[closed] A spring and a beam of the same stiffness bear half of what one would."""
+    scene = turned(ub.Softening(np.inf, 1.0), lambda t: 0.1 * t, "spring")
+    newton = ub.Newton(reference=reference)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton, progress=False)
+    assert run.connector(scene.connectors[0]).force == pytest.approx([0.0, 25.0, 50.0], rel=1e-9)
+
+
 def test_events_and_pictures():
     """Opening, and 99.9 % of an energy that quadrature has found."""
     law = LAWS["rising"]

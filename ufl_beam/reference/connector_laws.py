@@ -324,10 +324,12 @@ class _Sprung(LawInStep):
     def __init__(self, link: Connector, setting: Setting) -> None:
         super().__init__(link, setting)
         spring = self.law
+        softening = spring.softening
         layout = Layout(
             strains=np.eye(1, 3), weights=np.ones(1), stiffness=np.array([spring.stiffness]),
             laws=((spring.law or Hardening(limit=np.inf), 1),), rest=np.zeros(3),
-            softening=spring.softening, breaking=slice(None),
+            softening=softening if softening is not None and softening.opens else None,
+            breaking=slice(None),
         )  # fmt: skip
         of = setting.scheme, setting.search, setting.ledger
         self.points = MaterialPoints(layout, [(0, 0)], np.ones(1), *of)

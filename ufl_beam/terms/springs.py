@@ -22,13 +22,14 @@ class _Sprung(Response):
     """Springs of one law: material points whose strain is the motion."""
 
     def _prepare(self, law: Spring) -> None:
+        softening = law.softening
         layout = Layout(
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),
             stiffness=np.array([law.stiffness]),
             laws=((law.law or Hardening(limit=np.inf), 1),),
             rest=np.zeros(3),
-            softening=law.softening,
+            softening=softening if softening is not None and softening.opens else None,
             breaking=slice(0, None),
         )
         setting, number = self._setting, len(self._links)
