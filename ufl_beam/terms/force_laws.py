@@ -242,6 +242,7 @@ class AskedLaws(Response):
         return np.array([one.state for one in self._each])
 
     def restore(self, rows: Array) -> None:
-        """Take over the internal variables of a :meth:`state`."""
+        """Take over the internal variables of a :meth:`state`, at the accepted motions."""
         for i, one in enumerate(self._each):
             one.state = rows[i].copy()
+        self.start(self._e0)
