@@ -236,6 +236,7 @@ class Combination:
         found = set(re.findall(r"ub\.(\w+)", self.source))
         found |= {"ground"} if self.has("ub.ground") else set()
         found |= {"law_functions", "MaterialLaw"} if self.has("Dashpot", "PowerLaw") else set()
+        found |= {"ConnectorLaw"} if self.has("Stiffening", "Relaxing") else set()
         own = {"ExactStep", "Midway", "Scheme", "DynamicScheme", "Step"}
         return found | (own if self.has("Weighted") else set())
 
