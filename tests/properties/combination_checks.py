@@ -140,7 +140,8 @@ def saved(case):
 
     Guide curves are saved as points, so that the directions of their forces have fewer digits.
     """
-    only(not case.combination.has(*LAWS, *SOFTENING), "own laws cannot be saved")
+    own = *LAWS, *SOFTENING, "Stiffening", "Relaxing"
+    only(not case.combination.has(*own), "own laws cannot be saved")
     before, scene = case.whole.solution, case.whole.names["scene"]
     before.save(case.folder / "solution.h5")
     after = ub.load(case.folder / "solution.h5")

@@ -238,6 +238,7 @@ class Combination:
         found |= {"ground"} if self.has("ub.ground") else set()
         found |= {"law_functions", "MaterialLaw"} if self.has(*LAWS) else set()
         found |= {"law_functions", "SofteningLaw"} if self.has(*SOFTENING) else set()
+        found |= {"ConnectorLaw"} if self.has("Stiffening", "Relaxing") else set()
         own = {"Coefficients", "ExactStep", "Midway", "Scheme", "DynamicScheme", "Step"}
         return found | (own if self.has("Weighted") else set())
 

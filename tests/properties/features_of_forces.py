@@ -61,6 +61,14 @@ def stop(d):
     _connect(d, f"ub.Stop({d.some(200, 900):.4g}, low=-0.01, high={d.some(0.005, 0.02):.4g})")
 
 
+@feature(statics=False, elastic=False)
+def damped_stop(d):
+    _connect(
+        d, f"ub.Stop({d.some(200, 900):.4g}, high={d.some(0.005, 0.02):.4g}, "
+        f"damping={d.some(0.1, 3):.3g})"
+    )  # fmt: skip
+
+
 @feature("rubs", statics=False, at_end=False, elastic=False)
 def coulomb(d):
     _connect(d, f"ub.Coulomb({d.some(0.2, 2):.4g})")
@@ -112,6 +120,17 @@ def force_law_with_history(d):
     _connect(
         d, f"ub.ForceLaw(Maxwell({d.some(50, 200):.4g}, {d.some(0.02, 0.1):.4g}), state=[0.0])"
     )
+
+
+@feature()
+def connector_law(d):
+    _connect(d, f"Stiffening({d.some(50, 200):.4g}, {d.some(500, 3000):.4g})")
+
+
+@feature(statics=False, elastic=False)
+def connector_law_with_history(d):
+    numbers = d.some(50, 200), d.some(0.02, 0.1), d.some(0.1, 2)
+    _connect(d, f"Relaxing({', '.join(f'{x:.4g}' for x in numbers)})")
 
 
 @feature(at_end=False, elastic=False)

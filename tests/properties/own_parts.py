@@ -161,6 +161,36 @@ class Cubic:
         return self.k * motion**2 / 2 + self.cubic * motion**4 / 4
 
 
+@dataclass(frozen=True)
+class Stiffening(ub.ConnectorLaw):
+    """Spring of a quartic energy."""
+
+    k: float
+    cubic: float
+
+    def energy(self, motion, state):
+        return self.k * motion**2 / 2 + self.cubic * motion**4 / 4
+
+
+@dataclass(frozen=True)
+class Relaxing(ub.ConnectorLaw):
+    """Spring and damper in series, beside a quadratic damper."""
+
+    k: float
+    time: float
+    drag: float
+    variables: ClassVar = {"creep": 0.0}
+
+    def energy(self, motion, state):
+        return self.k * (motion - state.creep) ** 2 / 2
+
+    def resistance(self, motion, rate, state, dt):
+        return self.drag * f.absolute(rate) * rate
+
+    def increments(self, motion, rate, state, dt):
+        return {"creep": (motion - state.creep) / (self.time / dt + 1)}
+
+
 class Integral:
     """Controller that remembers the sum of the rotations of a place."""
 

@@ -3,6 +3,7 @@
 
 import dataclasses
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -45,6 +46,16 @@ def amount(figure):
     return drawn + len(figure.axes[0].texts)
 
 
+@dataclass(frozen=True)
+class Dashpot(ub.ConnectorLaw):
+    """A law of a user."""
+
+    c: float
+
+    def resistance(self, motion, rate, state, dt):
+        return self.c * rate
+
+
 LAWS = {
     "spring": ub.Spring(2e4),
     "damper": ub.Damper(300.0),
@@ -54,6 +65,7 @@ LAWS = {
     "actuator": ub.Actuator(lambda t: t),
     "controller": ub.Controller(lambda simulation: 0.0),
     "function": ub.ForceLaw(lambda motion, rate: motion),
+    "own law": Dashpot(3.0),
     "rigid-plastic": ub.RigidPlastic(ub.Softening(1e3, 10.0)),
 }
 

@@ -5,6 +5,7 @@ import math
 import os
 import shutil
 import sys
+from dataclasses import dataclass
 from itertools import pairwise
 
 from mpi4py import MPI
@@ -584,6 +585,16 @@ def test_displacements_of_bodies_are_magnified(engine):
     np.testing.assert_allclose(line.points[0], expected, atol=1e-12)
 
 
+@dataclass(frozen=True)
+class Quadratic(ub.ConnectorLaw):
+    """A law of a user."""
+
+    k: float
+
+    def energy(self, motion, state):
+        return self.k * motion**2 / 2
+
+
 LAWS = [
     ub.Motor(lambda t: 0.1 * t),
     ub.Actuator(lambda t: t),
@@ -593,6 +604,7 @@ LAWS = [
     ub.Stop(100.0, high=0.05),
     ub.Coulomb(0.1),
     ub.ForceLaw(lambda x, v: 10.0 * x),
+    Quadratic(10.0),
     ub.RigidPlastic(ub.Softening(0.5, 1.0)),
 ]
 

@@ -169,6 +169,7 @@ LAWS = {
     "breaking": ub.Spring(20.0, softening=ub.Softening(limit=1.0, energy=5.0)),
     "damper": ub.Damper(3.0),
     "stop": ub.Stop(30.0, low=-0.05, high=0.05),
+    "damped stop": ub.Stop(30.0, low=-0.05, high=0.05, damping=0.4),
     "function": ub.ForceLaw(lambda e, rate: 5 * e + e**3 + 0.3 * rate),
     "friction": ub.Coulomb(0.7),
 }

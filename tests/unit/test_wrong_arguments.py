@@ -258,7 +258,7 @@ TABLE = {
     "Stop": call(
         ub.Stop,
         stiffness=V(1.0, POSITIVE), low=V(-1.0, [*NO_NUMBER, None, NAN, 1.0]),
-        high=V(1.0, [*NO_NUMBER, None, NAN, -1.0]),
+        high=V(1.0, [*NO_NUMBER, None, NAN, -1.0]), damping=V(1.0, FROM_ZERO),
     ),
     "Coulomb": call(
         ub.Coulomb,

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import inspect
+from dataclasses import fields
 from numbers import Real
 
 import numpy as np
@@ -23,7 +24,8 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     what = f"{what}: {type(law).__name__}"
     require_dataclass(law, what)
     reserved = {*vars(ConnectorLaw), *ConnectorLaw.__annotations__}
-    if taken := sorted(reserved & set(law.numbers())):
+    names = {field.name for field in fields(law)}  # type: ignore[arg-type]
+    if taken := sorted(reserved & names):
         raise SceneError(
             f"{what}: a field cannot have the name {' or '.join(taken)}, which every ConnectorLaw "
             "gives to something else"

@@ -253,11 +253,11 @@ class _Stated(LawInStep):
         z, way = self._after(changes, self._part), e1 - self.e0
         elastic = end = self._elastic(e1, z)
         if self._part != 1.0:
-            # By Gauss's rule; where the work of that is not the change of the energy, from this.
+            # By Gauss's rule; where the force is not smooth, from the change of the energy.
             mean = self.setting.scheme.mean(lambda e: self._elastic(e, z), self.e0, e1)
-            before, now = self._energy(self.e0, z), self._energy(e1, z)
-            if abs(now - before - mean * way) > 2**-48 * (abs(before) + abs(now)):
-                mean = (now - before) / way
+            first, middle = (self._elastic(e, z) for e in (self.e0, (self.e0 + e1) / 2))
+            if abs(mean - (first + 4 * middle + end) / 6) > 1e-7 * (abs(first) + abs(end)):
+                mean = (self._energy(e1, z) - self._energy(self.e0, z)) / way
             elastic = mean + (2 * self._part - 1) * (end - mean)
         return elastic + float(np.sum(resistance))
 

@@ -9,9 +9,12 @@ from typing import Any
 
 import numpy as np
 import ufl
+from ufl.algorithms import expand_derivatives
+from ufl.constantvalue import Zero
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, fill, in_order, lib, names, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.connector_steps import law_step
@@ -43,10 +46,10 @@ class LawForms:
         self._at = {**self._pointwise.at, "motion": motion}
         try:
             force, *numbers, variables = law_step(law, self._at, scheme)
-            self.force = self._pointwise.compile(force, ufl.diff(force, motion))
+            self.force = self._compile(force, ufl.diff(force, motion))
             by_name = dict(zip(("stored", "numerical"), numbers, strict=True))
             end = in_order("law_output", by_name, "law_")
-            self.end = self._pointwise.compile(*end, *variables)
+            self.end = self._compile(*end, *variables)
         except Exception as error:
             raise SceneError(
                 f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
@@ -56,10 +59,16 @@ class LawForms:
     @cached_property
     def frozen(self) -> tuple[Any, Any]:
         """The same force, and its second derivative, while the variables stay as they are."""
-        motion, compile = self._at["motion"], self._pointwise.compile
+        motion = self._at["motion"]
         force = law_step(self._law, self._at, self._scheme, frozen=True).force
         slope = ufl.diff(force, motion)
-        return compile(force, slope), compile(ufl.diff(slope, motion))
+        return self._compile(force, slope), self._compile(ufl.diff(slope, motion))
+
+    def _compile(self, *outputs: Expr) -> Any:
+        """Compile a function; none if all that it returns is zero."""
+        outputs = tuple(map(expand_derivatives, outputs))
+        zero = all(isinstance(one, Zero) for one in outputs)
+        return ffi.NULL if zero else self._pointwise.compile(*outputs)
 
 
 _law_forms = stated(LawForms)

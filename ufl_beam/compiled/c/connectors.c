@@ -60,6 +60,13 @@ static void get_forces(const couplings *c, const double *q, double *force)
   for (int i = 0; i < c->number; ++i) force[i] = q[c->force[i]];
 }
 
+/* Numbers of a law, which has no kernel where all of them are zero. */
+static void answer_of_law(kernel *law, const double *w, int answers, double *s)
+{
+  if (law) ask(law, w, answers, s);
+  else memset(s, 0, answers * sizeof *s);
+}
+
 /* The compiled laws around their motions e1. */
 static void find_rows_of_laws(const connector_laws *p, const double *e1)
 {
@@ -67,7 +74,7 @@ static void find_rows_of_laws(const connector_laws *p, const double *e1)
   for (int i = 0; i < p->number; ++i, w += p->width) {
     double *row = p->rows + 3 * i;
     w[LAW_MOTION] = e1[i];
-    ask(p->force, w, 2, s);
+    answer_of_law(p->force, w, 2, s);
     row[0] = -s[1], row[1] = 1, row[2] = s[0] - s[1] * e1[i];
   }
 }
@@ -76,7 +83,7 @@ static void find_rows_of_laws(const connector_laws *p, const double *e1)
 double ask_law(kernel *law, const double *w)
 {
   double s;
-  ask(law, w, 1, &s);
+  answer_of_law(law, w, 1, &s);
   return s;
 }
 
@@ -85,7 +92,7 @@ static const double *end_of_law(const connector_laws *p, int i, double e1)
 {
   double *w = p->w + i * p->width;
   w[LAW_MOTION] = e1;
-  ask(p->end, w, LAW_OUTPUTS + p->variables, p->answer);
+  answer_of_law(p->end, w, LAW_OUTPUTS + p->variables, p->answer);
   return p->answer;
 }
 
