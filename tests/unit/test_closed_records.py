@@ -11,7 +11,7 @@ from ufl_beam.model.damping import Damping
 from ufl_beam.model.loads import Load
 
 CLOSED = [
-    *Law.__args__, *Load.__args__, *Damping.__args__,
+    *(law for law in Law.__args__ if law is not ub.ConnectorLaw), *Load.__args__, *Damping.__args__,
     *(ub.Softening, ub.LinearSoftening, ub.VirtualWork, ub.Potential, ub.Perzyna),
     *(ub.DuvautLions, ub.Table),
 ]  # fmt: skip

@@ -422,3 +422,31 @@ def test_a_lone_body_seen_from_a_rotating_frame():
         solution.position(body.middle)[-1], seen, atol=3.2 * 2 * 2.0 * 0.02**2 / 12
     )
     assert solution.energy.worst < 1e-12
+
+
+@pytest.mark.parametrize(
+    "law",
+    [
+        ub.Damper(5.0), ub.Actuator(lambda t: 0.0 * t), ub.Motor(lambda t: 0.0 * t),
+        ub.Spring(10.0), ub.Stop(1e4, low=-1.0), ub.ForceLaw(lambda e, de: 10 * e + 5 * e**3),
+        ub.Coulomb(1.0),
+    ],
+    ids=lambda law: type(law).__name__,
+)  # fmt: skip
+def test_buckling_with_each_law(law):
+    """A column with a connector at its top: free, held (what sticks and motors), or sprung."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=500.0, rhoA=2.0, rhoI=0.01)
+    column = ub.Beam((0, 0), (0, 2), section, cells=8)
+    weight = ub.PointLoad(column.end, force=(0.0, -100.0))
+    top = ub.Slide(ub.ground(0, 2), column.end, law, axis=(1, 0))
+    foot = ub.Clamped(column.start)
+    scene = ub.Scene([column], supports=[foot], loads=[weight], connectors=[top])
+    factor = ub.buckling(scene, 1).factors[0]
+    free = np.pi**2 / 4 * 500.0 / 2.0**2 / 100.0
+    held = 8.18 * free  # (0.699 l) beside 2 l
+    if isinstance(law, ub.Motor | ub.Coulomb):
+        assert factor == pytest.approx(held, rel=0.06)
+    elif isinstance(law, ub.Spring | ub.ForceLaw):
+        assert 1.03 * free < factor < 1.1 * free
+    else:
+        assert factor == pytest.approx(free, rel=0.01)

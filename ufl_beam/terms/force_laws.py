@@ -210,6 +210,7 @@ class AskedLaws(Response):
 
     def _find_rows(self) -> None:
         """Put the laws around the iterate into the rows of C."""
+        self._rows[:, 2] = math.nan  # where a law has no value
         motions = zip(self._each, self._e1.tolist(), self._force.tolist(), strict=True)
         for row, (one, e1, λ) in zip(self._rows, motions, strict=True):
             slope, intercept = one.line(e1, λ)
