@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
 /* Points held on curves that only Python knows, see guide_curves.py.
  *
- * Python is asked for five points of a curve at a time. The polynomial through them gives the nearest point
- * and the derivatives there; it stands for the curve only next to the point in its middle. */
+ * Python is asked for five points of a curve at a time. The polynomial through them says where the nearest
+ * point is, until that is the one in the middle but for its last digits; and gives the derivatives there. */
 
 enum { PROJECTIONS = 50, MOST_REFINEMENTS = 20 }; /* largest numbers of iterations */
 
-/* Steps of the parameter: up to which a polynomial says where to go; up to which it is the curve; of
- * which Newton's method leaves nothing. */
-static const double TRUSTED = 32, NEAR = 1e-6, NOTHING_LEFT = 1e-12;
+/* Steps of the parameter up to which a polynomial says where to go; of which Newton's method leaves nothing;
+ * what the last search may leave, as a part of the scene. */
+static const double TRUSTED = 32, NOTHING_LEFT = 1e-12, CLOSE_ENOUGH = 1e-9;
 
 static double product_of(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1]; }
 
@@ -31,12 +31,12 @@ static void expand_curve(const guides *g, int k, double s, curve_around *c)
   }
 }
 
-/* Its point u steps from the middle, and the derivatives by u. */
-static void derive(const curve_around *c, double u, double *on, double *slope, double *bend)
+/* The way from the point in its middle to that u steps on, and the derivatives by u. */
+static void derive(const curve_around *c, double u, double *way, double *slope, double *bend)
 {
   for (int i = 0; i < 2; ++i) {
     const double a1 = c->a[1][i], a2 = c->a[2][i], a3 = c->a[3][i], a4 = c->a[4][i];
-    on[i] = c->a[0][i] + u * (a1 + u * (a2 + u * (a3 + u * a4)));
+    way[i] = u * (a1 + u * (a2 + u * (a3 + u * a4)));
     slope[i] = a1 + u * (2 * a2 + u * (3 * a3 + u * 4 * a4));
     bend[i] = 2 * a2 + u * (6 * a3 + u * 12 * a4);
   }
@@ -47,9 +47,9 @@ static double steps_to(const curve_around *c, const double *p)
 {
   double u = 0, along_tangent = NAN;
   for (int i = 0; i < MOST_REFINEMENTS; ++i) {
-    double on[2], slope[2], bend[2];
-    derive(c, u, on, slope, bend);
-    const double gap[2] = {p[0] - on[0], p[1] - on[1]};
+    double way[2], slope[2], bend[2];
+    derive(c, u, way, slope, bend);
+    const double gap[2] = {p[0] - c->a[0][0] - way[0], p[1] - c->a[0][1] - way[1]};
     const double square = product_of(slope, slope), along = product_of(gap, slope);
     const double change = along / fmax(square - product_of(gap, bend), square / 2);
     if (i == 0) along_tangent = along / square;
@@ -64,16 +64,17 @@ static double steps_to(const curve_around *c, const double *p)
 static int find_nearest(const guides *g, int k, const double *p, double *on, double *slope, double *bend)
 {
   curve_around *c = g->around + k;
-  double s = g->s[k];
+  double s = g->s[k], way[2], left = 4 * last_digit(g->size + hypot(p[0], p[1]));
   for (int i = 0; i < PROJECTIONS && isfinite(s); ++i) {
     if (i > 0 || isnan(c->middle)) expand_curve(g, k, s, c);
     const double u = steps_to(c, p);
     s = c->middle + u * g->step[k];
-    if (fabs(u) <= NEAR) {
-      g->s[k] = s;
-      derive(c, u, on, slope, bend);
-      return 1;
-    }
+    if (i == PROJECTIONS - 1) left = CLOSE_ENOUGH * g->size;
+    if (!(fabs(u) * hypot(c->a[1][0], c->a[1][1]) <= left)) continue;
+    g->s[k] = s;
+    derive(c, u, way, slope, bend);
+    for (int j = 0; j < 2; ++j) on[j] = c->a[0][j] + way[j];
+    return 1;
   }
   c->middle = NAN;
   return 0;
