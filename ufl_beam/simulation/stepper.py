@@ -17,7 +17,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index, Later, Snapshots
 from ufl_beam.collective_errors import Agreement
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib, loop
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia, with_half_tangents
 from ufl_beam.model.loads import RotatingFrame
@@ -197,7 +197,7 @@ class Stepper:
             stop = callbacks.handle(lambda t: extras.stop(self.c.t, t))
             self.c.stop, self.c.stops = lib.time_in_python, stop
         # What may raise comes first, before other loops of C have accepted anything.
-        asking = lib.phase_in_python, loop("accept_guides", None)[0]
+        asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
         mine = [one for one in loops["accept"] if one[0] in asking]
         others = [one for one in loops["accept"] if one[0] not in asking]
         loops["accept"] = [*mine, *others]

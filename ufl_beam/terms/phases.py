@@ -136,7 +136,7 @@ class Callbacks:
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """Context, outside of steps, that raises what a function has raised that C has called."""
+        """Raise at the end of a block, outside of steps, what functions have raised in it."""
         before, self.error = (self.error, self.c.raised), None
         try:
             yield
