@@ -24,8 +24,8 @@ from ufl_beam.dolfinx_compat import VERSIONS
 T = TypeVar("T")
 
 SOURCES = (
-    "loops", "material_points", "rigid_plastic", "connectors", "elimination", "fronts", "newton",
-    "cell_forces", "prediction", "march",
+    "loops", "material_points", "rigid_plastic", "connectors", "guide_curves", "elimination",
+    "fronts", "newton", "cell_forces", "prediction", "march",
 )  # fmt: skip
 """Files of C beside this one; they are one translation unit."""
 
@@ -35,8 +35,7 @@ NumPy."""
 
 _CALLBACKS = """
 extern "Python" void add_in_python(void *self, const double *q, double *out);
-extern "Python" double missed_in_python(void *self, const double *q, const double *r, double scale,
-                                        double moved);
+extern "Python" void curve_in_python(void *handle, double s, double step, double *out);
 extern "Python" double time_in_python(void *handle, double t);
 extern "Python" void phase_in_python(void *handle, const time_step *step, const double *q1,
                                      const double *s);

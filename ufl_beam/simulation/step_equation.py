@@ -77,7 +77,7 @@ class StepEquation:
             return one[1]
 
         product, cells = take("add_step_tangent"), take("add_cells")
-        demands = [one.demand() or callbacks.demand(one.excess) for one in couplings]
+        demands = [one.demand() for one in couplings]
         demands += filter(None, (one.demand() for one in beams))
         demanding = share.largest(float(bool(demands)))
         predicted = [one.predicted.c for one in beams if one.predicted is not None]

@@ -195,10 +195,12 @@ class Stepper:
         if extras.stop is not None:
             stop = callbacks.handle(lambda t: extras.stop(self.c.t, t))
             self.c.stop, self.c.stops = lib.time_in_python, stop
+        # What may raise comes first, before other loops of C have accepted anything.
+        asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
+        mine = [one for one in loops["accept"] if one[0] in asking]
+        others = [one for one in loops["accept"] if one[0] not in asking]
+        loops["accept"] = [*mine, *others]
         if callbacks.used or any(extras[:4]):
-            # What may raise comes first, before loops of C have accepted anything.
-            mine = [one for one in loops["accept"] if one[0] == lib.phase_in_python]
-            others = [one for one in loops["accept"] if one[0] != lib.phase_in_python]
             if extras.require is not None:
                 mine.insert(0, callbacks.accept(lambda q1, s: extras.require(q1)))  # type: ignore[misc]
             loops["accept"] = [callbacks.phase(callbacks.note_end), *mine, *others]

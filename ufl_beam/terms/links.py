@@ -78,13 +78,9 @@ class Links(InternalForces):
         """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
         return np.zeros(len(self.links))
 
-    def demand(self) -> Loop | None:
-        """Return the C function of :meth:`excess` with its data, if there is one."""
-        return None
-
-    def excess(self, q: Array, r: Array, force: float, moved: float) -> float:
-        """Largest residual of a law, without dimension; used where C has no :meth:`demand`."""
-        return 0.0
+    @abstractmethod
+    def demand(self) -> Loop:
+        """C function of ``demand`` in loops.h with its data: how far laws are missed."""
 
     def again(self) -> None:
         """Begin the step again: forget what its iterates have tried."""

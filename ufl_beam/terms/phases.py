@@ -4,7 +4,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from functools import partial
 from typing import Any, NamedTuple
 
@@ -15,6 +16,7 @@ from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.model.curves import Curve
 from ufl_beam.model.time_functions import Constant, Table, TimeFunction, steady, value_at
 
 
@@ -67,9 +69,9 @@ class Callbacks:
         """C function that adds to ``size`` numbers what Python does; not a number if that fails."""
         return lib.add_in_python, self.handle(add, size)
 
-    def demand(self, missed: Callable[[Array, Array, float, float], float]) -> Loop:
-        """C function that calls ``missed(q, r, scale, moved)``; not a number if that fails."""
-        return lib.missed_in_python, self.handle(missed)
+    def curves(self, curves: Sequence[Curve]) -> Any:
+        """Handles of curves for C; their points are not numbers if a curve fails."""
+        return ffi.new("void *[]", [self.handle(curve, 2 * lib.CURVE_POINTS) for curve in curves])
 
     def run(self, function: Callable[[], None]) -> Loop:
         """C function that calls ``function()``."""
@@ -134,6 +136,16 @@ class Callbacks:
         if error is not None:
             raise error
 
+    @contextmanager
+    def raising(self) -> Iterator[None]:
+        """Raise at the end of a block, outside of steps, what functions have raised in it."""
+        before, self.error = (self.error, self.c.raised), None
+        try:
+            yield
+            self.settle()
+        finally:
+            self.error, self.c.raised = before
+
     @property
     def end(self) -> Array:
         """The end of the step."""
@@ -182,11 +194,13 @@ def add_in_python(handle: Any, q: Any, out: Any) -> None:
     function(callbacks.lend(q), np.frombuffer(ffi.buffer(out, 8 * size)))
 
 
-@from_c(math.nan)
-def missed_in_python(handle: Any, q: Any, r: Any, scale: float, moved: float) -> float:
+@from_c()
+def curve_in_python(handle: Any, s: float, step: float, out: Any) -> None:
     """Callback of C, declared in c_library.py."""
-    callbacks, function, _ = ffi.from_handle(handle)
-    return float(function(callbacks.lend(q), callbacks.lend(r), scale, moved))
+    curve, far = ffi.from_handle(handle)[1], 2 * step
+    out[0 : 2 * lib.CURVE_POINTS] = (
+        *curve(s - far), *curve(s - step), *curve(s), *curve(s + step), *curve(s + far),
+    )  # fmt: skip
 
 
 @from_c(math.nan)

@@ -349,6 +349,49 @@ double missed_by_points(void *self, const double *q, const double *r, double sca
 int gives_energy(const points *p);
 void commit(points *p);
 
+/* -- points on guide curves -------------------------------------------------------------------- */
+
+enum { CURVE_POINTS = 5 }; /* at equal steps of the parameter */
+
+/* The polynomial through these points of a curve, around the parameter in their middle; its coefficients
+ * are of powers of steps. */
+typedef struct {
+  double middle; /* not a number if there is none */
+  double a[CURVE_POINTS][2];
+} curve_around;
+
+/* A place and its curve: where the rest is known, or not numbers; the nearest point, and the derivative
+ * by steps there; distance and normal; the normal over the step, and its derivative by the place. */
+typedef struct {
+  double at[2], on[2], slope[2];
+  double distance, n[2], m[2], dm[2][2];
+} guide_frame;
+
+/* Places held on curves, see guide_curves.c. */
+typedef struct {
+  int number, over_step;   /* over_step: whether forces are across the chord of a step */
+  const int32_t *dofs;     /* seven of each link */
+  const int32_t *entries;  /* of the tangent, eight of each: dm, m, n */
+  const double *point;     /* in the undeformed scene */
+  double size, reach;      /* of the scene; of a step, as a part of that */
+  const double *shortest;  /* chord that has a direction */
+  double *distance, *s0, *step, *on0; /* the accepted state: parameter, its steps, point of the curve */
+  double *s;               /* parameter of the latest nearest point */
+  guide_frame *frame;      /* of the latest iterate */
+  curve_around *around;    /* latest polynomials */
+  void (*ask)(void *curve, double s, double step, double *out); /* for points of a curve */
+  void *const *curve;
+  int lost;                /* guide that has no nearest point; Python raises that if it is told */
+  void (*report)(void *handle);
+  void *handle;
+} guides;
+
+int find_frames(guides *g, const double *q);
+void begin_guides_again(void *self);
+void add_guides_force(void *self, const double *q, double *r);
+void add_guides_tangent(void *self, const double *q, double *tangent);
+double missed_by_guides(void *self, const double *q, const double *r, double scale, double moved);
+
 /* -- elimination along chains ------------------------------------------------------------------ */
 
 /* What is kept of a vertex: its pivot block as LU, what that makes of the coupling to the vertex after. */
@@ -966,6 +1009,8 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
 void begin_couplings_again(void *self);
 void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s);
+void begin_guides(void *self, const time_step *step, const double *q1, const double *s);
+void accept_guides(void *self, const time_step *step, const double *q1, const double *s);
 int points_dissipate(void *self, const double *q1);
 int springs_dissipate(void *self, const double *q1);
 void change_of_form(void *self, const double *q1, energy_change *sum);

@@ -1,0 +1,214 @@
+/* SPDX-License-Identifier: MIT */
+/* Points held on curves that only Python knows, see guide_curves.py.
+ *
+ * Python is asked for five points of a curve at a time. The polynomial through them says where the nearest
+ * point is, until that is the one in the middle but for its last digits; and gives the derivatives there. */
+
+enum { PROJECTIONS = 50, MOST_REFINEMENTS = 20 }; /* largest numbers of iterations */
+
+/* Steps of the parameter up to which a polynomial says where to go; of which Newton's method leaves nothing;
+ * what the last search may leave, as a part of the scene. */
+static const double TRUSTED = 32, NOTHING_LEFT = 1e-12, CLOSE_ENOUGH = 1e-9;
+
+static double product_of(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1]; }
+
+static double last_digit(double x) { return nextafter(x, INFINITY) - x; }
+
+/* The polynomial around the parameter s. */
+static void expand_curve(const guides *g, int k, double s, curve_around *c)
+{
+  double p[CURVE_POINTS][2];
+  g->ask(g->curve[k], s, g->step[k], p[0]);
+  c->middle = s;
+  for (int i = 0; i < 2; ++i) {
+    const double odd = p[3][i] - p[1][i], even = p[3][i] + p[1][i] - 2 * p[2][i];
+    const double far_odd = p[4][i] - p[0][i], far_even = p[4][i] + p[0][i] - 2 * p[2][i];
+    c->a[0][i] = p[2][i];
+    c->a[1][i] = (8 * odd - far_odd) / 12;
+    c->a[2][i] = (16 * even - far_even) / 24;
+    c->a[3][i] = (far_odd - 2 * odd) / 12;
+    c->a[4][i] = (far_even - 4 * even) / 24;
+  }
+}
+
+/* The way from the point in its middle to that u steps on, and the derivatives by u. */
+static void derive(const curve_around *c, double u, double *way, double *slope, double *bend)
+{
+  for (int i = 0; i < 2; ++i) {
+    const double a1 = c->a[1][i], a2 = c->a[2][i], a3 = c->a[3][i], a4 = c->a[4][i];
+    way[i] = u * (a1 + u * (a2 + u * (a3 + u * a4)));
+    slope[i] = a1 + u * (2 * a2 + u * (3 * a3 + u * 4 * a4));
+    bend[i] = 2 * a2 + u * (6 * a3 + u * 12 * a4);
+  }
+}
+
+/* Steps from the middle to the point nearest to p; far away along the tangent. */
+static double steps_to(const curve_around *c, const double *p)
+{
+  double u = 0, along_tangent = NAN;
+  for (int i = 0; i < MOST_REFINEMENTS; ++i) {
+    double way[2], slope[2], bend[2];
+    derive(c, u, way, slope, bend);
+    const double gap[2] = {p[0] - c->a[0][0] - way[0], p[1] - c->a[0][1] - way[1]};
+    const double square = product_of(slope, slope), along = product_of(gap, slope);
+    const double change = along / fmax(square - product_of(gap, bend), square / 2);
+    if (i == 0) along_tangent = along / square;
+    u += change;
+    if (!(fabs(u) <= TRUSTED)) break;
+    if (fabs(change) <= NOTHING_LEFT) return u;
+  }
+  return along_tangent;
+}
+
+/* The point of a curve nearest to p, from the latest one on, and derivatives; whether there is one. */
+static int find_nearest(const guides *g, int k, const double *p, double *on, double *slope, double *bend)
+{
+  curve_around *c = g->around + k;
+  double s = g->s[k], way[2], left = 4 * last_digit(g->size + hypot(p[0], p[1]));
+  for (int i = 0; i < PROJECTIONS && isfinite(s); ++i) {
+    if (i > 0 || isnan(c->middle)) expand_curve(g, k, s, c);
+    const double u = steps_to(c, p);
+    s = c->middle + u * g->step[k];
+    if (i == PROJECTIONS - 1) left = CLOSE_ENOUGH * g->size;
+    if (!(fabs(u) * hypot(c->a[1][0], c->a[1][1]) <= left)) continue;
+    g->s[k] = s;
+    derive(c, u, way, slope, bend);
+    for (int j = 0; j < 2; ++j) on[j] = c->a[0][j] + way[j];
+    return 1;
+  }
+  c->middle = NAN;
+  return 0;
+}
+
+/* Direction of a short chord: that of the curve in its middle; and its change with the end. */
+static void find_direction_in_middle(const guides *g, int k, double *d, double *change)
+{
+  curve_around c;
+  expand_curve(g, k, (g->s0[k] + g->s[k]) / 2, &c);
+  const double *slope = c.a[1], square = product_of(slope, slope);
+  for (int i = 0; i < 2; ++i) d[i] = slope[i] / sqrt(square);
+  const double bend[2] = {2 * c.a[2][0] / square, 2 * c.a[2][1] / square}, along = product_of(d, bend);
+  for (int i = 0; i < 2; ++i) change[i] = (bend[i] - d[i] * along) / 2;
+}
+
+/* Distance of a point from the curve, the normals, and how that over the step changes with the point. */
+static int find_frame(const guides *g, int k, const double *p, guide_frame *f)
+{
+  double bend[2], t[2], d[2], change[2];
+  f->at[0] = NAN;
+  if (!find_nearest(g, k, p, f->on, f->slope, bend)) return 0;
+  const double gap[2] = {p[0] - f->on[0], p[1] - f->on[1]}, square = product_of(f->slope, f->slope);
+  for (int i = 0; i < 2; ++i) t[i] = f->slope[i] / sqrt(square);
+  f->n[0] = -t[1], f->n[1] = t[0];
+  f->distance = product_of(f->n, gap);
+  const double chord[2] = {f->on[0] - g->on0[2 * k], f->on[1] - g->on0[2 * k + 1]};
+  const double length = sqrt(product_of(chord, chord));
+  if (!g->over_step) {
+    /* The normal at the end turns by the curvature: dn = -curvature t t.dp / (1 - curvature distance). */
+    const double curvature = product_of(f->n, bend) / square;
+    for (int i = 0; i < 2; ++i) d[i] = t[i], change[i] = f->n[i] * curvature / (1 - curvature * f->distance);
+  } else if (length > g->shortest[k]) {
+    /* The direction changes with the point by (I - d d) t t.dp / length. */
+    const double way = copysign(length, product_of(chord, t));
+    for (int i = 0; i < 2; ++i) d[i] = chord[i] / way;
+    const double along = product_of(d, t);
+    for (int i = 0; i < 2; ++i) change[i] = (t[i] - d[i] * along) / way;
+  } else
+    find_direction_in_middle(g, k, d, change);
+  f->m[0] = -d[1], f->m[1] = d[0];
+  for (int j = 0; j < 2; ++j) f->dm[0][j] = -change[1] * t[j], f->dm[1][j] = change[0] * t[j];
+  f->at[0] = p[0], f->at[1] = p[1];
+  return 1;
+}
+
+/* Those of all guides at q, unless they are known; whether they are found. Python says what is lost. */
+int find_frames(guides *g, const double *q)
+{
+  for (int k = 0; k < g->number; ++k) {
+    guide_frame *f = g->frame + k;
+    const int32_t *dofs = g->dofs + 7 * k;
+    const double p[2] = {g->point[2 * k] + q[dofs[1]], g->point[2 * k + 1] + q[dofs[3]]};
+    if (f->at[0] == p[0] && f->at[1] == p[1]) continue;
+    if (find_frame(g, k, p, f)) continue;
+    g->lost = k;
+    g->report(g->handle);
+    return 0;
+  }
+  return 1;
+}
+
+void add_guides_force(void *self, const double *q, double *r)
+{
+  guides *g = self;
+  const double found = find_frames(g, q) ? 0 : NAN;
+  for (int k = 0; k < g->number; ++k) {
+    const guide_frame *f = g->frame + k;
+    const int32_t *dofs = g->dofs + 7 * k;
+    const double force = q[dofs[6]] + found;
+    r[dofs[1]] += force * f->m[0];
+    r[dofs[3]] += force * f->m[1];
+    r[dofs[6]] += f->distance + found;
+  }
+}
+
+void add_guides_tangent(void *self, const double *q, double *tangent)
+{
+  guides *g = self;
+  const double found = find_frames(g, q) ? 0 : NAN;
+  for (int k = 0; k < g->number; ++k) {
+    const guide_frame *f = g->frame + k;
+    const int32_t *at = g->entries + 8 * k;
+    const double force = q[g->dofs[7 * k + 6]] + found;
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) tangent[at[2 * i + j]] += force * f->dm[i][j];
+      tangent[at[4 + i]] += f->m[i];
+      tangent[at[6 + i]] += f->n[i];
+    }
+  }
+}
+
+/* Largest distance, as a part of 1 % of the scene; what the last digits make of it does not count. */
+double missed_by_guides(void *self, const double *q, const double *r, double scale, double moved)
+{
+  const guides *g = self;
+  double most = 0;
+  for (int k = 0; k < g->number; ++k) {
+    const double *p = g->point + 2 * k, *on0 = g->on0 + 2 * k;
+    const double far = g->size + fmax(fabs(p[0] + on0[0]), fabs(p[1] + on0[1]));
+    const double left = fabs(r[g->dofs[7 * k + 6]]) - 8 * last_digit(far);
+    const double missed = left > 0 ? left / (0.01 * g->size) : left <= 0 ? 0 : NAN;
+    if (!(missed <= most)) most = missed;
+  }
+  return most;
+}
+
+/* Begin at the points of the last step. What iterates have found since is forgotten: a restart from a
+ * checkpoint does not have it. */
+void begin_guides_again(void *self)
+{
+  const guides *g = self;
+  for (int k = 0; k < g->number; ++k) {
+    g->s[k] = g->s0[k];
+    g->around[k].middle = g->frame[k].at[0] = NAN;
+  }
+}
+
+void begin_guides(void *self, const time_step *step, const double *q1, const double *s)
+{
+  begin_guides_again(self);
+}
+
+/* Remember the points on the curves; nothing is, if one is lost. */
+void accept_guides(void *self, const time_step *step, const double *q1, const double *s)
+{
+  guides *g = self;
+  if (!find_frames(g, q1)) return;
+  for (int k = 0; k < g->number; ++k) {
+    const guide_frame *f = g->frame + k;
+    memcpy(g->on0 + 2 * k, f->on, sizeof f->on);
+    g->step[k] *= g->reach * g->size / sqrt(product_of(f->slope, f->slope));
+    g->distance[k] = f->distance;
+    g->s0[k] = g->s[k];
+  }
+  begin_guides_again(g);
+}
