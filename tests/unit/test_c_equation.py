@@ -111,7 +111,7 @@ def test_reasons_are_those_of_petsc(mine, theirs):
     assert getattr(lib, mine) == int(getattr(PETSc.SNES.ConvergedReason, theirs))
 
 
-@pytest.mark.parametrize("name", ["add_in_python", "curve_in_python"])
+@pytest.mark.parametrize("name", ["run_in_python", "curve_in_python"])
 def test_an_interrupt_at_the_door_of_a_callback_is_not_lost(name):
     """It comes before the first line of what C calls, and cffi would only print it.
 

@@ -16,6 +16,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.terms.compiled_laws import LawForms, inputs
 
 f = ub.law_functions
@@ -311,8 +312,9 @@ def test_steps_need_no_python():
     """All steps of a run are taken in C."""
     _, _, scene = all_laws()
     simulation = ub.Simulation(scene, ub.Midpoint())
-    assert not simulation.equation.callbacks.used
-    assert all(one.loops() is not None for one in simulation.couplings)
+    python = {lib.phase_in_python, lib.run_in_python, lib.begin_in_python}
+    phases = [loop for one in simulation.equation.phases for loop in (*one.begin, *one.accept)]
+    assert not python & {function for function, _ in phases}
     simulation.close()
 
 

@@ -3,7 +3,6 @@
 
 import math
 import re
-from dataclasses import replace
 from pathlib import Path
 
 from mpi4py import MPI
@@ -250,13 +249,6 @@ def test_numbers_times_and_steps_compile_nothing():
     assert prepared.cache_info().misses == before
     other = run(flying(), dt=0.1)
     assert np.abs(first.q[-1] - other.q[-1]).max() > 1e-3
-
-
-def test_steps_with_works_and_a_frame_need_no_python():
-    scene = replace(flying(), loads=[ub.RotatingFrame(rate=2.0)])
-    simulation = ub.Simulation(scene, ub.Midpoint())
-    assert all(term.loops() is not None for term in simulation.equation.terms)
-    assert not simulation.equation.callbacks.used
 
 
 def test_a_number_may_have_any_name():

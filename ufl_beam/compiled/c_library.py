@@ -34,12 +34,10 @@ FLAGS = ["-O3", NATIVE, "-fopenmp-simd", "-ffp-contract=off"]
 NumPy."""
 
 _CALLBACKS = """
-extern "Python" void add_in_python(void *self, const double *q, double *out);
 extern "Python" void curve_in_python(void *handle, double s, double step, double *out);
 extern "Python" double time_in_python(void *handle, double t);
 extern "Python" void phase_in_python(void *handle, const time_step *step, const double *q1,
                                      const double *s);
-extern "Python" void change_in_python(void *handle, const double *q1, energy_change *sum);
 extern "Python" int numbers_in_python(void *handle, scheme_numbers *numbers);
 extern "Python" void agree_in_python(void *handle, int number, const int *how, double *values);
 extern "Python" int solve_in_python(void *handle, int anew);

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
@@ -65,7 +65,7 @@ class StepEquation:
         self.terms: list[Term] = [*self.inner, *self.others]
         self.c = struct("equation", size=A.size, owned=share.num_owned, weight=self.weights)
         self.callbacks = callbacks = Callbacks(self.c)
-        loops = [term.loops() or self._in_python(term) for term in self.terms]
+        loops = [term.loops() for term in self.terms]
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
 
         def take(name: str) -> Any:
@@ -103,13 +103,6 @@ class StepEquation:
         # The ledger has all its entries now, to whose places phases write.
         self.phases = [one.phases(callbacks) for one in self.terms]
 
-    def _in_python(self, term: Term) -> tuple[Loop, Loop]:
-        def add_tangent(q1: Array, _: Array) -> None:
-            term.add_tangent(q1)
-
-        residual = self.callbacks.part(term.add_residual, self.share.size)
-        return residual, self.callbacks.part(add_tangent, len(self.A.data))
-
     @property
     def held(self) -> Index:
         """Degrees of freedom that supports hold; what stands for them in A means nothing."""
@@ -128,16 +121,14 @@ class StepEquation:
             "ratio": step.ratio, "q0": doubles(q0), "q_before": doubles(q_before),
         })  # fmt: skip
         self._begun = c, q0, q_before  # as long as forms and terms know them
-        self.callbacks.note_beginning(c, ffi.NULL, ffi.NULL)
-        for term, phases in zip(self.terms, self.phases, strict=True):
-            if term in some:
-                for begin, data in phases.begin:
+        with self.callbacks.raising():
+            for term, phases in zip(self.terms, self.phases, strict=True):
+                for begin, data in phases.begin if term in some else ():
                     begin(data, c, ffi.NULL, ffi.NULL)
         for one in self.beams:
             if one in some and one.predicted is not None:
                 of = one.predicted.c
                 of.begins, of.stale, of.exact = 0, 1, 1
-        self.callbacks.settle()
 
     def forces_at_rest(self, scheme: Scheme, q: Array) -> Array:
         """Forces of beams at ``q``, in a step so short that nothing viscous flows."""
@@ -164,11 +155,10 @@ class StepEquation:
 
     def add_state(self, q: Array) -> None:
         """Enter the energies that the scene holds at ``q``."""
-        self.callbacks.note_end(ffi.NULL, doubles(q), doubles(q))
-        for phases in self.phases:
-            for add, data in phases.add_state:
-                add(data, ffi.NULL, doubles(q), ffi.NULL)
-        self.callbacks.settle()
+        with self.callbacks.raising():
+            for phases in self.phases:
+                for add, data in phases.add_state:
+                    add(data, ffi.NULL, doubles(q), ffi.NULL)
 
     def tangent_at(self, x: Array, v: Array, r: Array) -> Csr:
         """Return the tangent at ``x``; add to ``r`` what it makes of a motion ``v`` of supports.
@@ -197,8 +187,9 @@ class StepEquation:
     def forces(self, q1: Array) -> Array:
         """Return the sum of the forces of all terms at ``q1``, those of this process."""
         r = np.zeros(self.share.size)
-        for term in self.terms:
-            term.add_residual(q1, r)
+        with self.callbacks.raising():
+            for term in self.terms:
+                term.add_residual(q1, r)
         return r
 
     def tangent(self, q1: Array) -> None:
@@ -229,10 +220,11 @@ class StepEquation:
         r = np.zeros(self.share.size)
         self.begin(step)
         self.A.data.fill(0.0)
-        for term in self.terms:
-            if term.kind != "inertia":
-                term.add_residual(q, r)
-                term.add_tangent(q)
+        with self.callbacks.raising():
+            for term in self.terms:
+                if term.kind != "inertia":
+                    term.add_residual(q, r)
+                    term.add_tangent(q)
         return r, self.A.data.copy()
 
     def tangent_change(self, q: Array, u: Array) -> Array:

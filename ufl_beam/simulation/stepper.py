@@ -198,13 +198,9 @@ class Stepper:
         # What may raise comes first, before other loops of C have accepted anything.
         asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
         mine = [one for one in loops["accept"] if one[0] in asking]
-        others = [one for one in loops["accept"] if one[0] not in asking]
-        loops["accept"] = [*mine, *others]
-        if callbacks.used or any(extras[:4]):
-            if extras.require is not None:
-                mine.insert(0, callbacks.accept(lambda q1, s: extras.require(q1)))  # type: ignore[misc]
-            loops["accept"] = [callbacks.phase(callbacks.note_end), *mine, *others]
-            loops["begin"].insert(0, callbacks.phase(callbacks.note_beginning))
+        if extras.require is not None:
+            mine.insert(0, callbacks.phase(self._require))
+        loops["accept"] = mine + [one for one in loops["accept"] if one[0] not in asking]
         if extras.ask is not None:
             loops["begin"].insert(0, callbacks.phase(self._ask))
         if extras.note is not None:
@@ -340,10 +336,15 @@ class Stepper:
             self._state.q = partial(self._copy, self.c.q)  # type: ignore[assignment]
             self._together(self._extras.ask)
 
+    def _require(self, step: Any, q1: Any, s: Any) -> None:
+        """Require that a state is held before it is accepted."""
+        if self._extras.require is not None:
+            self._extras.require(self._copy(q1))
+
     def _note(self, step: Any, q1: Any, s: Any) -> None:
         """Note an accepted step."""
         if self._extras.note is not None:
-            self._extras.note(step.t1, self._callbacks.end)
+            self._extras.note(step.t1, self._copy(q1))
 
     def _prepare(self) -> None:
         """Take from a trial step what the scheme keeps besides the velocities."""

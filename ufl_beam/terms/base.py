@@ -8,14 +8,13 @@ what several processes add to one degree of freedom is summed by the solver.
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Callbacks, Phases
 
@@ -32,50 +31,34 @@ class Term(ABC):
     _A: Csr
     """Matrix that takes the tangent."""
 
-    def loops(self) -> tuple[Loop, Loop | None] | None:
-        """Return C loops of residual and tangent with data; None where Python evaluates them."""
-        return None
+    @abstractmethod
+    def loops(self) -> tuple[Loop, Loop | None]:
+        """Return C functions of residual and tangent, with their data."""
 
+    @abstractmethod
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return C functions of a step; by default they call the methods of these names below."""
-        return Phases(
-            [callbacks.begin(self.begin)], [callbacks.accept(self.accept)],
-            [callbacks.add_state(self.add_state)],
-        )  # fmt: skip
+        """Return C functions of the beginning and the acceptance of a step; called once."""
 
     def in_cells(self) -> Sequence[InCells]:
         """Forces on the nodes of cells; none if all act between nodes that joints may share."""
         return ()
 
-    def begin(self, step: Step) -> None:
-        """Take note of the step that is to be solved."""
-
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the virtual work at ``q1`` to ``r``; by default as C does."""
-        if (loops := self.loops()) is not None:
-            (force, data), _ = loops
-            force(data, doubles(q1), doubles(r))
+        """Add the virtual work at ``q1`` to ``r``."""
+        (force, data), _ = self.loops()
+        force(data, doubles(q1), doubles(r))
 
     def add_tangent(self, q1: Array) -> None:
         """Add the derivative at ``q1`` to the matrix that the term was made with."""
-        if (loops := self.loops()) is not None and loops[1] is not None:
-            tangent, data = loops[1]
-            tangent(data, doubles(q1), doubles(self._A.data))
+        _, tangent = self.loops()
+        if tangent is not None:
+            tangent[0](tangent[1], doubles(q1), doubles(self._A.data))
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
 
-    def accept(self, q1: Array, s: Array) -> None:
-        """Take the end of the step as the new state, and enter what the step supplied or lost.
-
-        ``s`` is the step of the nodes that the virtual works are works on.
-        """
-
     def start(self, q: Array) -> None:
         """Take ``q`` for the accepted configuration, which no step has led to."""
-
-    def add_state(self, q: Array) -> None:
-        """Enter the energy that the term holds in the accepted state ``q``."""
 
     def remember(self, memory: Memory, q: Array) -> None:
         """State what later steps depend on; ``q`` is the configuration of the state."""

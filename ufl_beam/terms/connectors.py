@@ -104,7 +104,7 @@ class Couplings(Links):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the connectors; where laws of a user have a history, they are asked, too."""
-        response = self.response
+        self._callbacks, response = callbacks, self.response
         of_law = response.in_steps(callbacks)
         fields = {name for name, _ in ffi.typeof("coupling_term").fields}
         mine = {name: x for name, x in of_law.items() if name in fields}

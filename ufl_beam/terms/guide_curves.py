@@ -85,16 +85,6 @@ class Guides(Links):
         """Distances in the accepted state."""
         return self._distance
 
-    def add_residual(self, q1: Array, r: Array) -> None:
-        """Add the forces, and the distances."""
-        with self._callbacks.raising():
-            super().add_residual(q1, r)
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add the derivatives of forces and constraints to the tangent."""
-        with self._callbacks.raising():
-            super().add_tangent(q1)
-
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``.
 

@@ -15,7 +15,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.model.connectors import Connector
 from ufl_beam.terms.base import InternalForces
 from ufl_beam.terms.connector_responses import Setting, respond
-from ufl_beam.terms.phases import Callbacks, Phases
+from ufl_beam.terms.phases import Callbacks
 
 CONNECTION = 5
 """Numbers of a connector in a state, the columns of :class:`Connection`."""
@@ -42,6 +42,7 @@ class Links(InternalForces):
         self._dofs = share.link_dofs[here].astype(np.int32)
         self._forces_at = self._dofs[:, 6]
         self._A = A
+        self._callbacks: Callbacks  # from when the phases are made
         self.response = respond(self.links[0].law, self.links, setting)
         self.must_dissipate = self.response.must_dissipate
         self._before, self.work, self.rate = np.zeros((3, len(self.links)))
@@ -82,8 +83,15 @@ class Links(InternalForces):
     def demand(self) -> Loop:
         """C function of ``demand`` in loops.h with its data: how far laws are missed."""
 
-    def again(self) -> None:
-        """Begin the step again: forget what its iterates have tried."""
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add forces and rows of laws, and raise what functions of a user raise."""
+        with self._callbacks.raising():
+            super().add_residual(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivatives, and raise what functions of a user raise."""
+        with self._callbacks.raising():
+            super().add_tangent(q1)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Put what laws of forces work on in the step ``v`` from ``q`` in the place of forces."""
@@ -96,19 +104,6 @@ class Links(InternalForces):
         """Put the forces that springs bear in the undeformed scene into its configuration."""
         if (borne := self.response.borne()) is not None:
             q[self._forces_at] = self._before[:] = borne
-
-    def phases(self, callbacks: Callbacks) -> Phases:
-        """C functions of the methods."""
-        change = callbacks.change(lambda q1: (0.0, self.change(q1), self.effort(q1)))
-        return super().phases(callbacks)._replace(again=callbacks.run(self.again), change=change)
-
-    def change(self, q1: Array) -> float:
-        """Energy that the connectors take in the step to ``q1``; J."""
-        return 0.0
-
-    def effort(self, q1: Array) -> float:
-        """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
-        return 0.0
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a law gives energy in the step to ``q1``."""

@@ -15,7 +15,6 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.curves import Curve
 from ufl_beam.model.time_functions import Constant, Table, TimeFunction, steady, value_at
 
@@ -45,17 +44,12 @@ class Callbacks:
     Attributes:
         error: What was raised in the latest step; a failure of a step gives way to anything else.
         c: ``equation`` of loops.h.
-        used: Whether a term has phases that are methods.
     """
 
     error: BaseException | None = None
-    used = False
 
     def __init__(self, c: Any) -> None:
         self.c, self._alive, self._bytes = c, list[Any](), 8 * c.size
-        # What terms are told of the step that C takes; they know a configuration by its identity.
-        self._step: Step | None = None
-        self._q0, self._q1, self._s = (np.full(c.size, math.nan) for _ in range(3))
 
     def note(self, error: BaseException) -> None:
         """Keep an exception, and let C end the step on all processes."""
@@ -63,11 +57,7 @@ class Callbacks:
             self.error = error
         self.c.raised = max(self.c.raised, 1 if isinstance(error, StepFailed) else 2)
 
-    # -- functions of the equation ---------------------------------------------------------------
-
-    def part(self, add: Callable[[Array, Array], None], size: int) -> Loop:
-        """C function that adds to ``size`` numbers what Python does; not a number if that fails."""
-        return lib.add_in_python, self.handle(add, size)
+    # -- functions, with their data ---------------------------------------------------------------
 
     def curves(self, curves: Sequence[Curve]) -> Any:
         """Handles of curves for C; their points are not numbers if a curve fails."""
@@ -94,41 +84,11 @@ class Callbacks:
                 place.handle = self.handle(partial(_value, function, owner))
         return of_time
 
-    # -- phases of terms -------------------------------------------------------------------------
-
-    def begin(self, function: Callable[[Step], None]) -> Loop:
-        """Phase of C that calls ``function(step)`` when a step begins."""
-        self.used = True
-        return self.phase(lambda *_: function(self._step))  # type: ignore[arg-type]
-
-    def accept(self, function: Callable[[Array, Array], None]) -> Loop:
-        """Phase of C that calls ``function(q1, s)`` when a step is accepted."""
-        return self.phase(lambda *_: function(self._q1, self._s))
-
-    def add_state(self, function: Callable[[Array], None]) -> Loop:
-        """Phase of C that calls ``function(q1)`` for the accepted state."""
-        return self.phase(lambda *_: function(self._q1))
-
-    def change(self, function: Callable[[Array], tuple[float, float, float]]) -> Loop:
-        """C function that adds the ``energy_change`` of loops.h which ``function(q1)`` returns."""
-        return lib.change_in_python, self.handle(function)
-
     def phase(self, function: Callable[[Any, Any, Any], None]) -> Loop:
         """Phase of C that calls ``function(step, q1, s)`` with pointers."""
         return lib.phase_in_python, self.handle(function)
 
-    def note_beginning(self, step: Any, q1: Any, s: Any) -> None:
-        """Make the step that terms are told of."""
-        if not np.array_equal(before := self.copy(step.q0), self._q1):
-            self._q1 = before
-        self._q0 = self._q1
-        numbers = step.load_time, step.motion_time, step.fraction, step.at
-        q_before = self.copy(step.q_before)
-        self._step = Step(step.t0, step.t1, self._q0, *numbers, q_before, step.ratio)
-
-    def note_end(self, step: Any, q1: Any, s: Any) -> None:
-        """Copy the end of the step for terms."""
-        self._q1, self._s = self.copy(q1), self.copy(s)
+    # -- what they raise --------------------------------------------------------------------------
 
     def settle(self) -> None:
         """Raise what a function that C has called has raised."""
@@ -145,11 +105,6 @@ class Callbacks:
             self.settle()
         finally:
             self.error, self.c.raised = before
-
-    @property
-    def end(self) -> Array:
-        """The end of the step."""
-        return self._q1
 
     # -- handles -----------------------------------------------------------------------------------
 
@@ -188,13 +143,6 @@ def from_c(error: float | None = None) -> Callable[[Callable[..., Any]], Any]:
 
 
 @from_c()
-def add_in_python(handle: Any, q: Any, out: Any) -> None:
-    """Callback of C, declared in c_library.py."""
-    callbacks, function, size = ffi.from_handle(handle)
-    function(callbacks.lend(q), np.frombuffer(ffi.buffer(out, 8 * size)))
-
-
-@from_c()
 def curve_in_python(handle: Any, s: float, step: float, out: Any) -> None:
     """Callback of C, declared in c_library.py."""
     curve, far = ffi.from_handle(handle)[1], 2 * step
@@ -225,16 +173,6 @@ def begin_in_python(handle: Any, t: float, dt: float) -> None:
 def phase_in_python(handle: Any, step: Any, q1: Any, s: Any) -> None:
     """Callback of C, declared in c_library.py."""
     ffi.from_handle(handle)[1](step, q1, s)
-
-
-@from_c()
-def change_in_python(handle: Any, q1: Any, found: Any) -> None:
-    """Callback of C, declared in c_library.py."""
-    callbacks, function, _ = ffi.from_handle(handle)
-    in_beams, in_connectors, effort = function(callbacks.copy(q1))
-    found.in_beams += in_beams
-    found.in_connectors += in_connectors
-    found.effort += effort
 
 
 def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
