@@ -478,7 +478,7 @@ RECORDS_OF_RUNS = {
 
 WITHOUT_PARAMETERS = {
     "Static", "PrintedMidpoint", "Extremes", "Recorder", "say", "Scheme", "DynamicScheme",
-    "ExactStep", "Midway", "MaterialLaw", "law_functions",
+    "ExactStep", "Midway", "MaterialLaw", "ConnectorLaw", "law_functions",
 }  # fmt: skip
 
 OF_SOLUTIONS = {

@@ -211,7 +211,7 @@ class Stop(Record, ConnectorLaw):
 
     @property
     def elastic(self) -> bool:
-        """True without damping."""
+        """True if there is no damping."""
         return self.damping == 0.0
 
     @property

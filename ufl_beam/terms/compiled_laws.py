@@ -149,7 +149,7 @@ class CompiledLaws(Response):
         return float(np.sum(self._numbers_at().energy(e1, self._variables()) - self._held))
 
     def dissipated(self) -> Sequence[Array]:
-        """What is lost."""
+        """Energies that the connectors have lost."""
         return (self._lost,)
 
     def bends(self, e1: Array) -> Array:
