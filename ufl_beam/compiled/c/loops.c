@@ -337,8 +337,8 @@ void subtract_frame_forces(void *self, const double *q, double *r)
 void add_tangent_of_frame(void *self, const double *q, double *tangent)
 {
   const rotating_frame *f = self;
-  const double share = f->growth * f->part;
-  for (int i = 0; i < f->entries; ++i) tangent[i] += f->turns[i] / f->dt - share * f->pulls[i];
+  const double pulled = f->growth * f->part;
+  for (int i = 0; i < f->entries; ++i) tangent[i] += f->turns[i] / f->dt - pulled * f->pulls[i];
 }
 
 /* tan(x/2) for the increment x of rotation k: forces and their tangent are asked at the same. */
