@@ -142,7 +142,7 @@ def own_hinge_in_cells(d):
 def fibres(d):
     mean = d.some(4e4, 1e5)
     limit = d.one([
-        f"{mean:.5g}", f"ub.Normal({mean:.5g}, {mean / 8:.5g}, seed=1)",
+        f"ub.Normal({mean:.5g}, {mean / 8:.5g}, seed=1)",
         f"ub.TruncatedNormal({mean:.5g}, {mean / 5:.5g}, seed=2)",
         f"ub.Lognormal({mean:.5g}, {mean / 5:.5g}, seed=3)",
         f"ub.Weibull({mean:.5g}, 6.0, seed=4)",
