@@ -11,6 +11,8 @@ import warnings
 from dataclasses import dataclass
 from typing import ClassVar
 
+from mpi4py import MPI
+
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
@@ -285,7 +287,10 @@ def test_restart_and_start(scheme, shared_path):
         for mine, other in zip(resumed.connector(link), whole.connector(link), strict=True):
             assert np.array_equal(mine, other)
     for entry in whole.energy:
-        assert np.array_equal(resumed.energy[entry], whole.energy[entry])
+        # Several processes add up what was lost before and after in another order.
+        digits = 0.0 if MPI.COMM_WORLD.size == 1 else 1e-14
+        scale = digits * whole.energy.throughput
+        np.testing.assert_allclose(resumed.energy[entry], whole.energy[entry], rtol=0, atol=scale)
     first = run(scene, scheme, t=(0, 0.3))
     second = run(scene, scheme, t=(0.3, 0.6), start=first)
     np.testing.assert_allclose(second.q[-1], whole.q[-1], rtol=0, atol=1e-8 * np.abs(whole.q).max())
@@ -345,7 +350,7 @@ def test_motions_of_all_kinds():
     assert found.energy.worst < 1e-12
 
 
-MPI = {
+MPIRUN = {
     "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
     "OMPI_MCA_mpi_yield_when_idle": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
 }  # fmt: skip
@@ -369,7 +374,7 @@ def test_two_processes_share_a_scene():
     here = os.path.dirname(os.path.abspath(__file__))
     code = SHARED.format(here=here, tests=os.path.dirname(here))
     command = ["mpirun", "-n", "2", sys.executable, "-c", code]
-    environment = {**os.environ, **MPI}
+    environment = {**os.environ, **MPIRUN}
     found = subprocess.run(
         command, env=environment, capture_output=True, text=True, timeout=300, check=False
     )
@@ -578,6 +583,7 @@ def test_preloaded_laws_need_a_state():
 # -- watches -------------------------------------------------------------------------------------
 
 
+@pytest.mark.serial  # the first process warns
 @pytest.mark.parametrize(("law", "warned"), [(Bad(0.5), True), (Drive(0.5), False)])
 def test_a_law_that_gives_energy_is_told(law, warned):
     _, link, scene = carriage(law, v=0.1)
