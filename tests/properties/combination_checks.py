@@ -179,7 +179,8 @@ def recorders(case):
         assert (rows[:, 1:4] == end).all()
     only(not has_cut(run), "parts of steps are in either the solution or the records")
     for beam in run.names["scene"].beams:
-        kept = run.solution.q[:, run.solution.grid.nodes_of(beam)[1]]
+        grid = run.solution.grid
+        kept = run.solution.q[:, grid.dofs[grid.nodes_along(beam)]]
         drawn = [run.solution.diagram(beam, n, points=2)[1:] for n in range(len(kept))]
         forces = np.array(drawn).transpose(0, 2, 1)
         moved, borne = extremes.displacement(beam), extremes.section_forces(beam)

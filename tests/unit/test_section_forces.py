@@ -434,7 +434,7 @@ def require_extremes(scene, scheme, points, **options):
             at = np.abs(run.times - when[..., None]).argmin(axis=-1)
             reached = np.take_along_axis(values, at[None], axis=0)[0]
             assert np.abs(reached - extreme).max() < ROUND_OFF * size
-        motion = run.q[:, run.grid.nodes_of(beam)[1]]
+        motion = run.q[:, run.grid.dofs[run.grid.nodes_along(beam)]]
         assert np.array_equal(extremes.displacement(beam).low, motion.min(axis=0))
         assert np.array_equal(extremes.displacement(beam).high, motion.max(axis=0))
 
