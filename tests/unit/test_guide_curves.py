@@ -82,6 +82,7 @@ def test_a_curve_that_ceases_to_return_points(answer):
     np.testing.assert_array_equal(simulation.q, stepped(wave, 3).q)
 
 
+@pytest.mark.serial  # one process has the guide
 def test_what_a_curve_raises_outside_of_steps():
     curve = Failing(lambda: 1 / 0)
     simulation = stepped(curve, 2)
