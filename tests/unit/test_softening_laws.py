@@ -29,6 +29,8 @@ LAWS = {
 }
 KINKS = [0.8 * G / T, 3.6 * G / T]
 
+pytestmark = pytest.mark.serial  # hinges on several processes are in other files
+
 each_law = pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 
 
