@@ -15,10 +15,12 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+import ufl
 from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
-from ufl_beam.compiled.c_library import lib
+from ufl_beam.compiled.c_library import doubles, lib
+from ufl_beam.mechanics.connector_steps import law_step
 from ufl_beam.terms.compiled_laws import LawForms, inputs
 
 f = ub.law_functions
@@ -147,8 +149,6 @@ def test_tangent_is_the_derivative(name, scheme):
     """Against central differences, in small steps, in large ones and in none."""
     law = LAWS[name]
     forms = LawForms(law, scheme)
-    from ufl_beam.compiled.c_library import doubles, lib
-
     names = inputs(law)
     known = {f"number {n}": x for n, x in law.numbers().items()} | {
         "dt": 0.01,
@@ -156,23 +156,19 @@ def test_tangent_is_the_derivative(name, scheme):
     }
     known |= {f"state {n}": 1e-3 for n in law.variables}
 
-    def force(e0, e1, kernel=forms.force):
+    motion, stated = forms._at["motion"], law_step(law, forms._at, scheme).force
+    of_force, of_slope = map(forms._pointwise.compile, (stated, ufl.diff(stated, motion)))
+
+    def ask(kernel, e0, e1):  # which returns one number
         w = np.array([{**known, "before": e0, "motion": e1}[n] for n in names])
         return lib.ask_law(kernel, doubles(w))
 
-    def slope(e0, e1):
-        motion = forms._at["motion"]
-        from ufl import diff
-
-        from ufl_beam.mechanics.connector_steps import law_step
-
-        derivative = diff(law_step(law, forms._at, scheme).force, motion)
-        return force(e0, e1, forms._pointwise.compile(derivative))
-
     for e0, e1 in [(0.01, 0.013), (-0.02, 0.03), (0.01, 0.01 + 1e-9), (0.02, 0.02), (0.0, 0.0)]:
         ε = 1e-6
-        found = (force(e0, e1 + ε) - force(e0, e1 - ε)) / (2 * ε)
-        assert slope(e0, e1) == pytest.approx(found, rel=1e-5, abs=0.6 if name == "drag" else 1e-4)
+        found = (ask(of_force, e0, e1 + ε) - ask(of_force, e0, e1 - ε)) / (2 * ε)
+        assert ask(of_slope, e0, e1) == pytest.approx(
+            found, rel=1e-5, abs=0.6 if name == "drag" else 1e-4
+        )
 
 
 @pytest.mark.parametrize("law", [Cubic(100.0, 1e5), Bump(200.0, 0.02), LAWS["stop"]], ids=repr)
