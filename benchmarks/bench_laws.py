@@ -130,11 +130,11 @@ def measure(name, rounds):
     }  # fmt: skip
 
 
-def table(records):
+def table(records, rounds):
     """Markdown of all lines."""
     of = machine()
     lines = [
-        f"Commit {of['commit']}, {of['processor']}; medians of {ROUNDS} rounds.", "",
+        f"Commit {of['commit']}, {of['processor']}; medians of {rounds} rounds.", "",
         "| with | a step (µs) | iterations | without (µs) | iterations | per iteration | µs more |",
         "|---|--:|--:|--:|--:|--:|--:|",
     ]  # fmt: skip
@@ -156,12 +156,14 @@ def main():
     records = [measure(name, chosen.rounds) for name in CASES]
     for record in records:
         keep("bench_laws", record)
-    print(table(records))
+    print(table(records, chosen.rounds))
     if chosen.update:
         begin, end = "<!-- laws -->\n", "<!-- end of laws -->"
         before, rest = PAGE.read_text(encoding="utf-8").split(begin)
         _, after = rest.split(end)
-        PAGE.write_text(before + begin + table(records) + "\n" + end + after, encoding="utf-8")
+        PAGE.write_text(
+            before + begin + table(records, chosen.rounds) + "\n" + end + after, encoding="utf-8"
+        )
 
 
 if __name__ == "__main__":
