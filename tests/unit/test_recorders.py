@@ -452,3 +452,18 @@ def test_rows_of_displacements_follow_the_beam(degree):
     for row, s in ((0, 0.0), (2 * degree, 0.5), (-1, 1.0)):
         assert np.array_equal(low[row], run.displacement(beam.at(s)).min(axis=0))
     assert (np.diff(low[:, 1]) < 0).all()  # it bends down, further from row to row
+
+
+@pytest.mark.parametrize("most", [10**9, 3], ids=["all states", "thinned"])
+def test_iterations_of_a_failed_step_count_with_and_without_recorders(most):
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
+    twist = ub.Prescribed(beam.start, psi=lambda t: t + 4.0 * (t > 0.55))
+    moved = ub.Scene([beam], supports=[twist])
+
+    def counts(*recorders):
+        with pytest.raises(ub.ConvergenceError) as failure:
+            run(moved, *recorders, most=most)
+        return failure.value.solution.parts, failure.value.solution.iterations
+
+    assert counts() == counts(ub.Extremes()) == counts(ub.Events())
+    assert counts()[1] > 20  # most are of the failed step
