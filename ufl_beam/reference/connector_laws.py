@@ -412,6 +412,8 @@ class _Rubbing(LawInStep):
         if not self._guessed and stuck and λ * self._way < 0:
             self._against = True
         self._guessed = False
+        if not self._against and self._slip * self._way > 0:
+            moved -= self._way  # rest at the end, rather than a reversed velocity
         if not stuck and self._slip * moved < -1e-14 * self.length:
             self._slip = 0.0
         elif stuck and abs(λ) > self._limit * (1 + 1e-12):

@@ -35,13 +35,16 @@ static void set_rows_of_springs(const couplings *c)
 }
 
 /* Rows of dry friction at the motions e1: a connector sticks while the force is below the limit, and slips
- * until the sliding velocity reverses. */
+ * until the sliding velocity reverses, be it in the middle of the step or at its end. Both slipping to a
+ * reversed velocity and rest can be solutions of a long step; rest is taken if it gives no energy. */
 static void find_rows_of_friction(friction *f, const double *e0, const double *e1, const double *force)
 {
   for (int i = 0; i < f->number; ++i) {
     const double step = e1[i] - e0[i], λ = force[i], limit = *f->limit[i];
     double *slip = f->slip + i, *row = f->rows + 3 * i;
-    const int stuck = *slip == 0, back = !stuck && *slip * step < -f->tiny[i];
+    const int stuck = *slip == 0;
+    const int slows = !f->against[i] && *slip * f->way[i] > 0;
+    const int back = !stuck && *slip * (slows ? step - f->way[i] : step) < -f->tiny[i];
     /* To come to rest must not give energy; if it did, the place is held at once in this step. The force
      * of the guess does not decide this: it belongs to another motion. */
     if (!f->guessed) f->against[i] |= stuck && λ * f->way[i] < 0;
