@@ -65,6 +65,7 @@ from ufl_beam.model.bodies import Body, Place, Spot, ground
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
     Actuator,
+    Clearance,
     Controller,
     Coulomb,
     Damper,
@@ -73,7 +74,7 @@ from ufl_beam.model.connector_laws import (
     Spring,
     Stop,
 )
-from ufl_beam.model.connectors import Connector, Slide, Stretch, Turn
+from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.model.distributions import Lognormal, Normal, TruncatedNormal, Weibull
 from ufl_beam.model.fibres import Fibres
@@ -139,7 +140,7 @@ __version__ = version()
 
 __all__ = [
     "VTKHDF", "XDMF", "Actuator", "Adaptive", "ArcLength", "ArmstrongFrederick", "AxialBending",
-    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Camera", "Checkpoint", "Clamped",
+    "Beam", "Body", "BoucWen", "Branch", "Buckling", "Bushing", "Camera", "Checkpoint", "Clamped", "Clearance",
     "Coefficients", "Connector", "ConnectorLaw", "Controller", "ConvergenceError", "CopiesDiffer",
     "Coulomb", "CriticalPoint", "Cycles", "Damper", "Decay", "DecayingMidpoint", "Diagram",
     "DisplacementControl", "DissipationControl", "DolfinxView", "DuvautLions", "DynamicScheme",

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Forms of connectors: the force of a law on the variation of a relative motion."""
+"""Forms of connectors: the forces of a law on the variations of relative motions."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
 import basix.ufl
@@ -19,12 +21,12 @@ from ufl_beam.structure_cache import stated
 class ConnectorForms(NamedTuple):
     """Forms of connectors with the coefficients that they are written in."""
 
-    work: ufl.Form  # virtual work, and the row ``row[0] e + row[1] λ - row[2]`` of a law
+    work: ufl.Form  # virtual work, and a row ``row[:n]·e + row[n] λ - row[n + 1]`` of each motion
     tangent: ufl.Form  # its derivative by the configuration
-    motion: ufl.Form  # the relative motion e by cell
-    rate: ufl.Form  # its derivative along ``u``
-    change: ufl.Form  # derivative of the tangent along ``u``; ``bend`` is that of row[0] by e
-    numbers: fem.Function  # see :class:`Numbers`
+    motion: ufl.Form  # the n relative motions e by cell
+    rate: ufl.Form  # their derivatives along ``u``
+    change: ufl.Form  # derivative of the tangent along ``u``; ``bend`` is that of row[:n] by e
+    numbers: fem.Function  # see :class:`Numbers`; of each motion
     row: fem.Function
     q0: fem.Function
     q1: fem.Function
@@ -33,34 +35,47 @@ class ConnectorForms(NamedTuple):
 
 
 @stated
-def connector_forms(motion: str, scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
+def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
     """Forms on cells of unit length, from one node of a connector to the other."""
+    n = len(motions)
     line = basix.ufl.element("Lagrange", "interval", 1)
     point = basix.ufl.element("DG", "interval", 0)
-    space = fem.functionspace(cell, basix.ufl.mixed_element([line, line, line, point]))
-    numbers, row, bend = (
-        fem.Function(fem.functionspace(cell, ("DG", 0, shape))) for shape in ((8,), (3,), ())
+    space = fem.functionspace(cell, basix.ufl.mixed_element([line, line, line, *n * [point]]))
+    numbers, row, bend, of_cell = (
+        fem.Function(fem.functionspace(cell, ("DG", 0, (size,))))
+        for size in (8 * n, n * (n + 2), n**3, n)
     )
     q0, q1, u = (fem.Function(space) for _ in range(3))
     (before, _), (now, λ), (w, w_λ) = map(_split, (q0, q1, ufl.TestFunction(space)))
-    n = Numbers(*(ufl.as_vector([numbers[i], numbers[i + 1]]) for i in (0, 2, 4, 6)))
-    e = MOTIONS[motion].value(now, n)
-    e_w = MOTIONS[motion].variation(before, now, w, n, scheme)
     dx = ufl.Measure("dx", domain=cell, metadata={"quadrature_degree": 1})
-    dq, z = ufl.TrialFunction(space), ufl.TestFunction(bend.function_space)
-    work = (λ * e_w + w_λ * (row[0] * e + row[1] * λ - row[2])) * dx
-    tangent, by_cell = ufl.derivative(work, q1, dq), e * z * dx
-    of_rows = w_λ * bend * ufl.derivative(e, q1, u) * ufl.derivative(e, q1, dq) * dx
-    change = ufl.derivative(tangent, q1, u) + of_rows
+    dq, z = ufl.TrialFunction(space), ufl.TestFunction(of_cell.function_space)
+    e, e_w = [], []
+    for k, motion in enumerate(motions):
+        at = range(8 * k, 8 * k + 8, 2)
+        mine = Numbers(*(ufl.as_vector([numbers[i], numbers[i + 1]]) for i in at))
+        e.append(MOTIONS[motion].value(now, mine))
+        e_w.append(MOTIONS[motion].variation(before, now, w, mine, scheme))
+    de, du = ([ufl.derivative(one, q1, along) for one in e] for along in (dq, u))
+    density, of_rows, of_motions = 0, 0, 0
+    for i in range(n):
+        first = i * (n + 2)
+        law = sum(row[first + j] * e[j] for j in range(n))
+        density += λ[i] * e_w[i] + w_λ[i] * (law + row[first + n] * λ[i] - row[first + n + 1])
+        of_motions += e[i] * z[i]
+        for j, k in product(range(n), repeat=2):
+            of_rows += w_λ[i] * bend[n * (n * i + j) + k] * du[k] * de[j]
+    work, by_cell = density * dx, of_motions * dx
+    tangent = ufl.derivative(work, q1, dq)
+    change = ufl.derivative(tangent, q1, u) + of_rows * dx
     rate = ufl.derivative(by_cell, q1, u)
     return ConnectorForms(work, tangent, by_cell, rate, change, numbers, row, q0, q1, bend, u)
 
 
-def _split(q: Expr) -> tuple[Pair, Expr]:
-    """Split coefficients into both configurations, values at the ends of a cell, and the force."""
-    *components, force = ufl.split(q)
+def _split(q: Expr) -> tuple[Pair, Sequence[Expr]]:
+    """Split coefficients into both configurations, values at the ends of a cell, and the forces."""
+    parts = ufl.split(q)
 
     def at(end: float) -> Expr:
-        return ufl.as_vector([x + end / 2 * ufl.grad(x)[0] for x in components])
+        return ufl.as_vector([x + end / 2 * ufl.grad(x)[0] for x in parts[:3]])
 
-    return Pair(at(-1.0), at(1.0)), force
+    return Pair(at(-1.0), at(1.0)), parts[3:]

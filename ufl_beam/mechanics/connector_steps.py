@@ -7,7 +7,8 @@ The law holds at t_n+θ: its variables there are those after a backward-Euler st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import ufl
@@ -29,7 +30,7 @@ Errors are of the eighth and the fourth order in the step h, with the factors 1 
 class LawStep(NamedTuple):
     """A law over a step; J, forces in N or N m."""
 
-    force: Expr  # that acts in the step
+    forces: tuple[Expr, ...]  # that act in the step; of each component
     stored: Expr  # at the end
     numerical: Expr  # lost by the scheme in the step
     variables: tuple[Expr, ...]  # at the end
@@ -40,15 +41,16 @@ def law_step(
 ) -> LawStep:
     """State a step; ``frozen`` variables stay as they are.
 
-    Numbers are by name: motions at the end of the step and before it, dt and theta, the
-    variables before it as "state ...", and the numbers of the law as "number ...".
+    Numbers are by name: motions at the end of the step, "motion 0" and so on, and before it as
+    "before 0", dt and theta, the variables before it as "state ...", and the numbers of the law as
+    "number ...".
     """
     law = law.of({name: at[f"number {name}"] for name in law.numbers()})
-    e0, e1, dt, θ, part = (
-        *(at[n] for n in ("before", "motion", "dt", "theta")),
-        scheme.load_weight,
-    )
-    e, rate = (1 - θ) * e0 + θ * e1, (e1 - e0) / dt
+    dt, θ, part = at["dt"], at["theta"], scheme.load_weight
+    e0, e1 = ([at[f"{n} {i}"] for i in range(law.components)] for n in ("before", "motion"))
+    pairs = list(zip(e0, e1, strict=True))
+    e = law.given([(1 - θ) * x0 + θ * x1 for x0, x1 in pairs])
+    rate = law.given([(x1 - x0) / dt for x0, x1 in pairs])
     names = () if frozen else tuple(law.variables)
     old = State({name: at[f"state {name}"] for name in law.variables})
     changes = law.increments(e, rate, old, θ * dt) if names else {}
@@ -57,40 +59,60 @@ def law_step(
         """Variables after a part of the step."""
         return State(vars(old) | {n: getattr(old, n) + part / θ * changes[n] for n in names})
 
-    resistance = ufl.as_ufl(law.resistance(e, rate, after(θ), dt))
-    force = _elastic_force(law, e0, e1, after(part), scheme) + resistance
+    resistances = law.each(law.resistance(e, rate, after(θ), dt))
+    elastic = _elastic_forces(law, e0, e1, after(part), scheme)
+    forces = tuple(f + ufl.as_ufl(r) for f, r in zip(elastic, resistances, strict=True))
     end = {n: ufl.variable(ufl.as_ufl(z)) for n, z in vars(after(1.0)).items()}
-    moved = ufl.variable(e1)
-    stored = ufl.as_ufl(law.energy(moved, State(end)))
+    moved = [ufl.variable(x1) for x1 in e1]
+    stored = ufl.as_ufl(law.energy(law.given(moved), State(end)))
     numerical = ufl.as_ufl(0.0)
     if part > 0.5 and scheme.average(0.0, 1.0) != 1.0:  # works are exact increments of energy
         # What backward Euler loses: of second order, and positive of convex energies.
-        growth = ufl.diff(stored, moved) * (e1 - e0)
+        growth = sum(ufl.diff(stored, m) * (x1 - x0) for m, (x0, x1) in zip(moved, pairs, strict=True))
         growth += sum(ufl.diff(stored, z) * (z - getattr(old, n)) for n, z in end.items())
-        numerical = (2 * part - 1) * (law.energy(e0, old) - stored + growth)
-    return LawStep(force, stored, numerical, tuple(end.values()))
+        numerical = (2 * part - 1) * (law.energy(law.given(e0), old) - stored + growth)
+    return LawStep(forces, stored, numerical, tuple(end.values()))
 
 
-def _elastic_force(law: ConnectorLaw, e0: Expr, e1: Expr, state: State, scheme: Scheme) -> Expr:
-    """Force of the energy where loads act: over the step, at its end, or a mean of both.
+def _elastic_forces(
+    law: ConnectorLaw, e0: Sequence[Expr], e1: Sequence[Expr], state: State, scheme: Scheme
+) -> list[Expr]:
+    """Forces of the energy where loads act: over the step, at its end, or a mean of both.
 
-    Over the step the force does the work of the change of the energy, that is their quotient.  In a
-    small step the quotient has few digits, and the mean of the force by Gauss's rule has all.  So
-    it is the latter where the force is smooth over the step, and the former at kinks and in large
-    steps.
+    Over the step the forces do the work of the change of the energy.  Means of the forces by
+    Gauss's rule do it to all digits where they are smooth over the step.  At kinks and in large
+    steps each gets a share of the work that is missing, as large as the square of its own error:
+    of one force this is the quotient of the growth of the energy and the way, which has few digits
+    in small steps.
     """
 
-    def force(e: Expr) -> Expr:
-        at = ufl.variable(e)
-        return ufl.diff(ufl.as_ufl(law.energy(at, state)), at)
+    def energy(e: Sequence[Expr]) -> Expr:
+        return ufl.as_ufl(law.energy(law.given(e), state))
 
-    part = scheme.load_weight
+    def force(e: Expr, i: int) -> Expr:
+        at = [ufl.variable(e[j]) for j in components]
+        return ufl.diff(energy(at), at[i])
+
+    part, components = scheme.load_weight, range(len(e0))
+    x0, x1 = ufl.as_vector(e0), ufl.as_vector(e1)
+    ends = [force(x1, i) for i in components]
     if part == 1.0:
-        return force(e1)
-    mean, way = scheme.mean(force, e0, e1), e1 - e0
-    growth = ufl.as_ufl(law.energy(e1, state)) - law.energy(e0, state)
-    before, middle, end = map(force, (e0, (e0 + e1) / 2, e1))
-    missed = abs(mean - (before + 4 * middle + end) / 6)
-    smooth = ufl.le(missed, SMOOTH * (abs(before) + abs(end)))
-    mean = ufl.conditional(smooth, mean, growth / way)
-    return mean if part == 0.5 else mean + (2 * part - 1) * (end - mean)
+        return ends
+    ways = [x1[i] - x0[i] for i in components]
+    means = [scheme.mean(partial(force, i=i), x0, x1) for i in components]
+    size, errors = 0, []
+    for i, (mean, end, way) in enumerate(zip(means, ends, ways, strict=True)):
+        before = force(x0, i)
+        errors.append(mean - (before + 4 * force((x0 + x1) / 2, i) + end) / 6)
+        size += (abs(before) + abs(end)) * abs(way)
+    works = [error * way for error, way in zip(errors, ways, strict=True)]
+    smooth = ufl.le(sum(map(abs, works)), SMOOTH * size)
+    growth = energy(e1) - energy(e0)
+    missing = growth - sum(mean * way for mean, way in zip(means, ways, strict=True))
+    shares = sum(work**2 for work in works)
+    forces = []
+    for mean, end, way, error in zip(means, ends, ways, errors, strict=True):
+        exact = growth / way if len(e0) == 1 else mean + missing * error**2 * way / shares
+        over_step = ufl.conditional(smooth, mean, exact)
+        forces.append(over_step + (2 * part - 1) * (end - over_step))
+    return forces

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import copy
 from abc import ABC
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any, ClassVar
 
@@ -27,6 +27,8 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
 
     Attributes:
         variables: Internal variables, and their values before anything has happened.
+        components: Motions that the law acts on; 2 or 3 of a law for :class:`Bushing`, whose methods
+            get tuples of motions and rates, and whose resistance is a tuple.
         entry: Entry of the ledger, in ``lost``, of what is not stored.
         active: True of a law that may give energy, such as a drive.  Else runs warn if the energy
             that it has lost falls.
@@ -50,20 +52,21 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
     """
 
     variables: ClassVar[Mapping[str, float]] = {}
+    components: ClassVar[int] = 1
     entry: ClassVar[str] = "connectors"
     active: ClassVar[bool] = False
 
-    def energy(self, motion: Values, state: State) -> Values:
+    def energy(self, motion: Any, state: State) -> Values:
         """Energy that can be had back, zero by default; J.
 
         Args:
-            motion: m or rad.
+            motion: m or rad; a tuple where there are several components.
             state: Internal variables, as attributes.
         """
         return 0.0
 
-    def resistance(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
-        """Force beside that of the energy, zero by default; N or N m.
+    def resistance(self, motion: Any, rate: Any, state: State, dt: Values) -> Any:
+        """Force beside that of the energy, zero by default; N or N m; of several components a tuple.
 
         Args:
             motion: At the time of the step at which the law holds; m or rad.
@@ -71,10 +74,10 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
             state: Internal variables at the time of the motion.
             dt: Length of the step; s.
         """
-        return 0.0
+        return 0.0 if self.components == 1 else self.components * (0.0,)
 
     def increments(
-        self, motion: Values, rate: Values, state: State, dt: Values
+        self, motion: Any, rate: Any, state: State, dt: Values
     ) -> Mapping[str, Values]:
         """Changes of the variables over a backward-Euler step of length dt, in closed form.
 
@@ -106,11 +109,24 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         vars(law).update(numbers)
         return law
 
+    def given(self, motions: Sequence[Values]) -> Any:
+        """Motions as the methods of the law get them: a number, or a tuple of several."""
+        return motions[0] if self.components == 1 else tuple(motions)
+
+    def each(self, forces: Any) -> tuple[Values, ...]:
+        """Forces of the law as a tuple, also where there is one."""
+        return (forces,) if self.components == 1 else tuple(forces)
+
     def initially(self) -> State:
         """Internal variables before anything has happened, each (1,)."""
         return State({name: np.full(1, float(x)) for name, x in self.variables.items()})
 
-    def elastic_force(self, motion: Values, state: State) -> Values:
-        """Derivative of the energy by the motion at arrays of real numbers; N or N m."""
-        with np.errstate(all="ignore"):
-            return np.imag(self.energy(motion + IMAGINARY * 1j, state)) / IMAGINARY + 0 * motion
+    def elastic_forces(self, motions: Sequence[Values], state: State) -> list[Values]:
+        """Derivatives of the energy by the motions, arrays of real numbers; N or N m."""
+        forces = []
+        for i, motion in enumerate(motions):
+            moved = [*motions[:i], motion + IMAGINARY * 1j, *motions[i + 1 :]]
+            with np.errstate(all="ignore"):
+                energy = self.energy(self.given(moved), state)
+            forces.append(np.imag(energy) / IMAGINARY + 0 * motion)
+        return forces

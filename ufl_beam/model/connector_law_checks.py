@@ -45,7 +45,9 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
         )
     for name, value in law.variables.items():
         require_number(value, f"{what}.variables[{name!r}]")
-    motion, state = np.zeros(1), law.initially()
+    if law.components not in (1, 2, 3):
+        raise SceneError(f"{what}.components = {law.components!r} must be 1, 2 or 3")
+    motion, state = law.given([np.zeros(1)] * law.components), law.initially()
     calls = {"energy": (motion, state)}
     calls |= dict.fromkeys(CALLED[1:], (motion, motion, state, 1.0))  # type: ignore[arg-type]
     for name, arguments in calls.items():
@@ -56,7 +58,16 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
             raise SceneError(f"{what}.{name} fails at no motion: {error}{place_of(law)}") from error
         if name == "increments":
             require_names(found, law, f"{what}.{name}")
-        for of, value in found.items() if name == "increments" else [("", found)]:
+        if name == "resistance" and law.components > 1:
+            if not isinstance(found, tuple | list) or len(found) != law.components:
+                raise SceneError(
+                    f"{what}.resistance returns {shorten(found)}; it must return a tuple of "
+                    f"{law.components} forces{place_of(law)}"
+                )
+            values = [("", force) for force in found]
+        else:
+            values = list(found.items()) if name == "increments" else [("", found)]
+        for of, value in values:
             number = isinstance(value, Real) or np.shape(value) == (1,)
             if not number or not np.all(np.isfinite(value)):
                 raise SceneError(
@@ -71,7 +82,7 @@ CALLED = ("energy", "resistance", "increments")
 
 def require_limit(law: ConnectorLaw, what: str) -> None:
     """Raise :class:`SceneError` unless increments of a law have a limit for ever longer steps."""
-    motion, rest = np.full(1, 0.5), np.zeros(1)
+    motion, rest = (law.given([np.full(1, x)] * law.components) for x in (0.5, 0.0))
     with np.errstate(all="ignore"):
         changes = law.increments(motion, rest, law.initially(), np.inf) if law.variables else {}
     for name, change in changes.items():
@@ -102,6 +113,7 @@ def judges_loss(law: ConnectorLaw) -> bool:
         draw = np.random.default_rng(0).uniform
         state = State({name: factor * draw(-1.0, 1.0, 1) for name in law.variables})
         with np.errstate(all="ignore"):
-            return [float(np.sum(law.energy(factor * draw(-1.0, 1.0, 1), state)))]
+            motions = [factor * draw(-1.0, 1.0, 1) for _ in range(law.components)]
+            return [float(np.sum(law.energy(law.given(motions), state)))]
 
     return not law.active and (not law.variables or quadratic(energy))

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from numbers import Real
@@ -23,7 +23,7 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.curves import Curve
 from ufl_beam.model.force_laws import ForceLaw as ForceLaw
 from ufl_beam.model.law_checks import require_bulk_law
-from ufl_beam.model.law_functions import Values, larger, positive
+from ufl_beam.model.law_functions import Values, larger, positive, smaller, sqrt
 from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.material_laws import DuvautLions, Hardening
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
@@ -243,6 +243,122 @@ class Stop(Record, ConnectorLaw):
                 f"Stop: the interval from low = {self.low:g} to high = {self.high:g} must contain "
                 "0, the undeformed scene, and have at least one end"
             )
+
+
+@closed(OWN_LAW)
+@dataclass(frozen=True)
+class Clearance(Record, ConnectorLaw):
+    """Pin in a round hole that is larger: free within a gap, contact at its edge; of a Bushing.
+
+    At a depth δ beyond the gap the hole presses on the pin with stiffness δ (1 + damping dδ/dt), as
+    a :class:`Stop`.  Friction acts along the edge, against the motion of the surface of the pin,
+    and turns it.  It sticks by an elastic deflection, as stiff as the contact, up to
+    ``friction`` times the pressing force.  The lost energy is the entry "contact" of the ledger.
+
+    Args:
+        stiffness: Of the contact; N/m.
+        gap: Difference of the radii of hole and pin; m.
+        damping: Of the contact; s/m.
+        friction: Coefficient of friction.  With one the law has the rotation as third component.
+        radius: Of the pin; m.
+
+    Raises:
+        SceneError: No stiffness, no gap, a negative number, or friction without a radius.
+
+    Example:
+        >>> hole = ub.Clearance(stiffness=1e8, gap=1e-3, friction=0.2, radius=0.02)
+        >>> pin = ub.Bushing(ub.ground(2, 0), beam.end, hole)
+        >>> hung = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[pin])
+        >>> run = ub.simulate(hung, ub.Static(), t=(0, 1), dt=0.1)
+        >>> along, across, turn = run.connector(pin).force[-1]  # N, N, N m
+        >>> bool(abs(turn) <= 0.2 * 0.02 * np.hypot(along, across))
+        True
+    """
+
+    stiffness: Positive
+    _: KW_ONLY
+    gap: Positive
+    damping: NotNegative = 0.0
+    friction: NotNegative = 0.0
+    radius: NotNegative = 0.0
+
+    entry = "contact"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.friction > 0.0) != (self.radius > 0.0):
+            raise SceneError("Clearance: give friction and radius together, the latter of the pin")
+
+    @property
+    def rubs(self) -> bool:
+        """True if there is friction."""
+        return not isinstance(self.friction, Real) or self.friction > 0.0
+
+    @property
+    def components(self) -> int:  # type: ignore[override]
+        """Displacements along and across the axis; with friction the rotation, too."""
+        return 3 if self.rubs else 2
+
+    @property
+    def variables(self) -> dict[str, float]:  # type: ignore[override]
+        """Elastic deflection of what sticks along the edge; m."""
+        return {"deflection": 0.0} if self.rubs else {}
+
+    def numbers(self) -> dict[str, Any]:
+        """Those that the law has."""
+        unused = () if self.rubs else ("friction", "radius")
+        return {name: x for name, x in super().numbers().items() if name not in unused}
+
+    @property
+    def elastic(self) -> bool:
+        """True if nothing is lost."""
+        return self.damping == 0.0 and not self.rubs
+
+    @property
+    def resists(self) -> bool:
+        """False: nothing is borne within the gap."""
+        return False
+
+    def _contact(self, motion: Any) -> tuple[Values, Values, Values]:
+        """Depth (m), and the direction from the middle of the hole to that of the pin."""
+        x, y = motion[:2]
+        r = sqrt(larger(x**2 + y**2, (self.gap / 2) ** 2))  # not zero, where there is no direction
+        return positive(r - self.gap), x / r, y / r
+
+    def _pressure(self, motion: Any, rate: Any) -> tuple[Values, Values]:
+        """Pressing force, and the part of it that the damping gives; N."""
+        depth, x, y = self._contact(motion)
+        elastic = self.stiffness * depth
+        damped = elastic * larger(self.damping * (x * rate[0] + y * rate[1]), -1.0)
+        return elastic + damped, damped
+
+    def energy(self, motion: Any, state: State) -> Values:
+        """Energy of the depth, and of the deflection of what sticks; J."""
+        depth, *_ = self._contact(motion)
+        stored = self.stiffness * depth**2 / 2
+        return stored + self.stiffness * state.deflection**2 / 2 if self.rubs else stored
+
+    def resistance(self, motion: Any, rate: Any, state: State, dt: Values) -> Any:
+        """Forces of damping and friction; N, N and N m."""
+        _, x, y = self._contact(motion)
+        _, damped = self._pressure(motion, rate)
+        if not self.rubs:
+            return damped * x, damped * y
+        rubbing = self.stiffness * state.deflection
+        return damped * x - rubbing * y, damped * y + rubbing * x, rubbing * self.radius
+
+    def increments(
+        self, motion: Any, rate: Any, state: State, dt: Values
+    ) -> Mapping[str, Values]:
+        """The surface of the pin takes the deflection along, up to the limit."""
+        if not self.rubs:
+            return {}
+        _, x, y = self._contact(motion)
+        pressure, _ = self._pressure(motion, rate)
+        limit = self.friction * pressure / self.stiffness
+        way = dt * (x * rate[1] - y * rate[0] + self.radius * rate[2])
+        moved = smaller(larger(state.deflection + way, -limit), limit)
+        return {"deflection": moved - state.deflection}
 
 
 @closed(OWN_LAW)

@@ -352,10 +352,13 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
                 (beam.name, law, stiffness[k], of_points[k])
                 for (law, _), k in zip(layout.laws, first[:-1], strict=True)
             ]
-    for link in scene.connectors:
+    for link in scene.links:
         if isinstance(link.law, ConnectorLaw):
-            ends, state = (0.0, LAST_DIGITS * (1.0 if link.turns else size)), link.law.initially()
-            here, there = (link.law.elastic_force(np.full(1, e), state)[0] for e in ends)
+            rest, i = [np.zeros(1)] * link.law.components, link.component
+            moved = LAST_DIGITS * (1.0 if link.turns else size)
+            ends = (rest, [*rest[:i], rest[i] + moved, *rest[i + 1 :]])
+            state = link.law.initially()
+            here, there = (link.law.elastic_forces(e, state)[i][0] for e in ends)
             if abs(here) > abs(there - here):
                 raise SceneError(
                     f"{what}: {type(link.law).__name__} of {link} bears a force at no motion, "

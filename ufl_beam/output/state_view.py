@@ -20,12 +20,12 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
-from ufl_beam.model.connectors import Connector
+from ufl_beam.model.connectors import Bushing, Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
-from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
+from ufl_beam.output.joint_histories import Connection, connection, links_of, motion_of, velocity_of
 from ufl_beam.output.watches import Watch
 from ufl_beam.parameter import Parameter
 from ufl_beam.solvers.newton import Solver
@@ -199,14 +199,13 @@ class StateView(ABC):
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
 
-    def connector(self, connector: Connector) -> Connection:
+    def connector(self, connector: Connector | Bushing) -> Connection:
         """Return motion, force, work and rate of a connector at the end of the last step.
 
         Raises:
             SceneError: It is not in the scene.
         """
-        (number,) = links_of(self.scene, connector)
-        return Connection(*self.connections()[number].tolist())
+        return connection(self.connections()[links_of(self.scene, connector)])
 
     def displacement(self, place: Anchor) -> Array:
         """Displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""

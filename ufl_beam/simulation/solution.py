@@ -16,7 +16,7 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor, Member, Place
-from ufl_beam.model.connectors import Connector
+from ufl_beam.model.connectors import Bushing, Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
@@ -24,6 +24,7 @@ from ufl_beam.output.archive import Content, above, below, require_arrays, write
 from ufl_beam.output.joint_histories import (
     Connection,
     JointHistory,
+    connection,
     links_of,
     motion_of,
     of_joint,
@@ -197,14 +198,13 @@ class Solution(Rich):
 
     # -- joints --------------------------------------------------------------------------------
 
-    def connector(self, connector: Connector) -> Connection:
+    def connector(self, connector: Connector | Bushing) -> Connection:
         """Relative motion, force and work of a connector.
 
         Raises:
             SceneError: It is not in the scene.
         """
-        (number,) = links_of(self.scene, connector)
-        return Connection(*self._kept.connections[:, number].T)
+        return connection(self._kept.connections[:, links_of(self.scene, connector)])
 
     def joint(self, joint: Joint) -> JointHistory:
         """Return the relative motion and the forces of the first two places of a joint.

@@ -14,7 +14,7 @@ from ufl.constantvalue import Zero
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, names, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.connector_steps import law_step
@@ -28,25 +28,27 @@ from ufl_beam.terms.phases import Callbacks
 
 def inputs(law: ConnectorLaw) -> tuple[str, ...]:
     """Names of the inputs of a compiled law; loops.h explains their order."""
+    motions = (f"{when} {i}" for when in ("motion", "before") for i in range(law.components))
     of_law = (*(f"state {name}" for name in law.variables), *(f"number {n}" for n in law.numbers()))
-    return (*names("law_input", "law_"), *of_law)
+    return (*motions, "dt", "theta", *of_law)
 
 
 class LawForms:
     """Compiled law of a connector, for all numbers.
 
     Attributes:
-        force: Force and its derivative by the motion at the end of the step.
+        force: Forces and their derivatives by the motions at the end of the step.
         end: ``law_output`` of loops.h, then the variables at the end.
     """
 
     def __init__(self, law: ConnectorLaw, scheme: Scheme) -> None:
         self._law, self._scheme, self._pointwise = law, scheme, Pointwise(inputs(law))
-        motion = ufl.variable(self._pointwise.at["motion"])
-        self._at = {**self._pointwise.at, "motion": motion}
+        at, motions = self._pointwise.at, [f"motion {i}" for i in range(law.components)]
+        self._at = at | {name: ufl.variable(at[name]) for name in motions}
+        self._motions = [self._at[name] for name in motions]
         try:
-            force, *numbers, variables = law_step(law, self._at, scheme)
-            self.force = self._compile(force, ufl.diff(force, motion))
+            forces, *numbers, variables = law_step(law, self._at, scheme)
+            self.force = self._compile(*forces, *self._slopes(forces))
             by_name = dict(zip(("stored", "numerical"), numbers, strict=True))
             end = in_order("law_output", by_name, "law_")
             self.end = self._compile(*end, *variables)
@@ -58,11 +60,14 @@ class LawForms:
 
     @cached_property
     def frozen(self) -> tuple[Any, Any]:
-        """The same force, and its second derivative, while the variables stay as they are."""
-        motion = self._at["motion"]
-        force = law_step(self._law, self._at, self._scheme, frozen=True).force
-        slope = ufl.diff(force, motion)
-        return self._compile(force, slope), self._compile(ufl.diff(slope, motion))
+        """The same forces, and second derivatives, while the variables stay as they are."""
+        forces = law_step(self._law, self._at, self._scheme, frozen=True).forces
+        slopes = self._slopes(forces)
+        return self._compile(*forces, *slopes), self._compile(*self._slopes(slopes))
+
+    def _slopes(self, values: Sequence[Expr]) -> list[Expr]:
+        """Derivatives of each value by all motions."""
+        return [ufl.diff(value, motion) for value in values for motion in self._motions]
 
     def _compile(self, *outputs: Expr) -> Any:
         """Compile a function; none if all that it returns is zero."""
@@ -79,7 +84,8 @@ class CompiledLaws(Response):
     """Connectors whose laws are of one class, with numbers of their own."""
 
     def _prepare(self, law: Any) -> None:
-        setting, n, ledger = self._setting, len(self._links), self._setting.ledger
+        setting, ledger, k = self._setting, self._setting.ledger, law.components
+        n = len(self._links) // k
         self._law, self._loses = law, not law.elastic
         self.name_in_files = f"{type(law).__qualname__}{[*law.variables]}"
         ledger.state["stored"] += 0.0
@@ -96,14 +102,14 @@ class CompiledLaws(Response):
         for name, value in law.variables.items():
             self._at[f"state {name}"][:] = value
         for name in law.numbers():
-            self._at[f"number {name}"][:] = self._numbers(name)
-        self._held, self._lost = np.zeros((2, n))
-        self._rows, self._sum = np.zeros((n, 3)), np.zeros(2)
+            self._at[f"number {name}"][:] = self._numbers(name)[::k]
+        self._held, self._lost = np.zeros(n), np.zeros(n * k)  # lost: in the first component
+        self._rows, self._sum = np.zeros((n, k * (k + 2))), np.zeros(2)
         self._forms = _law_forms(law.of(dict.fromkeys(law.numbers(), 1.0)), setting.scheme)
         outputs = int(lib.LAW_OUTPUTS) + len(law.variables)
         self._c = struct(
             "connector_laws", number=n, width=len(columns), variables=len(law.variables),
-            force=self._forms.force, end=self._forms.end, loses=self._loses, w=w,
+            components=k, force=self._forms.force, end=self._forms.end, loses=self._loses, w=w,
             stored=self._held, lost=self._lost, rows=self._rows, answer=np.zeros(outputs),
             sum=self._sum,
         )  # fmt: skip
@@ -125,8 +131,12 @@ class CompiledLaws(Response):
 
     def bends(self, e1: Array) -> Array:
         """Minus the second derivatives of the forces; variables stay."""
-        self._at["motion"][:] = e1
-        return np.array([-lib.ask_law(self._forms.frozen[1], doubles(w)) for w in self._w])
+        k = self._law.components
+        self._w[:, :k] = e1.reshape(-1, k)
+        bends = np.zeros((len(self._w), k**3))
+        for w, of in zip(self._w, bends, strict=True):
+            lib.ask_law(self._forms.frozen[1], doubles(w), k**3, doubles(of))
+        return -bends
 
     # -- the state -----------------------------------------------------------------------------
 
@@ -140,24 +150,33 @@ class CompiledLaws(Response):
 
     def state(self) -> Array:
         """Internal variables, stored energy, and what was lost; (num_links, k)."""
+        k = self._law.components
         of_law = [self._at[f"state {name}"] for name in self._law.variables]
-        return np.column_stack([*of_law, self._held, self._lost])
+        rows = np.column_stack([*of_law, self._held, self._lost[::k]])
+        return np.repeat(rows, k, axis=0)
 
     def restore(self, rows: Array) -> None:
         """Take over the variables of :meth:`state`."""
-        *of_law, self._held[:], self._lost[:] = rows.T
+        k = self._law.components
+        *of_law, self._held[:], self._lost[::k] = rows[::k].T
         for name, values in zip(self._law.variables, of_law, strict=True):
             self._at[f"state {name}"][:] = values
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""
-        self._at["before"][:] = e
+        k = self._law.components
+        self._w[:, k : 2 * k] = e.reshape(-1, k)
         with np.errstate(all="ignore"):
-            self._held[:] = self._numbers_at().energy(e, self._variables())
+            law, motions = self._numbers_at(), self._motions_before()
+            self._held[:] = law.energy(law.given(motions), self._variables())
 
     def borne(self) -> Array | None:
         """Forces of the energies where :meth:`start` has begun."""
-        return np.asarray(self._numbers_at().elastic_force(self._at["before"], self._variables()))
+        forces = self._numbers_at().elastic_forces(self._motions_before(), self._variables())
+        return np.column_stack(forces).ravel()
+
+    def _motions_before(self) -> list[Array]:
+        return [self._at[f"before {i}"] for i in range(self._law.components)]
 
     def freeze(self) -> None:
         """Keep the variables from now on."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors over a step: one row ``α e + β λ = γ`` for each of them.
+"""Laws of connectors over a step: one row ``α e + β λ = γ`` for each component of each of them.
 
 e is the relative motion at the end of the step and λ the force that resists its growth.  What is
 held has a row about e, all other laws have one about λ, linear in e around the latest iterate.
@@ -91,9 +91,9 @@ class Response:
     def about_force(self, rows: Array) -> Array:
         """Factors by which rows about the force are divided, zero for rows about the motion.
 
-        ``rows`` are the latest ones; (num_links, 3).
+        ``rows`` are the latest ones; (num_links, n), the force and the right side at the end.
         """
-        of_force = rows[:, 1]
+        of_force = rows[:, -2]
         return np.divide(1.0, of_force, out=np.zeros(len(rows)), where=of_force != 0.0)
 
     def motion(self, e: Array) -> Array:
@@ -126,8 +126,8 @@ class Response:
         return np.ones(len(self._links))
 
     def bends(self, e1: Array) -> Array:
-        """Derivative of α by the motion, internal variables kept; (num_links,)."""
-        return np.zeros(len(self._links))
+        """Derivatives of α by the motions, internal variables kept; (num_connectors, n)."""
+        return np.zeros((len(self._links), 1))
 
     def state(self) -> Array:
         """Return the internal variables; (num_links, k)."""

@@ -21,6 +21,7 @@ from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import HELD, ForceLaw, Law, RigidPlastic, Spring
+from ufl_beam.model.connectors import Connector
 from ufl_beam.terms import compiled_laws, connector_laws, force_laws, rigid_plastic, springs
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.links import Links
@@ -28,6 +29,13 @@ from ufl_beam.terms.phases import Callbacks, Phases, beginning
 
 LAWS = (compiled_laws, connector_laws, force_laws, rigid_plastic, springs)
 """Modules with the responses of laws, which register them with :func:`respond`."""
+
+
+def _motions_with(link: Connector) -> tuple[str, ...]:
+    """Motions that the law of a link acts on, its own among them."""
+    if isinstance(link.law, ConnectorLaw) and link.law.components > 1:
+        return ("sliding", "sliding", "turning")[: link.law.components]
+    return (link.motion,)
 
 
 def _kind(law: Law) -> object:
@@ -47,27 +55,34 @@ def _one_cell() -> meshes.Mesh:
 
 
 class Couplings(Links):
-    """Connectors of one relative motion whose laws are of one kind.
+    """Connectors of the same relative motions whose laws are of one kind.
 
-    Each is a cell of unit length from one node to the other, with its force as a seventh unknown.
-    Forms, and laws of many kinds, are evaluated in C.
+    Each is a cell of unit length from one node to the other, with its forces as unknowns after those
+    of the nodes.  Components of a :class:`Bushing` are links that stand one after the other.  Forms,
+    and laws of many kinds, are evaluated in C.
     """
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
         super().__init__(share, here, setting, A)
-        links, n, scheme = self.links, len(here), setting.scheme
-        self._forms = forms = connector_forms(links[0].motion, scheme, _one_cell())
-        self._numbers = np.array([(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links])
+        links, scheme = self.links, setting.scheme
+        motions = _motions_with(links[0])
+        k, n = len(motions), len(links)
+        self._cells = n // k
+        self._dofs = np.column_stack([self._dofs[::k, :6], self._forces_at.reshape(-1, k)])
+        self._forms = forms = connector_forms(motions, scheme, _one_cell())
+        numbers = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links]
+        self._numbers = np.reshape(numbers, (self._cells, 8 * k))
         self._work, self._tangent, self._value = map(
             self._form, (forms.work, forms.tangent, forms.motion)
         )
         self._tangent.place(A)
-        self._e, self._now, self._rows = np.zeros(n), np.zeros(n), np.zeros((n, 3))
+        self._e, self._now, self._rows = np.zeros(n), np.zeros(n), np.zeros((self._cells, k * (k + 2)))
         self._rows[:, 0] = 1.0  # held, until a law says something else
         for kernel in (self._work, self._tangent):
             kernel.put(forms.row, self._rows)
         self._in_c = struct(
-            "couplings", number=n, link=np.arange(n, dtype=np.int32), dofs=self._dofs,
+            "couplings", number=self._cells, components=k,
+            link=np.arange(self._cells, dtype=np.int32), dofs=self._dofs,
             force=self._forces_at.copy(), size=setting.size,
             length=np.where([c.turns for c in links], 1.0, setting.size),
             work=self._work.cells, tangent=self._tangent.cells, motion=self._value.cells,
@@ -80,7 +95,7 @@ class Couplings(Links):
 
     def _form(self, form: ufl.Form) -> Kernel:
         """A form on the connectors, with their numbers."""
-        unit = np.tile([[0.0, 0.0], [1.0, 0.0]], (len(self.links), 1, 1))
+        unit = np.tile([[0.0, 0.0], [1.0, 0.0]], (self._cells, 1, 1))
         kernel = Kernel(form, self._forms.q1, self._dofs, unit)
         if kernel.uses(self._forms.numbers):
             kernel.put(self._forms.numbers, self._numbers)
@@ -158,14 +173,16 @@ class Couplings(Links):
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Put minus the change of the motions where the row is about the force."""
-        about_force = self.response.about_force(self.rows(q))
+        rows = self.rows(q)
+        k = len(self.links) // self._cells
+        about_force = self.response.about_force(rows.reshape(-1, k + 2))
         if about_force.any():
             works[self._forces_at] = np.where(
                 about_force != 0.0, -about_force * self.rates(q, v), works[self._forces_at]
             )
 
     def rows(self, q: Array) -> Array:
-        """Rows of the laws around ``q``; (num_links, 3)."""
+        """Rows of the laws around ``q``; (num_cells, n (n + 2)) with n components."""
         lib.find_rows(self._in_c, doubles(q), doubles(self._rows))
         return self._rows
 
@@ -177,7 +194,7 @@ class Couplings(Links):
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         change, e = self._tangent_change, self.motion(q1)
         rows = self.rows(q1)
-        bends = self.response.bends(e)[:, None]
+        bends = np.reshape(self.response.bends(e), (self._cells, -1))
         for function, values in ((self._forms.row, rows), (self._forms.bend, bends)):
             if change.uses(function):
                 change.put(function, values)
@@ -214,8 +231,8 @@ def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
     others write.
     """
     links = share.grid.scene.links
-    groups: dict[tuple[str, object], list[int]] = {}
-    keys = [(link.motion, _kind(link.law)) for link in links]
+    groups: dict[tuple[tuple[str, ...], object], list[int]] = {}
+    keys = [(_motions_with(link), _kind(link.law)) for link in links]
     for i, number in enumerate(share.links):
         groups.setdefault(keys[number], []).append(i)
     made: list[Links] = []

@@ -4,15 +4,20 @@
 /* Motions of the links at q. */
 void find_motions(const couplings *c, const double *q)
 {
-  memset(c->by_cell, 0, c->number * sizeof *c->by_cell);
+  const int n = c->components;
+  memset(c->by_cell, 0, (size_t)n * c->number * sizeof *c->by_cell);
   add_cells((void *)c->motion, q, c->by_cell);
-  for (int k = 0; k < c->number; ++k) c->e1[c->link[k]] = c->by_cell[k];
+  for (int k = 0; k < c->number; ++k) memcpy(c->e1 + n * c->link[k], c->by_cell + n * k, n * sizeof(double));
 }
 
+/* Numbers of the rows of a connector: in each row one of each motion, of the force, and the right side. */
+static int numbers_of_rows(const couplings *c) { return c->components * (c->components + 2); }
+
+/* Put the rows of a connector. */
 static void put_row(const couplings *c, int cell, const double *row)
 {
-  put_in_cell(c->work, cell, c->row, 3, row);
-  put_in_cell(c->tangent, cell, c->row_of_tangent, 3, row);
+  put_in_cell(c->work, cell, c->row, numbers_of_rows(c), row);
+  put_in_cell(c->tangent, cell, c->row_of_tangent, numbers_of_rows(c), row);
 }
 
 /* Let springs answer their motions e1. */
@@ -64,7 +69,7 @@ static void get_forces(const couplings *c, const double *q, double *force)
 }
 
 /* Numbers of a law, which has no kernel where all of them are zero. */
-static void answer_of_law(kernel *law, const double *w, int answers, double *s)
+void ask_law(kernel *law, const double *w, int answers, double *s)
 {
   if (law) ask(law, w, answers, s);
   else memset(s, 0, answers * sizeof *s);
@@ -73,46 +78,43 @@ static void answer_of_law(kernel *law, const double *w, int answers, double *s)
 /* The compiled laws around their motions e1. */
 static void find_rows_of_laws(const connector_laws *p, const double *e1)
 {
-  double *w = p->w, s[2];
-  for (int i = 0; i < p->number; ++i, w += p->width) {
-    double *row = p->rows + 3 * i;
-    w[LAW_MOTION] = e1[i];
-    answer_of_law(p->force, w, 2, s);
-    row[0] = -s[1], row[1] = 1, row[2] = s[0] - s[1] * e1[i];
+  const int n = p->components;
+  double *w = p->w, *row = p->rows, s[12]; /* of three components, at most */
+  for (int i = 0; i < p->number; ++i, w += p->width, e1 += n) {
+    memcpy(w, e1, n * sizeof *e1);
+    ask_law(p->force, w, n + n * n, s);
+    for (int j = 0; j < n; ++j, row += n + 2) {
+      const double *slope = s + n + n * j;
+      row[n] = 1, row[n + 1] = s[j];
+      for (int l = 0; l < n; ++l) row[l] = -slope[l], row[n + 1] -= slope[l] * e1[l];
+    }
   }
 }
 
-/* A number of a law. */
-double ask_law(kernel *law, const double *w)
-{
-  double s;
-  answer_of_law(law, w, 1, &s);
-  return s;
-}
-
-/* What the law of connector i brings at the end of a step to the motion e1. */
-static const double *end_of_law(const connector_laws *p, int i, double e1)
+/* What the law of connector i brings at the end of a step to the motions e1. */
+static const double *end_of_law(const connector_laws *p, int i, const double *e1)
 {
   double *w = p->w + i * p->width;
-  w[LAW_MOTION] = e1;
-  answer_of_law(p->end, w, LAW_OUTPUTS + p->variables, p->answer);
+  memcpy(w, e1, p->components * sizeof *e1);
+  ask_law(p->end, w, LAW_OUTPUTS + p->variables, p->answer);
   return p->answer;
 }
 
-/* Take the motion e1 as the new state of connector i, which has taken a work. */
-static void commit_law(const connector_laws *p, int i, double e1, double work)
+/* Take the motions e1 as the new state of connector i, which has taken a work. */
+static void commit_law(const connector_laws *p, int i, const double *e1, double work)
 {
+  const int n = p->components;
   const double *s = end_of_law(p, i, e1);
   if (p->loses) {
     const double lost = work - (s[LAW_STORED] - p->stored[i]) - s[LAW_NUMERICAL];
-    p->lost[i] += lost;
+    p->lost[n * i] += lost;
     p->sum[0] += lost;
   }
   p->sum[1] += s[LAW_NUMERICAL];
   p->stored[i] = s[LAW_STORED];
   double *w = p->w + i * p->width;
-  memcpy(w + LAW_INPUTS, s + LAW_OUTPUTS, p->variables * sizeof *s);
-  w[LAW_BEFORE] = e1;
+  memcpy(w + 2 * n + 2, s + LAW_OUTPUTS, p->variables * sizeof *s);
+  memcpy(w + n, e1, n * sizeof *e1);
 }
 
 /* The laws that depend on iterates, around the motions at q. */
@@ -137,16 +139,17 @@ static void set_rows(const couplings *c, const double *q)
     c->asked->find_rows(c->asked->rows_self);
     rows = c->asked->rows;
   }
-  for (int k = 0; rows && k < c->number; ++k) put_row(c, k, rows + 3 * c->link[k]);
+  for (int k = 0; rows && k < c->number; ++k) put_row(c, k, rows + numbers_of_rows(c) * c->link[k]);
 }
 
 /* Rows of all connectors around their motions at q; as step begins have put those that stay in it. */
 void find_rows(const couplings *c, const double *q, double *rows)
 {
+  const int n = numbers_of_rows(c);
   set_rows(c, q);
   for (int k = 0; k < c->number; ++k) {
     const double *row = in_cell(c->work, k, c->row);
-    for (int i = 0; i < 3; ++i) rows[3 * c->link[k] + i] = row[i * c->work->lanes];
+    for (int i = 0; i < n; ++i) rows[n * c->link[k] + i] = row[i * c->work->lanes];
   }
 }
 
@@ -163,28 +166,33 @@ void add_couplings_force(void *self, const double *q, double *r)
 double missed_by_couplings(void *self, const double *q, const double *r, double scale, double moved)
 {
   const couplings *c = self;
+  const int n = c->components, lanes = c->work->lanes;
+  const double amplitude = moved / c->size;
   double most = 0;
   for (int k = 0; k < c->number; ++k) {
     const int i = c->link[k];
-    const int32_t *dofs = c->dofs + 7 * i;
-    const double *row = in_cell(c->work, k, c->row), length = c->length[i];
-    const double weight = fabs(row[c->work->lanes]);
-    const double unit = c->rigid_plastic ? c->rigid_plastic->slope[i] : 1;
-    const double amplitude = moved / c->size;
-    const double size = weight * unit < 1 - 1e-12 ? 0.01 * length * amplitude
-                                                  : weight * scale * c->size / length;
+    const int32_t *dofs = c->dofs + (6 + n) * i;
+    const double *row = in_cell(c->work, k, c->row), *length = c->length + n * i;
     double far = amplitude;
     for (int j = 0; j < 4; ++j) far = fmax(far, amplitude + fabs(q[dofs[j]]) / c->size);
     for (int j = 4; j < 6; ++j) far = fmax(far, amplitude + fabs(q[dofs[j]]));
-    const double round_off = 8 * fabs(row[0]) * length * (nextafter(far, INFINITY) - far);
-    const double left = fabs(r[c->force[i]]) - round_off;
-    const double missed = left > 0 ? left / size : left <= 0 ? 0 : NAN;
-    if (!(missed <= most)) most = missed;
+    for (int j = 0; j < n; ++j, row += (n + 2) * lanes) {
+      const double weight = fabs(row[n * lanes]);
+      const double unit = c->rigid_plastic ? c->rigid_plastic->slope[i] : 1;
+      const double size = weight * unit < 1 - 1e-12 ? 0.01 * length[j] * amplitude
+                                                    : weight * scale * c->size / length[j];
+      double reach = 0; /* of the motions in the row */
+      for (int l = 0; l < n; ++l) reach += fabs(row[l * lanes]) * length[l];
+      const double round_off = 8 * reach * (nextafter(far, INFINITY) - far);
+      const double left = fabs(r[c->force[n * i + j]]) - round_off;
+      const double missed = left > 0 ? left / size : left <= 0 ? 0 : NAN;
+      if (!(missed <= most)) most = missed;
+    }
   }
   return most;
 }
 
-/* What connector i takes in a step to the motion e1. */
+/* Work that component i takes in a step to the motion e1. */
 static double taken_by(const couplings *c, int i, const double *q)
 {
   const double a = c->weight_of_before, force = a * c->before[i] + (1 - a) * q[c->force[i]];
@@ -197,14 +205,19 @@ double commit_couplings(const couplings *c, const double *q, double dt)
   double sum = 0;
   find_motions(c, q);
   if (c->laws) memset(c->laws->sum, 0, 2 * sizeof *c->laws->sum);
+  const int n = c->components;
   for (int i = 0; i < c->number; ++i) {
-    const double work = taken_by(c, i, q);
-    if (c->laws) commit_law(c->laws, i, c->e1[i], work);
-    c->taken[i] += work;
-    c->rate[i] = (c->e1[i] - c->e0[i]) / dt;
-    c->before[i] = q[c->force[i]];
-    c->e0[i] = c->e1[i];
-    sum += work;
+    double of_all = 0;
+    for (int j = n * i; j < n * (i + 1); ++j) {
+      const double work = taken_by(c, j, q);
+      c->taken[j] += work;
+      c->rate[j] = (c->e1[j] - c->e0[j]) / dt;
+      c->before[j] = q[c->force[j]];
+      c->e0[j] = c->e1[j];
+      of_all += work;
+    }
+    if (c->laws) commit_law(c->laws, i, c->e1 + n * i, of_all);
+    sum += of_all;
   }
   return sum;
 }

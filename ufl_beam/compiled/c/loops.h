@@ -295,24 +295,26 @@ typedef struct {
   void (*begin)(void *self, double t, double dt);
   void (*find_rows)(void *self), (*again)(void *self);
 } asked_laws;
-/* The first inputs of a law of connectors, then come its variables before the step, and its numbers;
- * and what the end of a step brings, then come its variables there. */
-enum law_input { LAW_MOTION, LAW_BEFORE, LAW_DT, LAW_THETA, LAW_INPUTS };
+
+/* The end of a step in a law of connectors, then come its variables there. */
 enum law_output { LAW_STORED, LAW_NUMERICAL, LAW_OUTPUTS };
 
-/* Connectors with compiled laws, see compiled_laws.py. */
+/* Connectors with compiled laws, see compiled_laws.py. Inputs of a law are its motions, those before the
+ * step, dt, theta, the variables before the step, and the numbers of the law. */
 typedef struct {
-  kernel *force, *end;        /* force and its derivative by the motion; what the end of a step brings */
+  kernel *force, *end;        /* forces and their derivatives by the motions; what the end of a step brings */
   int number, width, variables;
+  int components;             /* motions of each */
   int loses;                  /* whether what is not stored of a work is lost, or the ledger is open by it */
   double *w;                  /* what the kernels know, `width` numbers of each connector */
   double *stored, *lost;      /* energy in the accepted state; lost by each since the beginning */
-  double *rows, *answer;      /* of each connector, three; space for an answer */
+  double *rows, *answer;      /* rows as in `couplings`; space for an answer */
   double *sum;                /* lost in the last step, and by the scheme */
 } connector_laws;
 
-/* Connectors of one motion as cells, with their forces as unknowns. Their laws are rows
- * a e + b f = c in the motion e and the force f; those of springs come of points. */
+/* Connectors of the same motions as cells, with their forces as unknowns. A law is a row a·e + b f = c
+ * for each component, in all motions e of the connector and the force f of the component; rows of
+ * springs come of points. Arrays have one number for each component of each link. */
 typedef struct {
   const cells *work, *tangent, *motion;
   points *points;                  /* or none */
@@ -320,13 +322,13 @@ typedef struct {
   connector_laws *laws;            /* or none */
   friction *friction;              /* or none */
   asked_laws *asked;               /* or none; if none of all these, the rows stay during a step */
-  int number;
-  const int32_t *link, *force;     /* of each cell; where each link's force is among the unknowns */
+  int number, components;          /* components: one, but for compiled laws */
+  const int32_t *link, *force;     /* of each cell; where the forces are among the unknowns */
   int row, row_of_tangent;         /* where the coefficients of work and tangent have the rows */
   double *by_cell, *e1;            /* space; motions at the latest unknowns */
   double *e0, *before, *taken, *rate; /* the accepted state: motion, force, work, rate */
   double weight_of_before;         /* of the force that works in a step */
-  const int32_t *dofs;             /* seven of each link */
+  const int32_t *dofs;             /* of each link: six of its nodes, then the forces */
   const double *length;            /* one where it turns, else the size of the scene */
   double size;                     /* of the scene */
 } couplings;
@@ -335,7 +337,7 @@ void find_motions(const couplings *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
 void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums);
 void find_rows(const couplings *c, const double *q, double *rows);
-double ask_law(kernel *law, const double *w);
+void ask_law(kernel *law, const double *w, int answers, double *s);
 void add_couplings_force(void *self, const double *q, double *r);
 double missed_by_couplings(void *self, const double *q, const double *r, double scale,
                            double moved);

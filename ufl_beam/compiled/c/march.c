@@ -490,7 +490,8 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
   if (t->entry && !c->friction && !c->asked) put_rows_of_step(t, step);
   for (int i = 0; l && i < l->number; ++i) {
     double *w = l->w + i * l->width;
-    w[LAW_DT] = step->dt, w[LAW_BEFORE] = c->e0[i];
+    memcpy(w + c->components, c->e0 + i * c->components, c->components * sizeof *w);
+    w[2 * c->components] = step->dt;
   }
   if (c->friction) begin_friction(c, step);
   if (c->asked) {
@@ -576,12 +577,14 @@ void change_of_couplings(void *self, const double *q1, energy_change *sum)
   const couplings *c = t->links;
   double taken = 0;
   find_motions(c, q1);
-  for (int i = 0; i < c->number; ++i) {
-    const double work = taken_by(c, i, q1);
-    const int loses = !c->laws || c->laws->loses;
-    taken += loses ? work : end_of_law(c->laws, i, c->e1[i])[LAW_STORED] - c->laws->stored[i];
+  const int loses = !c->laws || c->laws->loses, n = c->components;
+  for (int j = 0; j < n * c->number; ++j) {
+    const double work = taken_by(c, j, q1);
+    taken += loses ? work : 0;
     sum->effort += fabs(work);
   }
+  for (int i = 0; !loses && i < c->number; ++i)
+    taken += end_of_law(c->laws, i, c->e1 + n * i)[LAW_STORED] - c->laws->stored[i];
   if (c->points) {
     respond_springs(c);
     taken = change_by_response(c->points, t->points->copy);
