@@ -77,7 +77,7 @@ class Connectors(Linked):
         mesh, order = separate_cells(np.tile([[0.0, 0.0], [1.0, 0.0]], (n, 1, 1)))
         super().__init__(grid, numbers[order])
         self.laws = [law_in_step(link, setting) for link in self.links]
-        self._setting, self._stated = setting, connector_forms(motion, setting.scheme, mesh)
+        self._setting, self._stated = setting, connector_forms((motion,), setting.scheme, mesh)
         stated = self._stated
         self._at: Index = np.empty(7 * n, dtype=np.int64)
         self._at[dofs_of_cells(stated.q1.function_space)] = self.dofs

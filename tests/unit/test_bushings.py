@@ -1,0 +1,445 @@
+# SPDX-License-Identifier: MIT
+"""Laws of several components of a relative motion, and a pin in a round hole, which is one."""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+from ufl_beam.compiled.c_library import doubles, lib
+from ufl_beam.terms.compiled_laws import LawForms, inputs
+
+f = ub.law_functions
+SECTION = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, rhoI=1e-2)
+
+
+@dataclass(frozen=True)
+class Springs(ub.ConnectorLaw):
+    """Three springs that know nothing of each other."""
+
+    along: float
+    across: float
+    turning: float
+    components: ClassVar = 3
+
+    def energy(self, motion, state):
+        x, y, turn = motion
+        return (self.along * x**2 + self.across * y**2 + self.turning * turn**2) / 2
+
+
+@dataclass(frozen=True)
+class Cushion(ub.ConnectorLaw):
+    """A spring that stiffens with the distance, and a damper that it stiffens."""
+
+    k: float
+    size: float
+    c: float
+    components: ClassVar = 2
+
+    def energy(self, motion, state):
+        x, y = motion
+        return self.k * (x**2 + 2 * y**2) / 2 * (1 + (x**2 + y**2) / self.size**2)
+
+    def resistance(self, motion, rate, state, dt):
+        viscosity = self.c * (1 + (motion[0] ** 2 + motion[1] ** 2) / self.size**2)
+        return viscosity * rate[0], viscosity * rate[1]
+
+
+@dataclass(frozen=True)
+class Creeping(ub.ConnectorLaw):
+    """A mount whose stiffness against turning grows with the pull, and that creeps along."""
+
+    k: float
+    turning: float
+    eta: float
+    components: ClassVar = 3
+    variables: ClassVar = {"creep": 0.0}
+
+    def energy(self, motion, state):
+        x, y, turn = motion
+        elastic = x - state.creep
+        return self.k * (elastic**2 + y**2) / 2 + self.turning * (1 + 50 * elastic) * turn**2 / 2
+
+    def increments(self, motion, rate, state, dt):
+        return {"creep": self.k * (motion[0] - state.creep) / (self.eta / dt + self.k)}
+
+
+HOLE = {"stiffness": 2000.0, "gap": 0.004}
+LAWS = {
+    "springs": Springs(100.0, 200.0, 3.0),
+    "cushion": Cushion(150.0, 0.02, 4.0),
+    "creeping": Creeping(200.0, 4.0, 20.0),
+    "hole": ub.Clearance(**HOLE),
+    "damped hole": ub.Clearance(**HOLE, damping=3.0),
+    "rough hole": ub.Clearance(**HOLE, damping=1.0, friction=0.3, radius=0.05),
+}
+SCHEMES = [
+    ub.Static(), ub.ExactStatic(), ub.ExactStatic(0.5), ub.Midpoint(), ub.Midpoint(0.1, 0.1),
+    ub.DecayingMidpoint(), ub.GeneralizedAlpha(0.8), ub.Newmark(),
+]  # fmt: skip
+
+
+def cantilever(*laws, load=None, axis=(0.6, 0.8)):
+    """A flexible cantilever whose end is in bushings."""
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
+    links = [ub.Bushing(ub.ground(1, 0), beam.end, law, axis=axis) for law in laws]
+    time = load or (lambda t: math.sin(9 * t))
+    push = ub.PointLoad(beam.end, force=(0.7, 1.0), moment=0.4, time=time)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=links)
+    return beam.end, links, scene
+
+
+def run(scene, scheme, t=(0, 0.6), dt=0.02, **more):
+    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+
+
+# -- laws of several components ------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+@pytest.mark.parametrize("name", LAWS)
+def test_tangent_is_the_derivative(name, scheme):
+    """Against central differences, in small steps, in large ones, over edges and in none."""
+    law, n = LAWS[name], LAWS[name].components
+    forms = LawForms(law, scheme)
+    known = {f"number {x}": value for x, value in law.numbers().items()}
+    known |= {"dt": 0.01, "theta": scheme.theta} | {f"state {x}": 1e-4 for x in law.variables}
+
+    def ask(e0, e1):
+        given = known | {f"before {i}": x for i, x in enumerate(e0)}
+        given |= {f"motion {i}": x for i, x in enumerate(e1)}
+        w, answers = np.array([given[x] for x in inputs(law)]), np.zeros(n + n * n)
+        lib.ask_law(forms.force, doubles(w), n + n * n, doubles(answers))
+        return answers[:n], answers[n:].reshape(n, n)
+
+    starts = np.array([[3e-3, 1e-3, 0.01], [5e-3, -4e-3, 0.02], [0.0, 0.0, 0.0]])
+    ways = np.array([[2e-4, 1e-4, -1e-3], [5e-3, 4e-3, 0.03], [0.0, 0.0, 0.0]])
+    for e0 in starts[:, :n]:
+        for way in ways[:, :n]:
+            (force, slopes), found = ask(e0, e0 + way), np.zeros((n, n))
+            for j, ε in enumerate(1e-7 * np.eye(n)):
+                found[:, j] = (ask(e0, e0 + way + ε)[0] - ask(e0, e0 + way - ε)[0]) / 2e-7
+            size = max(np.abs(slopes).max(), np.abs(force).max() / 1e-3, 1.0)
+            np.testing.assert_allclose(slopes, found, rtol=0, atol=3e-5 * size)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_springs_in_one_law_are_springs(scheme):
+    """The same solution as three connectors with a spring each."""
+    at, (bushing,), one = cantilever(LAWS["springs"])
+    beam, load = one.beams[0], one.loads[0]
+    ends, law = (ub.ground(1, 0), beam.end), bushing.law
+    links = [
+        ub.Slide(*ends, ub.Spring(law.along), axis=(0.6, 0.8)),
+        ub.Slide(*ends, ub.Spring(law.across), axis=(-0.8, 0.6)),
+        ub.Turn(*ends, ub.Spring(law.turning)),
+    ]
+    three = ub.Scene([beam], supports=one.supports, loads=[load], connectors=links)
+    found, expected = (run(x, scheme, newton=ub.Newton(rtol=1e-12)) for x in (one, three))
+    np.testing.assert_allclose(found.q, expected.q, rtol=0, atol=1e-10 * np.abs(found.q).max())
+    history, of_each = found.connector(bushing), [expected.connector(x) for x in links]
+    for name in ("motion", "force", "rate"):
+        together = np.column_stack([getattr(x, name) for x in of_each])
+        scale = 1e-9 * np.abs(together).max()
+        np.testing.assert_allclose(getattr(history, name), together, rtol=0, atol=scale)
+    work = sum(x.work for x in of_each)
+    np.testing.assert_allclose(history.work, work, rtol=0, atol=1e-9 * np.abs(work).max())
+    assert found.energy.keys() == expected.energy.keys()
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+@pytest.mark.parametrize("name", LAWS)
+def test_reference(name, scheme):
+    """The law by NumPy in the reference solver, and the ledger of both."""
+    _, (link,), scene = cantilever(LAWS[name])
+    found, reference = (
+        run(scene, scheme, newton=ub.Newton(rtol=1e-12, reference=one)) for one in (False, True)
+    )
+    scale = np.abs(found.q).max()
+    np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * scale)
+    mine, other = found.connector(link), reference.connector(link)
+    for of in ("motion", "force", "work", "rate", "dissipated"):
+        a, b = getattr(mine, of), getattr(other, of)
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-8 * max(np.abs(a).max(), 1e-3))
+    assert list(found.energy) == list(reference.energy)
+    for entry in found.energy:
+        a, b = found.energy[entry], reference.energy[entry]
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.throughput)
+
+
+@pytest.mark.parametrize("scheme", [s for s in SCHEMES if isinstance(s, ub.ExactStep)], ids=str)
+@pytest.mark.parametrize("name", LAWS)
+def test_the_ledger_closes(name, scheme):
+    """Also where a step passes the edge of a hole; what is lost never comes back."""
+    _, (link,), scene = cantilever(LAWS[name])
+    solution = run(scene, scheme, newton=ub.Newton(rtol=1e-12))
+    assert solution.energy.worst < 1e-11
+    assert solution.warnings == ""
+    loses = name in ("cushion", "creeping", "damped hole", "rough hole")
+    assert (solution.connector(link).dissipated[-1] > 0) == loses
+    if loses:
+        lost = solution.energy.lost[link.law.entry]
+        np.testing.assert_allclose(lost, solution.connector(link).dissipated, rtol=0, atol=1e-15)
+        if (name, scheme.theta) != ("creeping", 0.6):
+            assert np.diff(lost).min() > -1e-15
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(0.05), ub.Newmark(), ub.Static()], ids=str)
+def test_restart_and_start(scheme, shared_path):
+    _, links, scene = cantilever(*LAWS.values())
+    whole = run(scene, scheme)
+    file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
+    run(scene, scheme, t=(0, 0.3), checkpoint=file)
+    resumed = run(scene, scheme, checkpoint=file)
+    assert np.array_equal(resumed.q, whole.q)
+    for link in links:
+        for mine, other in zip(resumed.connector(link), whole.connector(link), strict=True):
+            assert np.array_equal(mine, other)
+    first = run(scene, scheme, t=(0, 0.3))
+    second = run(scene, scheme, t=(0.3, 0.6), start=first)
+    np.testing.assert_allclose(second.q[-1], whole.q[-1], rtol=0, atol=1e-8 * np.abs(whole.q).max())
+
+
+def test_save_and_load(shared_path):
+    _, (smooth, rough), scene = cantilever(LAWS["hole"], LAWS["rough hole"])
+    solution, path = run(scene, ub.Midpoint()), shared_path / "run.h5"
+    solution.save(path)
+    loaded = ub.load(path)
+    for mine, other in zip((smooth, rough), loaded.scene.connectors, strict=True):
+        assert (mine.law, mine.axis, str(mine)) == (other.law, other.axis, str(other))
+        assert np.array_equal(solution.connector(mine).force, loaded.connector(other).force)
+    more = [run(x.scene, ub.Midpoint(), t=(0.6, 0.8), start=x) for x in (solution, loaded)]
+    assert np.array_equal(more[0].q, more[1].q)
+
+
+def test_tables_and_live_values(shared_path, on_first_rank):
+    _, (link,), scene = cantilever(LAWS["rough hole"])
+    path, live = shared_path / "run.csv", []
+
+    class Watching(ub.Recorder):
+        by_itself, files = False, ()
+
+        def open(self, simulation):
+            pass
+
+        def write(self, simulation):
+            live.append(simulation.connector(link))
+
+    solution = run(scene, ub.Midpoint(), record=[ub.History(path, connectors=[link]), Watching()])
+    history = solution.connector(link)
+    for name in history._fields:
+        of_run = np.array([getattr(one, name) for one in live])
+        np.testing.assert_array_equal(of_run, getattr(history, name)[1:])
+    header, *rows = on_first_rank(lambda: path.read_text().splitlines())
+    assert "force Bushing(ground (1, 0), beam.end (1, 0)), along [N]" in header
+    assert "motion Bushing(ground (1, 0), beam.end (1, 0)), turn [rad]" in header
+    found = np.array([[float(x) for x in row.split(",")] for row in rows])[:, [1, 4, 7]]
+    np.testing.assert_array_equal(found, history.motion)
+
+
+def test_steps_need_no_python():
+    _, _, scene = cantilever(*LAWS.values())
+    simulation = ub.Simulation(scene, ub.Midpoint())
+    python = {lib.phase_in_python, lib.run_in_python, lib.begin_in_python}
+    phases = [loop for one in simulation.equation.phases for loop in (*one.begin, *one.accept)]
+    assert not python & {function for function, _ in phases}
+    simulation.close()
+
+
+def test_buckling_and_modes():
+    """The bends of the law, against a spring that is the same in one component."""
+
+    @dataclass(frozen=True)
+    class Stiffening(ub.ConnectorLaw):
+        k: float
+        cubic: float
+
+        def energy(self, motion, state):
+            return self.k * motion**2 / 2 + self.cubic * motion**4 / 4
+
+    @dataclass(frozen=True)
+    class Mount(Stiffening):
+        components: ClassVar = 3
+
+        def energy(self, motion, state):
+            x, y, turn = motion
+            return Stiffening.energy(self, turn, state) + 1e6 * (x**2 + y**2)
+
+    column = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e7, GA=1e7, EI=1e5, rhoA=1.0), cells=4)
+    ends, factors, omegas = (ub.ground(0, 0), column.start), [], []
+    alone = [ub.Turn(*ends, Stiffening(5.0, 30.0))]
+    alone += [ub.Slide(*ends, ub.Spring(2e6), axis=axis) for axis in ((1, 0), (0, 1))]
+    for links in (alone, [ub.Bushing(*ends, Mount(5.0, 30.0))]):
+        push = ub.PointLoad(column.end, force=(0.3, -1.0), time=lambda t: t)
+        scene = ub.Scene([column], loads=[push], connectors=links)
+        state = run(scene, ub.Static(), t=(0, 1), dt=0.25)
+        factors.append(ub.buckling(scene, 1, at=state, t=2.0).factors[0])
+        omegas.append(ub.modes(scene, 3, at=state).omega)
+    assert factors[0] == pytest.approx(factors[1], rel=1e-6)
+    np.testing.assert_allclose(*omegas, rtol=1e-6)
+
+
+# -- a pin in a round hole -----------------------------------------------------------------------
+
+
+def pinned(law, v, *, spin=0.0, more=(), loads=(), inertia=1.0):
+    """A body whose pin is in a hole of the ground."""
+    body = ub.Body((1, 0), mass=2.0, inertia=inertia)
+    link = ub.Bushing(ub.ground(1, 0), body.middle, law, axis=(0.6, 0.8))
+    start = ub.Velocity((body,), linear=v, angular=spin, about=(1, 0))
+    loads = [make(body) for make in loads]
+    return body.middle, link, ub.Scene(
+        bodies=[body], connectors=[link, *more], loads=loads, initial=[start]
+    )
+
+
+@pytest.mark.parametrize("damping", [0.0, 2.0])
+@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.DecayingMidpoint(), ub.Newmark()], ids=str)
+def test_on_a_line_it_is_a_stop(scheme, damping):
+    """A pin that runs to and fro across the hole, in any direction [closed]."""
+    v, way = 0.3, np.array([0.28, 0.96])
+    hole = ub.Clearance(2e4, gap=0.01, damping=damping)
+    at, link, scene = pinned(hole, v=tuple(v * way))
+    body = ub.Body((1, 0), mass=2.0, inertia=1.0)
+    stop = ub.Slide(ub.ground(1, 0), body.middle, ub.Stop(2e4, low=-0.01, high=0.01, damping=damping),
+                    axis=tuple(way))  # fmt: skip
+    start = ub.Velocity((body,), linear=tuple(v * way))
+    line = ub.Scene(bodies=[body], connectors=[stop], initial=[start])
+    found, expected = (
+        run(x, scheme, t=(0, 0.4), dt=1e-3, newton=ub.Newton(rtol=1e-13)) for x in (scene, line)
+    )
+    on_line = found.displacement(at)[:, :2] @ way
+    np.testing.assert_allclose(on_line, expected.connector(stop).motion, rtol=0, atol=1e-9)
+    force = np.hypot(*found.connector(link).force.T)
+    np.testing.assert_allclose(force, np.abs(expected.connector(stop).force), atol=1e-5)
+    for entry in expected.energy:
+        np.testing.assert_allclose(found.energy[entry], expected.energy[entry], atol=1e-8)
+
+
+def test_without_friction_the_spin_stays():
+    """Nothing turns the pin, and its path keeps its moment of momentum about the hole [closed]."""
+    at, _, scene = pinned(ub.Clearance(2e4, gap=0.01), v=(0.2, 0.1), spin=3.0)
+    solution = run(scene, ub.Midpoint(), t=(0, 1.0), dt=1e-3, newton=ub.Newton(rtol=1e-13))
+    velocity, moved = solution.velocity(at), solution.displacement(at)
+    np.testing.assert_allclose(velocity[:, 2], 3.0, rtol=1e-12)
+    assert np.ptp(solution.energy.total) < 1e-11 * solution.energy.total[0]
+    assert np.hypot(*moved[:, :2].T).max() > 0.01
+
+
+@pytest.mark.parametrize("friction", [0.1, 0.4])
+def test_a_turning_pin_climbs_to_the_friction_angle(friction):
+    """Driven slowly round it slides where tan φ is the friction; the drive bears mg r sin φ [closed].
+
+    The contact is in its edge by mg cos φ/k, by which the moment of the friction is not longer: the
+    surface of the pin is where it is pressed.
+    """
+    mass, gravity, radius = 2.0, 9.81, 0.05
+    hole = ub.Clearance(1e6, gap=1e-3, friction=friction, radius=radius)
+    body = ub.Body((1, 0), mass=mass, inertia=1.0)
+    link = ub.Bushing(ub.ground(1, 0), body.middle, hole)
+    drive = ub.Turn(ub.ground(1, 0), body.middle, ub.Motor(lambda t: 2 * t))
+    scene = ub.Scene(bodies=[body], connectors=[link, drive], loads=[ub.Gravity(gravity)])
+    solution = run(scene, ub.Static(), t=(0, 1), dt=0.01)
+    (x, y, _), angle = solution.connector(link).motion[-1], math.atan(friction)
+    assert math.atan2(x, -y) == pytest.approx(-angle, rel=1e-3) or math.atan2(x, -y) == pytest.approx(
+        angle, rel=1e-3
+    )
+    assert x * 2 > 0  # it rolls to the side that its surface comes from
+    moment = solution.connector(link).force[-1, 2]
+    assert moment == pytest.approx(mass * gravity * math.sin(angle) * radius, rel=1e-6)
+    along, across, _ = solution.connector(link).force[-1]
+    assert (along, across) == pytest.approx((0.0, -mass * gravity), abs=1e-6)
+
+
+def test_a_pin_that_is_held_by_friction_rests():
+    """A moment below the limit only bends the contact, and nothing is lost after that [closed]."""
+    hole = ub.Clearance(1e6, gap=1e-3, friction=0.3, radius=0.05)
+    limit = 0.3 / math.hypot(1, 0.3) * 2.0 * 9.81 * 0.05
+    results = []
+    for part in (0.5, 0.9, 1.1):
+        at, link, scene = pinned(
+            hole, v=(0, 0),
+            loads=[lambda b: ub.Gravity(), lambda b: ub.PointLoad(
+                b.middle, moment=part * limit, time=lambda t: min(t, 1.0))],
+        )  # fmt: skip
+        scheme = ub.Static()
+        try:
+            solution = run(scene, scheme, t=(0, 2), dt=0.05)
+            results.append(abs(solution.connector(link).force[-1, 2]) / limit)
+        except ub.ConvergenceError:
+            results.append(None)
+    assert results[:2] == pytest.approx([0.5, 0.9], rel=1e-6)
+    assert results[2] is None  # a mechanism
+
+
+# -- what is refused -----------------------------------------------------------------------------
+
+
+def law_of(**members):
+    kind = type("Mine", (ub.ConnectorLaw,), {"__annotations__": {}, **members})
+    return dataclass(frozen=True)(kind)()
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda a, b: ub.Slide(a, b, LAWS["cushion"]), "Cushion acts on 2 components of"),
+        (lambda a, b: ub.Turn(a, b, LAWS["hole"]), "use Bushing(a, b, law)"),
+        (lambda a, b: ub.Bushing(a, b, ub.Stop(1.0, high=0.1)), "acts on one component"),
+        (lambda a, b: ub.Bushing(a, b, ub.Spring(1.0)), "law"),
+        (lambda a, b: ub.Bushing(a, b, LAWS["hole"], axis=(0, 0)), "axis has zero length"),
+        (lambda a, b: ub.Bushing(a, b, law_of(components=4)), "neither energy nor resistance"),
+        (
+            lambda a, b: ub.Bushing(a, b, law_of(components=4, energy=lambda s, e, z: 0.0)),
+            "components = 4 must be 1, 2 or 3",
+        ),
+        (
+            lambda a, b: ub.Bushing(
+                a, b, law_of(components=2, resistance=lambda s, e, r, z, dt: r[0])
+            ),
+            "it must return a tuple of 2 forces",
+        ),
+        (lambda a, b: ub.Stretch(a, b, ub.Stop(1.0, high=0.1)), "Clearance(...)) for a pin"),
+    ],
+)  # fmt: skip
+def test_refusals(make, message):
+    beam = ub.Beam((0, 0), (1, 0), SECTION)
+    with pytest.raises(ub.SceneError, match=re.escape(message)):
+        make(ub.ground(1, 0), beam.end)
+
+
+@pytest.mark.parametrize(
+    ("numbers", "message"),
+    [
+        ({"stiffness": 0.0, "gap": 1e-3}, "stiffness"),
+        ({"stiffness": 1e6, "gap": 0.0}, "gap"),
+        ({"stiffness": 1e6, "gap": 1e-3, "friction": 0.1}, "give friction and radius together"),
+        ({"stiffness": 1e6, "gap": 1e-3, "radius": 0.1}, "give friction and radius together"),
+        ({"stiffness": 1e6, "gap": 1e-3, "damping": -1.0}, "damping"),
+    ],
+)
+def test_numbers_of_a_clearance(numbers, message):
+    with pytest.raises(ub.SceneError, match=message):
+        ub.Clearance(**numbers)
+
+
+def test_a_path_has_no_time_for_friction():
+    _, _, scene = cantilever(LAWS["rough hole"], load=lambda t: t)
+    with pytest.raises(ub.SceneError, match="simulate"):
+        ub.follow(scene, ub.LoadControl(0.2), steps=5)
+    at, _, scene = cantilever(LAWS["hole"], load=lambda t: t)
+    path = ub.follow(scene, ub.LoadControl(0.1), steps=10)
+    static = run(scene, ub.Static(), t=(0, 1), dt=0.1)
+    np.testing.assert_allclose(
+        path.displacement(at)[-1], static.displacement(at)[-1], rtol=1e-7, atol=1e-12
+    )
+
+
+def test_pictures(tmp_path):
+    _, _, scene = cantilever(LAWS["rough hole"])
+    ub.plot(scene).savefig(tmp_path / "model.png")
+    ub.plot(run(scene, ub.Static())).savefig(tmp_path / "solution.png")
