@@ -18,6 +18,14 @@ SECTION = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, rhoI=1e-2)
 
 
 @dataclass(frozen=True)
+class Linear(ub.ConnectorLaw):
+    k: float
+
+    def energy(self, motion, state):
+        return self.k * motion**2 / 2
+
+
+@dataclass(frozen=True)
 class Springs(ub.ConnectorLaw):
     """Three springs that know nothing of each other."""
 
@@ -68,6 +76,7 @@ class Creeping(ub.ConnectorLaw):
         return {"creep": self.k * (motion[0] - state.creep) / (self.eta / dt + self.k)}
 
 
+XY = (1, 0), (0, 1)
 HOLE = {"stiffness": 2000.0, "gap": 0.004}
 LAWS = {
     "springs": Springs(100.0, 200.0, 3.0),
@@ -83,12 +92,11 @@ SCHEMES = [
 ]  # fmt: skip
 
 
-def cantilever(*laws, load=None, axis=(0.6, 0.8)):
+def cantilever(*laws, load=lambda t: math.sin(9 * t), axis=(0.6, 0.8)):
     """A flexible cantilever whose end is in bushings."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
     links = [ub.Bushing(ub.ground(1, 0), beam.end, law, axis=axis) for law in laws]
-    time = load or (lambda t: math.sin(9 * t))
-    push = ub.PointLoad(beam.end, force=(0.7, 1.0), moment=0.4, time=time)
+    push = ub.PointLoad(beam.end, force=(0.7, 1.0), moment=0.4, time=load)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=links)
     return beam.end, links, scene
 
@@ -134,9 +142,9 @@ def test_springs_in_one_law_are_springs(scheme):
     beam, load = one.beams[0], one.loads[0]
     ends, law = (ub.ground(1, 0), beam.end), bushing.law
     links = [
-        ub.Slide(*ends, ub.Spring(law.along), axis=(0.6, 0.8)),
-        ub.Slide(*ends, ub.Spring(law.across), axis=(-0.8, 0.6)),
-        ub.Turn(*ends, ub.Spring(law.turning)),
+        ub.Slide(*ends, Linear(law.along), axis=(0.6, 0.8)),
+        ub.Slide(*ends, Linear(law.across), axis=(-0.8, 0.6)),
+        ub.Turn(*ends, Linear(law.turning)),
     ]
     three = ub.Scene([beam], supports=one.supports, loads=[load], connectors=links)
     found, expected = (run(x, scheme, newton=ub.Newton(rtol=1e-12)) for x in (one, three))
@@ -184,8 +192,8 @@ def test_the_ledger_closes(name, scheme):
     if loses:
         lost = solution.energy.lost[link.law.entry]
         np.testing.assert_allclose(lost, solution.connector(link).dissipated, rtol=0, atol=1e-15)
-        if (name, scheme.theta) != ("creeping", 0.6):
-            assert np.diff(lost).min() > -1e-15
+        if name != "creeping":  # whose energy is not convex
+            assert np.diff(lost).min() > -1e-12 * solution.energy.throughput
 
 
 @pytest.mark.parametrize("scheme", [ub.Midpoint(0.05), ub.Newmark(), ub.Static()], ids=str)
@@ -205,7 +213,7 @@ def test_restart_and_start(scheme, shared_path):
 
 
 def test_save_and_load(shared_path):
-    _, (smooth, rough), scene = cantilever(LAWS["hole"], LAWS["rough hole"])
+    _, (smooth, rough), scene = cantilever(LAWS["hole"], LAWS["rough hole"], load=ub.ramp(0.3))
     solution, path = run(scene, ub.Midpoint()), shared_path / "run.h5"
     solution.save(path)
     loaded = ub.load(path)
@@ -286,15 +294,12 @@ def test_buckling_and_modes():
 # -- a pin in a round hole -----------------------------------------------------------------------
 
 
-def pinned(law, v, *, spin=0.0, more=(), loads=(), inertia=1.0):
+def pinned(law, v, *, spin=0.0):
     """A body whose pin is in a hole of the ground."""
-    body = ub.Body((1, 0), mass=2.0, inertia=inertia)
+    body = ub.Body((1, 0), mass=2.0, inertia=1.0)
     link = ub.Bushing(ub.ground(1, 0), body.middle, law, axis=(0.6, 0.8))
     start = ub.Velocity((body,), linear=v, angular=spin, about=(1, 0))
-    loads = [make(body) for make in loads]
-    return body.middle, link, ub.Scene(
-        bodies=[body], connectors=[link, *more], loads=loads, initial=[start]
-    )
+    return body.middle, link, ub.Scene(bodies=[body], connectors=[link], initial=[start])
 
 
 @pytest.mark.parametrize("damping", [0.0, 2.0])
@@ -342,38 +347,48 @@ def test_a_turning_pin_climbs_to_the_friction_angle(friction):
     body = ub.Body((1, 0), mass=mass, inertia=1.0)
     link = ub.Bushing(ub.ground(1, 0), body.middle, hole)
     drive = ub.Turn(ub.ground(1, 0), body.middle, ub.Motor(lambda t: 2 * t))
-    scene = ub.Scene(bodies=[body], connectors=[link, drive], loads=[ub.Gravity(gravity)])
+    soft = [ub.Slide(ub.ground(1, 0), body.middle, ub.Spring(1e-3), axis=axis) for axis in XY]
+    scene = ub.Scene(
+        bodies=[body], connectors=[link, drive, *soft], loads=[ub.Gravity((0, -gravity))]
+    )
     solution = run(scene, ub.Static(), t=(0, 1), dt=0.01)
     (x, y, _), angle = solution.connector(link).motion[-1], math.atan(friction)
-    assert math.atan2(x, -y) == pytest.approx(-angle, rel=1e-3) or math.atan2(x, -y) == pytest.approx(
-        angle, rel=1e-3
-    )
-    assert x * 2 > 0  # it rolls to the side that its surface comes from
+    assert math.atan2(abs(x), -y) == pytest.approx(angle, rel=1e-4)
+    assert x < 0  # the surface below goes to the right, and the pin rolls to the left
     moment = solution.connector(link).force[-1, 2]
     assert moment == pytest.approx(mass * gravity * math.sin(angle) * radius, rel=1e-6)
     along, across, _ = solution.connector(link).force[-1]
-    assert (along, across) == pytest.approx((0.0, -mass * gravity), abs=1e-6)
+    assert (along, across) == pytest.approx((0.0, -mass * gravity), abs=1e-5)
 
 
 def test_a_pin_that_is_held_by_friction_rests():
-    """A moment below the limit only bends the contact, and nothing is lost after that [closed]."""
-    hole = ub.Clearance(1e6, gap=1e-3, friction=0.3, radius=0.05)
-    limit = 0.3 / math.hypot(1, 0.3) * 2.0 * 9.81 * 0.05
-    results = []
+    """A moment below the limit rolls it by an angle whose sine is M/(mg r), and no further [closed].
+
+    Then the surfaces have rolled by the same length, but for the deflection of the contact.
+    """
+    k, gap, radius, weight = 1e6, 1e-3, 0.05, 2.0 * 9.81
+    hole = ub.Clearance(k, gap=gap, friction=0.3, radius=radius)
+    limit = 0.3 / math.hypot(1, 0.3) * weight * radius
+    results, turned = [], []
     for part in (0.5, 0.9, 1.1):
-        at, link, scene = pinned(
-            hole, v=(0, 0),
-            loads=[lambda b: ub.Gravity(), lambda b: ub.PointLoad(
-                b.middle, moment=part * limit, time=lambda t: min(t, 1.0))],
-        )  # fmt: skip
-        scheme = ub.Static()
-        try:
-            solution = run(scene, scheme, t=(0, 2), dt=0.05)
-            results.append(abs(solution.connector(link).force[-1, 2]) / limit)
-        except ub.ConvergenceError:
-            results.append(None)
-    assert results[:2] == pytest.approx([0.5, 0.9], rel=1e-6)
-    assert results[2] is None  # a mechanism
+        body = ub.Body((1, 0), mass=2.0, inertia=1.0)
+        link = ub.Bushing(ub.ground(1, 0), body.middle, hole)
+        soft = [ub.Slide(ub.ground(1, 0), body.middle, ub.Spring(1e-3), axis=axis) for axis in XY]
+        soft.append(ub.Turn(ub.ground(1, 0), body.middle, ub.Spring(1e-6)))
+        push = ub.PointLoad(body.middle, moment=part * limit, time=lambda t: max(t - 1.0, 0.0))
+        loads = [ub.Gravity((0, -9.81), time=ub.ramp(1.0)), push]
+        scene = ub.Scene(bodies=[body], connectors=[link, *soft], loads=loads)
+        solution = run(scene, ub.Static(), t=(0, 2), dt=0.05)
+        history = solution.connector(link)
+        results.append(abs(history.force[-1, 2]) / limit)
+        turned.append(abs(history.motion[-1, 2]))
+    assert results == pytest.approx([0.5, 0.9, 1.0], rel=1e-5)
+    for part, found in zip((0.5, 0.9), turned, strict=False):
+        sine = part * limit / (weight * radius)
+        depth, deflection = weight * math.sqrt(1 - sine**2) / k, weight * sine / k
+        expected = ((gap + depth) * math.asin(sine) + deflection) / radius
+        assert found == pytest.approx(expected, rel=2e-3)
+    assert turned[2] > 1.0
 
 
 # -- what is refused -----------------------------------------------------------------------------
@@ -387,7 +402,7 @@ def law_of(**members):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda a, b: ub.Slide(a, b, LAWS["cushion"]), "Cushion acts on 2 components of"),
+        (lambda a, b: ub.Slide(a, b, LAWS["cushion"], axis=(1, 0)), "Cushion acts on 2 components of"),
         (lambda a, b: ub.Turn(a, b, LAWS["hole"]), "use Bushing(a, b, law)"),
         (lambda a, b: ub.Bushing(a, b, ub.Stop(1.0, high=0.1)), "acts on one component"),
         (lambda a, b: ub.Bushing(a, b, ub.Spring(1.0)), "law"),
@@ -433,7 +448,9 @@ def test_a_path_has_no_time_for_friction():
         ub.follow(scene, ub.LoadControl(0.2), steps=5)
     at, _, scene = cantilever(LAWS["hole"], load=lambda t: t)
     path = ub.follow(scene, ub.LoadControl(0.1), steps=10)
-    static = run(scene, ub.Static(), t=(0, 1), dt=0.1)
+    end = path.factor[-1]
+    static = run(scene, ub.Static(), t=(0, end), dt=end / 10)
+    assert end > 0.8
     np.testing.assert_allclose(
         path.displacement(at)[-1], static.displacement(at)[-1], rtol=1e-7, atol=1e-12
     )

@@ -81,9 +81,9 @@ def _elastic_forces(
 
     Over the step the forces do the work of the change of the energy.  Means of the forces by
     Gauss's rule do it to all digits where they are smooth over the step.  At kinks and in large
-    steps each gets a share of the work that is missing, as large as the square of its own error:
-    of one force this is the quotient of the growth of the energy and the way, which has few digits
-    in small steps.
+    steps a force along the way does the work that is missing; forces and moment share it as the
+    squares of the errors of their works.  With one force it is then the quotient of the growth of
+    the energy and the way, which has few digits in small steps.
     """
 
     def energy(e: Sequence[Expr]) -> Expr:
@@ -108,11 +108,17 @@ def _elastic_forces(
     works = [error * way for error, way in zip(errors, ways, strict=True)]
     smooth = ufl.le(sum(map(abs, works)), SMOOTH * size)
     growth = energy(e1) - energy(e0)
-    missing = growth - sum(mean * way for mean, way in zip(means, ways, strict=True))
-    shares = sum(work**2 for work in works)
-    forces = []
-    for mean, end, way, error in zip(means, ends, ways, errors, strict=True):
-        exact = growth / way if len(e0) == 1 else mean + missing * error**2 * way / shares
-        over_step = ufl.conditional(smooth, mean, exact)
-        forces.append(over_step + (2 * part - 1) * (end - over_step))
-    return forces
+    if len(ways) == 1:
+        exact = [growth / ways[0]]
+    else:
+        missing = growth - sum(mean * way for mean, way in zip(means, ways, strict=True))
+        groups = [range(2), *([range(2, 3)] if len(ways) == 3 else [])]  # displacements, rotation
+        shares = [sum(works[i] for i in group) ** 2 for group in groups]
+        exact = []
+        for share, group in zip(shares, groups, strict=True):
+            square = sum(ways[i] ** 2 for i in group)
+            square = ufl.conditional(ufl.gt(square, 0.0), square, 1.0)
+            factor = missing * share / (sum(shares) * square)
+            exact += [means[i] + factor * ways[i] for i in group]
+    over_step = [ufl.conditional(smooth, *both) for both in zip(means, exact, strict=True)]
+    return [x + (2 * part - 1) * (end - x) for x, end in zip(over_step, ends, strict=True)]

@@ -90,7 +90,7 @@ def require_limit(law: ConnectorLaw, what: str) -> None:
             raise SceneError(
                 f"{what}: {type(law).__name__}.increments returns {name} = {shorten(change)} for "
                 "dt = inf, and steps of a path are infinitely slow; state it so that it has a "
-                f"limit, as a / (b / dt + c){place_of(law)}"
+                f"limit, as a / (b / dt + c), or use simulate(scene, Static(), ...){place_of(law)}"
             )
 
 
