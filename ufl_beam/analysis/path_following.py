@@ -26,7 +26,7 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_law_checks import require_limit
-from ufl_beam.model.connector_laws import Controller, Coulomb
+from ufl_beam.model.connector_laws import Controller, rubs
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import Content, above, below, require_arrays
@@ -208,7 +208,7 @@ def _require_driven(scene: Scene, t0: float) -> None:
     for link in scene.links:
         if isinstance(link.law, Controller):
             raise SceneError(f"{link}: a controller acts in time, and a path has none")
-        if isinstance(link.law, Coulomb):
+        if rubs(link.law):
             raise SceneError(
                 f"{link}: dry friction sticks or slides in steps of time, and a path has none; use "
                 "simulate(scene, Static(), ...), or a Spring that yields"

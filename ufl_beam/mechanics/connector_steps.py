@@ -30,7 +30,7 @@ Errors are of the eighth and the fourth order in the step h, with the factors 1 
 class LawStep(NamedTuple):
     """A law over a step; J, forces in N or N m."""
 
-    forces: tuple[Expr, ...]  # that act in the step; of each component
+    forces: tuple[Expr, ...]  # that act in the step; of each component; size of a sliding force
     stored: Expr  # at the end
     numerical: Expr  # lost by the scheme in the step
     variables: tuple[Expr, ...]  # at the end
@@ -59,13 +59,17 @@ def law_step(
         """Variables after a part of the step."""
         return State(vars(old) | {n: getattr(old, n) + part / θ * changes[n] for n in names})
 
+    end = {n: ufl.variable(ufl.as_ufl(z)) for n, z in vars(after(1.0)).items()}
+    zero = ufl.as_ufl(0.0)
+    if law.holds:  # the force against the motion
+        sliding = ufl.as_ufl(law.sliding(e, rate, after(θ), dt))
+        return LawStep((sliding,), zero, zero, tuple(end.values()))
     resistances = law.each(law.resistance(e, rate, after(θ), dt))
     elastic = _elastic_forces(law, e0, e1, after(part), scheme)
     forces = tuple(f + ufl.as_ufl(r) for f, r in zip(elastic, resistances, strict=True))
-    end = {n: ufl.variable(ufl.as_ufl(z)) for n, z in vars(after(1.0)).items()}
     moved = [ufl.variable(x1) for x1 in e1]
     stored = ufl.as_ufl(law.energy(law.given(moved), State(end)))
-    numerical = ufl.as_ufl(0.0)
+    numerical = zero
     if part > 0.5 and scheme.average(0.0, 1.0) != 1.0:  # works are exact increments of energy
         # What backward Euler loses: of second order, and positive of convex energies.
         growth = sum(ufl.diff(stored, m) * (x1 - x0) for m, (x0, x1) in zip(moved, pairs, strict=True))

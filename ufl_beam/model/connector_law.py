@@ -23,7 +23,9 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
     The fields of the dataclass are the numbers of the law.  Its methods are written with the
     functions of ``ub.law_functions``.  A law states an energy, a resistance, or both: the force
     that resists the growth of the motion is the derivative of the energy by the motion, plus the
-    resistance.  Work that is not stored is lost.  See docs/extending_laws.md.
+    resistance.  Work that is not stored is lost.  A law of what rubs states a limit, and perhaps a
+    sliding force, instead: the motion is held, without a stiffness, until the force is beyond the
+    limit, and again when it comes to rest.  See docs/extending_laws.md.
 
     Attributes:
         variables: Internal variables, and their values before anything has happened.
@@ -76,6 +78,22 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         """
         return 0.0 if self.components == 1 else self.components * (0.0,)
 
+    def limit(self, state: State) -> Values:
+        """Force up to which the motion is held, none by default; N or N m.
+
+        Args:
+            state: Internal variables at the beginning of the step.
+        """
+        return 0.0
+
+    def sliding(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
+        """Size of the force against the motion while it is not held, the limit by default; N or N m.
+
+        Args:
+            motion: As in :meth:`resistance`, and so are rate, state and dt.
+        """
+        return self.limit(state)
+
     def increments(
         self, motion: Any, rate: Any, state: State, dt: Values
     ) -> Mapping[str, Values]:
@@ -90,9 +108,15 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return {}
 
     @property
+    def holds(self) -> bool:
+        """True if the motion is held below a limit."""
+        return type(self).limit is not ConnectorLaw.limit
+
+    @property
     def elastic(self) -> bool:
         """True if the law loses nothing."""
-        return not self.variables and type(self).resistance is ConnectorLaw.resistance
+        lossless = type(self).resistance is ConnectorLaw.resistance and not self.holds
+        return lossless and not self.variables
 
     @property
     def resists(self) -> bool:

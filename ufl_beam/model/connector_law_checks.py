@@ -33,8 +33,17 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     for name, value in law.numbers().items():
         require_number(value, f"{what}: {name}")
     stated = {n for n in CALLED if getattr(type(law), n) is not getattr(ConnectorLaw, n)}
-    if not stated & {"energy", "resistance"}:
-        raise SceneError(f"{what} has neither energy nor resistance; define one of both methods")
+    if not stated & {"energy", "resistance", "limit"}:
+        raise SceneError(
+            f"{what} has neither energy nor resistance, nor a limit; define one of these methods"
+        )
+    if law.holds and (stated & {"energy", "resistance"} or law.components > 1):
+        raise SceneError(
+            f"{what} has a limit, which is for laws of one component without energy and "
+            "resistance; let another connector beside it have these"
+        )
+    if "sliding" in stated and not law.holds:
+        raise SceneError(f"{what} has a sliding force and no limit; define this method")
     if law.variables and "increments" not in stated:
         raise SceneError(f"{what} has variables and no increments; define this method")
     require_text(law.entry, f"{what}.entry")
@@ -48,8 +57,8 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     if law.components not in (1, 2, 3):
         raise SceneError(f"{what}.components = {law.components!r} must be 1, 2 or 3")
     motion, state = law.given([np.zeros(1)] * law.components), law.initially()
-    calls = {"energy": (motion, state)}
-    calls |= dict.fromkeys(CALLED[1:], (motion, motion, state, 1.0))  # type: ignore[arg-type]
+    calls = {"energy": (motion, state), "limit": (state,)}
+    calls |= dict.fromkeys(CALLED[2:], (motion, motion, state, 1.0))  # type: ignore[arg-type]
     for name, arguments in calls.items():
         try:
             with np.errstate(all="ignore"):
@@ -76,7 +85,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
                 )
 
 
-CALLED = ("energy", "resistance", "increments")
+CALLED = ("energy", "limit", "resistance", "sliding", "increments")
 """Methods that a law of a connector may define."""
 
 

@@ -491,5 +491,10 @@ def resists(law: Law) -> bool:
     return law.resists if isinstance(law, ConnectorLaw) else isinstance(law, RESISTING)
 
 
+def rubs(law: object) -> bool:
+    """Return whether a law holds its motion below a limit of the force, and slides beyond it."""
+    return isinstance(law, Coulomb) or (isinstance(law, ConnectorLaw) and law.holds)
+
+
 HELD = Motor(Constant(0.0))
 """The law of what a joint holds."""

@@ -11,7 +11,7 @@ from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, arm, require_anchors
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_law_checks import require_connector_law
-from ufl_beam.model.connector_laws import Coulomb, Guide, Law, Motor, RigidPlastic
+from ufl_beam.model.connector_laws import Guide, Law, Motor, RigidPlastic, rubs
 from ufl_beam.model.curves import Point
 from ufl_beam.model.records import Record
 from ufl_beam.one_line import bracketed
@@ -74,7 +74,7 @@ class Connector:
     @property
     def holds(self) -> bool:
         """True if the law may demand a motion, whatever force that takes."""
-        return isinstance(self.law, Motor | Coulomb | Guide | RigidPlastic)
+        return isinstance(self.law, Motor | Guide | RigidPlastic) or rubs(self.law)
 
     @property
     def arms(self) -> tuple[Point, Point]:

@@ -20,10 +20,12 @@ from ufl_beam.model.connector_laws import (
     RESISTING,
     Coulomb,
     Damper,
+    Law,
     RigidPlastic,
     Spring,
     Stop,
     resists,
+    rubs,
 )
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import Point
@@ -120,7 +122,7 @@ def require_independent(scene: Scene) -> None:
     They do if their gradients in the undeformed scene, by what moves freely, are dependent.  What
     is rigid-plastic is a constraint below its limit.
     """
-    rows, within = _dependences(scene, (*HOLDING, RigidPlastic))
+    rows, within = _dependences(scene, lambda law: isinstance(law, (*HOLDING, RigidPlastic)))
     if within.shape[1] == 0:
         return
     dependent = [rows[i] for i in np.flatnonzero(np.abs(within).max(axis=1) > 1e-6)]
@@ -162,22 +164,25 @@ def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
 
 def friction_repeats(scene: Scene) -> bool:
     """Return whether places that stick hold what is held already, by joints or by each other."""
-    if not any(isinstance(link.law, Coulomb) for link in scene.links):
+    if not any(rubs(link.law) for link in scene.links):
         return False
-    return _dependences(scene, (*HOLDING, RigidPlastic, Coulomb))[1].shape[1] > 0
+    holding = (*HOLDING, RigidPlastic)
+    return _dependences(scene, lambda law: isinstance(law, holding) or rubs(law))[1].shape[1] > 0
 
 
-def _dependences(scene: Scene, laws: tuple[type, ...]) -> tuple[list[tuple[object, Row]], Array]:
-    """Find dependent constraints of connectors with some laws and of supports in turned axes.
+def _dependences(
+    scene: Scene, holds: Callable[[Law], bool]
+) -> tuple[list[tuple[object, Row]], Array]:
+    """Find dependent constraints of connectors with laws that hold, and of supports in turned axes.
 
     Returns the constraints with their owners, those left out that are alone in moving something,
     and, in columns, the combinations of constraints that vanish for all that can move.
     """
-    if not any(isinstance(link.law, laws) for link in scene.links):
+    if not any(holds(link.law) for link in scene.links):
         return [], np.zeros((0, 0))
     same, fixed = scene.representatives, _fixed(scene)
     rows = [
-        *_of_connectors(scene, lambda link: isinstance(link.law, laws)),
+        *_of_connectors(scene, lambda link: holds(link.law)),
         *_of_supports(support for support in scene.supports if support.angle),
     ]
     moved: list[dict[NodeDof, float]] = []
@@ -383,7 +388,7 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
     """Raise :class:`SceneError` if a time scheme has not the rates that a scene needs."""
     name = type(scheme).__name__
     for owner, what in [*((c, c.law) for c in scene.links), *((x, x) for x in scene.loads)]:
-        if isinstance(what, Coulomb | RotatingFrame) and not scheme.has_mean_velocity:
+        if (isinstance(what, RotatingFrame) or rubs(what)) and not scheme.has_mean_velocity:
             raise SceneError(
                 f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
                 "here; use Midpoint() or DecayingMidpoint()"

@@ -16,7 +16,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Memory, Restoring, Saving, State
 from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_laws import Coulomb
+from ufl_beam.model.connector_laws import rubs
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
@@ -73,7 +73,7 @@ class Assembly:
         self.controllers.remember(memory, t)
         for one in self.remembering:
             one.remember(memory, q)
-        slips = any(isinstance(link.law, Coulomb) for link in self.controllers.values)
+        slips = any(rubs(link.law) for link in self.equation.share.grid.scene.links)
         if self.inertia is None or self.supports.work or slips:
             self.supports.carry_on(memory, q)
         if self.inertia is not None:

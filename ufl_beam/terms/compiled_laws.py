@@ -22,7 +22,9 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_law_checks import place_of
 from ufl_beam.model.material_law import State
-from ufl_beam.terms.connector_responses import Response, respond
+from ufl_beam.model.connectors import Connector
+from ufl_beam.terms.connector_laws import Rubbing
+from ufl_beam.terms.connector_responses import Response, Setting, respond
 from ufl_beam.terms.phases import Callbacks
 
 
@@ -39,6 +41,7 @@ class LawForms:
     Attributes:
         force: Forces and their derivatives by the motions at the end of the step.
         end: ``law_output`` of loops.h, then the variables at the end.
+        limit: Force up to which the motion is held.
     """
 
     def __init__(self, law: ConnectorLaw, scheme: Scheme) -> None:
@@ -52,6 +55,9 @@ class LawForms:
             by_name = dict(zip(("stored", "numerical"), numbers, strict=True))
             end = in_order("law_output", by_name, "law_")
             self.end = self._compile(*end, *variables)
+            old = State({name: at[f"state {name}"] for name in law.variables})
+            numbers_of_law = {name: at[f"number {name}"] for name in law.numbers()}
+            self.limit = self._compile(ufl.as_ufl(law.of(numbers_of_law).limit(old)))
         except Exception as error:
             raise SceneError(
                 f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
@@ -80,6 +86,10 @@ _law_forms = stated(LawForms)
 
 
 @respond.register(ConnectorLaw)
+def _(law: ConnectorLaw, links: Sequence[Connector], setting: Setting) -> Response:
+    return (RubbingLaws if law.holds else CompiledLaws)(law, links, setting)
+
+
 class CompiledLaws(Response):
     """Connectors whose laws are of one class, with numbers of their own."""
 
@@ -181,3 +191,24 @@ class CompiledLaws(Response):
     def freeze(self) -> None:
         """Keep the variables from now on."""
         fill(self._c, force=self._forms.frozen[0])
+
+
+class RubbingLaws(Rubbing, CompiledLaws):
+    """Laws that hold the motion below a limit."""
+
+    def _prepare(self, law: Any) -> None:
+        super()._prepare(law)
+        self._limits = np.zeros(len(self._links))
+        places = [doubles(self._limits) + i for i in range(len(self._links))]
+        self._rub(places, laws=self._c, limit_of_law=self._forms.limit)
+
+    def borne(self) -> Array | None:
+        """Nobody knows the forces of what is held."""
+        return None
+
+    def bends(self, e1: Array) -> Array:
+        """Zero: what sticks has none, and what slides is followed in no analysis."""
+        return np.zeros((len(self._links), 1))
+
+    def freeze(self) -> None:
+        """What sticks does so from now on."""

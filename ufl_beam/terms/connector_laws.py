@@ -99,38 +99,46 @@ class _Damped(Response):
         return {"viscosity": self._numbers("viscosity"), **super().in_steps(callbacks)}
 
 
-@respond.register(Coulomb)
-class _Rubbing(Response):
-    """Dry friction: each connector sticks (0), or slips one way or the other (-1, 1)."""
+class Rubbing(Response):
+    """Connectors that stick (0), or slip one way or the other (-1, 1)."""
 
-    _entry = "friction"
-
-    def _prepare(self, law: Any) -> None:
+    def _rub(self, limits: list[Any], **of_laws: Any) -> None:
+        """Make the struct of C; ``limits`` are addresses of the limits of the forces."""
         n, setting = len(self._links), self._setting
         self._slip, self._accepted, way, creep = np.zeros((4, n))
         self._sticks, against = np.zeros((2, n), dtype=np.int32)
         softness = CREEP if setting.friction_repeats else 0.0
-        limits = [setting.asked(link) for link in self._links]
-        self._c = struct(
+        self._friction = struct(
             "friction", number=n, limit=ffi.new("double *[]", limits), slip=self._slip,
             accepted=self._accepted, way=way, creep=creep, softness=softness * self._lengths(),
             tiny=1e-14 * self._lengths(), sticks=self._sticks, against=against,
-            switched=setting.search.switched, force=np.zeros(n), rows=np.zeros((n, 3)),
+            switched=setting.search.switched, force=np.zeros(n), rows=np.zeros((n, 3)), **of_laws,
         )  # fmt: skip
         if setting.rates is not None:
-            fill(self._c, rates=setting.rates.c)
-        self.in_c = {"friction": self._c}
+            fill(self._friction, rates=setting.rates.c)
+        self.in_c = {**self.in_c, "friction": self._friction}
 
     def know(self, couplings: Any) -> None:
         rate, v = couplings.rate_of_motion, couplings.velocities
-        fill(self._c, rate=rate.cells, at_v=rate.position(v))
+        fill(self._friction, rate=rate.cells, at_v=rate.position(v))
 
     def about_force(self, rows: Array) -> Array:
         return np.where(self._sticks != 0, 0.0, 1.0)
 
     def state(self) -> Array:
-        """Which way each slips."""
-        return self._accepted[:, None]
+        """Which way each slips, and what else the law remembers."""
+        return np.column_stack([self._accepted, super().state()])
 
     def restore(self, rows: Array) -> None:
         self._slip[:] = self._accepted[:] = rows[:, 0]
+        super().restore(rows[:, 1:])
+
+
+@respond.register(Coulomb)
+class _DryFriction(Rubbing):
+    """Dry friction, whose limits controllers may set."""
+
+    _entry, name_in_files = "friction", "_Rubbing"
+
+    def _prepare(self, law: Any) -> None:
+        self._rub([self._setting.asked(link) for link in self._links])

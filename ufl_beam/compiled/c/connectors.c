@@ -39,6 +39,13 @@ static void set_rows_of_springs(const couplings *c)
   }
 }
 
+/* Numbers of a law, which has no kernel where all of them are zero. */
+void ask_law(kernel *law, const double *w, int answers, double *s)
+{
+  if (law) ask(law, w, answers, s);
+  else memset(s, 0, answers * sizeof *s);
+}
+
 /* Rows of dry friction at the motions e1: a connector sticks while the force is below the limit, and slips
  * until the sliding velocity reverses, be it in the middle of the step or at its end. Both slipping to a
  * reversed velocity and rest can be solutions of a long step; rest is taken if it gives no energy. */
@@ -57,8 +64,17 @@ static void find_rows_of_friction(friction *f, const double *e0, const double *e
     else if (stuck && fabs(λ) > limit * (1 + 1e-12)) *slip = λ < 0 ? -1 : 1;
     const int sticks = *slip == 0 && limit > 0;
     if (sticks != f->sticks[i]) f->sticks[i] = sticks, *f->switched = 1;
-    row[0] = sticks, row[1] = sticks ? -f->creep[i] : 1;
-    row[2] = sticks ? e0[i] + (f->against[i] ? 0 : f->way[i]) : *slip * limit;
+    if (sticks) {
+      row[0] = 1, row[1] = -f->creep[i], row[2] = e0[i] + (f->against[i] ? 0 : f->way[i]);
+    } else {
+      double s[2] = {limit, 0}; /* sliding force, and its derivative */
+      if (f->laws) {
+        double *w = f->laws->w + i * f->laws->width;
+        w[0] = e1[i];
+        ask_law(f->laws->force, w, 2, s);
+      }
+      row[0] = -*slip * s[1], row[1] = 1, row[2] = *slip * (s[0] - s[1] * e1[i]);
+    }
   }
   f->guessed = 0;
 }
@@ -66,13 +82,6 @@ static void find_rows_of_friction(friction *f, const double *e0, const double *e
 static void get_forces(const couplings *c, const double *q, double *force)
 {
   for (int i = 0; i < c->number; ++i) force[i] = q[c->force[i]];
-}
-
-/* Numbers of a law, which has no kernel where all of them are zero. */
-void ask_law(kernel *law, const double *w, int answers, double *s)
-{
-  if (law) ask(law, w, answers, s);
-  else memset(s, 0, answers * sizeof *s);
 }
 
 /* The compiled laws around their motions e1. */
@@ -127,13 +136,13 @@ static void set_rows(const couplings *c, const double *q)
   if (c->rigid_plastic) {
     set_rows_of_rigid_plastic(c, q);
     rows = c->rigid_plastic->rows;
-  } else if (c->laws) {
-    find_rows_of_laws(c->laws, c->e1);
-    rows = c->laws->rows;
   } else if (c->friction) {
     get_forces(c, q, c->friction->force);
     find_rows_of_friction(c->friction, c->e0, c->e1, c->friction->force);
     rows = c->friction->rows;
+  } else if (c->laws) {
+    find_rows_of_laws(c->laws, c->e1);
+    rows = c->laws->rows;
   } else if (c->asked) {
     get_forces(c, q, c->asked->force);
     c->asked->find_rows(c->asked->rows_self);

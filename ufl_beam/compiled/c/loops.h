@@ -815,7 +815,9 @@ struct friction {
   const cells *rate;           /* rates of the motions */
   int at_v;                    /* where its coefficients have the velocities */
   const rates *rates;          /* in motion */
-  const double *const *limit;  /* of the force of each; N or N m */
+  double *const *limit;        /* of the force of each; N or N m */
+  connector_laws *laws;        /* whose forces slide; or none, where sliding forces are the limits */
+  kernel *limit_of_law;        /* of these laws */
   double *slip, *accepted;     /* in the latest iterate, and in the accepted state */
   double *way, *creep;         /* in the step: of what comes to rest at its end; for a unit of force */
   double *softness, *tiny;     /* creep at the limit; step that is nothing but round-off */

@@ -474,6 +474,10 @@ static void begin_friction(const couplings *c, const time_step *step)
   }
   for (int k = 0; k < c->number; ++k) {
     const int i = c->link[k];
+    if (f->laws) {
+      ask_law(f->limit_of_law, f->laws->w + i * f->laws->width, 1, f->limit[i]);
+      *f->limit[i] = fmax(*f->limit[i], 0);
+    }
     const double limit = *f->limit[i];
     f->way[i] = way_to_rest * c->by_cell[k];
     f->creep[i] = limit > 0 ? f->softness[i] / limit : 0;

@@ -1,0 +1,224 @@
+# SPDX-License-Identifier: MIT
+"""Laws of connectors of a user that hold the motion below a limit, and slide beyond it."""
+
+import math
+import re
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+f = ub.law_functions
+
+
+@dataclass(frozen=True)
+class Dry(ub.ConnectorLaw):
+    """Coulomb's law."""
+
+    force: float
+    entry: ClassVar = "friction"
+
+    def limit(self, state):
+        return self.force
+
+
+@dataclass(frozen=True)
+class Breakaway(ub.ConnectorLaw):
+    """More to break loose than to slide, with Stribeck's curve and a viscous part."""
+
+    rest: float
+    slow: float
+    speed: float
+    viscosity: float
+
+    def limit(self, state):
+        return self.rest
+
+    def sliding(self, motion, rate, state, dt):
+        v = f.absolute(rate)
+        falling = (self.rest - self.slow) * f.exp(-((v / self.speed) ** 2))
+        return self.slow + falling + self.viscosity * v
+
+
+@dataclass(frozen=True)
+class Wearing(ub.ConnectorLaw):
+    """A limit that falls with the way of sliding."""
+
+    new: float
+    worn: float
+    way: float
+    variables: ClassVar = {"slipped": 0.0}
+
+    def limit(self, state):
+        return self.worn + (self.new - self.worn) * f.exp(-state.slipped / self.way)
+
+    def increments(self, motion, rate, state, dt):
+        return {"slipped": f.absolute(rate) * dt}
+
+
+LAWS = {
+    "dry": Dry(2.0), "breakaway": Breakaway(2.0, 1.2, 0.05, 0.5), "wearing": Wearing(2.0, 0.5, 0.1),
+}  # fmt: skip
+SCHEMES = [ub.Midpoint(), ub.Midpoint(0.1, 0.1), ub.DecayingMidpoint(), ub.Static()]
+
+
+def oscillator(*laws, v=1.5):
+    """A mass between a spring and what rubs on its rail, struck and pushed to and fro."""
+    mass = ub.Body((1, 0), mass=2.0, inertia=1.0)
+    rail = ub.ground(0, 0), mass.middle
+    links = [ub.Slide(*rail, law) for law in laws]
+    push = ub.PointLoad(mass.middle, force=(8.0, 0), time=lambda t: math.sin(7 * t))
+    scene = ub.Scene(
+        bodies=[mass], joints=[ub.Prismatic(*rail)], loads=[push],
+        connectors=[ub.Slide(*rail, ub.Spring(50.0)), *links],
+        initial=[ub.Velocity((mass,), linear=(v, 0.0))],
+    )  # fmt: skip
+    return mass.middle, links, scene
+
+
+def run(scene, scheme, t=(0, 3.0), dt=0.01, **more):
+    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+
+
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_a_constant_limit_is_dry_friction(scheme):
+    solutions = []
+    for law in (Dry(2.0), ub.Coulomb(2.0)):
+        at, (link,), scene = oscillator(law)
+        solution = run(scene, scheme, newton=ub.Newton(rtol=1e-13))
+        solutions.append((solution.displacement(at), *solution.connector(link)[:4]))
+        lost = solution.energy.lost["friction"]
+        assert lost[-1] > 0
+        if isinstance(law, Dry):
+            np.testing.assert_allclose(solution.connector(link).dissipated, lost, atol=1e-15)
+    for one, other in zip(*solutions, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-11 * np.abs(other).max())
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_held_exactly_and_never_gives_energy(name, scheme):
+    at, (link,), scene = oscillator(LAWS[name])
+    solution = run(scene, scheme)
+    history = solution.connector(link)
+    lost = solution.energy.lost[LAWS[name].entry]
+    assert np.diff(lost).min() > -1e-13 * lost[-1]
+    if scheme != ub.Static():
+        assert solution.energy.worst < 1e-9
+    held = np.abs(np.diff(history.motion)) < 1e-13
+    assert held.any() and not held.all()
+    largest = LAWS[name].limit(LAWS[name].initially())
+    if name != "breakaway":  # whose viscous part comes on top
+        assert np.abs(history.force).max() <= largest * (1 + 1e-9)
+
+
+def test_a_slow_pull_slips_by_twice_the_drop():
+    """A mass on a slow spring: it breaks loose at Fs, and comes to rest after 2 (Fs - Fk)/k [closed].
+
+    The spring moves by v T in the half period T of a slip, a part 2.5e-3 of it.
+    """
+
+    @dataclass(frozen=True)
+    class Drop(Breakaway):
+        def sliding(self, motion, rate, state, dt):
+            return self.slow
+
+    k, mass, v = 50.0, 2.0, 4e-5
+    body = ub.Body((1, 0), mass=mass, inertia=1.0)
+    hand = ub.Body((2, 0), mass=1.0, inertia=1.0)
+    links = [ub.Slide(ub.ground(0, 0), one.middle, law) for one, law in (
+        (body, Drop(3.0, 2.0, 1.0, 0.0)), (hand, ub.Motor(lambda t: 0.059 + v * t)))]  # fmt: skip
+    spring = ub.Slide(body.middle, hand.middle, ub.Spring(k))
+    rails = [ub.Prismatic(ub.ground(0, 0), one.middle) for one in (body, hand)]
+    scene = ub.Scene(bodies=[body, hand], joints=rails, connectors=[*links, spring])
+    start = run(scene, ub.Static(), t=(-1, 0), dt=1.0)
+    solution = run(scene, ub.Midpoint(), t=(0, 30), dt=0.005, start=start)
+    pull, moved = solution.connector(spring).force, solution.connector(links[0]).motion
+    assert pull.max() == pytest.approx(3.0, rel=1e-4)
+    assert moved[-1] == pytest.approx(2 * (3.0 - 2.0) / k, rel=5e-3)
+    after = pull[np.argmax(pull) + 400]  # at rest again
+    assert after == pytest.approx(2 * 2.0 - 3.0, rel=5e-3)
+
+
+def test_what_wears_is_lost():
+    """The way of sliding is the variable, and the loss its integral of the limit [closed]."""
+    at, (link,), scene = oscillator(Wearing(2.0, 0.5, 0.1))
+    coarse, fine = (
+        (solution := run(scene, ub.Midpoint(), dt=dt)).energy.lost["connectors"][-1]
+        - lost_over(np.abs(np.diff(solution.connector(link).motion)).sum())
+        for dt in (0.02, 0.01)
+    )
+    assert abs(fine) < abs(coarse) < 0.02
+    assert abs(fine) < 2e-3
+
+
+def lost_over(way):
+    """Integral of the limit of `Wearing(2, 0.5, 0.1)` over a way of sliding; J."""
+    return 0.5 * way + 1.5 * 0.1 * (1 - math.exp(-way / 0.1))
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+def test_reference(name, scheme):
+    """The law by NumPy in the reference solver, and the ledger of both."""
+    _, (link,), scene = oscillator(LAWS[name])
+    found, reference = (
+        run(scene, scheme, t=(0, 1), newton=ub.Newton(rtol=1e-12, reference=one))
+        for one in (False, True)
+    )
+    np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * np.abs(found.q).max())
+    for mine, other in zip(found.connector(link), reference.connector(link), strict=True):
+        np.testing.assert_allclose(mine, other, rtol=0, atol=1e-8 * max(np.abs(mine).max(), 1e-3))
+    assert list(found.energy) == list(reference.energy)
+    for entry in found.energy:
+        a, b = found.energy[entry], reference.energy[entry]
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.throughput)
+
+
+@pytest.mark.parametrize("scheme", [ub.Midpoint(0.05), ub.Static()], ids=str)
+def test_restart_and_start(scheme, shared_path):
+    at, links, scene = oscillator(*LAWS.values())
+    whole = run(scene, scheme, t=(0, 1))
+    file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
+    run(scene, scheme, t=(0, 0.5), checkpoint=file)
+    resumed = run(scene, scheme, t=(0, 1), checkpoint=file)
+    assert np.array_equal(resumed.q, whole.q)
+    for link in links:
+        for mine, other in zip(resumed.connector(link), whole.connector(link), strict=True):
+            assert np.array_equal(mine, other)
+    first = run(scene, scheme, t=(0, 0.5))
+    second = run(scene, scheme, t=(0.5, 1), start=first)
+    np.testing.assert_allclose(second.q[-1], whole.q[-1], rtol=0, atol=1e-8 * np.abs(whole.q).max())
+
+
+def law_of(**members):
+    kind = type("Mine", (ub.ConnectorLaw,), {"__annotations__": {}, **members})
+    return dataclass(frozen=True)(kind)()
+
+
+@pytest.mark.parametrize(
+    ("members", "message"),
+    [
+        ({"limit": lambda s, z: 1.0, "energy": lambda s, e, z: e**2}, "has a limit, which is for"),
+        ({"limit": lambda s, z: 1.0, "components": 2}, "has a limit, which is for"),
+        ({"energy": lambda s, e, z: e, "sliding": lambda s, e, r, z, dt: 1.0}, "and no limit"),
+        ({"limit": lambda s, z: None}, "Mine.limit returns None"),
+        ({"limit": lambda s, z: 1.0, "sliding": lambda s, e, r, z, dt: e / 0}, "Mine.sliding"),
+    ],
+)
+def test_refusals(members, message):
+    beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e5, GA=1e5, EI=3.0))
+    with pytest.raises(ub.SceneError, match=re.escape(message)):
+        ub.Turn(ub.ground(1, 0), beam.end, law_of(**members))
+
+
+def test_where_friction_is_refused():
+    _, _, scene = oscillator(Dry(2.0))
+    with pytest.raises(ub.SceneError, match="needs the mean velocity of a step"):
+        run(scene, ub.Newmark())
+    with pytest.raises(ub.SceneError, match="a path has none"):
+        ub.follow(scene, ub.LoadControl(0.2), steps=5)
+
