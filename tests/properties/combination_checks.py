@@ -20,7 +20,7 @@ from combination_case import (
     only,
     results,
 )  # fmt: skip
-from own_parts import LAWS, SOFTENING, LargestCurvature
+from own_parts import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
 
 import ufl_beam as ub
 from ufl_beam.reference.solver import Solver
@@ -140,7 +140,7 @@ def saved(case):
 
     Guide curves are saved as points, so that the directions of their forces have fewer digits.
     """
-    own = *LAWS, *SOFTENING, "Stiffening", "Relaxing"
+    own = *LAWS, *SOFTENING, *CONNECTOR_LAWS
     only(not case.combination.has(*own), "own laws cannot be saved")
     before, scene = case.whole.solution, case.whole.names["scene"]
     before.save(case.folder / "solution.h5")

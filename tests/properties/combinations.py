@@ -16,7 +16,7 @@ from functools import cached_property
 import features_of_forces  # noqa: F401 - adds its features
 import numpy as np
 from features import FEATURES, PLAIN, Feature
-from own_parts import LAWS, SOFTENING
+from own_parts import CONNECTOR_LAWS, LAWS, SOFTENING
 
 STATICS = ("Static()", "ExactStatic()", "Static()", "ExactStatic(0.7)")
 DYNAMICS = (
@@ -28,7 +28,7 @@ SCHEMES = (*STATICS, *DYNAMICS)
 EXACT = ("ub.ExactStatic", "ub.Midpoint", "ub.DecayingMidpoint", "Weighted")
 
 HOLDING = (
-    "Link", "Prismatic", "measured=", "Guided", "Motor", "Release", "Coulomb", "RigidPlastic",
+    "Link", "Prismatic", "measured=", "Guided", "Motor", "Release", "Coulomb", "Brake", "RigidPlastic",
     "hinges=", "Prescribed", "Roller", "Body",
 )  # fmt: skip
 """Constraints, at which accelerations of undamped Newmark oscillate."""
@@ -238,7 +238,7 @@ class Combination:
         found |= {"ground"} if self.has("ub.ground") else set()
         found |= {"law_functions", "MaterialLaw"} if self.has(*LAWS) else set()
         found |= {"law_functions", "SofteningLaw"} if self.has(*SOFTENING) else set()
-        found |= {"ConnectorLaw"} if self.has("Stiffening", "Relaxing") else set()
+        found |= {"ConnectorLaw"} if self.has(*CONNECTOR_LAWS) else set()
         own = {"Coefficients", "ExactStep", "Midway", "Scheme", "DynamicScheme", "Step"}
         return found | (own if self.has("Weighted") else set())
 

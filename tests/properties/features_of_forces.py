@@ -133,6 +133,34 @@ def connector_law_with_history(d):
     _connect(d, f"Relaxing({', '.join(f'{x:.4g}' for x in numbers)})")
 
 
+@feature(statics=False)
+def cushion(d):
+    place = d.one([f"{d.last}.at(0.5)", "b0.end"])
+    law = f"Cushion({d.some(50, 200):.4g}, {d.some(0.02, 0.1):.4g}, {d.some(0.1, 2):.4g})"
+    d.connectors.append(f"ub.Bushing(ub.ground(0.2, 0.7), {place}, {law}, axis=(0.3, 1.0))")
+
+
+@feature(elastic=False)
+def clearance(d):
+    law = f"ub.Clearance({d.some(300, 900):.4g}, gap={d.some(0.002, 0.01):.4g})"
+    d.connectors.append(f"ub.Bushing(ub.ground(0.2, 0.7), {d.last}.end, {law}, axis=(0.3, 1.0))")
+
+
+@feature(statics=False, elastic=False)
+def rough_clearance(d):
+    law = (
+        f"ub.Clearance({d.some(300, 900):.4g}, gap={d.some(0.002, 0.01):.4g}, damping=1.0, "
+        f"friction={d.some(0.1, 0.5):.3g}, radius=0.02)"
+    )
+    d.connectors.append(f"ub.Bushing(ub.ground(0.2, 0.7), {d.last}.end, {law}, axis=(0.3, 1.0))")
+
+
+@feature("rubs", statics=False, at_end=False, elastic=False)
+def brake(d):
+    rest = d.some(0.3, 2)
+    _connect(d, f"Brake({rest:.4g}, {rest * d.some(0.5, 1):.4g}, {d.some(0.02, 0.2):.4g})")
+
+
 @feature(at_end=False, elastic=False)
 def rigid_plastic(d):
     law = f"ub.RigidPlastic(ub.Hardening({d.some(1, 4):.4g}, modulus={d.some(50, 200):.4g}))"

@@ -133,6 +133,8 @@ class RisesFirst(ub.SofteningLaw):
 LAWS, SOFTENING = ("Dashpot", "PowerLaw"), ("Bilinear", "RisesFirst")
 """Names of the material laws and of the softening laws."""
 
+CONNECTOR_LAWS = "Stiffening", "Relaxing", "Cushion", "Brake"
+
 
 # -- laws of connectors ------------------------------------------------------------------------
 
@@ -189,6 +191,42 @@ class Relaxing(ub.ConnectorLaw):
 
     def increments(self, motion, rate, state, dt):
         return {"creep": (motion - state.creep) / (self.time / dt + 1)}
+
+
+@dataclass(frozen=True)
+class Cushion(ub.ConnectorLaw):
+    """Two components that stiffen each other, with a damper."""
+
+    k: float
+    size: float
+    c: float
+    components: ClassVar = 2
+
+    def energy(self, motion, state):
+        x, y = motion
+        return self.k * (x**2 + 2 * y**2) / 2 * (1 + (x**2 + y**2) / self.size**2)
+
+    def resistance(self, motion, rate, state, dt):
+        return self.c * rate[0], self.c * rate[1]
+
+
+@dataclass(frozen=True)
+class Brake(ub.ConnectorLaw):
+    """It breaks loose at a limit, which grows with the way of sliding, and slides below it."""
+
+    rest: float
+    moving: float
+    way: float
+    variables: ClassVar = {"slipped": 0.0}
+
+    def limit(self, state):
+        return self.rest * (1 + state.slipped / self.way)
+
+    def sliding(self, motion, rate, state, dt):
+        return self.moving * (1 + state.slipped / self.way)
+
+    def increments(self, motion, rate, state, dt):
+        return {"slipped": f.absolute(rate) * dt}
 
 
 class Integral:
