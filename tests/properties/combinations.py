@@ -28,8 +28,8 @@ SCHEMES = (*STATICS, *DYNAMICS)
 EXACT = ("ub.ExactStatic", "ub.Midpoint", "ub.DecayingMidpoint", "Weighted")
 
 HOLDING = (
-    "Link", "Prismatic", "measured=", "Guided", "Motor", "Release", "Coulomb", "Brake", "RigidPlastic",
-    "hinges=", "Prescribed", "Roller", "Body",
+    "Link", "Prismatic", "measured=", "Guided", "Motor", "Release", "Coulomb", "Brake",
+    "RigidPlastic", "hinges=", "Prescribed", "Roller", "Body",
 )  # fmt: skip
 """Constraints, at which accelerations of undamped Newmark oscillate."""
 

@@ -138,7 +138,7 @@ def test_tangent_is_the_derivative(name, scheme):
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 def test_springs_in_one_law_are_springs(scheme):
     """The same solution as three connectors with a spring each."""
-    at, (bushing,), one = cantilever(LAWS["springs"])
+    _, (bushing,), one = cantilever(LAWS["springs"])
     beam, load = one.beams[0], one.loads[0]
     ends, law = (ub.ground(1, 0), beam.end), bushing.law
     links = [
@@ -310,8 +310,8 @@ def test_on_a_line_it_is_a_stop(scheme, damping):
     hole = ub.Clearance(2e4, gap=0.01, damping=damping)
     at, link, scene = pinned(hole, v=tuple(v * way))
     body = ub.Body((1, 0), mass=2.0, inertia=1.0)
-    stop = ub.Slide(ub.ground(1, 0), body.middle, ub.Stop(2e4, low=-0.01, high=0.01, damping=damping),
-                    axis=tuple(way))  # fmt: skip
+    edges = ub.Stop(2e4, low=-0.01, high=0.01, damping=damping)
+    stop = ub.Slide(ub.ground(1, 0), body.middle, edges, axis=tuple(way))
     start = ub.Velocity((body,), linear=tuple(v * way))
     line = ub.Scene(bodies=[body], connectors=[stop], initial=[start])
     found, expected = (
@@ -337,7 +337,7 @@ def test_without_friction_the_spin_stays():
 
 @pytest.mark.parametrize("friction", [0.1, 0.4])
 def test_a_turning_pin_climbs_to_the_friction_angle(friction):
-    """Driven slowly round it slides where tan φ is the friction; the drive bears mg r sin φ [closed].
+    """Driven slowly it slides where tan φ is the friction; the drive bears mg r sin φ [closed].
 
     The contact is in its edge by mg cos φ/k, by which the moment of the friction is not longer: the
     surface of the pin is where it is pressed.
@@ -362,7 +362,7 @@ def test_a_turning_pin_climbs_to_the_friction_angle(friction):
 
 
 def test_a_pin_that_is_held_by_friction_rests():
-    """A moment below the limit rolls it by an angle whose sine is M/(mg r), and no further [closed].
+    """A moment below the limit rolls it by an angle whose sine is M/(mg r), no further [closed].
 
     Then the surfaces have rolled by the same length, but for the deflection of the contact.
     """
@@ -402,7 +402,7 @@ def law_of(**members):
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda a, b: ub.Slide(a, b, LAWS["cushion"], axis=(1, 0)), "Cushion acts on 2 components of"),
+        (lambda a, b: ub.Slide(a, b, LAWS["cushion"], axis=(1, 0)), "Cushion acts on 2 components"),
         (lambda a, b: ub.Turn(a, b, LAWS["hole"]), "use Bushing(a, b, law)"),
         (lambda a, b: ub.Bushing(a, b, ub.Stop(1.0, high=0.1)), "acts on one component"),
         (lambda a, b: ub.Bushing(a, b, ub.Spring(1.0)), "law"),

@@ -155,16 +155,15 @@ def test_tangent_is_the_derivative(name, scheme):
     known |= {f"state {n}": 1e-3 for n in law.variables}
 
     def ask(e0, e1):
-        w, answers = np.array([{**known, "before 0": e0, "motion 0": e1}[n] for n in names]), np.zeros(2)
+        given, answers = {**known, "before 0": e0, "motion 0": e1}, np.zeros(2)
+        w = np.array([given[n] for n in names])
         lib.ask_law(forms.force, doubles(w), 2, doubles(answers))
         return answers
 
     for e0, e1 in [(0.01, 0.013), (-0.02, 0.03), (0.01, 0.01 + 1e-9), (0.02, 0.02), (0.0, 0.0)]:
         ε = 1e-6
         found = (ask(e0, e1 + ε)[0] - ask(e0, e1 - ε)[0]) / (2 * ε)
-        assert ask(e0, e1)[1] == pytest.approx(
-            found, rel=1e-5, abs=0.6 if name == "drag" else 1e-4
-        )
+        assert ask(e0, e1)[1] == pytest.approx(found, rel=1e-5, abs=0.6 if name == "drag" else 1e-4)
 
 
 @pytest.mark.parametrize("law", [Cubic(100.0, 1e5), Bump(200.0, 0.02), LAWS["stop"]], ids=repr)
@@ -504,7 +503,7 @@ ONE = {"variables": {"z": 0.0}, "energy": quadratic}
 @pytest.mark.parametrize(
     ("make", "message"),
     [
-        (lambda: law_of(), "Mine has neither energy nor resistance; define one"),
+        (lambda: law_of(), "Mine has neither energy nor resistance, nor a limit; define one"),
         (lambda: type("Plain", (ub.ConnectorLaw,), {"energy": quadratic})(), "must be a dataclass"),
         (lambda: law_of(energy=quadratic, fields={"k": math.nan}), "Mine: k = nan is not finite"),
         (lambda: law_of(energy=quadratic, fields={"k": "x"}), "Mine: k = 'x' is not a number"),

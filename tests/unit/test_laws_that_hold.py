@@ -70,7 +70,7 @@ def oscillator(*laws, v=1.5):
     mass = ub.Body((1, 0), mass=2.0, inertia=1.0)
     rail = ub.ground(0, 0), mass.middle
     links = [ub.Slide(*rail, law) for law in laws]
-    push = ub.PointLoad(mass.middle, force=(8.0, 0), time=lambda t: math.sin(7 * t))
+    push = ub.PointLoad(mass.middle, force=(3.0, 0), time=lambda t: math.sin(4 * t))
     scene = ub.Scene(
         bodies=[mass], joints=[ub.Prismatic(*rail)], loads=[push],
         connectors=[ub.Slide(*rail, ub.Spring(50.0)), *links],
@@ -98,10 +98,13 @@ def test_a_constant_limit_is_dry_friction(scheme):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-11 * np.abs(other).max())
 
 
-@pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+@pytest.mark.parametrize(
+    ("name", "scheme"),
+    # In statics a force that falls when it slides is a limit load.
+    [(name, one) for name in LAWS for one in SCHEMES if (name, one) != ("breakaway", ub.Static())],
+)
 def test_held_exactly_and_never_gives_energy(name, scheme):
-    at, (link,), scene = oscillator(LAWS[name])
+    _, (link,), scene = oscillator(LAWS[name])
     solution = run(scene, scheme)
     history = solution.connector(link)
     lost = solution.energy.lost[LAWS[name].entry]
@@ -109,14 +112,14 @@ def test_held_exactly_and_never_gives_energy(name, scheme):
     if scheme != ub.Static():
         assert solution.energy.worst < 1e-9
     held = np.abs(np.diff(history.motion)) < 1e-13
-    assert held.any() and not held.all()
+    assert 0 < held.sum() < len(held)
     largest = LAWS[name].limit(LAWS[name].initially())
     if name != "breakaway":  # whose viscous part comes on top
         assert np.abs(history.force).max() <= largest * (1 + 1e-9)
 
 
 def test_a_slow_pull_slips_by_twice_the_drop():
-    """A mass on a slow spring: it breaks loose at Fs, and comes to rest after 2 (Fs - Fk)/k [closed].
+    """A mass on a slow spring breaks loose at Fs, and rests after 2 (Fs - Fk)/k [closed].
 
     The spring moves by v T in the half period T of a slip, a part 2.5e-3 of it.
     """
@@ -145,7 +148,7 @@ def test_a_slow_pull_slips_by_twice_the_drop():
 
 def test_what_wears_is_lost():
     """The way of sliding is the variable, and the loss its integral of the limit [closed]."""
-    at, (link,), scene = oscillator(Wearing(2.0, 0.5, 0.1))
+    _, (link,), scene = oscillator(Wearing(2.0, 0.5, 0.1))
     coarse, fine = (
         (solution := run(scene, ub.Midpoint(), dt=dt)).energy.lost["connectors"][-1]
         - lost_over(np.abs(np.diff(solution.connector(link).motion)).sum())
@@ -180,7 +183,7 @@ def test_reference(name, scheme):
 
 @pytest.mark.parametrize("scheme", [ub.Midpoint(0.05), ub.Static()], ids=str)
 def test_restart_and_start(scheme, shared_path):
-    at, links, scene = oscillator(*LAWS.values())
+    _, links, scene = oscillator(*LAWS.values())
     whole = run(scene, scheme, t=(0, 1))
     file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
     run(scene, scheme, t=(0, 0.5), checkpoint=file)
@@ -221,4 +224,3 @@ def test_where_friction_is_refused():
         run(scene, ub.Newmark())
     with pytest.raises(ub.SceneError, match="a path has none"):
         ub.follow(scene, ub.LoadControl(0.2), steps=5)
-

@@ -187,7 +187,8 @@ class Fields:
         """A new matrix on the degrees of freedom of this process."""
         if self._matrix is None:
             share = self.share
-            links, couples = share.grid.scene.links, [share.cell_dofs, share.link_dofs, share.body_dofs]
+            links = share.grid.scene.links
+            couples = [share.cell_dofs, share.link_dofs, share.body_dofs]
             component = np.array([links[i].component for i in share.links], dtype=np.int32)
             for back in range(1, component.max(initial=0) + 1):  # forces of one bushing
                 later, force = np.flatnonzero(component >= back), share.link_dofs[:, 6]

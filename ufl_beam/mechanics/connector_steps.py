@@ -72,7 +72,8 @@ def law_step(
     numerical = zero
     if part > 0.5 and scheme.average(0.0, 1.0) != 1.0:  # works are exact increments of energy
         # What backward Euler loses: of second order, and positive of convex energies.
-        growth = sum(ufl.diff(stored, m) * (x1 - x0) for m, (x0, x1) in zip(moved, pairs, strict=True))
+        each = zip(moved, pairs, strict=True)
+        growth = sum(ufl.diff(stored, m) * (x1 - x0) for m, (x0, x1) in each)
         growth += sum(ufl.diff(stored, z) * (z - getattr(old, n)) for n, z in end.items())
         numerical = (2 * part - 1) * (law.energy(law.given(e0), old) - stored + growth)
     return LawStep(forces, stored, numerical, tuple(end.values()))

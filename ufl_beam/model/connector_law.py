@@ -29,8 +29,8 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
 
     Attributes:
         variables: Internal variables, and their values before anything has happened.
-        components: Motions that the law acts on; 2 or 3 of a law for :class:`Bushing`, whose methods
-            get tuples of motions and rates, and whose resistance is a tuple.
+        components: Motions that the law acts on; 2 or 3 of a law for :func:`Bushing`, whose
+            methods get tuples of motions and rates, and whose resistance is a tuple.
         entry: Entry of the ledger, in ``lost``, of what is not stored.
         active: True of a law that may give energy, such as a drive.  Else runs warn if the energy
             that it has lost falls.
@@ -68,7 +68,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return 0.0
 
     def resistance(self, motion: Any, rate: Any, state: State, dt: Values) -> Any:
-        """Force beside that of the energy, zero by default; N or N m; of several components a tuple.
+        """Force beside that of the energy, zero by default; N or N m; a tuple of several.
 
         Args:
             motion: At the time of the step at which the law holds; m or rad.
@@ -87,16 +87,17 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return 0.0
 
     def sliding(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
-        """Size of the force against the motion while it is not held, the limit by default; N or N m.
+        """Size of the force against sliding, the limit by default; N or N m.
 
         Args:
-            motion: As in :meth:`resistance`, and so are rate, state and dt.
+            motion: At the time of the step at which the law holds; m or rad.
+            rate: Mean rate of the step; m/s or rad/s.
+            state: Internal variables at the time of the motion.
+            dt: Length of the step; s.
         """
         return self.limit(state)
 
-    def increments(
-        self, motion: Any, rate: Any, state: State, dt: Values
-    ) -> Mapping[str, Values]:
+    def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
         """Changes of the variables over a backward-Euler step of length dt, in closed form.
 
         Args:

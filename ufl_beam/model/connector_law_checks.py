@@ -58,7 +58,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
         raise SceneError(f"{what}.components = {law.components!r} must be 1, 2 or 3")
     motion, state = law.given([np.zeros(1)] * law.components), law.initially()
     calls = {"energy": (motion, state), "limit": (state,)}
-    calls |= dict.fromkeys(CALLED[2:], (motion, motion, state, 1.0))  # type: ignore[arg-type]
+    calls |= dict.fromkeys(CALLED[2:], (motion, motion, state, 1.0))
     for name, arguments in calls.items():
         try:
             with np.errstate(all="ignore"):

@@ -347,9 +347,7 @@ class Clearance(Record, ConnectorLaw):
         rubbing = self.stiffness * state.deflection
         return damped * x - rubbing * y, damped * y + rubbing * x, rubbing * self.radius
 
-    def increments(
-        self, motion: Any, rate: Any, state: State, dt: Values
-    ) -> Mapping[str, Values]:
+    def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
         """The surface of the pin takes the deflection along, up to the limit."""
         if not self.rubs:
             return {}

@@ -29,7 +29,7 @@ from ufl_beam.model.bodies import (
     node,
 )
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
-from ufl_beam.model.connectors import Bushing, Connector
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import enclosing_diameter, points_along
 from ufl_beam.model.damping import Damping, KelvinVoigt
 from ufl_beam.model.joints import Joint
@@ -78,7 +78,7 @@ class Scene(Rich):
     initial: Sequence[Velocity] = ()
     damping: Sequence[Damping] = ()
     bodies: Sequence[Body] = ()
-    connectors: Sequence[Connector | Bushing] = ()
+    connectors: Sequence[Connector] = ()
     works: Sequence[Work] = ()
 
     @no_garbage_collection()
@@ -86,7 +86,7 @@ class Scene(Rich):
         kinds: dict[str, type | tuple[type, ...]] = {
             "beams": Beam, "joints": Joint, "supports": Support, "loads": Load.__args__,
             "masses": PointMass, "initial": Velocity, "damping": Damping.__args__, "bodies": Body,
-            "connectors": (Connector, Bushing), "works": (VirtualWork, Potential),
+            "connectors": Connector, "works": (VirtualWork, Potential),
         }  # fmt: skip
         for part, kind in kinds.items():
             records = require_sequence(getattr(self, part), f"Scene: {part}")
@@ -169,11 +169,7 @@ class Scene(Rich):
         held = [holder for joint in self.joints for holder in joint.holders]
         pushing = (load for load in self.loads if isinstance(load, PointLoad))
         loads = [push for load in pushing for push in _off_center(load)]
-        between = [
-            link
-            for one in self.connectors
-            for link in (one.components if isinstance(one, Bushing) else (one,))
-        ]
+        between = [link for one in self.connectors for link in one.components or (one,)]
         return (*held, *between, *loads)
 
     @cached_property

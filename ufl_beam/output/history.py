@@ -15,7 +15,7 @@ from ufl_beam.arrays import State
 from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
 from ufl_beam.model.bodies import Anchor, require_anchors
-from ufl_beam.model.connectors import Bushing, Connector
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.joint_histories import links_of, motion_of
@@ -25,6 +25,7 @@ from ufl_beam.output.state_view import StateView
 
 MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))  # columns of a place, and their units
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # beginnings of formulas in spreadsheets
+COMPONENTS = ("along", "across", "turn")  # of a bushing
 CONNECTOR = ("motion", "force", "work")  # columns of a connector
 
 
@@ -58,7 +59,7 @@ class History(Recorder):
         self,
         path: str | Path,
         places: Sequence[Anchor] = (),
-        connectors: Sequence[Connector | Bushing | Joint] = (),
+        connectors: Sequence[Connector | Joint] = (),
         *,
         every: int = 1,
         most: int = sys.maxsize,
@@ -73,7 +74,7 @@ class History(Recorder):
         for i, place in enumerate(self._places):
             require_anchors(f"History {path}: places[{i}]", place)
         for i, one in enumerate(self._connectors):
-            require_kind(one, (Connector, Bushing, Joint), f"History {path}: connectors[{i}]")
+            require_kind(one, (Connector, Joint), f"History {path}: connectors[{i}]")
         self._files: list[OutputFile] = []
 
     @property
@@ -202,14 +203,12 @@ def _line(cells: Sequence[str]) -> bytes:
     return text.getvalue().encode()
 
 
-def _named_links(scene: Scene, followed: Connector | Bushing | Joint) -> list[tuple[int, str]]:
+def _named_links(scene: Scene, followed: Connector | Joint) -> list[tuple[int, str]]:
     """Numbers of links and their names, which tell alike ones between the same places apart."""
     links = links_of(scene, followed)
     if isinstance(followed, Connector):
-        return [(links[0], f"{followed}, {type(followed.law).__name__}")]
-    if isinstance(followed, Bushing):
-        names = ("along", "across", "turn")
-        return [(k, f"{followed}, {name}") for k, name in zip(links, names, strict=False)]
+        names = COMPONENTS if followed.components else (type(followed.law).__name__,)
+        return [(link, f"{followed}, {name}") for link, name in zip(links, names, strict=False)]
     holders = [scene.links[link] for link in links]
     axes = ["psi" if c.turns else "xy"[abs(c.axis[1]) > abs(c.axis[0])] for c in holders]
     return [

@@ -12,7 +12,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
 from ufl_beam.model.connector_laws import Guide
-from ufl_beam.model.connectors import Bushing, Connector
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
@@ -25,7 +25,7 @@ Vectors: TypeAlias = Array | Blocks
 class Connection(NamedTuple):
     """History of a connector.
 
-    Motion, force and rate of a :class:`Bushing` are of all components; (n+1, 2) or (n+1, 3).
+    Motion, force and rate of a :func:`Bushing` are of all components; (n+1, 2) or (n+1, 3).
 
     Attributes:
         motion: Relative motion since the undeformed scene; (n+1,); m or rad.
@@ -70,24 +70,21 @@ class JointHistory(NamedTuple):
 
 
 def connection(numbers: Array) -> Connection:
-    """Columns of a connector; those of a :class:`Bushing` by component, but for works; (..., k, 5)."""
+    """History of the columns of k components, of which works are added; (..., k, 5)."""
     if numbers.shape[-2] == 1:
         columns = np.moveaxis(numbers[..., 0, :], -1, 0)
-        return Connection(*(columns if columns.ndim > 1 else columns.tolist()))
+        return Connection(*(x if x.ndim else float(x) for x in columns))
     motion, force, work, rate, dissipated = np.moveaxis(numbers, -1, 0)
     return Connection(motion, force, work.sum(-1), rate, dissipated.sum(-1))
 
 
-def links_of(scene: Scene, of: Connector | Bushing | Joint) -> list[int]:
+def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
     """Numbers of the links of a connector, or of those that hold a joint of the scene."""
-    if isinstance(of, Bushing):
-        if of not in scene.connectors:
-            raise SceneError(f"{of} is not in the scene")
-        return [scene.links.index(component) for component in of.components]
     if isinstance(of, Connector):
-        if of not in scene.links:
+        links = of.components or (of,)
+        if links[0] not in scene.links:
             raise SceneError(f"{of} is not in the scene")
-        return [scene.links.index(of)]
+        return [scene.links.index(link) for link in links]
     if of not in scene.joints:
         raise SceneError(f"{of} is not in the scene")
     if not of.holders:

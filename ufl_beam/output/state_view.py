@@ -20,7 +20,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
-from ufl_beam.model.connectors import Bushing, Connector
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
@@ -199,7 +199,7 @@ class StateView(ABC):
             self.share.comm.Allreduce(MPI.IN_PLACE, here)
         return here
 
-    def connector(self, connector: Connector | Bushing) -> Connection:
+    def connector(self, connector: Connector) -> Connection:
         """Return motion, force, work and rate of a connector at the end of the last step.
 
         Raises:

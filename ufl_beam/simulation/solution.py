@@ -16,7 +16,7 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor, Member, Place
-from ufl_beam.model.connectors import Bushing, Connector
+from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
@@ -198,7 +198,7 @@ class Solution(Rich):
 
     # -- joints --------------------------------------------------------------------------------
 
-    def connector(self, connector: Connector | Bushing) -> Connection:
+    def connector(self, connector: Connector) -> Connection:
         """Relative motion, force and work of a connector.
 
         Raises:

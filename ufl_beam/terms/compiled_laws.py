@@ -21,8 +21,8 @@ from ufl_beam.mechanics.connector_steps import law_step
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_law_checks import place_of
-from ufl_beam.model.material_law import State
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.material_law import State
 from ufl_beam.terms.connector_laws import Rubbing
 from ufl_beam.terms.connector_responses import Response, Setting, respond
 from ufl_beam.terms.phases import Callbacks

@@ -119,10 +119,12 @@ class Rubbing(Response):
         self.in_c = {**self.in_c, "friction": self._friction}
 
     def know(self, couplings: Any) -> None:
+        """Take the rates of the motions."""
         rate, v = couplings.rate_of_motion, couplings.velocities
         fill(self._friction, rate=rate.cells, at_v=rate.position(v))
 
     def about_force(self, rows: Array) -> Array:
+        """Zero for what sticks."""
         return np.where(self._sticks != 0, 0.0, 1.0)
 
     def state(self) -> Array:
@@ -130,6 +132,7 @@ class Rubbing(Response):
         return np.column_stack([self._accepted, super().state()])
 
     def restore(self, rows: Array) -> None:
+        """Take over a :meth:`state`."""
         self._slip[:] = self._accepted[:] = rows[:, 0]
         super().restore(rows[:, 1:])
 

@@ -57,9 +57,9 @@ def _one_cell() -> meshes.Mesh:
 class Couplings(Links):
     """Connectors of the same relative motions whose laws are of one kind.
 
-    Each is a cell of unit length from one node to the other, with its forces as unknowns after those
-    of the nodes.  Components of a :class:`Bushing` are links that stand one after the other.  Forms,
-    and laws of many kinds, are evaluated in C.
+    Each is a cell of unit length from one node to the other, with its forces as unknowns after
+    those of the nodes.  Components of a :func:`Bushing` are links that stand one after the other.
+    Forms, and laws of many kinds, are evaluated in C.
     """
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
@@ -76,7 +76,7 @@ class Couplings(Links):
             self._form, (forms.work, forms.tangent, forms.motion)
         )
         self._tangent.place(A)
-        self._e, self._now, self._rows = np.zeros(n), np.zeros(n), np.zeros((self._cells, k * (k + 2)))
+        self._e, self._now, self._rows = np.zeros(n), np.zeros(n), np.zeros((n, k + 2))
         self._rows[:, 0] = 1.0  # held, until a law says something else
         for kernel in (self._work, self._tangent):
             kernel.put(forms.row, self._rows)
@@ -193,8 +193,8 @@ class Couplings(Links):
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         change, e = self._tangent_change, self.motion(q1)
-        rows = self.rows(q1)
-        bends = np.reshape(self.response.bends(e), (self._cells, -1))
+        both = self.rows(q1), self.response.bends(e)
+        rows, bends = (np.reshape(x, (self._cells, -1)) for x in both)
         for function, values in ((self._forms.row, rows), (self._forms.bend, bends)):
             if change.uses(function):
                 change.put(function, values)
