@@ -79,7 +79,7 @@ class Couplings(Links):
         self._e, self._now, self._rows = np.zeros(n), np.zeros(n), np.zeros((n, k + 2))
         self._rows[:, 0] = 1.0  # held, until a law says something else
         for kernel in (self._work, self._tangent):
-            kernel.put(forms.row, self._rows)
+            kernel.put(forms.row, self._rows.reshape(self._cells, -1))
         self._in_c = struct(
             "couplings", number=self._cells, components=k,
             link=np.arange(self._cells, dtype=np.int32), dofs=self._dofs,
@@ -173,16 +173,14 @@ class Couplings(Links):
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Put minus the change of the motions where the row is about the force."""
-        rows = self.rows(q)
-        k = len(self.links) // self._cells
-        about_force = self.response.about_force(rows.reshape(-1, k + 2))
+        about_force = self.response.about_force(self.rows(q))
         if about_force.any():
             works[self._forces_at] = np.where(
                 about_force != 0.0, -about_force * self.rates(q, v), works[self._forces_at]
             )
 
     def rows(self, q: Array) -> Array:
-        """Rows of the laws around ``q``; (num_cells, n (n + 2)) with n components."""
+        """Rows of the laws around ``q``; (num_links, k + 2) with k components."""
         lib.find_rows(self._in_c, doubles(q), doubles(self._rows))
         return self._rows
 
