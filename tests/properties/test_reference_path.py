@@ -235,15 +235,14 @@ def sign_of_jump(patch):
 
 def hardening_twice(patch):
     """Accumulated plastic strain counts twice."""
-    commit = points.MaterialPoints._commit
+    accept = points.MaterialPoints.accept
 
     def wrong(self):
         before = self.at["state accumulated"].copy()
-        sums = commit(self)
+        accept(self)
         self.at["state accumulated"] += self.at["state accumulated"] - before
-        return sums
 
-    patch.setattr(points.MaterialPoints, "_commit", wrong)
+    patch.setattr(points.MaterialPoints, "accept", wrong)
 
 
 def factor_of_forms(patch):
@@ -264,31 +263,35 @@ def limit_of_slips(patch):
     direction = _Slipping._direction
 
     def wrong(self, motion, λ):
-        self._limit *= 0.9
+        limit = self.z["limit"]
+        self.z["limit"] = 0.9 * limit
         try:
             return direction(self, motion, λ)
         finally:
-            self._limit /= 0.9
+            self.z["limit"] = limit
 
     patch.setattr(_Slipping, "_direction", wrong)
 
 
 def energy_of_points(patch):
     """What points dissipate is entered with the wrong sign."""
-    commit = points.MaterialPoints._commit
+    accept = points.MaterialPoints.accept
 
     def wrong(self):
-        plastic, *others = commit(self)
-        return -plastic, *others
+        lost = self._ledger.lost
+        before = lost.get("plastic", 0.0)
+        accept(self)
+        if "plastic" in lost:
+            lost["plastic"] = 2 * before - lost["plastic"]
 
-    patch.setattr(points.MaterialPoints, "_commit", wrong)
+    patch.setattr(points.MaterialPoints, "accept", wrong)
 
 
 def time_of_loads(patch):
     """Loads are taken at the end of the step."""
-    begin = loads.DeadLoad.begin
+    begin = loads.LoadForce.begin
     wrong = lambda self, step: begin(self, step._replace(load_time=step.t1))  # noqa: E731
-    patch.setattr(loads.DeadLoad, "begin", wrong)
+    patch.setattr(loads.LoadForce, "begin", wrong)
 
 
 def mass_of_beams(patch):
