@@ -30,7 +30,7 @@ from ufl_beam.mechanics.time_schemes import (
 )
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.model.fibres import Layout
-from ufl_beam.reference.cells import CellForce, Cells, Force, Ledger, Memory, OnNodes, lumps, put
+from ufl_beam.reference.cells import CellForce, Cells, Force, Ledger, Memory, lumps, put
 from ufl_beam.reference.points import MaterialPoints, Search
 
 
@@ -41,7 +41,7 @@ class ElasticBeams(CellForce):
 
     def __init__(self, grid: Grid, numbers: Index, scheme: Scheme, ledger: Ledger) -> None:
         cells = Cells(grid, numbers)
-        of, self._ledger = cells.element, ledger
+        of = cells.element
         C, e0, e1 = of.stiffness, strain(of.q0, of.axis), strain(of.q1, of.axis)
         r, losses = scheme.resultants(C, e0, e1, of.constant), []
         if scheme.alpha:
@@ -52,11 +52,9 @@ class ElasticBeams(CellForce):
             r = r + damped
             losses.append(virtual_work(damped, e1 - e0))
         w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
-        super().__init__(cells, virtual_work(r, w_e) * of.dx(1))
-        self._lost = cells.form(sum(losses) * of.dx(1)) if losses else None
-        if losses:
-            ledger.lost["numerical"] += 0.0
-        self._energy = cells.form(elastic_energy(e1, C) * of.dx(1))
+        energy = elastic_energy(e1, C) * of.dx(1), "stored"
+        lost = (sum(losses) * of.dx(1), "numerical") if losses else None
+        super().__init__(cells, virtual_work(r, w_e) * of.dx(1), ledger, stored=energy, lost=lost)
         self._last_change: Array = np.zeros((len(numbers), len(grid.mesh.point_weights), 3))
         self._last_dt = math.inf
 
@@ -67,21 +65,14 @@ class ElasticBeams(CellForce):
 
     def change(self, q1: Array) -> float:
         """Energy that is stored in the step to ``q1``; J."""
-        return self.value(self._energy, q1) - self.stored["stored"]
+        return self.energy(q1) - self.stored["stored"]
 
     def accept(self, q1: Array, s: Array) -> None:
-        """Take the end of the step, and enter what the scheme has lost."""
+        """Take the end of the step, and the changes of the strains in it."""
         super().accept(q1, s)
-        if self._lost is not None:
-            self._ledger.lost["numerical"] += self.value(self._lost, q1)
         if self._decays:
             self._last_change = self.cells.strains(q1) - self.cells.strains(self.q0)
             self._last_dt = self.dt
-        self.start(q1)
-
-    def start(self, q: Array) -> None:
-        """Take the elastic energy of a configuration."""
-        self.stored = {"stored": self.value(self._energy, q)}
 
     def remember(self, memory: Memory) -> None:
         """Changes of the strains in the last step, and its length."""
@@ -112,7 +103,7 @@ class YieldingBeams(CellForce):
         w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
         linear = self._b + ufl.dot(self._D, strain(of.q1, of.axis))
         work, around = (virtual_work(r, w_e) * of.dx(1) for r in (self._r, linear))
-        super().__init__(cells, work, around)
+        super().__init__(cells, work, ledger, around=around)
         self._names = [grid.describe_cell(number) for number in cells.numbers]
         keys = grid.keys(cells.numbers)
         self.points = MaterialPoints(layout, keys, cells.lengths, scheme, search, ledger)
@@ -202,7 +193,7 @@ class Mass:
         self.matrix = cells.form(form).matrix() + csr_array(scipy.sparse.diags_array(diagonal))
         self._of_beams = cells.form(ufl.action(form, cells.element.q1))
 
-    def on_nodes(self, v: Array) -> OnNodes:
+    def on_nodes(self, v: Array) -> Array:
         """Mass of the beams times a vector."""
         self.cells.set(self.cells.element.q1, v)
         return self.cells.on_nodes("density", self._of_beams)
@@ -266,7 +257,7 @@ class Inertia(MatrixForce):
 
     def accept(self, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme has lost."""
-        self.on_nodes = [self.mass.on_nodes(self.rate(q1))]
+        self.on_nodes = self.mass.on_nodes(self.rate(q1))
         v, *more = self.after(s)
         if self.of_step.slip is not None:
             change = v - self.v
@@ -314,10 +305,7 @@ class RayleighForce(MatrixForce):
         self._ledger.lost["damping"] += float(s @ (self.matrix @ s)) / self._dt
         by_mass = self._mass.on_nodes(self.rate(q1))
         by_stiffness = self._mass.cells.on_nodes("stress", self._stiffness)  # at the same vector
-        self.on_nodes = [
-            by_mass._replace(forces=self._damping.mass * by_mass.forces),
-            by_stiffness._replace(forces=self._damping.stiffness * by_stiffness.forces),
-        ]
+        self.on_nodes = self._damping.mass * by_mass + self._damping.stiffness * by_stiffness
 
 
 class KelvinVoigtForce(CellForce):
@@ -327,23 +315,17 @@ class KelvinVoigtForce(CellForce):
         self, damping: KelvinVoigt, grid: Grid, numbers: Index, scheme: Scheme, ledger: Ledger
     ) -> None:
         cells = Cells(grid, numbers)
-        of, self._time, self._ledger = cells.element, damping.time, ledger
-        self._rate = of.constant(1.0)
+        of, self._time, self._rate = cells.element, damping.time, cells.element.constant(1.0)
         change = strain(of.q1, of.axis) - strain(of.q0, of.axis)
         r = self._rate * resultants(change, of.stiffness)
         w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
-        super().__init__(cells, virtual_work(r, w_e) * of.dx(1))
-        self._lost = cells.form(virtual_work(r, change) * of.dx(1))
+        lost = virtual_work(r, change) * of.dx(1), "damping"
+        super().__init__(cells, virtual_work(r, w_e) * of.dx(1), ledger, lost=lost)
 
     def begin(self, step: Step) -> None:
         """Tell the form the length of the step."""
         super().begin(step)
         self._rate.value = self._time / step.dt
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the energy that was damped."""
-        super().accept(q1, s)
-        self._ledger.lost["damping"] += self.value(self._lost, q1)
 
 
 def damping_forces(

@@ -8,10 +8,10 @@ and neighbours share.  Residuals of the scene are Cᵀ r, tangents Cᵀ K C.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy  # its parts are loaded when they are used
@@ -28,6 +28,9 @@ from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Step
 
 T = TypeVar("T", bound=Array | None)
+
+Entry = tuple[ufl.Form, str]
+"""Form of an energy, and its entry in the ledger."""
 
 
 @dataclass
@@ -78,14 +81,6 @@ class Memory:
         return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
 
 
-class OnNodes(NamedTuple):
-    """Forces of a part of the equation on the nodes of some cells."""
-
-    kind: str  # "stress"; "work" of a user; "density", which acts along all of the cell
-    cells: Index  # numbers of the cells in the scene
-    forces: Array  # (num_cells, 3, nodes of a cell); N, N, N m
-
-
 class Force:
     """Virtual work in the equation of a step; a method that a force does not define does nothing.
 
@@ -93,13 +88,13 @@ class Force:
         inner: Whether it acts between parts of the scene: cells and connectors.
         size: Number of degrees of freedom of the scene.
         stored: Energies that it holds in the accepted state, by entry of the ledger; J.
-        on_nodes: Forces on the nodes of cells in the step that was accepted last.
+        on_nodes: Forces on the cells in the accepted step, see :func:`numbers_of_cells`.
     """
 
     inner = False
     size: int
     stored: Mapping[str, float] = {}
-    on_nodes: Sequence[OnNodes] = ()
+    on_nodes: Array | float = 0.0
 
     def begin(self, step: Step) -> None:
         """Begin a step; iterates begin anew."""
@@ -200,7 +195,7 @@ class Cells:
 
     def __init__(self, grid: Grid, numbers: Index) -> None:
         mesh, order = separate_cells(grid.points[grid.cells[numbers]])
-        self.numbers, self.size = numbers[order], grid.size
+        self.numbers, self.size, self._grid = numbers[order], grid.size, grid
         self.lengths, self.element = grid.lengths(self.numbers), Element(grid.mesh, mesh)
         of, self._weights = self.element, grid.mesh.point_weights
         self._dofs = dofs_of_cells(of.space)
@@ -232,10 +227,32 @@ class Cells:
         weighted = ufl.dot(strain(of.q1, of.axis), ufl.TestFunction(space)) / of.axis.h
         return self.form(weighted * of.dx(1)), dofs_of_cells(space)
 
-    def on_nodes(self, kind: str, form: Form) -> OnNodes:
-        """Forces of a linear form on the nodes of the cells."""
+    def on_nodes(self, kind: str, form: Form) -> Array:
+        """Forces of a linear form on the nodes of the cells, see :func:`numbers_of_cells`."""
         forces = form.entries()[self._dofs].reshape(len(self.numbers), 3, -1)
-        return OnNodes(kind, self.numbers, forces)
+        return numbers_of_cells(self._grid, kind, self.numbers, forces)
+
+
+def numbers_of_cells(grid: Grid, kind: str, cells: Index, forces: Array) -> Array:
+    """Forces at both ends of all cells, and how they are distributed; (9, num_cells).
+
+    (X, Y, M) at the start and at the end; the couple of what acts along a cell; first moments
+    of its forces about the middle, over the length.
+
+    Args:
+        grid: Numbering of the scene.
+        kind: "stress"; "work" of a user; "density", which acts along all of the cell.
+        cells: Numbers of cells.
+        forces: On their nodes; (len(cells), 3, nodes of a cell); N, N, N m.
+    """
+    numbers = np.zeros((9, len(grid.cells)))
+    first, *between, last = grid.mesh.nodes - 0.5
+    numbers[:3, cells], numbers[3:6, cells] = forces[:, :, 0].T, forces[:, :, 1].T
+    if kind != "stress":
+        numbers[6, cells] = forces[:, 2].sum(axis=1)
+    if kind == "density":
+        numbers[7:, cells] = (forces[:, :2] @ np.array([first, last, *between])).T
+    return numbers
 
 
 class CellForce(Force):
@@ -244,18 +261,26 @@ class CellForce(Force):
     Args:
         cells: Where it acts.
         work: The form.
+        ledger: Where energies are entered.
         around: Form with the same derivative, if UFL cannot derive ``work``.
-        kind: See :class:`OnNodes`.
+        stored: Form of the energy at the end of the step, and its entry.
+        lost: Form of the energy that is lost in the step, and its entry.
+        kind: See :func:`numbers_of_cells`.
     """
 
     def __init__(
-        self, cells: Cells, work: ufl.Form, around: ufl.Form | None = None, kind: str = "stress"
-    ) -> None:
+        self, cells: Cells, work: ufl.Form, ledger: Ledger, *, around: ufl.Form | None = None,
+        stored: Entry | None = None, lost: Entry | None = None, kind: str = "stress",
+    ) -> None:  # fmt: skip
         of = cells.element
-        self.cells, self.size, self.of, self._kind = cells, cells.size, of, kind
-        self.work, trial = cells.form(work), ufl.TrialFunction(of.space)
+        self.cells, self.size, self.of, self.ledger = cells, cells.size, of, ledger
+        self.work, self._kind, trial = cells.form(work), kind, ufl.TrialFunction(of.space)
         derivative = expand_derivatives(ufl.derivative(around or work, of.q1, trial))
         self._derivative = None if derivative.empty() else cells.form(derivative)
+        self._stored = {stored[1]: cells.form(stored[0])} if stored else {}
+        self._lost = {lost[1]: cells.form(lost[0])} if lost else {}
+        for name in self._lost:
+            ledger.lost[name] += 0.0
 
     def begin(self, step: Step) -> None:
         """Take the configuration at the beginning."""
@@ -268,23 +293,30 @@ class CellForce(Force):
         return self.work.vector()
 
     def tangent(self, q1: Array) -> csr_array:
-        """Its derivative."""
+        """Derivative of the residual."""
         self.cells.set(self.of.q1, q1)
         return super().tangent(q1) if self._derivative is None else self._derivative.matrix()
 
-    def value(self, energy: Form | None, q1: Array) -> float:
-        """Energy by a form, zero without one; J."""
-        self.cells.set(self.of.q1, q1)
-        return 0.0 if energy is None else energy.value()
+    def energy(self, q: Array) -> float:
+        """Energy that is stored at a configuration; J."""
+        self.cells.set(self.of.q1, q)
+        return sum(form.value() for form in self._stored.values())
 
     def accept(self, q1: Array, s: Array) -> None:
-        """Note the forces on the nodes."""
+        """Note the forces on the nodes, and enter what is lost."""
         self.cells.set(self.of.q1, q1)
         self.note()
+        for name, form in self._lost.items():
+            self.ledger.lost[name] += form.value()
+        self.start(q1)
 
     def note(self) -> None:
         """Note the forces on the nodes in the latest residual."""
-        self.on_nodes = [self.cells.on_nodes(self._kind, self.work)]
+        self.on_nodes = self.cells.on_nodes(self._kind, self.work)
+
+    def start(self, q: Array) -> None:
+        """Take the energy of a configuration."""
+        self.stored = {name: self.energy(q) for name in self._stored}
 
 
 # -- scenes --------------------------------------------------------------------------------------

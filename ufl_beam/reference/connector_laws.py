@@ -146,62 +146,48 @@ def small_way(e0: float, e1: float, length: float) -> float:
 # -- what is held, driven, pushed, damped --------------------------------------------------------
 
 
-class _Held(LawInStep):
-    """Constraint of a joint: no motion, no work."""
+class _Known(LawInStep):
+    """Law whose row is known as the step begins: of what is held, driven, pushed or damped."""
 
-    saved_as = "_Held"
-    target = 0.0
-
-    def row(self, e1: float, λ: float) -> Row:
-        return 1.0, 0.0, self.target
-
-
-class _Driven(_Held):
-    """Motor: the motion is given."""
-
-    part, entry, sign, saved_as = "supplied", "motors", -1.0, "_Driven"
-
-    def begin(self, e0: float, step: Step) -> None:
-        super().begin(e0, step)
-        wanted = value_at(self.law.motion, step.motion_time, self.link)
-        self.target = e0 + step.fraction * (wanted - e0)
-
-
-class _Pushed(LawInStep):
-    """Actuator, whose force is a function of time; or controller, asked as the step begins."""
-
-    part, sign = "supplied", -1.0
+    KINDS = {  # noqa: RUF012
+        Motor: ("supplied", "motors", -1.0, "_Driven"),
+        Actuator: ("supplied", "loads", -1.0, "_Pushed"),
+        Controller: ("supplied", "controllers", -1.0, "_Controlled"),
+        Damper: ("lost", "damping", 1.0, "_Damped"),
+    }
 
     def __init__(self, link: Connector, setting: Setting) -> None:
-        asks = isinstance(link.law, Controller)
-        self.entry, self.saved_as = ("controllers", "_Controlled") if asks else ("loads", "_Pushed")
+        held = "lost", "", 1.0, "_Held"  # by a joint: no motion, no work
+        kind = held if link.law is HELD else self.KINDS[type(link.law)]
+        self.part, self.entry, self.sign, self.saved_as = kind
         super().__init__(link, setting)
-        self.z = {"reached": 0.0}
+        self._gives_force = isinstance(link.law, Actuator | Controller)
+        self.z = {"reached": 0.0} if self._gives_force else {}
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
-        wanted = self.setting.asked.get(self.link)
-        if wanted is None:
-            wanted = value_at(self.law.force, step.load_time, self.link)
-        growth = step.fraction * (-wanted - self.z["reached"])
-        self._force, self._end = self.z["reached"] + step.at * growth, self.z["reached"] + growth
+        law, link = self.law, self.link
+        if law is HELD:
+            self._row = 1.0, 0.0, 0.0
+        elif isinstance(law, Motor):
+            wanted = value_at(law.motion, step.motion_time, link)
+            self._row = 1.0, 0.0, e0 + step.fraction * (wanted - e0)
+        elif isinstance(law, Damper):
+            factor = law.viscosity / step.dt
+            self._row = -factor, 1.0, -factor * e0
+        else:  # a controller is asked as the step begins
+            asked, reached = self.setting.asked.get(link), self.z["reached"]
+            wanted = value_at(law.force, step.load_time, link) if asked is None else asked
+            growth = step.fraction * (-wanted - reached)
+            self._row, self._end = (0.0, 1.0, reached + step.at * growth), reached + growth
 
     def row(self, e1: float, λ: float) -> Row:
-        return 0.0, 1.0, self._force
+        return self._row
 
     def accept(self, e1: float, work: float) -> None:
         super().accept(e1, work)
-        self.z["reached"] = self._end
-
-
-class _Damped(LawInStep):
-    """Damper: viscosity times the mean rate of the step."""
-
-    entry, saved_as = "damping", "_Damped"
-
-    def row(self, e1: float, λ: float) -> Row:
-        factor = self.law.viscosity / self.dt
-        return -factor, 1.0, -factor * self.e0
+        if self._gives_force:
+            self.z["reached"] = self._end
 
 
 # -- energies, resistances and springs -----------------------------------------------------------
@@ -218,7 +204,6 @@ class _Stated(LawInStep):
         self.z["dissipated"] = 0.0
         self._loses, self._part, self._θ = not law.elastic, scheme.load_weight, scheme.theta
         self._delayed = scheme.weight_of_before == 0 and self._part > 0.5
-        self.stored = {"stored": 0.0}
         if self._loses:
             ledger.lost[law.entry] += 0.0
         if self._delayed:
@@ -326,16 +311,13 @@ class _Sprung(LawInStep):
 
     def accept(self, e1: float, work: float) -> None:
         self._points.accept()
-        self._show()
+        self.start(e1)
 
     def start(self, e: float) -> float:
         self._points.start(np.array([[e, 0.0, 0.0]]))
-        self._show()
-        return float(self._points.kept[0, 0])
-
-    def _show(self) -> None:
         self.stored = self._points.stored
         self.z["dissipated"] = float(self._points.kept[0, 4:].sum())
+        return float(self._points.kept[0, 0])
 
     def state(self) -> Array:
         return np.asarray(self._points.state()[0])
@@ -413,8 +395,6 @@ class _Slipping(LawInStep):
         self._released, self.excess, self._hardens = False, 0.0, isinstance(law, Hardening)
         setting.ledger.lost["hinges"] += 0.0
         self._loss = 2 * setting.scheme.alpha if self._hardens else 0.0
-        if self._hardens:
-            self.stored = {"hardening": 0.0}
         if self._loss:
             setting.ledger.lost["numerical"] += 0.0
 
@@ -478,18 +458,14 @@ class _Slipping(LawInStep):
             self.z |= {"limit": float(end.limit), "back force": float(end.back_force)}
             self.z["stored"] = float(end.stored)
         self.z["slipped"] += grown
-        self.z["start"] += self._way * grown
         self.z["way"] = float(self._way * (grown > 0))
-        self._show()
+        self.start(self.z["start"] + self._way * grown)
 
     def start(self, e: float) -> float:
         self.z["start"] = e
-        self._show()
-        return 0.0
-
-    def _show(self) -> None:
         if self._hardens:
             self.stored = {"hardening": self.z["stored"]}
+        return 0.0
 
     def motion(self, e: float) -> float:
         """Motion without the round-off of what is held."""
@@ -600,13 +576,12 @@ class _Asked(LawInStep):
 
 
 LAWS: dict[type, type[LawInStep]] = {
-    Motor: _Driven, Actuator: _Pushed, Controller: _Pushed, Damper: _Damped, ConnectorLaw: _Stated,
-    Spring: _Sprung, Coulomb: _Rubbing, RigidPlastic: _Slipping, ForceLaw: _Asked,
+    **dict.fromkeys(_Known.KINDS, _Known), ConnectorLaw: _Stated, Spring: _Sprung,
+    Coulomb: _Rubbing, RigidPlastic: _Slipping, ForceLaw: _Asked,
 }  # fmt: skip
 """Law in a step by the class of a record, or by its base."""
 
 
 def law_in_step(link: Connector, setting: Setting) -> LawInStep:
     """Law of a connector in a step."""
-    law = next(LAWS[one] for one in type(link.law).__mro__ if one in LAWS)
-    return (_Held if link.law is HELD else law)(link, setting)
+    return next(LAWS[kind] for kind in type(link.law).__mro__ if kind in LAWS)(link, setting)

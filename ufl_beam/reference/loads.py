@@ -27,9 +27,9 @@ from ufl_beam.reference.cells import (
     Force,
     Ledger,
     Memory,
-    OnNodes,
     coupled,
     lumps,
+    numbers_of_cells,
 )
 
 AT_REST = 1e300
@@ -41,7 +41,10 @@ class LoadForce(Force, ABC):
 
     Attributes:
         force: In the latest residual; (size,).
+        along: :attr:`on_nodes` at a factor of one, of loads along beams.
     """
+
+    along: Array | float = 0.0
 
     def __init__(self, load: Load, grid: Grid, scheme: Scheme, ledger: Ledger) -> None:
         self.size, self.load, self.scheme, self.ledger = grid.size, load, scheme, ledger
@@ -78,7 +81,7 @@ class LoadForce(Force, ABC):
         return -self.force
 
     def tangent(self, q1: Array) -> csr_array:
-        """Its derivative."""
+        """Derivative of the residual."""
         return csr_array(-self.factor * self.scheme.load_weight * self.slope(self.place(q1)))
 
     def accept(self, q1: Array, s: Array) -> None:
@@ -87,6 +90,7 @@ class LoadForce(Force, ABC):
         work = acting(self.scheme, self._before, self.force) @ s
         self.ledger.supplied["loads"] += float(work)
         self._before, self._reached = self.force, self._end
+        self.on_nodes = self.factor * self.along
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
         """The load at the time ``t``; the state is taken as one that is in equilibrium with it."""
@@ -110,20 +114,15 @@ class DeadLoad(LoadForce):
             of_beams[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
             for dofs, mass, _ in lumps(grid):
                 np.add.at(self._vector, dofs[:2], mass * np.array(load.acceleration))
-        self._cells, (first, *between, last) = np.arange(len(grid.cells)), grid.mesh.parts
-        total = of_beams[grid.beam_of_cell] * grid.lengths(self._cells)[:, None]
-        self._along = total[:, :, None] * np.array([first, last, *between])  # (num_cells, 3, nodes)
-        np.add.at(self._vector, grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1), self._along)
+        cells, (first, *between, last) = np.arange(len(grid.cells)), grid.mesh.parts
+        total = of_beams[grid.beam_of_cell] * grid.lengths(cells)[:, None]
+        along = total[:, :, None] * np.array([first, last, *between])  # (num_cells, 3, nodes)
+        np.add.at(self._vector, grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1), along)
+        self.along = numbers_of_cells(grid, "density", cells, -along)
 
     def forces(self, q: Array) -> Array:
-        """The nodal forces."""
+        """The consistent nodal forces."""
         return self._vector
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the work, and note the load along beams."""
-        super().accept(q1, s)
-        if self._along.any():
-            self.on_nodes = [OnNodes("density", self._cells, -self.factor * self._along)]
 
 
 class Follower(LoadForce):
@@ -172,11 +171,11 @@ class FrameForce(LoadForce):
         return 1.0
 
     def forces(self, q: Array) -> Array:
-        """Centrifugal forces."""
+        """Centrifugal forces at the places."""
         return np.asarray(self._pull @ (self._places + q))
 
     def slope(self, q: Array) -> csr_array:
-        """Their derivative."""
+        """Derivative of centrifugal forces."""
         return self._pull
 
     def residual(self, q1: Array) -> Array:
@@ -184,7 +183,7 @@ class FrameForce(LoadForce):
         return np.asarray(super().residual(q1) + self._gyro @ (q1 - self.q0) / self.dt)
 
     def tangent(self, q1: Array) -> csr_array:
-        """Derivative of both."""
+        """Derivative of centrifugal and Coriolis forces."""
         return csr_array(super().tangent(q1) + self._gyro / self.dt)
 
     def accept(self, q1: Array, s: Array) -> None:
@@ -194,7 +193,7 @@ class FrameForce(LoadForce):
         a = -self.factor * self._Ω**2 * self._no_turn * (self._places + self.place(q1))
         a[self._pairs[:, 0]] -= self._double * v[self._pairs[:, 1]]
         a[self._pairs[:, 1]] += self._double * v[self._pairs[:, 0]]
-        self.on_nodes = [self._mass.on_nodes(a)]
+        self.on_nodes = self._mass.on_nodes(a)
 
 
 def _turned_mass(grid: Grid, cells: Cells) -> csr_array:
@@ -218,11 +217,11 @@ class WorkForce(CellForce):
         numbers = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
         cells = Cells(grid, numbers)
         self._stated = stated = statement(work, cells.element, scheme)
-        super().__init__(cells, stated.residual, kind="work")
-        self._work, self._scheme, self._ledger = work, scheme, ledger
-        self._energy, self._lost = (
-            None if form is None else cells.form(form) for form in (stated.energy, stated.lost)
-        )
+        energy = None if stated.energy is None else (stated.energy, work.name)
+        lost = None if stated.lost is None else (stated.lost, "numerical")
+        of = cells, stated.residual, ledger
+        super().__init__(*of, stored=energy, lost=lost, kind="work")
+        self._work, self._scheme = work, scheme
         self._varies, self._is_potential = stated.varies(work), isinstance(work, Potential)
         self._t, self._grown = t0, 0.0
         self.force: Array = np.zeros(grid.size)
@@ -231,8 +230,6 @@ class WorkForce(CellForce):
             ledger.supplied[work.name] += 0.0
         if self._varies:
             ledger.supplied[work.in_time] += 0.0
-        if self._lost is not None:
-            ledger.lost["numerical"] += 0.0
 
     def _put(self, t: float, **clock: float) -> None:
         """Give the forms time, growth, length of the step, and the numbers of the work."""
@@ -259,29 +256,22 @@ class WorkForce(CellForce):
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what the work did in the step."""
         self.residual(q1)
-        super().accept(q1, s)
-        before, self._before = self._before, self.force
-        t, (self._t, self._grown) = self._t, self._end
+        name, supplied, at = self._work.name, self.ledger.supplied, np.array(self._at)
         if not self._is_potential:
-            work = acting(self._scheme, before, self.force) @ s
-            self._ledger.supplied[self._work.name] += float(work)
-            return
-        if self._lost is not None:
-            self._ledger.lost["numerical"] += self.value(self._lost, q1)
-        held = self.stored[self._work.name]
+            supplied[name] += float(acting(self._scheme, self._before, self.force) @ s)
+        held, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
+        self._before, (self._t, self._grown) = self.force, self._end
+        super().accept(q1, s)
         if self._varies:  # what time brings is all of the change but that by the motion
-            self._put(float(acting(self._scheme, np.array(t), np.array(self._at))))
-            moved = self.value(self._energy, q1) - self.value(self._energy, self.q0)
-        self.start(q1)
-        if self._varies:
-            gained = self.stored[self._work.name] - held - moved
-            self._ledger.supplied[self._work.in_time] += gained
+            self._put(t)
+            moved = self.energy(q1) - self.energy(self.q0)
+            supplied[self._work.in_time] += self.stored[name] - held - moved
 
     def start(self, q: Array) -> None:
         """Take the energy of a potential."""
         if self._is_potential:
             self._put(self._t)
-            self.stored = {self._work.name: self.value(self._energy, q)}
+            super().start(q)
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
         """The forces at ``q``, as at the end of a second in which the velocities stayed."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -112,6 +113,7 @@ class MaterialPoints:
         of = (rows(self._law, name) for name in ("strain", "before", "stiffness"))
         self._e, self._e0, self._C = of
         self._z, self._z1 = (prefixed(one, self._law.variables) for one in ("state", "new"))
+        self._variables = *self._z, "jump", "opening", *self._e0, "traction", "flows"
         for name, C in zip(self._C, np.reshape(layout.stiffness, (n, -1)).T, strict=True):
             at[name][:] = C
         for name, value in layout.numbers(keys).items():
@@ -173,7 +175,7 @@ class MaterialPoints:
         if opens.any():
             at["direction"][:] = np.where(opens, np.where(first < 0, -1.0, 1.0), 0.0)
             at["growth"][:] = self._growth(first, opens)
-            _, softens = self._resistance(at)
+            _, softens = derivative(partial(self._equations.resistance, at), at["growth"])
             stress_open, D = self._bulk(at)
             condensed = D * softens / (D / at["length"] + softens)  # P(76)
             stress, slope = np.where(opens, stress_open, stress), np.where(opens, condensed, slope)
@@ -231,19 +233,14 @@ class MaterialPoints:
 
     # -- discontinuities -------------------------------------------------------------------------
 
-    def _resistance(self, at: At) -> tuple[Array, Array]:
-        """Resistance of the discontinuities in the step, and its derivative by their growth."""
-        return derivative(lambda a: self._equations.resistance(at, a), np.asarray(at["growth"]))
-
     def _growth(self, stress: Array, opens: Array) -> Array:
         """Growth at which bulk and discontinuity bear the same; Newton's method in bounds."""
         at, length = self.at, self.at["length"]
 
         def excess(a: Array) -> tuple[Array, Array]:
             """What the bulk bears more than the discontinuity, and its derivative."""
-            now = {**at, "growth": a}
-            borne, tangent = self._bulk(now)
-            resists, softens = self._resistance(now)
+            borne, tangent = self._bulk({**at, "growth": a})
+            resists, softens = derivative(partial(self._equations.resistance, at), a)
             over = at["direction"] * borne[0] - resists  # P(32)
             return over, -tangent[0, 0] / length - softens
 
@@ -370,11 +367,6 @@ class MaterialPoints:
         elastic, hardening = (float(np.sum(self._volume * x)) for x in energies)
         of_entries = {"stored": elastic + self._of_rest(strains), "hardening": hardening}
         self.stored = {entry: of_entries[entry] for entry in self.stored}
-
-    @property
-    def _variables(self) -> tuple[str, ...]:
-        """Names of all that later steps depend on."""
-        return (*self._z, "jump", "opening", *self._e0, "traction", "flows")
 
     def state(self) -> Array:
         """Return the internal variables of the accepted state; (cells, k)."""

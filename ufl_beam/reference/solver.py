@@ -71,6 +71,9 @@ FAR, KINK = 1e3, 1e-6
 """Largest motion in a static step that is no mechanism, in sizes of the scene or rad; work that a
 kink of a law may leave unexplained, as a part of the energy that went through."""
 
+MISSED = 1e-9
+"""Part of a sample time by which the end of a step may miss it."""
+
 REASONS = PETSc.SNES.ConvergedReason
 
 
@@ -89,7 +92,6 @@ class Solver:
 
     Attributes:
         forces: All forces of the scene, those between its parts (``inner``) first.
-        given: Forces of the cells in the initial state, if those of another run are known.
     """
 
     def __init__(
@@ -106,6 +108,8 @@ class Solver:
         self.asked: dict[Connector, float] = dict.fromkeys(asked, 0.0)
         self.rates = dict(self.asked)
         self.samples: dict[Connector, tuple[float, int]] = {}  # time of the first, number
+        laws = {link: link.law for link in asked if isinstance(link.law, Controller)}
+        self._sampled = {link: law.sample for link, law in laws.items() if law.sample}
 
         rest = np.arange(len(grid.cells))
         self.yielding: list[YieldingBeams] = []
@@ -141,7 +145,6 @@ class Solver:
         self._inner: Array = np.zeros(grid.size)  # inner forces in the latest residual
         self._inner_before: Array = self._inner
         self._error: Exception | None = None
-        self.given: Array | None = None
         self._make_snes()
 
     def start(self, internal: dict[str, Array] | None, *, same: bool) -> None:
@@ -172,7 +175,7 @@ class Solver:
             beam.begin(short)
             self._inner_before = self._inner_before + beam.residual(self.q)
             beam.note()
-        self.on_nodes = [one for beam in self.beams for one in beam.on_nodes]
+        self.on_nodes = sum(beam.on_nodes for beam in self.beams)
         if self.inertia is None:
             step = Step.of(scheme, self.t, self.t + 1.0, self.t + 1.0, self.q)
             for one in self.connectors:
@@ -213,7 +216,7 @@ class Solver:
         """
         if self.parts == 0 and not self._continues and self._begins_loaded():
             begin, end = self.t, self.t + APPLYING * (t1 - self.t)
-            self._in_parts(end, partial(self._apply_loads, begin=begin, end=end))
+            self._in_parts(end, partial(self._attempt, end=end, at_rest=begin))
             self.last_dt = math.inf  # the next guess does not go on as loads were applied
         while self.t != t1:
             end = self._next_sample(t1)
@@ -243,17 +246,11 @@ class Solver:
         at_once = any(f(self.t) != 0 for _, f in self.scene.time_functions())
         return frames or bool(self.scene.works) or at_once
 
-    def _apply_loads(self, t1: float, begin: float, end: float) -> None:
-        """Apply a part of the loads of the time ``begin``, in a part that turns nodes little."""
-        step = Step.of(self.scheme, self.t, t1, end, self.q)
-        step = step._replace(load_time=begin, motion_time=begin)
-        q1, s = self._solve(step)
-        if self._turn(q1) > APPLYING_TURN and SHORT_PART * step.dt > end - begin:
-            raise StepFailed("a node turns too far while the loads at the beginning are applied")
-        self._accept(step, q1, s)
+    def _attempt(self, t1: float, end: float, at_rest: float | None = None) -> None:
+        """Take the step to ``t1``, a part of one to ``end``, if there is an equilibrium.
 
-    def _attempt(self, t1: float, end: float) -> None:
-        """Take the step to ``t1``, a part of one to ``end``, if there is an equilibrium."""
+        With ``at_rest`` the loads of that time are applied, in parts that turn nodes little.
+        """
         inertia = self.inertia
         if inertia is not None and inertia.scheme.kept and not inertia.more:
             # Accelerations at the beginning are those of a short trial step.
@@ -264,7 +261,13 @@ class Solver:
             for one in self.connectors:
                 one.before = q1[one.forces_at]
         step = Step.of(self.scheme, self.t, t1, end, self.q)
-        self._accept(step, *self._solve(step))
+        if at_rest is not None:
+            step = step._replace(load_time=at_rest, motion_time=at_rest)
+        q1, s = self._solve(step)
+        short = at_rest is None or SHORT_PART * step.dt <= end - at_rest
+        if not short and self._turn(q1) > APPLYING_TURN:
+            raise StepFailed("a node turns too far while the loads at the beginning are applied")
+        self._accept(step, q1, s)
 
     def _solve(self, step: Step) -> tuple[Array, Array]:
         """Configuration at the end of a step, and the step of the nodes that forces work on."""
@@ -320,7 +323,7 @@ class Solver:
         for force in self.forces:
             force.accept(q1, s)
         self.supports.accept(s)
-        self.on_nodes = [one for force in self.forces for one in force.on_nodes]
+        self.on_nodes = sum(force.on_nodes for force in self.forces)
         self.q_before, self.last_dt = self.q, step.dt
         self.q, self.t, self.parts = q1, step.t1, self.parts + 1
         self._sum_energies()
@@ -529,7 +532,7 @@ class Solver:
     def ask(self) -> None:
         """Ask controllers for forces and friction for limits; note the rates of what may slip."""
         for link in self.asked:
-            due = self._due(link) if _sample(link) else None
+            due = self._due(link) if link in self._sampled else None
             if due is None or due != self.samples.get(link):
                 self.asked[link] = link.law.ask(self, link)  # type: ignore[union-attr]
             if due is not None:
@@ -541,17 +544,17 @@ class Solver:
 
     def _due(self, link: Connector) -> tuple[float, int]:
         """Time of the first sample of a controller, s, and number of the one that is due."""
-        first, _ = self.samples.get(link, (self.t, -1))
-        sample = _sample(link)
-        return first, math.floor((self.t - first + _rounding(sample, self.t, first)) / sample)
+        sample, (first, _) = self._sampled[link], self.samples.get(link, (self.t, -1))
+        digits = MISSED * sample + 4 * math.ulp(max(self.t, first, key=abs))
+        return first, math.floor((self.t - first + digits) / sample)
 
     def _next_sample(self, end: float) -> float:
         """Return the next sample time of a controller, or ``end`` if that comes first; s."""
         stop = end
-        for link in filter(_sample, self.asked):
-            (first, number), sample = self._due(link), _sample(link)
+        for link, sample in self._sampled.items():
+            first, number = self._due(link)
             at = first + (number + 1) * sample
-            if self.t < at < stop - _rounding(sample, at, stop):
+            if self.t < at < stop - MISSED * sample - 4 * math.ulp(max(at, stop, key=abs)):
                 stop = at
         return stop
 
@@ -614,38 +617,9 @@ class Solver:
             reactions = np.full_like(reactions, np.nan)  # nobody knows them
         rows = np.concatenate([np.zeros((0, 7)), *(one.material() for one in self.yielding)])
         over_step = float(self.scheme.average(0.0, 1.0)) < 1
+        cells = np.zeros((9, len(self.grid.cells)))
         return Snapshot(
             self.t, self.q, None if self.inertia is None else self.inertia.v, reactions,
             self.ledger.copy(), rows[np.argsort(rows[:, 0])], self.connections(),
-            self._numbers_of_cells(), self.q_before if over_step else None,
+            cells + self.on_nodes, self.q_before if over_step else None,
         )  # fmt: skip
-
-    def _numbers_of_cells(self) -> Array:
-        """Forces at both ends of the cells, and how they are distributed; (9, num_cells).
-
-        (X, Y, M) at the start and at the end; the couple of what acts along a cell; first moments
-        of its forces about the middle, over the length.
-        """
-        if self.given is not None and self.parts == 0:
-            return self.given
-        numbers = np.zeros((9, len(self.grid.cells)))
-        first, *between, last = self.grid.mesh.nodes - 0.5
-        away = np.array([first, last, *between])
-        for kind, cells, forces in self.on_nodes:
-            numbers[:3, cells] += forces[:, :, 0].T
-            numbers[3:6, cells] += forces[:, :, 1].T
-            if kind != "stress":
-                numbers[6, cells] += forces[:, 2].sum(axis=1)
-            if kind == "density":
-                numbers[7:, cells] += (forces[:, :2] @ away).T
-        return numbers
-
-
-def _sample(link: Connector) -> float:
-    """Sample time of a connector; 0 if it has none; s."""
-    return (isinstance(link.law, Controller) and link.law.sample) or 0.0
-
-
-def _rounding(sample: float, *times: float) -> float:
-    """Difference of times that is due to their last digits; s."""
-    return 1e-9 * sample + 4 * math.ulp(max(map(abs, times)))
