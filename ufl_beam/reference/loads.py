@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""Loads: dead and follower loads, rotating frames, virtual works and potentials of users."""
+"""Loads, virtual works and potentials of users; supports and prescribed motions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from abc import ABC, abstractmethod
 
 import numpy as np
+import scipy  # its parts are loaded when they are used
 import ufl
 from scipy.sparse import csr_array
 
@@ -15,144 +16,133 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia
-from ufl_beam.model.bodies import carries
+from ufl_beam.model.bodies import GROUND, carries
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.time_functions import value_at
 from ufl_beam.model.works import Potential, Work
-from ufl_beam.reference.beams import CellForce, Mass
-from ufl_beam.reference.cells import Cells, Force, Ledger, OnNodes, coupled, lumps
+from ufl_beam.reference.beams import Mass
+from ufl_beam.reference.cells import (
+    CellForce,
+    Cells,
+    Force,
+    Ledger,
+    Memory,
+    coupled,
+    lumps,
+    numbers_of_cells,
+)
 
 AT_REST = 1e300
 """Longest step that forms are told of, in which all rates vanish; s."""
 
 
-class LoadForce(Force):
-    """Base of loads: their work is that of their forces on the step of the nodes.
+class LoadForce(Force, ABC):
+    """Base of loads: a factor in time, times forces at the configuration where loads act.
 
     Attributes:
         force: In the latest residual; (size,).
+        along: :attr:`on_nodes` at a factor of one, of loads along beams.
     """
 
-    def __init__(self, size: int, scheme: Scheme, ledger: Ledger, entry: str = "loads") -> None:
-        self.size, self.scheme, self.ledger, self._entry = size, scheme, ledger, entry
-        self.force: Array = np.zeros(size)
-        self.before: Array = self.force
-        ledger.supplied[entry] += 0.0
-
-    def enter_work(self, force: Array, s: Array, end: Array) -> None:
-        """Enter the work of the step; ``end`` are the forces before the next one."""
-        self.ledger.supplied[self._entry] += float(acting(self.scheme, self.before, force) @ s)
-        self.before = end
-
-
-class DeadLoad(LoadForce):
-    """Dead load: a vector times a function of time."""
+    along: Array | float = 0.0
 
     def __init__(self, load: Load, grid: Grid, scheme: Scheme, ledger: Ledger) -> None:
-        super().__init__(grid.size, scheme, ledger)
-        self._load, self._grid = load, grid
-        self._vector, self._along = _nodal_forces(load, grid)
-        self._now = self._end = self._reached = 0.0  # factors: acting, at the ends of the steps
+        self.size, self.load, self.scheme, self.ledger = grid.size, load, scheme, ledger
+        self.force: Array = np.zeros(grid.size)
+        self._before: Array = self.force
+        self.factor = self._reached = 0.0
+        ledger.supplied["loads"] += 0.0
+
+    @abstractmethod
+    def forces(self, q: Array) -> Array:
+        """Forces at the configuration ``q`` and a factor of one; (size,)."""
+
+    def slope(self, q: Array) -> csr_array:
+        """Their derivative; (size, size)."""
+        return csr_array((self.size, self.size))
+
+    def wanted(self, t: float) -> float:
+        """The factor at a time."""
+        return value_at(self.load.time, t, self.load)
 
     def begin(self, step: Step) -> None:
-        """Find the factor in the step; parts of a step go in proportion."""
-        factor = value_at(self._load.time, step.load_time, self._load)
-        change = step.fraction * (factor - self._reached)
-        self._end = factor if step.fraction == 1 else self._reached + change
-        self._now = self._end if step.at == 1 else self._reached + step.at * change
-        self.force = self._now * self._vector
+        """Find the factor in the step, and at its end; parts of a step go in proportion."""
+        self.q0, self.dt = step.q0, step.dt
+        growth = step.fraction * (self.wanted(step.load_time) - self._reached)
+        self.factor, self._end = self._reached + step.at * growth, self._reached + growth
+
+    def place(self, q1: Array) -> Array:
+        """Configuration at which the load acts if the step ends at ``q1``."""
+        return np.asarray(self.q0 + self.scheme.load_weight * (q1 - self.q0))
 
     def residual(self, q1: Array) -> Array:
         """Minus the load of the step."""
+        self.force = self.factor * self.forces(self.place(q1))
         return -self.force
 
+    def tangent(self, q1: Array) -> csr_array:
+        """Derivative of the residual."""
+        return csr_array(-self.factor * self.scheme.load_weight * self.slope(self.place(q1)))
+
     def accept(self, q1: Array, s: Array) -> None:
-        """Enter the work of the load."""
-        self.enter_work(self.force, s, self._end * self._vector)
-        self._reached, self._acted = self._end, self._now
+        """Enter the work of the load, that of its forces on the step of the nodes."""
+        self.residual(q1)
+        work = acting(self.scheme, self._before, self.force) @ s
+        self.ledger.supplied["loads"] += float(work)
+        self._before, self._reached = self.force, self._end
+        self.on_nodes = self.factor * self.along
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
-        """The load at the time ``t``."""
-        self._reached = value_at(self._load.time, t, self._load)
-        self.before = self._reached * self._vector
-        return self.before
-
-    def on_nodes(self) -> Sequence[OnNodes]:
-        """The load along beams."""
-        if self._along is None:
-            return ()
-        return [OnNodes("density", np.arange(len(self._along)), -self._now * self._along)]
+        """The load at the time ``t``; the state is taken as one that is in equilibrium with it."""
+        self._reached = self.wanted(t)
+        self.force = self._before = self._reached * self.forces(q)
+        return self.force
 
 
-def _nodal_forces(load: Load, grid: Grid) -> tuple[Array, Array | None]:
-    """Consistent nodal forces of a dead load, (size,); those along beams, (num_cells, 3, nodes)."""
-    scene, vector = grid.scene, np.zeros(grid.size)
-    of_beams = np.zeros((len(scene.beams), 3))
-    if isinstance(load, PointLoad) and carries(load.place):  # else Scene.links has connectors
-        np.add.at(vector, grid.node(load.place), [*load.force, load.moment])
-    elif isinstance(load, LineLoad):
-        of_beams[scene.beams.index(load.beam)] = *load.force, load.moment
-    elif isinstance(load, Gravity):
-        of_beams[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
-        for dofs, mass, _ in lumps(grid):
-            np.add.at(vector, dofs[:2], mass * np.array(load.acceleration))
-    if not of_beams.any():
-        return vector, None
-    total = of_beams[grid.beam_of_cell] * grid.lengths(np.arange(len(grid.cells)))[:, None]
-    first, *between, last = grid.mesh.parts
-    along = total[:, :, None] * np.array([first, last, *between])
-    np.add.at(vector, grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1), along)
-    return vector, along
+class DeadLoad(LoadForce):
+    """Dead load: consistent nodal forces times a function of time."""
+
+    def __init__(self, load: Load, grid: Grid, scheme: Scheme, ledger: Ledger) -> None:
+        super().__init__(load, grid, scheme, ledger)
+        scene, self._vector = grid.scene, np.zeros(grid.size)
+        of_beams = np.zeros((len(scene.beams), 3))
+        if isinstance(load, PointLoad) and carries(load.place):  # else Scene.links has connectors
+            np.add.at(self._vector, grid.node(load.place), [*load.force, load.moment])
+        elif isinstance(load, LineLoad):
+            of_beams[scene.beams.index(load.beam)] = *load.force, load.moment
+        elif isinstance(load, Gravity):
+            of_beams[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
+            for dofs, mass, _ in lumps(grid):
+                np.add.at(self._vector, dofs[:2], mass * np.array(load.acceleration))
+        cells, (first, *between, last) = np.arange(len(grid.cells)), grid.mesh.parts
+        total = of_beams[grid.beam_of_cell] * grid.lengths(cells)[:, None]
+        along = total[:, :, None] * np.array([first, last, *between])  # (num_cells, 3, nodes)
+        np.add.at(self._vector, grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1), along)
+        self.along = numbers_of_cells(grid, "density", cells, -along)
+
+    def forces(self, q: Array) -> Array:
+        """The consistent nodal forces."""
+        return self._vector
 
 
 class Follower(LoadForce):
     """Follower load: it turns with the cross-section or body that it acts on."""
 
     def __init__(self, load: FollowerLoad, grid: Grid, scheme: Scheme, ledger: Ledger) -> None:
-        super().__init__(grid.size, scheme, ledger)
-        self._load, self._dofs = load, grid.node(load.place)
-        self._given = np.array([*load.force, load.moment])
-        self._now = self._end = self._reached = 0.0
-        self._part = scheme.load_weight  # part of the step at whose rotation it acts
+        super().__init__(load, grid, scheme, ledger)
+        self._dofs, self._given = grid.node(load.place), (*load.force, load.moment)
 
-    def begin(self, step: Step) -> None:
-        """Find the factor in the step."""
-        factor = value_at(self._load.time, step.load_time, self._load)
-        self._end = self._reached + step.fraction * (factor - self._reached)
-        self._now = self._reached + step.at * (self._end - self._reached)
-        self._turn0 = step.q0[self._dofs[2]]
+    def forces(self, q: Array) -> Array:
+        """(F_x, F_y, M) turned by the rotation."""
+        (x, y, M), ψ, force = self._given, q[self._dofs[2]], np.zeros(self.size)
+        c, s = math.cos(ψ), math.sin(ψ)
+        np.add.at(force, self._dofs, [c * x - s * y, s * x + c * y, M])
+        return force
 
-    def _acting(self, q1: Array) -> Array:
-        """(F_x, F_y, M) in the step to ``q1``."""
-        ψ = self._turn0 + self._part * (q1[self._dofs[2]] - self._turn0)
-        (x, y, M), c, s = self._now * self._given, math.cos(ψ), math.sin(ψ)
-        return np.array([c * x - s * y, s * x + c * y, M])
-
-    def residual(self, q1: Array) -> Array:
-        """Minus the load of the step."""
-        self.force = np.zeros(self.size)
-        np.add.at(self.force, self._dofs, self._acting(q1))
-        return -self.force
-
-    def tangent(self, q1: Array) -> csr_array:
-        """Its derivative by the rotation."""
-        x, y, _ = self._acting(q1)
-        slope = self._part * np.array([y, -x])
-        return coupled(self.size, self._dofs[:2], np.repeat(self._dofs[2], 2), slope)
-
-    def accept(self, q1: Array, s: Array) -> None:
-        """Enter the work of the load."""
-        self.residual(q1)
-        self.enter_work(self.force, s, self.force)
-        self._reached = self._end
-
-    def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
-        """The load at the time ``t``."""
-        self._reached = self._now = value_at(self._load.time, t, self._load)
-        self._turn0 = q[self._dofs[2]]
-        self.residual(q)
-        self.before = self.force
-        return self.force
+    def slope(self, q: Array) -> csr_array:
+        """Derivative by the rotation."""
+        x, y = self.forces(q)[self._dofs[:2]]
+        return coupled(self.size, self._dofs[:2], np.repeat(self._dofs[2], 2), np.array([-y, x]))
 
 
 class FrameForce(LoadForce):
@@ -164,62 +154,46 @@ class FrameForce(LoadForce):
     def __init__(
         self, frame: RotatingFrame, grid: Grid, mass: Mass, scheme: Scheme, ledger: Ledger
     ) -> None:
-        super().__init__(grid.size, scheme, ledger)
-        Ω, self._grid, self._mass = frame.rate, grid, mass
-        no_turn: Array = np.ones(grid.size)
-        no_turn[grid.rotations] = 0.0
-        self._pull = csr_array(mass.matrix.multiply(Ω**2 * no_turn[:, None]))
-        self._gyro = 2 * Ω * has_inertia(scheme) * _turned_mass(grid, mass.cells)
-        self._no_turn, self._Ω, self._double = no_turn, Ω, 2 * Ω * has_inertia(scheme)
+        super().__init__(frame, grid, scheme, ledger)
+        self._Ω, self._mass, self._double = frame.rate, mass, 2 * frame.rate * has_inertia(scheme)
+        self._no_turn: Array = np.ones(grid.size)
+        self._no_turn[grid.rotations] = 0.0
+        self._pull = csr_array(mass.matrix.multiply(self._Ω**2 * self._no_turn[:, None]))
+        nodes = np.concatenate([grid.dofs_of_bodies, grid.dofs])
+        self._pairs = np.unique(nodes[:, :2], axis=0)  # degrees of freedom u, v of the nodes
+        self._gyro = self._double * _turned_mass(grid, mass.cells)
         centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
         self._places: Array = np.zeros(grid.size)  # from the centre of rotation
-        nodes = np.concatenate([grid.dofs_of_bodies, grid.dofs])
         self._places[nodes[:, :2]] = np.concatenate([centers, grid.points]) - frame.about
-        self._grown = self._accelerations = 0.0
 
-    def begin(self, step: Step) -> None:
-        """Remember the beginning, and how much of the forces acts."""
-        self._q0, self._dt = step.q0, step.dt
-        growth = step.fraction * (1.0 - self._grown)
-        self._growth, self._end = self._grown + step.at * growth, self._grown + growth
+    def wanted(self, t: float) -> float:
+        """One: it acts from the beginning."""
+        return 1.0
+
+    def forces(self, q: Array) -> Array:
+        """Centrifugal forces at the places."""
+        return np.asarray(self._pull @ (self._places + q))
+
+    def slope(self, q: Array) -> csr_array:
+        """Derivative of centrifugal forces."""
+        return self._pull
 
     def residual(self, q1: Array) -> Array:
-        """Minus the centrifugal forces where the scheme takes loads; Coriolis forces."""
-        q = self._q0 + self.scheme.load_weight * (q1 - self._q0)
-        self.force = self._growth * (self._pull @ (self._places + q))
-        return np.asarray(self._gyro @ (q1 - self._q0) / self._dt - self.force)
+        """Minus the centrifugal forces, and Coriolis forces at the mean rate."""
+        return np.asarray(super().residual(q1) + self._gyro @ (q1 - self.q0) / self.dt)
 
     def tangent(self, q1: Array) -> csr_array:
-        """Derivative of both forces."""
-        weight = self._growth * self.scheme.load_weight
-        return csr_array(self._gyro / self._dt - weight * self._pull)
+        """Derivative of centrifugal and Coriolis forces."""
+        return csr_array(super().tangent(q1) + self._gyro / self.dt)
 
     def accept(self, q1: Array, s: Array) -> None:
-        """Enter the work of the centrifugal forces."""
-        self.residual(q1)
-        self.enter_work(self.force, s, self.force)
-        self._grown, change = self._end, q1 - self._q0
-        x: Array = self._places + self._q0 + self.scheme.load_weight * change
-        self._note(x, self._growth, np.asarray(change / self._dt))
-
-    def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
-        """The centrifugal forces at ``q``."""
-        self._grown = 1.0
-        self.force = self.before = np.asarray(self._pull @ (self._places + q))
-        self._note(self._places + q, 1.0, np.zeros(self.size))
-        return self.force
-
-    def _note(self, x: Array, growth: float, v: Array) -> None:
-        """Note the accelerations of the frame at places ``x`` with the velocities ``v``."""
-        self._a = -growth * self._Ω**2 * x * self._no_turn
-        nodes = np.unique(np.r_[self._grid.dofs, self._grid.dofs_of_bodies], axis=0)
-        pairs = np.unique(nodes[:, :2], axis=0)
-        self._a[pairs[:, 0]] -= self._double * v[pairs[:, 1]]
-        self._a[pairs[:, 1]] += self._double * v[pairs[:, 0]]
-
-    def on_nodes(self) -> Sequence[OnNodes]:
-        """Mass of the beams times the accelerations of the frame."""
-        return [self._mass.on_nodes(self._a)]
+        """Enter the work, and note mass times the accelerations of the frame in the beams."""
+        super().accept(q1, s)
+        v = (q1 - self.q0) / self.dt
+        a = -self.factor * self._Ω**2 * self._no_turn * (self._places + self.place(q1))
+        a[self._pairs[:, 0]] -= self._double * v[self._pairs[:, 1]]
+        a[self._pairs[:, 1]] += self._double * v[self._pairs[:, 0]]
+        self.on_nodes = self._mass.on_nodes(a)
 
 
 def _turned_mass(grid: Grid, cells: Cells) -> csr_array:
@@ -232,9 +206,6 @@ def _turned_mass(grid: Grid, cells: Cells) -> csr_array:
     return csr_array(G)
 
 
-# -- works of users ------------------------------------------------------------------------------
-
-
 class WorkForce(CellForce):
     """Virtual work or potential of a user on the cells on which it acts.
 
@@ -242,28 +213,23 @@ class WorkForce(CellForce):
     loads do.
     """
 
-    kind = "work"
-
     def __init__(self, work: Work, grid: Grid, scheme: Scheme, ledger: Ledger, t0: float) -> None:
         numbers = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
         cells = Cells(grid, numbers)
-        stated = statement(work, cells.element, scheme)
-        super().__init__(cells, stated.residual, [stated.lost] if stated.lost is not None else [])
-        self._work, self._stated, self._scheme, self._ledger = work, stated, scheme, ledger
-        self._energy = None if stated.energy is None else cells.form(stated.energy)
-        self._varies, self._held = stated.varies(work), 0.0
-        self._t = self._t_end = t0
-        self._grown = self._grown_end = 0.0
+        self._stated = stated = statement(work, cells.element, scheme)
+        energy = None if stated.energy is None else (stated.energy, work.name)
+        lost = None if stated.lost is None else (stated.lost, "numerical")
+        of = cells, stated.residual, ledger
+        super().__init__(*of, stored=energy, lost=lost, kind="work")
+        self._work, self._scheme = work, scheme
+        self._varies, self._is_potential = stated.varies(work), isinstance(work, Potential)
+        self._t, self._grown = t0, 0.0
         self.force: Array = np.zeros(grid.size)
-        self.before: Array = self.force
-        if isinstance(work, Potential):
-            ledger.state[work.name] += 0.0
-            if self._varies:
-                ledger.supplied[work.in_time] += 0.0
-            if self.losses:
-                ledger.lost["numerical"] += 0.0
-        else:
+        self._before: Array = self.force
+        if not self._is_potential:
             ledger.supplied[work.name] += 0.0
+        if self._varies:
+            ledger.supplied[work.in_time] += 0.0
 
     def _put(self, t: float, **clock: float) -> None:
         """Give the forms time, growth, length of the step, and the numbers of the work."""
@@ -276,13 +242,10 @@ class WorkForce(CellForce):
     def begin(self, step: Step) -> None:
         """Tell the forms of the step; parts of one go in proportion to the way of the loads."""
         super().begin(step)
-        part, self._q0 = step.fraction, step.q0
-        growth = part * (1.0 - self._grown)
-        self._t_end = self._t + part * (step.motion_time - self._t)
-        self._grown_end = self._grown + growth
+        part, growth = step.fraction, step.fraction * (1.0 - self._grown)
+        self._end = self._t + part * (step.motion_time - self._t), self._grown + growth
         t = self._t + step.at * part * (step.load_time - self._t)
-        growth = self._grown + step.at * growth
-        self._put(t, **{"dt": min(step.dt, AT_REST), GROWTH: growth})
+        self._put(t, **{"dt": min(step.dt, AT_REST), GROWTH: self._grown + step.at * growth})
 
     def residual(self, q1: Array) -> Array:
         """Minus the virtual work, or the derivative of the potential."""
@@ -292,34 +255,23 @@ class WorkForce(CellForce):
 
     def accept(self, q1: Array, s: Array) -> None:
         """Enter what the work did in the step."""
+        self.residual(q1)
+        name, supplied, at = self._work.name, self.ledger.supplied, np.array(self._at)
+        if not self._is_potential:
+            supplied[name] += float(acting(self._scheme, self._before, self.force) @ s)
+        held, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
+        self._before, (self._t, self._grown) = self.force, self._end
         super().accept(q1, s)
-        if isinstance(self._work, Potential):
-            if self.losses:
-                self._ledger.lost["numerical"] += self.lost(q1)
-            if self._varies:
-                self._ledger.supplied[self._work.in_time] += self._gained(q1)
-        else:
-            work = float(acting(self._scheme, self.before, self.force) @ s)
-            self._ledger.supplied[self._work.name] += work
-        self.before, self._t, self._grown = self.force, self._t_end, self._grown_end
+        if self._varies:  # what time brings is all of the change but that by the motion
+            self._put(t)
+            moved = self.energy(q1) - self.energy(self.q0)
+            supplied[self._work.in_time] += self.stored[name] - held - moved
 
-    def _gained(self, q1: Array) -> float:
-        """Energy that a change in time brings: all of the change but that by the motion; J."""
-        self._put(float(acting(self._scheme, np.array(self._t), np.array(self._at))))
-        moved = self._value(q1) - self._value(self._q0)
-        self._put(self._t_end)
-        return self._value(q1) - self._held - moved
-
-    def _value(self, q: Array) -> float:
-        self.cells.set(self.of.q1, q)
-        return 0.0 if self._energy is None else self._energy.value()
-
-    def enter_state(self, q: Array) -> None:
-        """Enter the energy of a potential."""
-        if self._energy is not None:
+    def start(self, q: Array) -> None:
+        """Take the energy of a potential."""
+        if self._is_potential:
             self._put(self._t)
-            self._held = self._value(q)
-            self._ledger.state[self._work.name] += self._held
+            super().start(q)
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
         """The forces at ``q``, as at the end of a second in which the velocities stayed."""
@@ -327,20 +279,13 @@ class WorkForce(CellForce):
         self.cells.set(self.of.q0, q if v is None else q - v)
         self._put(t, **{"dt": AT_REST if v is None else 1.0, GROWTH: 1.0})
         self.residual(q)
-        self.before = self.force
+        self._before = self.force
         return self.force
 
-    def internal(self) -> dict[str, Array]:
+    def remember(self, memory: Memory) -> None:
         """Forces of the last step, which depend on its motion."""
-        counted = self._scheme.weight_of_before != 0.0
-        if isinstance(self._work, Potential) or not (self._work.takes_rates and counted):
-            return {}
-        return {f"work of {self._work.name}": self.before}
-
-    def take(self, internal: dict[str, Array], q: Array, *, goes_on: bool) -> None:
-        """Take over these forces where the run goes on."""
-        if goes_on:
-            self.before = internal.get(f"work of {self._work.name}", self.before)
+        if self._work.takes_rates and self._scheme.weight_of_before and not self._is_potential:
+            self._before = memory.vector(f"work of {self._work.name}", self._before)
 
 
 def loads_of(
@@ -357,3 +302,78 @@ def loads_of(
             found.append(DeadLoad(load, grid, scheme, ledger))
     found += [WorkForce(work, grid, scheme, ledger, t0) for work in grid.scene.works]
     return found
+
+
+# -- supports ------------------------------------------------------------------------------------
+
+
+class Supports:
+    """Supports of a scene, which may be at an angle to the axes of the plane.
+
+    Attributes:
+        axes: Orthogonal matrix from the axes of the plane to those of the supports.
+        held: Degrees of freedom that are held or prescribed, in their axes.
+        free: All others: the unknowns of a step.
+        reactions: Forces of the supports in the latest residual, in their axes; (size,).
+        before: Those of the accepted step.
+    """
+
+    def __init__(self, grid: Grid, scheme: Scheme, ledger: Ledger) -> None:
+        self._grid, self._scheme, self._ledger = grid, scheme, ledger
+        axes = scipy.sparse.eye_array(grid.size).tolil()
+        held: dict[int, None] = {}
+        if GROUND in grid.scene.rigid_bodies:
+            held = {int(dof): None for dof in grid.node(GROUND.middle)}
+        self._motions = []
+        for support in grid.scene.supports:
+            dofs = grid.node(support.place)
+            if support.angle:
+                c, s, (i, j) = math.cos(support.angle), math.sin(support.angle), dofs[:2]
+                axes[i, i], axes[i, j], axes[j, i], axes[j, j] = c, s, -s, c
+            held |= {int(dofs[component]): None for component in support.held}
+            for component, motion in support.moving.items():
+                self._motions.append((int(dofs[component]), motion, support))
+        self.axes = csr_array(axes.tocsr())
+        self.held = np.array(sorted(held), dtype=np.int64)
+        self.free = np.setdiff1d(np.arange(grid.size), self.held)
+        self.reactions: Array = np.zeros(grid.size)
+        self.before: Array = self.reactions
+        if self._motions:
+            ledger.supplied["supports"] += 0.0
+
+    def move(self, x: Array, x0: Array, step: Step) -> None:
+        """Set in ``x`` what is held and prescribed in the step that begins at ``x0``."""
+        x[self.held] = x0[self.held]
+        for dof, motion, support in self._motions:
+            wanted = value_at(motion, step.motion_time, support)
+            x[dof] = x0[dof] + step.fraction * (wanted - x0[dof])
+
+    def stop(self, v: Array) -> Array:
+        """Velocities without those of what is held fast; else they would ring."""
+        x = self.axes @ v
+        moving = [dof for dof, *_ in self._motions]
+        x[np.setdiff1d(self.held, moving)] = 0.0
+        return np.asarray(self.axes.T @ x)
+
+    def note(self, r: Array) -> None:
+        """Note the reactions in a residual, which is in the axes of the supports."""
+        reactions: Array = np.zeros(len(r))
+        reactions[self.held] = r[self.held]
+        self.reactions = reactions
+
+    def accept(self, s: Array) -> None:
+        """Enter the work of supports that move in a step of the nodes."""
+        if self._motions:
+            force = acting(self._scheme, self.before, self.reactions)
+            self._ledger.supplied["supports"] += float(force @ (self.axes @ s))
+        self.before = self.reactions
+
+    def forces(self) -> Array:
+        """Forces of each support on the scene, of the components that it holds; (num, 3)."""
+        found = np.zeros((len(self._grid.scene.supports), 3))
+        for force, support in zip(found, self._grid.scene.supports, strict=True):
+            held = [*support.held]
+            force[held] = self.before[self._grid.node(support.place)[held]]
+            c, s = math.cos(support.angle), math.sin(support.angle)
+            force[:2] = c * force[0] - s * force[1], s * force[0] + c * force[1]
+        return found

@@ -10,10 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.mechanics.time_schemes import Scheme
@@ -97,6 +98,8 @@ class MaterialPoints:
         D: Their derivatives by the strains; (cells, 3, 3).
         kept: By cell: (N, V, M) of the accepted state, the jump of the last point, the energies
             dissipated by plastic strains and by discontinuities; (cells, 6).
+        stored: Energies in the accepted state, by entry of the ledger; J.
+        softens: Whether points may open.
         excess: ``|stress| / limit - 1`` of the points that are held closed, else 0; (cells, n).
     """
 
@@ -107,66 +110,48 @@ class MaterialPoints:
         self._layout, self._scheme, self._search, self._ledger = layout, scheme, search, ledger
         cells, n, self._law = len(keys), len(layout.weights), layout.kind.law
         self.at = at = {name: np.zeros((cells, n)) for name in inputs(layout)}
-        self._e, self._e0, self._C = (
-            rows(self._law, name) for name in ("strain", "before", "stiffness")
-        )
+        of = (rows(self._law, name) for name in ("strain", "before", "stiffness"))
+        self._e, self._e0, self._C = of
+        self._z, self._z1 = (prefixed(one, self._law.variables) for one in ("state", "new"))
+        self._variables = *self._z, "jump", "opening", *self._e0, "traction", "flows"
         for name, C in zip(self._C, np.reshape(layout.stiffness, (n, -1)).T, strict=True):
             at[name][:] = C
         for name, value in layout.numbers(keys).items():
             at[f"number {name}"][:] = value
-        for name, initial in self._law.variables.items():
-            at[f"state {name}"][:] = initial
+        for name, initial in zip(self._z, self._law.variables.values(), strict=True):
+            at[name][:] = initial
         at["length"][:], at["theta"][:], at["dt"][:] = length[:, None], scheme.theta, 1.0
         at["traction"][:] = np.inf
-        self.softens, softening = layout.softening is not None, layout.softening
-        if softening is not None:
-            for name, value in softening.numbers().items():
-                at[f"softening {name}"][:] = value
-        self._equations = PointEquations(layout.kind, softening, scheme)
+        for name, value in (layout.softening.numbers() if layout.softening else {}).items():
+            at[f"softening {name}"][:] = value
+        self._equations = PointEquations(layout.kind, layout.softening, scheme)
         # Strains of the points by component are B times those of the cell.
         self._B = np.asarray(layout.strains).reshape(n, -1, 3)
-        self.strains: Array = np.zeros((cells, 3))
-        self.strains0: Array = np.zeros((cells, 3))
-        self.r: Array = np.zeros((cells, 3))
+        self._volume = layout.weights * at["length"]
+        self.r, self.strains, self.strains0 = np.zeros((3, cells, 3))
         self.D: Array = np.zeros((cells, 3, 3))
         self.kept: Array = np.zeros((cells, 6))
         self.excess: Array = np.zeros((cells, n))
-        self._stored: Array = np.zeros(2)
-        self._resist()
-        self._expect_entries()
-
-    def _expect_entries(self) -> None:
-        """Make the entries of the ledger."""
-        layout, scheme, ledger = self._layout, self._scheme, self._ledger
+        self.softens = layout.softening is not None
         # What has broken may have a stress at the ends of a step, and none where its law holds.
         over_step = scheme.average(0.0, 1.0) != 1.0
-        self._releases = over_step and (self.softens or curved(layout.kind))
-        if layout.yields:
-            ledger.state["hardening"] += 0.0
-            ledger.lost["plastic"] += 0.0
-        if self.softens:
-            ledger.lost["hinges"] += 0.0
-        if scheme.alpha or self._releases:
-            ledger.lost["numerical"] += 0.0
+        releases = over_step and (self.softens or curved(layout.kind))
+        entries = {"plastic": layout.yields, "hinges": self.softens}
+        entries["numerical"] = bool(scheme.alpha) or releases
+        self._lost = [name for name, there in entries.items() if there]
+        for name in self._lost:
+            ledger.lost[name] += 0.0
+        self.stored = {"stored": 0.0, **({"hardening": 0.0} if layout.yields else {})}
 
     def _of_points(self, strains: Array) -> Array:
         """Strains of the points, by component, from those of the cells; (d, cells, n)."""
         return np.asarray(np.einsum("nak,ck->acn", self._B, strains))
 
-    def _resist(self) -> None:
-        """Resistance after the openings so far."""
-        softening, breaking = self._layout.softening, self._layout.breaking
-        if softening is not None:
-            self.at["traction"][:, breaking] = softening.traction(self.at["opening"][:, breaking])
+    def _array(self, values: Sequence[Values]) -> Array:
+        """Values at the points as one array; (m, cells, n)."""
+        return np.array([x + 0 * self.at["length"] for x in values])
 
     # -- a step ----------------------------------------------------------------------------------
-
-    def start(self, strains: Array) -> None:
-        """Begin at these strains of the cells; (cells, 3)."""
-        self.strains0 = strains.copy()
-        for name, values in zip(self._e0, self._of_points(strains), strict=True):
-            self.at[name][:] = values
-        self._resist()
 
     def begin(self, dt: float) -> None:
         """Begin a step of this length; s."""
@@ -190,8 +175,10 @@ class MaterialPoints:
         if opens.any():
             at["direction"][:] = np.where(opens, np.where(first < 0, -1.0, 1.0), 0.0)
             at["growth"][:] = self._growth(first, opens)
-            stress_open, slope_open = self._opened()
-            stress, slope = np.where(opens, stress_open, stress), np.where(opens, slope_open, slope)
+            _, softens = derivative(partial(self._equations.resistance, at), at["growth"])
+            stress_open, D = self._bulk(at)
+            condensed = D * softens / (D / at["length"] + softens)  # P(76)
+            stress, slope = np.where(opens, stress_open, stress), np.where(opens, condensed, slope)
         rest = self._layout.rest  # stiffness of what has no points
         self.r = rest * ((1 - θ) * self.strains0 + θ * strains)
         self.r = self.r + np.einsum("n,acn,nak->ck", w, stress, self._B)
@@ -201,65 +188,50 @@ class MaterialPoints:
         """Stresses of the bulk where its law holds, and derivatives; (d, cells, n), (d, d, ...)."""
 
         def stress(at: At) -> Array:
-            return np.array([σ + 0 * at["length"] for σ in self._equations.stress(at)])
+            return self._array(self._equations.stress(at))
 
         if not self._law.solves:
             return jacobian(stress, at, self._e)
         self._solve(at)
-        unknown = prefixed("new", self._law.variables)
         σ, by_strains = jacobian(stress, at, self._e)
-        _, by_unknown = jacobian(stress, at, unknown)
-        J, E = (jacobian(self._residuals, at, names)[1] for names in (unknown, self._e))
+        _, by_unknown = jacobian(stress, at, self._z1)
+        J, E = (jacobian(self._residuals, at, names)[1] for names in (self._z1, self._e))
         return σ, by_strains - np.einsum("aj...,jb...->ab...", by_unknown, solved(J, E))
 
     def _residuals(self, at: At) -> Array:
         """Residuals of the variables that a law solves for; (m, cells, n)."""
-        return np.array([r + 0 * at["length"] for r in self._equations.residuals(at)])
+        return self._array(self._equations.residuals(at))
 
     def _solve(self, at: At) -> None:
         """Find the variables of a law from its residuals, by Newton's method at each point."""
-        variables = self._law.variables
-        unknown = prefixed("new", variables)
-        for name, old in zip(unknown, prefixed("state", variables), strict=True):
+        for name, old in zip(self._z1, self._z, strict=True):
             at[name][:] = at[old]
         ε, done = np.array([at[name] for name in self._e]), np.zeros(at["length"].shape, bool)
         for _ in range(CORRECTIONS + 1):
-            R, J = jacobian(self._residuals, at, unknown)
+            R, J = jacobian(self._residuals, at, self._z1)
             _, E = jacobian(self._residuals, at, self._e)
-            z, δ = np.array([at[name] for name in unknown]), solved(J, R[:, None])[:, 0]
+            z, δ = np.array([at[name] for name in self._z1]), solved(J, R[:, None])[:, 0]
             # Sizes of the terms of each equation, and what their last digits make of it.
-            sizes = np.einsum("ij...,j...->i...", abs(J), abs(δ))
-            digits = np.einsum("ij...,j...->i...", abs(J), abs(z))
-            digits = 4 * EPS * (digits + np.einsum("ij...,j...->i...", abs(E), abs(ε)))
-            small = (abs(R) <= digits) | (abs(δ) <= 1e-9 * abs(z))
-            ends = ~done & small.all(axis=0)
-            sizes = sizes + digits
+            by_z, by_δ = (np.einsum("ij...,j...->i...", abs(J), abs(x)) for x in (z, δ))
+            digits = 4 * EPS * (by_z + np.einsum("ij...,j...->i...", abs(E), abs(ε)))
+            sizes = by_δ + digits
+            ends = done | ((abs(R) <= digits) | (abs(δ) <= 1e-9 * abs(z))).all(axis=0)
             before = _part_of(R, sizes)
             part: Array = np.ones(done.shape)
             for _ in range(HALVINGS):
-                for name, value in zip(unknown, z - part * δ, strict=True):
+                for name, value in zip(self._z1, z - part * δ, strict=True):
                     at[name][:] = np.where(done, at[name], value)
                 falls = _part_of(self._residuals(at), sizes) <= (1 - part / 10) * before
-                if (falls | done | ends).all():
+                if (falls | ends).all():
                     break
-                part = np.where(falls | done | ends, part, part / 2)
-            done |= ends
+                part = np.where(falls | ends, part, part / 2)
+            done = ends
             if done.all():
                 return
-        for name in unknown:
+        for name in self._z1:
             at[name][~done] = np.nan
 
     # -- discontinuities -------------------------------------------------------------------------
-
-    def _resistance(self, at: At) -> tuple[Array, Array]:
-        """Resistance of the discontinuities in the step, and its derivative by their growth."""
-        return derivative(lambda a: self._equations.resistance(at, a), at["growth"])
-
-    def _opened(self) -> tuple[Array, Array]:
-        """Stress at the growth that was found, and its derivative, condensed as P(74), P(75)."""
-        stress, slope = self._bulk(self.at)
-        _, softens = self._resistance(self.at)
-        return stress, slope * softens / (slope / self.at["length"] + softens)  # P(76)
 
     def _growth(self, stress: Array, opens: Array) -> Array:
         """Growth at which bulk and discontinuity bear the same; Newton's method in bounds."""
@@ -267,9 +239,8 @@ class MaterialPoints:
 
         def excess(a: Array) -> tuple[Array, Array]:
             """What the bulk bears more than the discontinuity, and its derivative."""
-            now = {**at, "growth": a}
-            borne, tangent = self._bulk(now)
-            resists, softens = self._resistance(now)
+            borne, tangent = self._bulk({**at, "growth": a})
+            resists, softens = derivative(partial(self._equations.resistance, at), a)
             over = at["direction"] * borne[0] - resists  # P(32)
             return over, -tangent[0, 0] / length - softens
 
@@ -316,9 +287,9 @@ class MaterialPoints:
             return
 
         def stored(at: At) -> Array:
-            return np.array([self._equations.stored(at) + 0 * at["length"]])
+            return self._array([self._equations.stored(at)])
 
-        _, slopes = jacobian(stored, self.at, prefixed("new", self._law.variables))
+        _, slopes = jacobian(stored, self.at, self._z1)
         own, size = self._equations.own_dissipation(self.at, tuple(slopes[0]))
         part = np.nan_to_num(own / size)
         worst = int(np.argmin(part))
@@ -330,120 +301,87 @@ class MaterialPoints:
                 "see docs/extending_laws.md"
             )
 
+    @np.errstate(all="ignore")
     def change(self) -> float:
         """Energy that the latest response stores and dissipates; J.
 
         Where viscous stresses relax it is as the trapezoidal rule counts it.
         """
-        before = self.at, self.strains0, self.kept, self._stored
-        self.at = {name: values.copy() for name, values in self.at.items()}
-        self.kept, stored = self.kept.copy(), self._stored.sum()
-        plastic, broken, _, released, relaxed = self._commit()
-        change = plastic + broken + self._stored.sum() - stored + released + relaxed
-        self.at, self.strains0, self.kept, self._stored = before
-        return float(change)
+        end = self._equations.end(self.at)
+        bulk = end.worked + end.elastic + end.hardening + end.missed + end.relaxed
+        change = np.sum(self._volume * bulk) + np.sum(self._layout.weights * end.broken)
+        return float(change + self._of_rest(self.strains)) - sum(self.stored.values())
 
-    def accept(self) -> None:
-        """Take the latest response as the new state, and enter what it dissipated."""
-        plastic, broken, lost, released, _ = self._commit()
-        entries, α = self._ledger.lost, self._scheme.alpha
-        if self._layout.yields:
-            entries["plastic"] += plastic
-        if self.softens:
-            entries["hinges"] += broken
-        if α or self._releases:
-            entries["numerical"] += 2 * α * lost + released
-
-    def enter_stored(self) -> None:
-        """Enter what the accepted state stores."""
-        elastic, hardening = self._stored
-        self._ledger.state["stored"] += elastic
-        if self._layout.yields:
-            self._ledger.state["hardening"] += hardening
+    def _of_rest(self, strains: Array) -> float:
+        """Elastic energy of what has no points; J."""
+        return float(np.sum(strains**2 @ self._layout.rest / 2 * self.at["length"][:, 0]))
 
     @np.errstate(over="ignore")
-    def _commit(self) -> tuple[float, float, float, float, float]:
-        """Write the end of the step into the variables.
-
-        Returns:
-            Energy dissipated by plastic strains and by discontinuities; lost numerically by
-            backward Euler, over ``2 alpha``; let go by what has broken; work of the mean stress on
-            plastic strains, less that at the end, of points whose stress relaxes; J.
-        """
-        at, layout, w = self.at, self._layout, self._layout.weights
-        length, volume, rest = at["length"][:, 0], w * at["length"], layout.rest
+    def accept(self) -> None:
+        """Take the latest response as the new state, and enter what it dissipated."""
+        at, α = self.at, self._scheme.alpha
         end = self._equations.end(at)
-        energy, stress = end.elastic, np.array([σ + 0 * at["length"] for σ in end.stress])
-
-        change, self.strains0 = self.strains - self.strains0, self.strains
-        lost = np.sum(rest * change**2 / 2 * length[:, None]) + np.sum(volume * end.lost)
-        elastic = np.sum(rest * self.strains**2 / 2 * length[:, None])
-
-        for name, grown in zip(prefixed("state", self._law.variables), end.changes, strict=True):
+        plastic = np.sum(self._volume * end.worked, axis=1)
+        broken = np.sum(self._layout.weights * (end.broken + 0 * at["length"]), axis=1)
+        self.kept[:, 4:] += np.column_stack([plastic, broken])
+        numerical = 2 * α * self._of_rest(self.strains - self.strains0)
+        numerical += np.sum(self._volume * (2 * α * end.lost + end.missed))
+        for name, grown in zip(self._z, end.changes, strict=True):
             at[name] += grown
-        for name, now in zip(self._e0, self._e, strict=True):
-            at[name][:] = at[now]
         at["jump"] += at["direction"] * at["growth"]
         at["opening"] += at["growth"]
         at["flows"][:] = np.where(at["growth"] > 0, FLOWING, CLOSED)
         at["growth"][:] = at["direction"][:] = 0.0
-
         # What has broken bears nothing; its elastic strain goes into the jump.
         breaks = np.isfinite(at["traction"])
         at["traction"][breaks] = (end.resistance + 0 * at["length"])[breaks]
         gone = at["traction"] == 0
-        for relieved, name in zip(stress, self._C, strict=True):
+        for relieved, name in zip(end.stress, self._C, strict=True):
             at["jump"] += np.where(gone, relieved / at[name] * at["length"], 0.0)
-        released = np.sum(np.where(gone, volume * (energy - end.left), 0.0) + volume * end.missed)
-        energy, stress = np.where(gone, end.left, energy), np.where(gone, 0.0, stress)
+        numerical += np.sum(np.where(gone, self._volume * (end.elastic - end.left), 0.0))
+        lost = {"plastic": plastic.sum(), "hinges": broken.sum(), "numerical": numerical}
+        for entry in self._lost:
+            self._ledger.lost[entry] += float(lost[entry])
+        self._hold(self.strains)
 
-        self.kept[:, :3] = rest * self.strains + np.einsum("n,acn,nak->ck", w, stress, self._B)
+    def start(self, strains: Array) -> None:
+        """Begin at these strains of the cells, to which no step has led; (cells, 3)."""
+        softening, breaking = self._layout.softening, self._layout.breaking
+        if softening is not None:
+            self.at["traction"][:, breaking] = softening.traction(self.at["opening"][:, breaking])
+        self._hold(strains.copy())
+
+    def _hold(self, strains: Array) -> None:
+        """Make forces and stored energies those of the variables at these strains."""
+        at, w = self.at, self._layout.weights
+        self.strains0, of_points = strains, self._of_points(strains)
+        for name, values in zip(self._e0, of_points, strict=True):
+            at[name][:] = values
+        law, z = self._equations.law(at), self._equations.state(at)
+        e = law.as_argument(tuple(of_points - at["jump"] / at["length"]))
+        stress = self._array(law.as_tuple(law.stress(e, z))) * (at["traction"] != 0)
+        self.kept[:, :3] = self._layout.rest * strains
+        self.kept[:, :3] += np.einsum("n,acn,nak->ck", w, stress, self._B)
         self.kept[:, 3] = at["jump"][:, -1]
-        plastic = np.sum(volume * end.worked, axis=1)
-        broken = np.sum(w * (end.broken + 0 * at["length"]), axis=1)
-        self.kept[:, 4] += plastic
-        self.kept[:, 5] += broken
-        stored = elastic + np.sum(volume * energy), np.sum(volume * end.hardening)
-        self._stored = np.array(stored)
-        sums = plastic.sum(), broken.sum(), lost, released, np.sum(volume * end.relaxed)
-        return tuple(map(float, sums))  # type: ignore[return-value]
-
-    # -- a state that no step has led to ---------------------------------------------------------
-
-    def refresh(self) -> None:
-        """Make forces and stored energies those of the strains at which the points begin."""
-        at, length, w = self.at, self.at["length"][:, 0], self._layout.weights
-        law, state = self._equations.law(at), self._equations.state(at)
-        volume, rest = w * at["length"], self._layout.rest
-        e = law.as_argument(tuple(self._of_points(self.strains0) - at["jump"] / at["length"]))
-        stress = np.array([σ + 0 * at["length"] for σ in law.as_tuple(law.stress(e, state))])
-        self.kept[:, :3] = rest * self.strains0 + np.einsum("n,acn,nak->ck", w, stress, self._B)
-        self._stored[0] = np.sum(volume * law.elastic_energy(e, state))
-        self._stored[0] += np.sum(self.strains0**2 @ rest / 2 * length)
-        self._stored[1] = np.sum(volume * law.hardening_energy(state))
-
-    @property
-    def _variables(self) -> tuple[str, ...]:
-        """Names of all that later steps depend on."""
-        others = "jump", "opening", *self._e0, "traction", "flows"
-        return (*prefixed("state", self._law.variables), *others)
+        energies = law.elastic_energy(e, z), law.hardening_energy(z)
+        elastic, hardening = (float(np.sum(self._volume * x)) for x in energies)
+        of_entries = {"stored": elastic + self._of_rest(strains), "hardening": hardening}
+        self.stored = {entry: of_entries[entry] for entry in self.stored}
 
     def state(self) -> Array:
         """Return the internal variables of the accepted state; (cells, k)."""
         stored = np.zeros((len(self.kept), 2))
-        stored[:1] = self._stored  # of all cells together; to whom it belongs does not matter
+        # That of all cells together; to whom it belongs does not matter.
+        stored[:1] = self.stored["stored"], self.stored.get("hardening", 0.0)
         variables = [self.at[name] for name in self._variables]
         return np.asarray(np.hstack([*variables, self.kept, self.strains0, stored]))
 
-    def restore(self, cells: Sequence[int] | Index, table: Array) -> None:
-        """Take over :meth:`state` in some of the cells."""
+    def restore(self, table: Array) -> None:
+        """Take over :meth:`state`; forces and stored energies follow from :meth:`start`."""
         n = self.at["length"].shape[1]
-        ends = np.arange(1, len(self._variables) + 1) * n
-        *variables, kept, e0, stored = np.split(table, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
-        for name, values in zip(self._variables, variables, strict=True):
-            self.at[name][cells] = values
-        self.kept[cells], self.strains0[cells] = kept, e0
-        self._stored = stored.sum(axis=0)
+        for i, name in enumerate(self._variables):
+            self.at[name][:] = table[:, i * n : (i + 1) * n]
+        self.kept = table[:, -11:-5].copy()
 
 
 def _part_of(residuals: Array, sizes: Array) -> Array:

@@ -42,7 +42,7 @@ def simulate_by_reference(
     if start is not None and start.between == between and same_unknowns(start.grid, grid):
         goes_on = same and "reactions" in internal and not len(start.v)
         if goes_on or has_inertia(scheme):
-            solver.given, before = start.last_forces()
+            solver.on_nodes, before = start.last_forces()
             solver.q_before = q if before is None else before
     solution = Solution(scene, grid)
     solution.between = between
