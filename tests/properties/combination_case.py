@@ -150,7 +150,8 @@ def results(names, solution, rows=slice(None)):
     forces += [solution.reaction(support)[rows] for support in scene.supports]
     links = [solution.connector(one) for one in scene.connectors]
     found["forces"] = np.array(forces), None
-    found["of connectors"] = np.array([link.force[rows] for link in links]), None
+    of_each = [np.atleast_2d(link.force[rows].T) for link in links]  # rows by component
+    found["of connectors"] = np.concatenate(of_each) if links else np.array([]), None
     return found
 
 

@@ -127,7 +127,12 @@ def momentum(case):
             away = solution.position(one.b) - np.array(one.a.point)
             sums, lengths = away[1:] + away[:-1], np.hypot(*away.T)
             axis = sums / (lengths[1:] + lengths[:-1])[:, None] if one.stretches else one.axis
-            add(-solution.connector(one).force[1:, None] * np.broadcast_to(axis, force.shape))
+            along = np.broadcast_to(axis, force.shape)
+            if one.components:
+                x, y = solution.connector(one).force[1:, :2].T
+                add(-x[:, None] * along - y[:, None] * along @ [[0.0, 1.0], [-1.0, 0.0]])
+            else:
+                add(-solution.connector(one).force[1:, None] * along)
     change = np.diff(solution.momentum()[:, :2], axis=0)
     missing = np.abs(change - dt[:, None] * force).max() / (size * dt.max())
     assert missing < FORCES, missing

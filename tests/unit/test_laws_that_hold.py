@@ -65,6 +65,13 @@ LAWS = {
 SCHEMES = [ub.Midpoint(), ub.Midpoint(0.1, 0.1), ub.DecayingMidpoint(), ub.Static()]
 
 
+CASES = pytest.mark.parametrize(
+    ("name", "scheme"),
+    # In statics a force that falls when it slides is a limit load.
+    [(name, one) for name in LAWS for one in SCHEMES if (name, one) != ("breakaway", ub.Static())],
+)
+
+
 def oscillator(*laws, v=1.5):
     """A mass between a spring and what rubs on its rail, struck and pushed to and fro."""
     mass = ub.Body((1, 0), mass=2.0, inertia=1.0)
@@ -98,11 +105,7 @@ def test_a_constant_limit_is_dry_friction(scheme):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-11 * np.abs(other).max())
 
 
-@pytest.mark.parametrize(
-    ("name", "scheme"),
-    # In statics a force that falls when it slides is a limit load.
-    [(name, one) for name in LAWS for one in SCHEMES if (name, one) != ("breakaway", ub.Static())],
-)
+@CASES
 def test_held_exactly_and_never_gives_energy(name, scheme):
     _, (link,), scene = oscillator(LAWS[name])
     solution = run(scene, scheme)
@@ -163,8 +166,7 @@ def lost_over(way):
     return 0.5 * way + 1.5 * 0.1 * (1 - math.exp(-way / 0.1))
 
 
-@pytest.mark.parametrize("name", LAWS)
-@pytest.mark.parametrize("scheme", SCHEMES, ids=str)
+@CASES
 def test_reference(name, scheme):
     """The law by NumPy in the reference solver, and the ledger of both."""
     _, (link,), scene = oscillator(LAWS[name])

@@ -167,7 +167,8 @@ class Form:
 def dofs_of_cells(space: fem.FunctionSpace) -> Index:
     """Degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
     blocks, size = space.dofmap.list, space.dofmap.bs
-    return np.asarray(blocks[:, :, None] * size + np.arange(size)).reshape(len(blocks), -1)
+    dofs = np.asarray(blocks[:, :, None] * size + np.arange(size))
+    return dofs.reshape(len(blocks), blocks.shape[1] * size)
 
 
 def put(function: fem.Function, values: Array) -> None:
@@ -229,7 +230,7 @@ class Cells:
 
     def on_nodes(self, kind: str, form: Form) -> Array:
         """Forces of a linear form on the nodes of the cells, see :func:`numbers_of_cells`."""
-        forces = form.entries()[self._dofs].reshape(len(self.numbers), 3, -1)
+        forces = form.entries()[self._dofs].reshape(len(self.numbers), 3, self._dofs.shape[1] // 3)
         return numbers_of_cells(self._grid, kind, self.numbers, forces)
 
 

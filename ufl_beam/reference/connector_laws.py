@@ -55,6 +55,9 @@ rigid-plastic connector slips in an iterate; least factor of motions, in EI over
 Row = tuple[float, float, float]
 """α, β, γ."""
 
+Motions = Any
+"""A relative motion, or an array of the components of a bushing; m or rad."""
+
 
 @dataclass
 class Setting:
@@ -209,7 +212,7 @@ class _Stated(LawInStep):
         if self._delayed:
             ledger.lost["numerical"] += 0.0
 
-    def _after(self, e1: float, part: float) -> State:
+    def _after(self, e1: Motions, part: float) -> State:
         """Variables after a part of the step to ``e1``; they grow in proportion."""
         z = {name: np.array([self.z[name]]) for name in self.law.variables}
         if part and z:
@@ -218,51 +221,74 @@ class _Stated(LawInStep):
             z = {name: x + part / self._θ * changes[name] for name, x in z.items()}
         return State(z)
 
-    def _at_law(self, e1: float) -> Array:
-        """Motion and rate at the time of the law; (2, 1)."""
-        return np.array([[(1 - self._θ) * self.e0 + self._θ * e1], [(e1 - self.e0) / self.dt]])
+    def _at_law(self, e1: Motions) -> tuple[Any, Any]:
+        """Motions and rates at the time of the law, as its methods get them."""
+        e0, e1 = np.atleast_1d(self.e0), np.atleast_1d(e1)
+        return tuple(
+            self.law.given([np.array([x]) for x in values])
+            for values in ((1 - self._θ) * e0 + self._θ * e1, (e1 - e0) / self.dt)
+        )
 
-    def _energy(self, e: float, z: State) -> float:
-        return float(np.sum(self.law.energy(np.array([e]), z)))
+    def _energy(self, e: Motions, z: State) -> float:
+        motion = self.law.given([np.array([x]) for x in np.atleast_1d(e)])
+        return float(np.sum(self.law.energy(motion, z)))
 
-    def _elastic(self, e: float, z: State, by: str = "") -> float:
-        """Derivative of the energy by the motion, or by a variable, by a complex step."""
-        motion = np.array([e if by else e + 1e-30j])
-        moved = State({name: x + 1e-30j if name == by else x for name, x in vars(z).items()})
+    def _elastic(self, e: Array, z: State) -> Array:
+        """Derivatives of the energy by the motions; (k,)."""
+        forces = self.law.elastic_forces([np.array([x]) for x in e], z)
+        return np.array([float(np.sum(force)) for force in forces])
+
+    def _by_variable(self, e: Motions, z: State, name: str) -> float:
+        """Derivative of the energy by a variable, by a complex step."""
+        moved = State({n: x + 1e-30j if n == name else x for n, x in vars(z).items()})
+        motion = self.law.given([np.array([x]) for x in np.atleast_1d(e)])
         return float(np.sum(np.imag(self.law.energy(motion, moved)))) / 1e-30
 
-    def _force(self, e1: float) -> float:
-        """Force of a step to ``e1``: of the energy where loads act, and the resistance."""
+    def _forces(self, e1: Array) -> Array:
+        """Forces of a step to ``e1``: of the energy where loads act, and the resistance; (k,)."""
+        e0, z = np.atleast_1d(self.e0), self._after(e1, self._part)
         resistance = self.law.resistance(*self._at_law(e1), self._after(e1, self._θ), self.dt)
-        z, way = self._after(e1, self._part), e1 - self.e0
         elastic = end = self._elastic(e1, z)
         if self._part != 1.0:
-            # By Gauss's rule; where the force is not smooth, from the change of the energy.
-            mean = self.setting.scheme.mean(lambda e: self._elastic(e, z), self.e0, e1)
-            first, middle = (self._elastic(e, z) for e in (self.e0, (self.e0 + e1) / 2))
-            if abs(mean - (first + 4 * middle + end) / 6) > 1e-7 * (abs(first) + abs(end)):
-                mean = (self._energy(e1, z) - self._energy(self.e0, z)) / way
+            # By Gauss's rule; where the forces are not smooth, from the change of the energy.
+            way, mean = e1 - e0, self.setting.scheme.mean(lambda e: self._elastic(e, z), e0, e1)
+            first, middle = (self._elastic(e, z) for e in (e0, (e0 + e1) / 2))
+            errors = (mean - (first + 4 * middle + end) / 6) * way
+            if np.abs(errors).sum() > 1e-7 * ((np.abs(first) + np.abs(end)) @ np.abs(way)):
+                missing = self._energy(e1, z) - self._energy(e0, z) - mean @ way
+                groups = (slice(2), slice(2, None))  # displacements, rotation
+                shares = np.array([errors[group].sum() ** 2 for group in groups])
+                for group, share in zip(groups, shares / shares.sum(), strict=True):
+                    if way[group].any():
+                        mean[group] += missing * share * way[group] / (way[group] @ way[group])
             elastic = mean + (2 * self._part - 1) * (end - mean)
-        return elastic + float(np.sum(resistance))
+        return elastic + [float(np.sum(force)) for force in self.law.each(resistance)]
 
-    def row(self, e1: float, λ: float) -> Row:
-        """The law around an iterate."""
+    def row(self, e1: Motions, λ: Motions) -> Any:
+        """The law around an iterate, a row for each component; (k, k + 2)."""
+        e0, e1 = np.atleast_1d(self.e0), np.atleast_1d(e1)
+        lengths, slopes = [self.length] if len(e1) == 1 else [self.length, self.length, 1.0], []
         with np.errstate(all="ignore"):
-            return around(self._force, e1, small_way(self.e0, e1, self.length))
+            for i, ε in enumerate(map(small_way, e0, e1, lengths)):
+                moved = ε * np.eye(len(e1))[i]
+                slopes.append((self._forces(e1 + moved) - self._forces(e1 - moved)) / (2 * ε))
+            D, force = np.transpose(slopes), self._forces(e1)
+        return np.column_stack([-D, np.ones(len(e1)), force - D @ e1])
 
-    def change(self, e1: float, work: float) -> float:
+    def change(self, e1: Motions, work: float) -> float:
         if self._loses:
             return work
         return self._energy(e1, self._after(e1, 0.0)) - self.z["held"]
 
-    def accept(self, e1: float, work: float) -> None:
+    def accept(self, e1: Motions, work: float) -> None:
         """Take the variables; what is neither stored nor lost by the scheme is lost."""
         old, new, ledger = self._after(e1, 0.0), self._after(e1, 1.0), self.setting.ledger
         held, numerical = self._energy(e1, new), 0.0
         if self._delayed:
-            growth = self._elastic(e1, new) * (e1 - self.e0)
+            e0, e = np.atleast_1d(self.e0), np.atleast_1d(e1)
+            growth = float(self._elastic(e, new) @ (e - e0))
             for name, z in vars(new).items():
-                growth += self._elastic(e1, new, name) * float((z - getattr(old, name))[0])
+                growth += self._by_variable(e1, new, name) * float((z - getattr(old, name))[0])
             numerical = (2 * self._part - 1) * (self._energy(self.e0, old) - held + growth)
             ledger.lost["numerical"] += numerical
         if self._loses:
@@ -272,11 +298,11 @@ class _Stated(LawInStep):
         self.z |= {name: float(x[0]) for name, x in vars(new).items()} | {"held": held}
         self.stored = {"stored": held}
 
-    def start(self, e: float) -> float:
+    def start(self, e: Motions) -> Any:
         z = self._after(e, 0.0)
         self.z["held"] = self._energy(e, z)
         self.stored = {"stored": self.z["held"]}
-        return self._elastic(e, z)
+        return self._elastic(np.atleast_1d(e), z)
 
 
 class _Sprung(LawInStep):
@@ -340,12 +366,15 @@ class _Rubbing(LawInStep):
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
-        self._limit = self.setting.asked[self.link]
+        self._limit = self._limit_now()
         softness = CREEP * self.length * self.setting.friction_repeats
         self._creep = softness / self._limit if self._limit > 0 else 0.0
         # With this way the velocity at the end is zero; with none, that before would come back.
         self._way = way_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.link]
         self._slip, self._against, self._guessed = self.z["slip"], False, True
+
+    def _limit_now(self) -> float:
+        return self.setting.asked[self.link]
 
     def row(self, e1: float, λ: float) -> Row:
         """Stick while the force is below the limit; slip until the sliding velocity reverses."""
@@ -364,11 +393,55 @@ class _Rubbing(LawInStep):
             self._slip = math.copysign(1.0, λ)
         if self._slip == 0 and self._limit > 0:
             return 1.0, -self._creep, self.e0 + (0.0 if self._against else self._way)
+        return self._sliding(e1)
+
+    def _sliding(self, e1: float) -> Row:
         return 0.0, 1.0, self._slip * self._limit
 
     def accept(self, e1: float, work: float) -> None:
         super().accept(e1, work)
         self.z["slip"] = self._slip
+
+
+class _Holding(_Rubbing):
+    """Law of a user that holds the motion up to a limit, and slides beyond it."""
+
+    def __init__(self, link: Connector, setting: Setting) -> None:
+        self.entry = link.law.entry  # type: ignore[union-attr]
+        super().__init__(link, setting)
+        law = self.law
+        self.saved_as, self._θ = f"{type(law).__qualname__}{[*law.variables]}", setting.scheme.theta
+        self.z |= {name: float(x) for name, x in law.variables.items()}
+        self.z |= {"held": 0.0, "dissipated": 0.0}
+        self.stored = {"stored": 0.0}
+
+    def _state(self) -> State:
+        return State({name: np.array([self.z[name]]) for name in self.law.variables})
+
+    def _limit_now(self) -> float:
+        return max(float(np.sum(self.law.limit(self._state()))), 0.0)
+
+    def _after(self, e1: float, part: float) -> tuple[Array, Array, State]:
+        """Motion and rate at the time of the law, and variables after a part of the step."""
+        e, rate = np.array([(1 - self._θ) * self.e0 + self._θ * e1]), np.array([e1 - self.e0])
+        rate, old = rate / self.dt, self._state()
+        if not vars(old):
+            return e, rate, old
+        changes = self.law.increments(e, rate, old, self._θ * self.dt)
+        z = {name: x + part / self._θ * changes[name] for name, x in vars(old).items()}
+        return e, rate, State(z)
+
+    def _sliding(self, e1: float) -> Row:
+        def force(e: float) -> float:
+            return self._slip * float(np.sum(self.law.sliding(*self._after(e, self._θ), self.dt)))
+
+        return around(force, e1, small_way(self.e0, e1, self.length))
+
+    def accept(self, e1: float, work: float) -> None:
+        *_, new = self._after(e1, 1.0)
+        super().accept(e1, work)
+        self.z |= {name: float(x[0]) for name, x in vars(new).items()}
+        self.z["dissipated"] += work
 
 
 class _Slipping(LawInStep):
@@ -584,4 +657,6 @@ LAWS: dict[type, type[LawInStep]] = {
 
 def law_in_step(link: Connector, setting: Setting) -> LawInStep:
     """Law of a connector in a step."""
+    if isinstance(link.law, ConnectorLaw) and link.law.holds:
+        return _Holding(link, setting)
     return next(LAWS[kind] for kind in type(link.law).__mro__ if kind in LAWS)(link, setting)

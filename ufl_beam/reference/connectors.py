@@ -6,7 +6,8 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections import defaultdict
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -17,6 +18,7 @@ from ufl_beam.errors import NoNumber
 from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
 from ufl_beam.mechanics.time_schemes import Step, acting
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
@@ -72,29 +74,34 @@ class Linked(Force, ABC):
 
 
 class Connectors(Linked):
-    """Connectors of one relative motion.
+    """Connectors of one relative motion, or of the k motions of a bushing.
 
-    Each is a cell of unit length from one node to the other, with its force as a seventh unknown.
+    Each is a cell of unit length from one node to the other, with its forces as further unknowns.
     """
 
-    def __init__(self, motion: str, numbers: Index, grid: Grid, setting: Setting) -> None:
-        n = len(numbers)
-        mesh, order = separate_cells(np.tile([[0.0, 0.0], [1.0, 0.0]], (n, 1, 1)))
-        super().__init__(grid, numbers[order])
-        self.laws = [law_in_step(link, setting) for link in self.links]
-        self._setting, self._stated = setting, connector_forms((motion,), setting.scheme, mesh)
+    def __init__(
+        self, motions: Sequence[str], numbers: Index, grid: Grid, setting: Setting
+    ) -> None:
+        n, k = len(numbers), len(motions)
+        mesh, order = separate_cells(np.tile([[0.0, 0.0], [1.0, 0.0]], (n // k, 1, 1)))
+        super().__init__(grid, numbers.reshape(-1, k)[order].ravel())
+        self._k, self.laws = k, [law_in_step(link, setting) for link in self.links[::k]]
+        self._setting, self._stated = setting, connector_forms(motions, setting.scheme, mesh)
         stated = self._stated
-        self._at: Index = np.empty(7 * n, dtype=np.int64)
-        self._at[dofs_of_cells(stated.q1.function_space)] = self.dofs
+        self._at: Index = np.empty(n // k * (6 + k), dtype=np.int64)
+        self._at[dofs_of_cells(stated.q1.function_space)] = np.column_stack(
+            [self.dofs[::k, :6], self.forces_at.reshape(-1, k)]
+        )
         self._work, self._tangent, self._motion, self._rate = (
             Form(form, self._at, grid.size)
             for form in (stated.work, stated.tangent, stated.motion, stated.rate)
         )
         numbers_of_links = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.links]
-        put(stated.numbers, np.array(numbers_of_links))
-        self._cell_dofs = dofs_of_cells(stated.bend.function_space)[:, 0]
-        self._length = np.array([law.length for law in self.laws])
-        self._rows: Array = np.zeros((n, 3))
+        put(stated.numbers, np.reshape(numbers_of_links, (-1, 8 * k)))
+        by_cell = stated.motion.arguments()[0].ufl_function_space()
+        self._cell_dofs = dofs_of_cells(by_cell).ravel()
+        self._length = np.where([link.turns for link in self.links], 1.0, setting.size)
+        self._rows: Array = np.zeros((n, k + 2))
         self._e0: Array = np.zeros(n)
         self._dt = 1.0
 
@@ -111,14 +118,19 @@ class Connectors(Linked):
     def begin(self, step: Step) -> None:
         """Begin the step in all laws."""
         self._stated.q0.x.array[:], self._dt = step.q0[self._at], step.dt
-        for law, e0 in zip(self.laws, self._e0, strict=True):
-            law.begin(float(e0), step)
+        for law, e0 in zip(self.laws, self._of_each(self._e0), strict=True):
+            law.begin(e0, step)
+
+    def _of_each(self, values: Array) -> list[Any]:
+        """Numbers of each connector: one, or an array of those of its components."""
+        return [*map(float, values)] if self._k == 1 else [*values.reshape(-1, self._k)]
 
     def residual(self, q1: Array) -> Array:
         """Forces on the nodes, and the rows of the laws."""
-        each = zip(self.laws, self.motion(q1), q1[self.forces_at], strict=True)
-        self._rows = np.array([law.row(float(e), float(λ)) for law, e, λ in each])
-        put(self._stated.row, self._rows)
+        given = map(self._of_each, (self.motion(q1), q1[self.forces_at]))
+        rows = [law.row(e, λ) for law, e, λ in zip(self.laws, *given, strict=True)]
+        self._rows = np.reshape(rows, self._rows.shape)
+        put(self._stated.row, self._rows.reshape(len(self.laws), -1))
         return self._work.vector()
 
     def tangent(self, q1: Array) -> csr_array:
@@ -132,14 +144,17 @@ class Connectors(Linked):
         What the last digits of the motions make of a row does not count.
         """
         size = self._setting.size
-        amplitude, weight = moved / size, np.abs(self._rows[:, 1])
-        about_motion = weight * [law.slope for law in self.laws] < 1 - 1e-12
+        k, length = self._k, self._length.reshape(-1, self._k)
+        amplitude, weight = moved / size, np.abs(self._rows[:, k])
+        slopes = np.repeat([law.slope for law in self.laws], k)
+        about_motion = weight * slopes < 1 - 1e-12
         of_motion = 0.01 * self._length * amplitude
         wanted = np.where(about_motion, of_motion, weight * scale * size / self._length)
         far = np.maximum(np.abs(q[self.dofs[:, :4]]).max(axis=1) / size,
                          np.abs(q[self.dofs[:, 4:6]]).max(axis=1)) + amplitude  # fmt: skip
         left = np.abs(r[self.forces_at])
-        left -= 8 * np.abs(self._rows[:, 0]) * self._length * np.spacing(far)
+        of_motions = np.abs(self._rows[:, :k]) * np.repeat(length, k, axis=0)
+        left -= 8 * of_motions.sum(axis=1) * np.spacing(far)
         with np.errstate(divide="ignore", invalid="ignore"):
             return float(np.where(left <= 0, 0.0, left / wanted).max())
 
@@ -150,8 +165,9 @@ class Connectors(Linked):
 
     def change(self, q1: Array) -> float:
         """Energy that the connectors store, dissipate or give away in the step; J."""
-        each = zip(self.laws, self.motion(q1), self.taken(q1), strict=True)
-        return sum(law.change(float(e), float(work)) for law, e, work in each)
+        works = self.taken(q1).reshape(-1, self._k).sum(axis=1)
+        each = zip(self.laws, self._of_each(self.motion(q1)), works, strict=True)
+        return sum(law.change(e, float(work)) for law, e, work in each)
 
     def accept(self, q1: Array, s: Array) -> None:
         """Take the end of the step; enter what was supplied or lost."""
@@ -159,14 +175,15 @@ class Connectors(Linked):
         self.work = self.work + taken
         self.rate, self._e0 = np.asarray((e - self._e0) / self._dt), e
         self.before = q1[self.forces_at]
-        for law, motion, work in zip(self.laws, e, taken, strict=True):
-            law.accept(float(motion), float(work))
+        works = taken.reshape(-1, self._k).sum(axis=1)
+        for law, motion, work in zip(self.laws, self._of_each(e), works, strict=True):
+            law.accept(motion, float(work))
 
     def start(self, q: Array) -> None:
         """Begin at the motions of ``q``."""
         self._e0 = self.motion(q)
-        each = zip(self.laws, map(float, self._e0), strict=True)
-        self.at_rest = np.array([law.start(e) for law, e in each])
+        each = zip(self.laws, self._of_each(self._e0), strict=True)
+        self.at_rest = np.ravel([law.start(e) for law, e in each])
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
@@ -178,13 +195,15 @@ class Connectors(Linked):
 
     def kept(self, q: Array) -> Array:
         """Columns of ``Connection`` of each; (num_links, 5)."""
-        e = [law.motion(float(e)) for law, e in zip(self.laws, self._e0, strict=True)]
-        dissipated = [law.z.get("dissipated", 0.0) for law in self.laws]
+        each = zip(self.laws, self._of_each(self._e0), strict=True)
+        e, dissipated = np.ravel([law.motion(e) for law, e in each]), np.zeros(len(self.links))
+        dissipated[:: self._k] = [law.z.get("dissipated", 0.0) for law in self.laws]
         return np.column_stack([e, q[self.forces_at], self.work, self.rate, dissipated])
 
     def remember(self, memory: Memory) -> None:
         """Works, rates, forces, motions and internal variables, by the kind of the law."""
-        for i, law in enumerate(self.laws):
+        for i in range(len(self.links)):
+            law = self.laws[i // self._k]
             row = np.array([self.work[i], self.rate[i], self.before[i], self._e0[i], *law.state()])
             row = memory.rows(law.saved_as, self.numbers[i : i + 1], row[None])[0]
             self.work[i], self.rate[i], self.before[i], self._e0[i] = row[:4]
@@ -285,13 +304,24 @@ class GuideForce(Linked):
         self._on0 = row[4:]
 
 
+def components(link: Connector) -> int:
+    """Number of motions that the law of a link acts on."""
+    return link.law.components if isinstance(link.law, ConnectorLaw) else 1
+
+
 def connectors_of(grid: Grid, setting: Setting) -> list[Linked]:
     """All connectors of a scene: those of one motion together, and each guide."""
     found: list[Linked] = []
     links = grid.scene.links
-    for motion in MOTIONS:
-        numbers = np.array([i for i, link in enumerate(links) if link.motion == motion])
-        if len(numbers):
-            found.append(Connectors(motion, numbers, grid, setting))
+    together = [("sliding", "sliding", "turning")[:k] for k in (2, 3)]
+    for motions in (*((motion,) for motion in MOTIONS), *together):
+        k = len(motions)
+        numbers = [
+            i
+            for i, link in enumerate(links)
+            if components(link) == k and (k > 1 or link.motion == motions[0])
+        ]
+        if numbers:
+            found.append(Connectors(motions, np.array(numbers), grid, setting))
     guides = (i for i, link in enumerate(links) if isinstance(link.law, Guide))
     return [*found, *(GuideForce(i, grid, setting) for i in guides)]

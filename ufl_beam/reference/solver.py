@@ -24,7 +24,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia, nodal_step
 from ufl_beam.model.bodies import Anchor
-from ufl_beam.model.connector_laws import Controller, Coulomb
+from ufl_beam.model.connector_laws import Controller, Coulomb, rubs
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.joints import Joint
@@ -106,7 +106,7 @@ class Solver:
         links = self.scene.links
         asked = [link for link in links if isinstance(link.law, Controller | Coulomb)]
         self.asked: dict[Connector, float] = dict.fromkeys(asked, 0.0)
-        self.rates = dict(self.asked)
+        self.rates = dict.fromkeys([*asked, *(link for link in links if rubs(link.law))], 0.0)
         self.samples: dict[Connector, tuple[float, int]] = {}  # time of the first, number
         laws = {link: link.law for link in asked if isinstance(link.law, Controller)}
         self._sampled = {link: law.sample for link, law in laws.items() if law.sample}
