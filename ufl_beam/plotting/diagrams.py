@@ -12,10 +12,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
-from ufl_beam.model.sections import Section
 from ufl_beam.plotting import drawing, style
 from ufl_beam.plotting.inelastic import draw_damage
-from ufl_beam.plotting.labels import Label, Spot, leader_of, place
+from ufl_beam.plotting.labels import Label, Spot, place
 from ufl_beam.plotting.layout import Pose, directions, joined, left_of, segments, unit_vectors
 from ufl_beam.plotting.style import (
     BLUE,
@@ -29,6 +28,7 @@ from ufl_beam.plotting.style import (
     make_room,
     number,
     shade,
+    size_of,
 )
 from ufl_beam.simulation.solution import Solution
 
@@ -119,14 +119,12 @@ def draw_frame(
 
 def _is_loaded(what: str, diagrams: Sequence[Values]) -> bool:
     """Return whether a section force is more than what rounding and iterations leave behind."""
-
-    def stiffness(section: Section) -> float:
-        return {"N": section.EA, "V": section.GA, "M": section.EI / section.depth}[what]
-
-    return any(
-        bool(np.abs(values).max() > LEAST_STRAIN * stiffness(beam.section))
-        for beam, values in diagrams
-    )
+    for beam, values in diagrams:
+        section = beam.section
+        stiffness = {"N": section.EA, "V": section.GA, "M": section.EI / section.depth}[what]
+        if np.abs(values).max() > LEAST_STRAIN * stiffness:
+            return True
+    return False
 
 
 def _draw_diagrams(
@@ -299,48 +297,41 @@ def _fit(axes: Axes, own: bool) -> None:
 
 def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     """Write peaks beside areas and lines; those without room are left out but for extremes."""
-    if not peaks:
-        return []
     figure = figure_of(axes)
     figure.draw_without_rendering()
+    looks: tuple[dict[str, Any], ...] = (
+        {"size": font_size(10.0), "weight": "normal"},
+        {"size": font_size(13.0), "weight": "bold"},
+    )
+    halves = [half_size(axes, peak.text, **looks[peak.extreme]) for peak in peaks]
+    crowded = 4 * sum(map(np.prod, halves)) > CROWDED * np.prod(size_of(axes))
+    chosen = [k for k, peak in enumerate(peaks) if peak.extreme or not crowded]
+    if not chosen:
+        return []
 
     def in_points(xy: Any) -> Array:
         return np.asarray(axes.transData.transform(xy) * POINTS / figure.dpi)
 
-    looks: list[dict[str, Any]] = [
-        {"size": font_size(10.0), "weight": "normal"},
-        {"size": font_size(13.0), "weight": "bold"},
-    ]
-
-    def half(peak: Peak) -> Array:
-        return half_size(axes, peak.text, **looks[peak.extreme])
-
-    room = np.prod(axes.get_window_extent().size) * (POINTS / figure.dpi) ** 2
-    if sum(4 * float(np.prod(half(peak))) for peak in peaks) > CROWDED * room:
-        peaks = [peak for peak in peaks if peak.extreme]
-    lines = _lines(axes, in_points)
-    labels, halves = [], []
-    for rank, (text, color, tip, outward, _) in enumerate(peaks):
+    labels = []
+    for k in chosen:
         # Straight away from the axis first, then more and more aside
         turns = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
-        ways = directions(math.atan2(outward[1], outward[0]) + turns)
-        at = in_points(tip)
-        labels.append(Label(text, color, rank, tuple(Spot(at, way) for way in ways)))
-        halves.append(half(peaks[rank]))
+        x, y = peaks[k].outward
+        at, ways = in_points(peaks[k].tip), directions(math.atan2(y, x) + turns)
+        spots = tuple(Spot(at, way) for way in ways)
+        labels.append(Label(peaks[k].text, peaks[k].color, k, spots))
     written = []
-    for one in place(labels, halves, lines):
-        text, color, rank, _ = one.label
-        peak = peaks[rank]
-        (x, y), (right, up) = peak.tip, one.center - one.spot
-        arrow = None
-        if len(leader := leader_of(one)):
-            end = (leader[1] - one.center + one.half) / (2 * one.half)
+    for one in place(labels, [halves[k] for k in chosen], _lines(axes, in_points)):
+        text, color, k, _ = one.label
+        (x, y), (right, up), arrow = peaks[k].tip, one.center - one.spot, None
+        if len(one.leader):
+            end = (one.leader[1] - one.center + one.half) / (2 * one.half)
             line = {"arrowstyle": "-", "color": color, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
             arrow = {**line, "relpos": end, "patchA": None}  # by itself it would search that end
-        if one.overlap == 0.0 or peak.extreme:
+        if one.overlap == 0.0 or peaks[k].extreme:
             mark = axes.annotate(
                 text, (x, y), (right, up), textcoords="offset points", color=color,
-                ha="center", va="center", zorder=6, arrowprops=arrow, **looks[peak.extreme],
+                ha="center", va="center", zorder=6, arrowprops=arrow, **looks[peaks[k].extreme],
             )  # fmt: skip
             written.append(mark)
     return written

@@ -124,24 +124,22 @@ def screen(pyvista: Any) -> Iterator[None]:
             "PyVista with this VTK needs a screen, and DISPLAY is not set; install Xvfb "
             "(apt-get install xvfb) or VTK 9.4 or newer"
         )
-    reader, writer = os.pipe()
     server = subprocess.Popen(
-        ["Xvfb", "-displayfd", str(writer), "-screen", "0", "1280x1024x24", "-nolisten", "tcp"],
-        pass_fds=[writer],
+        ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"],
         start_new_session=True,  # Ctrl-C is for this process; it still needs its screen to end
         stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,
+        text=True,
     )
-    os.close(writer)
-    try:
-        with os.fdopen(reader) as answer:
-            number = answer.readline().strip()
-        if not number:
-            raise RuntimeError("Xvfb did not start; try: Xvfb -displayfd 1")
-        os.environ["DISPLAY"] = f":{number}"
-        yield
-    finally:
-        os.environ.pop("DISPLAY", None)
-        server.terminate()
-        server.wait()
+    assert server.stdout is not None
+    with server:
+        try:
+            number = server.stdout.readline().strip()
+            if not number:
+                raise RuntimeError("Xvfb did not start; try: Xvfb -displayfd 1")
+            os.environ["DISPLAY"] = f":{number}"
+            yield
+        finally:
+            os.environ.pop("DISPLAY", None)
+            server.terminate()

@@ -263,7 +263,8 @@ class OpenHinge(NamedTuple):
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
     """Find hinges, in cells and of zero length, that are open; ``points`` are nodes as drawn."""
-    grid, found = solution.grid, []
+    grid = solution.grid
+    found: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
     for beam in solution.scene.beams:
         laws = grid.hinges(beam)
         if all(law is None or math.isinf(law.limit) for law in laws):
@@ -272,19 +273,17 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
         rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
         for cell, law, jump, lost in rows:
             if law is not None and (jump != 0.0 or lost > 0.0):
-                at = points[grid.cells[cell]].mean(axis=0)
-                found.append(OpenHinge(beam, at, _spent(law, lost)))
+                found.append((beam, points[grid.cells[cell]].mean(axis=0), law, float(lost)))
     for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
         kept = solution.connector(hinge)
         if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
-            part = _spent(law_of(hinge), float(kept.dissipated[n]))
-            found.append(OpenHinge(place_of(hinge).beam, points[vertex], part))
-    return found
-
-
-def _spent(law: HingeLaw, dissipated: float) -> float:
-    """Part of the fracture energy that is spent; a hinge that never resisted is a joint."""
-    return min(dissipated / law.energy, 1.0) if law.limit > 0.0 else 1.0
+            dissipated = float(kept.dissipated[n])
+            found.append((place_of(hinge).beam, points[vertex], law_of(hinge), dissipated))
+    return [
+        # One that never resisted is a joint.
+        OpenHinge(beam, at, min(lost / law.energy, 1.0) if law.limit > 0.0 else 1.0)
+        for beam, at, law, lost in found
+    ]
 
 
 def dissipated_per_length(solution: Solution, n: int) -> Array:

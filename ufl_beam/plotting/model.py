@@ -19,7 +19,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.scene_lines import spots_of
 from ufl_beam.plotting.diagrams import plot_state
 from ufl_beam.plotting.drawing import draw_strokes
-from ufl_beam.plotting.labels import Placed, leader_of, place
+from ufl_beam.plotting.labels import Placed, place
 from ufl_beam.plotting.layout import segments
 from ufl_beam.plotting.model_sheet import (
     CAPTIONS,
@@ -268,9 +268,10 @@ def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
 def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
     """The labels, and lines from those that stand away to what they name."""
     for one in placed:
-        leader = scale * leader_of(one)
-        if len(leader):
-            axes.plot(*leader.T, color="#999999", linewidth=0.8, zorder=6, gid="leaders")
+        if len(one.leader):
+            axes.plot(
+                *scale * one.leader.T, color="#999999", linewidth=0.8, zorder=6, gid="leaders"
+            )
         x, y = scale * one.center
         axes.text(
             x, y, one.label.text, color=shade(one.label.color), fontsize=font_size(LABEL_SIZE),

@@ -104,10 +104,6 @@ class Sheet:
         self.stacks: defaultdict[object, float] = defaultdict(float)
         """Heights of the symbols that stand at a place in a direction."""
 
-    def add(self, group: str, strokes: Iterable[Stroke]) -> None:
-        """Add strokes to a group."""
-        self.strokes[group] += strokes
-
     def write(self, text: str, color: str, rank: int, spots: Iterable[Spot]) -> None:
         """Add a label with the places where it may stand."""
         self.labels.append(Label(text, color, rank, tuple(spots)))
@@ -150,7 +146,7 @@ def draw(subject: Subject, scale: float) -> Sheet:
     scene, sheet = subject.scene, Sheet(subject, scale)
     _draw_beams(sheet)
     for group, strokes in symbols.in_plane(sheet.pose).items():
-        sheet.add(group, strokes)
+        sheet.strokes[group] += strokes
     _name_bodies_and_connectors(sheet)
     for support in scene.supports:
         _draw_prescribed(sheet, support)
@@ -172,17 +168,19 @@ def _draw_beams(sheet: Sheet) -> None:
     """Axes, names, marks between cells and where hinges may form if these are few; hinges."""
     subject, scale, unit = sheet.subject, sheet.scale, sheet.unit
     weight = 2.8 * unit / scale / SYMBOL
-    sheet.add("beams", (Stroke(x, INK, weight, layer=4.0) for x in subject.axes.values()))
+    sheet.strokes["beams"] += (Stroke(x, INK, weight, layer=4.0) for x in subject.axes.values())
     for beam, axis in subject.axes.items():
         if subject.cells <= MOST_CELLS:
             steps = np.diff(axis, axis=0)
             if len(steps) > 1 and np.linalg.norm(steps, axis=1).min() > 7.0 * scale:
                 left = 3.2 * scale * left_of(unit_vectors(steps[1:] + steps[:-1]))
                 marks = np.stack([axis[1:-1] - left, axis[1:-1] + left], axis=1)
-                sheet.add("cells", (Stroke(ends, INK, 1.0, layer=4.0) for ends in marks))
+                sheet.strokes["cells"] += (Stroke(ends, INK, 1.0, layer=4.0) for ends in marks)
             if beam.section.hinge is not None and beam.section.hinge.opens:
                 middles = (axis[1:] + axis[:-1]) / 2
-                sheet.add("hinges", (disc(x, 0.14 * unit, HINGE, HINGE, 4.1) for x in middles))
+                sheet.strokes["hinges"] += (
+                    disc(x, 0.14 * unit, HINGE, HINGE, 4.1) for x in middles
+                )
         if len(subject.axes) <= MOST_LABELS:
             sheet.write(subject.names[beam], TEXT, NAMES, sheet.along(axis, 2.5 * scale))
     for hinge in subject.scene.hinges:
@@ -191,7 +189,7 @@ def _draw_beams(sheet: Sheet) -> None:
         if place.s in (0.0, 1.0):  # beside what is at the end of the beam
             end, inner = axis[:2] if place.s == 0.0 else axis[:-3:-1]
             at = at + 0.7 * unit * unit_vectors(inner - end)
-        sheet.add("hinges", [disc(at, r, HINGE, HINGE, 5.2)])
+        sheet.strokes["hinges"] += [disc(at, r, HINGE, HINGE, 5.2)]
         if place.s in place.beam.hinges:
             words = f"hinge {with_unit(float(law_of(hinge).limit), 'N m')}"
             sheet.write(words, HINGE, CAPTIONS, sheet.around(at, r))
@@ -220,7 +218,8 @@ def _name_bodies_and_connectors(sheet: Sheet) -> None:
                 for part in (0.5, 0.3, 0.7)
                 for side in (outwards, -outwards)
             )
-        words = symbols.law_in_words(connector.law, connector.turns)
+        units = ("N m", "rad") if connector.turns else ("N", "m")
+        words = symbols.glyph_of(connector.law).words(connector.law, *units)
         sheet.write(words, TEXT, CAPTIONS, spots)
 
 
@@ -228,32 +227,23 @@ def _name_bodies_and_connectors(sheet: Sheet) -> None:
 
 
 def _arrow(
-    tail: Array, tip: Array, color: str, unit: float, *, hollow: bool = False, size: float = 1.0
+    line: Array, color: str, unit: float, *, hollow: bool = False, size: float = 1.0
 ) -> list[Stroke]:
-    """A straight arrow; ``size`` is a factor on its head and the width of its line."""
-    ahead = size * HEAD * unit * unit_vectors(tip - tail)
-    shaft = Stroke(np.array([tail, tip - ahead]), color, size * SHAFT, layer=FRONT)
-    return [shaft, _head(tip, ahead, 0.3 / HEAD, color, hollow)]
-
-
-def _turning_arrow(
-    center: Array, radius: float, sense: float, color: str, unit: float, *, hollow: bool = False
-) -> list[Stroke]:
-    """An arrow around a point, counter-clockwise if ``sense`` is positive."""
-    sign, length = math.copysign(1.0, sense), min(HEAD * unit, radius)
-    angles = np.radians(90.0 + sign * np.linspace(-150.0, 120.0, 40))
-    shaft = angles[: int(len(angles) * (1 - length / radius / (1.5 * math.pi)))]
-    middle = directions(angles[-1] - sign * 0.5 * length / radius)  # so that it is on the circle
-    ahead = sign * length * left_of(middle)
+    """An arrow along a line; ``size`` is a factor on its head and the width of the line."""
+    lengths = lengths_along(line)
+    head = min(size * HEAD * unit, lengths[-1] / 3)
+    shaft = points_along(line, lengths * (1.0 - head / lengths[-1]))
+    tip = in_frame([(0, 0), (-1, 0.36), (-1, -0.36), (0, 0)], line[-1], line[-1] - shaft[-1])
     return [
-        Stroke(center + radius * directions(shaft), color, SHAFT, layer=FRONT),
-        _head(center + radius * middle + 0.5 * ahead, ahead, 0.38, color, hollow),
+        Stroke(shaft, color, size * SHAFT, layer=FRONT),
+        Stroke(tip, color, 1.0, WHITE if hollow else color, FRONT),
     ]
 
 
-def _head(tip: Array, ahead: Array, half: float, color: str, hollow: bool) -> Stroke:
-    outline = in_frame([(0, 0), (-1, half), (-1, -half), (0, 0)], tip, ahead)
-    return Stroke(outline, color, 1.0, WHITE if hollow else color, FRONT)
+def _around(center: Array, radius: float, sense: float) -> Array:
+    """Line of an arrow around a point, counter-clockwise if ``sense`` is positive; (n, 2); m."""
+    turns = math.copysign(1.0, sense) * np.linspace(-150.0, 120.0, 40)
+    return np.asarray(center + radius * directions(np.radians(90.0 + turns)))
 
 
 def _beside(tail: Array, tip: Array) -> Spots:
@@ -279,21 +269,21 @@ def _draw_point_load(sheet: Sheet, load: PointLoad | FollowerLoad) -> None:
     more = ", follows" if hollow else ""
     if size > 0.0:
         way = np.array(load.force) / size
-        tail, tip = _stand(sheet, load.place, way, size / sheet.subject.force)
-        sheet.add("loads", _arrow(tail, tip, RED, unit, hollow=hollow))
+        line = _stand(sheet, load.place, way, size / sheet.subject.force)
+        sheet.strokes["loads"] += _arrow(line, RED, unit, hollow=hollow)
         text = in_time(with_unit(size, "N"), load.time) + more
-        sheet.write(text, RED, LOADS, _beside(tail, tip))
+        sheet.write(text, RED, LOADS, _beside(*line))
     if load.moment:
         radius = 1.7 * unit + sheet.stack((load.place.point, "moment"), 0.8 * unit)
-        sheet.add("loads", _turning_arrow(at, radius, load.moment, RED, unit, hollow=hollow))
+        sheet.strokes["loads"] += _arrow(_around(at, radius, load.moment), RED, unit, hollow=hollow)
         text = in_time(with_unit(abs(load.moment), "N m"), load.time) + more
         sheet.write(text, RED, LOADS, sheet.around(at, radius))
     if not size and not load.moment:
         sheet.write("0 N", RED, LOADS, sheet.around(at, 0.0))
 
 
-def _stand(sheet: Sheet, place: Anchor, way: Array, part: float) -> tuple[Array, Array]:
-    """Tail and tip of the arrow of a force: it ends at its place, or begins there.
+def _stand(sheet: Sheet, place: Anchor, way: Array, part: float) -> Array:
+    """The line of the arrow of a force: it ends at its place, or begins there; (2, 2); m.
 
     It begins where it would lie on a beam else; where it would in both cases, it is beside it.
     """
@@ -307,8 +297,8 @@ def _stand(sheet: Sheet, place: Anchor, way: Array, part: float) -> tuple[Array,
     start = apart + sheet.stack((place.point, *np.round(way, 6), pulls), length + apart)
     if behind and ahead:  # along a beam that goes on: beside it
         at = at + 0.8 * unit * left_of(way)
-    near, far = start * way, (start + length) * way
-    return (at + near, at + far) if pulls else (at - far, at - near)
+    ends = np.outer((start, start + length), way)
+    return np.asarray(at + ends if pulls else at - ends[::-1])
 
 
 def _draw_line_load(sheet: Sheet, load: LineLoad) -> None:
@@ -328,24 +318,24 @@ def _draw_line_load(sheet: Sheet, load: LineLoad) -> None:
             begin = sheet.stack((load.beam, *np.round(way, 6)), height + 0.35 * unit)
             near, far = begin + 0.3 * unit, begin + 0.3 * unit + height
             line = axis - far * way
-            sheet.add("loads", [Stroke(line, RED, 1.2, layer=FRONT)])
+            sheet.strokes["loads"] += [Stroke(line, RED, 1.2, layer=FRONT)]
             for foot in spaced(2.0 * unit, ends=True):
-                tail, tip = foot - far * way, foot - near * way
-                sheet.add("loads", _arrow(tail, tip, RED, unit, size=0.62))
+                ends = foot - np.outer((far, near), way)
+                sheet.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
             outwards = [(at, left if left @ way < 0 else -left) for at, left in _normals(line)]
             spots = [Spot(at, side) for at, out in outwards for side in (out, -out)]
         else:
             aside, left = 0.8 * unit + sheet.stack((load.beam, "along"), 0.7 * unit), left_of(way)
             for at in spaced(2.4 * unit) + aside * left:
-                half = 0.9 * unit * way
-                sheet.add("loads", _arrow(at - half, at + half, RED, unit, size=0.62))
+                ends = at + np.outer((-0.9 * unit, 0.9 * unit), way)
+                sheet.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
             gap = (aside + 0.3 * unit) / sheet.scale
             spots = [Spot(at, left, gap) for at, _ in _normals(axis)]
         sheet.write(in_time(with_unit(size, "N/m"), load.time), RED, LOADS, spots)
     if load.moment:
         for at in spaced(3.2 * unit):
-            arrow = _turning_arrow(at, 0.75 * unit, load.moment, RED, 0.7 * unit)
-            sheet.add("loads", arrow)
+            line = _around(at, 0.75 * unit, load.moment)
+            sheet.strokes["loads"] += _arrow(line, RED, 0.7 * unit)
         text = in_time(with_unit(abs(load.moment), "N m/m"), load.time)
         sheet.write(text, RED, LOADS, sheet.along(axis, 0.9 * unit))
     if not size and not load.moment:
@@ -366,16 +356,16 @@ def _draw_prescribed(sheet: Sheet, support: Support) -> None:
         text = f"{name} = {with_unit(values.pop(), of)}" if len(values) == 1 else f"{name}(t)"
         if component == 2:
             radius = 1.9 * unit
-            sheet.add("motions", _turning_arrow(at, radius, 1.0, MOVED, unit, hollow=True))
+            sheet.strokes["motions"] += _arrow(_around(at, radius, 1.0), MOVED, unit, hollow=True)
             sheet.write(text, MOVED, MOTIONS, sheet.around(at, radius))
             continue
         way = directions(support.angle + component * math.pi / 2)
         # Beside the place, on the side from which no beam comes.
         side = left_of(way) if left_of(way) @ inward <= 1e-9 else -left_of(way)
-        tail = at + 1.5 * unit * side
-        tip = tail + 2.6 * unit * way
-        sheet.add("motions", _arrow(tail, tip, MOVED, unit, hollow=True))
-        spots = (*(Spot(x, side) for x in ((tail + tip) / 2, tip, tail)), Spot(tip, way))
+        line = at + 1.5 * unit * side + np.outer((0.0, 2.6 * unit), way)
+        sheet.strokes["motions"] += _arrow(line, MOVED, unit, hollow=True)
+        tail, tip = line
+        spots = (*(Spot(x, side) for x in (line.mean(axis=0), tip, tail)), Spot(tip, way))
         sheet.write(text, MOVED, MOTIONS, (*spots, Spot(tail, -way)))
 
 
@@ -389,12 +379,11 @@ def _draw_velocity(sheet: Sheet, velocity: Velocity) -> None:
             if (speed := math.hypot(u, v)) > 0.05 * subject.speed:
                 way = np.array([u, v]) / speed
                 tip = at + (1.6 + 2.0 * speed / subject.speed) * unit * way
-                sheet.add("velocities", _arrow(at, tip, GREEN, unit, size=0.8))
+                sheet.strokes["velocities"] += _arrow(np.array([at, tip]), GREEN, unit, size=0.8)
                 found.append((speed, at, tip))
         if velocity.angular and isinstance(part, Body):
-            center = np.array(part.center)
-            arrow = _turning_arrow(center, 1.5 * unit, velocity.angular, GREEN, 0.8 * unit)
-            sheet.add("velocities", arrow)
+            line = _around(np.array(part.center), 1.5 * unit, velocity.angular)
+            sheet.strokes["velocities"] += _arrow(line, GREEN, 0.8 * unit)
     spin = f"{number(velocity.angular)} rad/s" if velocity.angular else ""
     if found:
         speed, at, tip = max(found, key=lambda entry: entry[0])

@@ -11,7 +11,6 @@ import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.tradeoff_result import Run, Tradeoff
-from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.output.extremes import Extremes
@@ -340,6 +339,8 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
         >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
         >>> ub.plot_cycles(fatigue, spot).savefig("cycles.png")
     """
+    from matplotlib.colors import LogNorm
+
     cycles, curve = fatigue.cycles(spot), fatigue.curve
     if not len(cycles.range):
         raise SceneError(f"plot_cycles: the stress at {spot} never turned")
@@ -348,7 +349,14 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
     edges = np.linspace(0.0, ranges[-1] * (1 + 1e-9), CLASSES + 1)
     with picture((13.0, 5.0)) as figure:
         matrix, spectrum, damage = figure.subplots(1, 3, sharey=True, width_ratios=(1.25, 1, 0.8))
-        _draw_matrix(matrix, edges, ranges, means, cycles.count)
+        middle, half = (means.max() + means.min()) / 2, 0.6 * max(np.ptp(means), edges[-1] / 4)
+        columns = np.linspace(middle - half, middle + half, CLASSES + 1)
+        found, _, _ = np.histogram2d(means, ranges, (columns, edges), weights=cycles.count)
+        colors = matrix.pcolormesh(
+            columns, edges, np.where(found > 0, found, np.nan).T,  # none is white
+            norm=LogNorm(0.5, max(10.0, found.max())), cmap="viridis_r", rasterized=True,
+        )  # fmt: skip
+        style.draw_bar(matrix, colors, "number")
         matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)")
         more = np.cumsum(cycles.count[::-1])[::-1]
         spectrum.plot(more, ranges, color=BLUE, drawstyle="steps-post", label="reached")
@@ -367,18 +375,3 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
         for axes, title in zip((matrix, spectrum, damage), titles, strict=True):
             axes.set_title(title, loc="left")
     return figure
-
-
-def _draw_matrix(axes: Axes, edges: Array, ranges: Array, means: Array, count: Array) -> None:
-    """Number of cycles by range and mean; none is white."""
-    from matplotlib.colors import LogNorm
-
-    middle, half = (means.max() + means.min()) / 2, 0.6 * max(np.ptp(means), edges[-1] / 4)
-    columns = np.linspace(middle - half, middle + half, CLASSES + 1)
-    found, _, _ = np.histogram2d(means, ranges, (columns, edges), weights=count)
-    shown = np.where(found > 0, found, np.nan).T
-    colors = axes.pcolormesh(
-        columns, edges, shown, norm=LogNorm(0.5, max(10.0, found.max())),
-        cmap="viridis_r", rasterized=True,
-    )  # fmt: skip
-    style.draw_bar(axes, colors, "number")

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import gc
 from collections import defaultdict
-from collections.abc import Collection, Generator, Iterable
+from collections.abc import Collection, Generator, Iterable, Iterator
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -158,7 +158,7 @@ def render(
     require_kind(camera, Camera, "render: camera")
     camera.origin(solids.stage([n]).pose(n))
     if active_comm().rank == 0:
-        with closing(_images(solids, [n], camera)) as frames:
+        with closing(_film(solids, [n], camera)) as frames:
             imsave(path, next(frames))
 
 
@@ -213,14 +213,14 @@ def animate(
     shown = evenly(solution, max(1, round(fps * seconds)))
     camera.origin(solids.stage(shown).undeformed)
     if active_comm().rank == 0:
-        with closing(_images(solids, shown, camera)) as frames:
+        with closing(_film(solids, shown, camera)) as frames:
             about = {"iterable": frames, "total": len(shown), "unit": "frame"}
             bar = progress_bar(progress, active_comm(), **about)
             WRITERS[path.suffix.lower()](path, iter(bar), fps)
     return Film(path)
 
 
-def _images(solids: Solids, shown: list[int], camera: Camera) -> Generator[Any, None, None]:
+def _film(solids: Solids, shown: list[int], camera: Camera) -> Generator[Any, None, None]:
     """Images (height, width, 3) of these states, one after the other."""
     try:
         import pyvista
@@ -239,11 +239,9 @@ def _images(solids: Solids, shown: list[int], camera: Camera) -> Generator[Any, 
             gc.collect()
 
 
-def _frames(
-    plotter: Any, solids: Solids, shown: list[int], camera: Camera
-) -> Generator[Any, None, None]:
+def _frames(plotter: Any, solids: Solids, shown: list[int], camera: Camera) -> Iterator[Any]:
     """Images of a plotter, in which only what moves is made anew."""
-    import pyvista
+    from pyvista import merge
 
     solution, magnify, size = solids.solution, solids.magnify, solids.size
     stage, grid, beams = solids.stage(shown), solution.grid, solution.scene.beams
@@ -278,7 +276,7 @@ def _frames(
             plotter.scalar_bars["values"].SetTitle("")  # VTK would set it over the numbers.
         for color, meshes in solids.others(n, pose).items():
             look = {"color": color, "name": color, "ambient": 0.25}
-            plotter.add_mesh(pyvista.merge(meshes), reset_camera=False, **look)
+            plotter.add_mesh(merge(meshes), reset_camera=False, **look)
         time = f"{solution.parameter.at(solution.times[n], '.3f')}{style.magnified(magnify)}"
         plotter.add_text(time, position=(0.02, 0.93), name="time", **text)
         plotter.reset_camera_clipping_range()

@@ -404,11 +404,6 @@ def glyph_of(law: laws.Law) -> Glyph:
     return LAWS.get(type(law), LAWS[ConnectorLaw])
 
 
-def law_in_words(law: laws.Law, turns: bool) -> str:
-    """Describe the law of a connector, which turns or not, and its size."""
-    return glyph_of(law).words(law, *(("N m", "rad") if turns else ("N", "m")))
-
-
 def connectors(pose: Pose) -> Iterator[Stroke]:
     """Draw springs, dampers, motors and their like."""
     for connector in pose.stage.scene.connectors:
