@@ -311,7 +311,7 @@ class Glyph(NamedTuple):
 
 
 def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke) -> Glyph:
-    """What drives: around a pin a curved arrow."""
+    """A drive: around a pin a curved arrow."""
     head = np.array([(1.45, 0.95), (2.05, 0.0), (1.45, -0.95), (1.45, 0.95)])
     turning = [_line((tail, 0), (1.6, 0), weight=2.6), Stroke(head, INK, 1.4, fill), *more]
     return Glyph(straight, turning=turning, sweep=1.4 * math.pi, spins=True)
