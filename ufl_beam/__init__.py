@@ -112,8 +112,6 @@ from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.time_series import VTKHDF, XDMF
 from ufl_beam.parallel import say
 from ufl_beam.plotting import notebook  # noqa: F401 - says how notebooks show models and results
-from ufl_beam.plotting.analyses import plot_cycles, plot_extremes, plot_modes, plot_tradeoff
-from ufl_beam.plotting.camera import Camera
 from ufl_beam.plotting.films import Film
 from ufl_beam.plotting.inelastic import (
     plot_damage,
@@ -122,8 +120,16 @@ from ufl_beam.plotting.inelastic import (
     plot_moment_curvature,
 )
 from ufl_beam.plotting.model import plot
-from ufl_beam.plotting.plots import plot_energy, plot_history, plot_shapes
-from ufl_beam.plotting.render3d import animate, render
+from ufl_beam.plotting.plots import (
+    plot_cycles,
+    plot_energy,
+    plot_extremes,
+    plot_history,
+    plot_modes,
+    plot_shapes,
+    plot_tradeoff,
+)
+from ufl_beam.plotting.render import Camera, animate, render
 from ufl_beam.plotting.style import picture
 from ufl_beam.simulation.checkpoint import Checkpoint
 from ufl_beam.simulation.force_diagrams import Diagram

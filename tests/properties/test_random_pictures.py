@@ -8,10 +8,8 @@ import pytest
 from random_machines import script
 
 import ufl_beam as ub
-from ufl_beam.plotting.load_symbols import badge
-from ufl_beam.plotting.model import notes_of
-from ufl_beam.plotting.model_sheet import Subject
-from ufl_beam.plotting.model_symbols import draw
+from ufl_beam.plotting.model import badge, notes_of
+from ufl_beam.plotting.model_sheet import Subject, draw
 
 PARTS = ("joints", "supports", "loads", "masses", "initial", "damping", "connectors")
 
@@ -27,7 +25,7 @@ def amount(scene):
     sheet = draw(Subject(scene), scene.size / 300.0)
     strokes = list(sheet.everything())
     assert all(np.isfinite(stroke.points).all() for stroke in strokes)
-    badges = [load for load in scene.loads if badge(load) is not None]
+    badges = [load for load in scene.loads if any(badge(load))]
     return len(strokes) + len(sheet.labels) + len(badges) + len(notes_of(scene))
 
 

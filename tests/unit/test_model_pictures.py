@@ -290,7 +290,7 @@ def test_a_large_scene_has_few_artists():
         ub.Scene(beams, joints=chains, loads=[ub.PointLoad(beams[0].end, force=(0, -1))])
     )
     assert len(shapes(figure, "beams")) == 1000
-    assert len(shapes(figure, "joints")) == len(chains)
+    assert len(shapes(figure, "pins")) == len(chains)
     assert words(figure) == ["1 N"]
     assert len(figure.axes[0].get_children()) < 40
 

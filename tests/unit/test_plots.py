@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Pictures: what is in them, that they need no screen, and what is refused."""
 
+import dataclasses
 import math
 import os
 import shutil
@@ -13,15 +14,15 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import scenes
+from matplotlib.colors import same_color
 from matplotlib.path import Path
 from matplotlib.text import Text
 
 import ufl_beam as ub
 from ufl_beam.plotting import films, symbols
-from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT, kind_of
-from ufl_beam.plotting.scene_layout import Stage
-from ufl_beam.plotting.style import BLUE, RED, decimal_prefix, number, with_unit
-from ufl_beam.plotting.symbols import EDGE, FILLED, support_direction
+from ufl_beam.plotting.layout import Stage
+from ufl_beam.plotting.style import BLUE, INK, RED, WHITE, decimal_prefix, number, with_unit
+from ufl_beam.plotting.symbols import EDGE, FILLED, LAWS, glyph_of, support_direction
 
 FIRST = MPI.COMM_WORLD.rank == 0
 INDEX = {"N": 0, "V": 1, "M": 2}
@@ -60,10 +61,18 @@ def engine():
     return ub.simulate(crank(), ub.Midpoint(), t=(0, 0.5), dt=0.05)
 
 
-def drawn(figure, marker):
-    """Where a picture has markers of a kind."""
-    lines = [x for x in figure.axes[0].lines if x.get_marker() == marker]
-    return [at for line in lines for at in line.get_xydata()]
+def outlines(figure, group, fill=None):
+    """Lines and areas of a group, those filled with a colour if one is given; m."""
+    drawn = [c for c in figure.axes[0].collections if c.get_gid() == group]
+    if fill is not None:
+        drawn = [c for c in drawn if any(same_color(x, fill) for x in c.get_facecolor())]
+    return [path.vertices for one in drawn for path in one.get_paths()]
+
+
+def middles(figure, group, fill=None):
+    """Where the symbols of a group are; (n, 2); m."""
+    found = [(x.min(axis=0) + x.max(axis=0)) / 2 for x in outlines(figure, group, fill)]
+    return np.reshape(found, (-1, 2))
 
 
 def chains(axes):
@@ -91,7 +100,7 @@ def boxes_of(figure):
 
 def areas_of(figure):
     """Outlines of the areas of a diagram, each closed; m."""
-    areas = figure.axes[0].collections
+    areas = [one for one in figure.axes[0].collections if one.get_gid() in (RED, BLUE)]
     return [path.vertices for one in areas for path in one.get_paths()]
 
 
@@ -109,23 +118,25 @@ def test_shape_draws_the_frame_where_it_is(swing):
     assert len(undeformed) == len(scene.beams)
     for chain, beam in zip(deformed, scene.beams, strict=True):
         np.testing.assert_array_equal(chain, swing.shape(beam))
-    assert len(drawn(axes.figure, "o")) == len(scene.joints) + len(scene.masses)
+    assert len(outlines(axes.figure, "pins", WHITE)) == len(scene.joints)
+    at = [swing.position(mass.place)[-1] for mass in scene.masses]
+    np.testing.assert_allclose(middles(axes.figure, "masses"), at, atol=1e-12)
     assert axes.get_aspect() == 1.0
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (m)", "y (m)")
     assert axes.get_title(loc="left") == "shape at t = 0.1 s"
-    assert not axes.patches
-    assert not axes.collections
+    assert not areas_of(axes.figure)
 
 
-def test_the_number_of_lines_does_not_grow_with_the_scene():
-    """20 000 beams would take minutes as as many lines."""
+def test_the_number_of_artists_does_not_grow_with_the_scene():
+    """20 000 beams would take minutes as as many artists."""
 
     def count(bays):
         beams = [ub.Beam((k, 0), (k + 1, 0), scenes.SLENDER) for k in range(bays)]
         joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
         supports = [ub.Clamped(beams[0].start), *(ub.Roller(beam.end) for beam in beams)]
         scene = ub.Scene(beams=beams, joints=joints, supports=supports)
-        return len(ub.plot(ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)).axes[0].lines)
+        axes = ub.plot(ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)).axes[0]
+        return len(axes.get_children())
 
     assert count(3) == count(30)
 
@@ -136,11 +147,11 @@ def test_pins_shrink_where_beams_are_short():
         beams = [ub.Beam((a, 0), (b, 0), scenes.SLENDER) for a, b in pairwise(ends)]
         joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
         scene = ub.Scene(beams=beams, joints=joints, supports=[ub.Clamped(beams[0].start)])
-        axes = ub.plot(ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)).axes[0]
-        return next(x.get_markersize() for x in axes.lines if x.get_marker() == "s")
+        figure = ub.plot(ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0))
+        return np.ptp(outlines(figure, "pins")[0], axis=0)
 
-    assert size(3) == 6.0
-    assert size(60) == pytest.approx(0.3 * 6.0)
+    # Beams of 0.33 and 0.017 m in a picture of one size: the symbols become 0.3 times as large
+    np.testing.assert_allclose(size(60), 0.3 * size(3))
 
 
 @pytest.mark.parametrize("what", ["N", "V", "M"])
@@ -404,7 +415,7 @@ def test_shapes(swing):
     scene = swing.scene
     shapes = [chain for chain in chains(axes) if len(chain) == len(scene.beams)]
     assert len(shapes) == 6
-    assert len(drawn(figure, "o")) == 5 * len(scene.masses)
+    assert len(outlines(figure, "masses")) == 5 * len(scene.masses)
     assert bar.get_ylabel() == "time t (s)"
     np.testing.assert_allclose(bar.get_ylim(), (0, 0.1))
 
@@ -503,17 +514,12 @@ def test_plot_without_beams(engine, what):
     bearing, _, rod = engine.scene.joints
     figure = ub.plot(engine, what)
     at = [engine.position(p)[-1] for p in (*bearing.places[:1], *rod.places)]
-    np.testing.assert_allclose(drawn(figure, "o"), at, atol=1e-12)
-    areas = [p for p in figure.axes[0].patches if p.get_facecolor()[:3] == rgb(FILLED)]
-    assert len(areas) == 2
-    marks = [p.get_xy() for p in figure.axes[0].patches if p.get_facecolor()[:3] == rgb(EDGE)]
+    np.testing.assert_allclose(middles(figure, "pins", WHITE), at, atol=1e-12)
+    assert len(outlines(figure, "bodies", FILLED)) == 2
+    marks = outlines(figure, "centres", EDGE)
     assert len(marks) == 4  # two quarters each
     for body, (mark, _) in zip((wheel, block), (marks[:2], marks[2:]), strict=True):
         assert has(mark, engine.position(body.middle)[-1])
-
-
-def rgb(color):
-    return tuple(int(color[i : i + 2], 16) / 255 for i in (1, 3, 5))
 
 
 def test_links_and_springs_reach_from_place_to_place(engine):
@@ -595,7 +601,7 @@ class Quadratic(ub.ConnectorLaw):
         return self.k * motion**2 / 2
 
 
-LAWS = [
+CONNECTOR_LAWS = [
     ub.Motor(lambda t: 0.1 * t),
     ub.Actuator(lambda t: t),
     ub.Controller(lambda simulation: 1.0),
@@ -622,11 +628,30 @@ def slider(connect, *laws):
     )
 
 
-def test_each_law_has_its_symbols():
-    assert {kind_of(law) for law in LAWS} == set(STRAIGHT) == set(AROUND)
+def test_each_law_has_its_symbol():
+    """All but those of a user, which have one in common."""
+    own = {type(law) for law in CONNECTOR_LAWS if not isinstance(law, Quadratic)}
+    assert own == set(LAWS) - {ub.ConnectorLaw}
+    assert glyph_of(Quadratic(10.0)) is LAWS[ub.ConnectorLaw]
 
 
-@pytest.mark.parametrize("law", LAWS, ids=lambda law: type(law).__name__)
+def test_joints_without_an_entry_have_a_plain_symbol():
+    left = ub.Beam((0, 0), (1, 0), scenes.SLENDER)
+    right = ub.Beam((1, 0), (2, 0), scenes.SLENDER)
+    apart = ub.Beam((3, 0), (4, 0), scenes.SLENDER)
+    joints = [
+        dataclasses.replace(ub.Revolute(left.end, right.start), look="own"),
+        dataclasses.replace(ub.RigidLink(right.end, apart.start), look="own"),
+    ]
+    scene = ub.Scene([left, right, apart], joints=joints, supports=[ub.Clamped(left.start)])
+    undeformed = Stage(scene, 1.0, 0.05).undeformed
+    (pin,) = symbols.pins(undeformed)
+    np.testing.assert_array_equal(pin.at, (1, 0))
+    (rod,) = symbols.rods(undeformed)
+    np.testing.assert_array_equal(rod.points, [(2, 0), (3, 0)])
+
+
+@pytest.mark.parametrize("law", CONNECTOR_LAWS, ids=lambda law: type(law).__name__)
 @pytest.mark.parametrize("connect", [ub.Stretch, ub.Turn])
 def test_symbols_are_where_their_connector_is(connect, law):
     solution = ub.simulate(slider(connect, law), ub.Midpoint(), t=(0, 0.2), dt=0.1)
@@ -642,7 +667,7 @@ def test_symbols_are_where_their_connector_is(connect, law):
             assert has(points, b)
             x, y = (b - a) / np.linalg.norm(b - a)
             assert np.abs(points @ (-y, x)).max() < 1.2 * 0.05
-    assert len(ub.plot(solution).axes[0].lines) > 3
+    assert outlines(ub.plot(solution), "connectors")
 
 
 def test_connectors_side_by_side_do_not_cover_each_other():
@@ -710,8 +735,8 @@ def test_beams_and_bodies_in_one_picture():
     solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.2), dt=0.02)
     figure = ub.plot(solution)
     corner, at = solution.position(beam.end)[-1], solution.position(bead.middle)
-    np.testing.assert_allclose(drawn(figure, "s"), [corner], atol=1e-12)
-    np.testing.assert_allclose(drawn(figure, "o"), [at[-1]], atol=1e-12)
+    np.testing.assert_allclose(middles(figure, "pins", INK), [corner], atol=1e-12)
+    np.testing.assert_allclose(middles(figure, "pins", WHITE), [at[-1]], atol=1e-12)
     curve = next(symbols.rails(pose(solution))).points
     np.testing.assert_allclose(curve[:, 1], (curve[:, 0] - 2.0) ** 2, atol=1e-12)
     assert curve[:, 0].min() < at[:, 0].min() < at[:, 0].max() < curve[:, 0].max()
@@ -735,7 +760,8 @@ def test_slide_is_drawn_along_its_axis():
 
 def test_shapes_of_bodies(engine):
     figure = ub.plot_shapes(engine, count=3)
-    assert len(figure.axes[0].patches) == 3 * 2 + 2  # bodies; block and arrow of the last one
+    assert len(outlines(figure, "moving", FILLED)) == 0  # each in the colour of its time
+    assert len(outlines(figure, "moving")) == 3 * (2 + 1)  # bodies and a rod
     assert figure.axes[0].get_xlim()[1] > 4.5
 
 
@@ -745,7 +771,7 @@ def test_damage_and_dissipation_without_beams(engine):
     assert drawn["supplied"][-1] > 0.0
     (spot,) = symbols.footings(pose(solution))
     assert has(np.array([spot.at]), (0.0, 0.0))
-    assert len(ub.plot_damage(solution).axes[0].patches) > 2
+    assert outlines(ub.plot_damage(solution), "connectors")
     falling = ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, inertia=0.1)], loads=[ub.Gravity()])
     with pytest.raises(ub.SceneError, match="neither beams nor connectors"):
         ub.plot_dissipation(ub.simulate(falling, ub.Midpoint(), t=(0, 0.1), dt=0.1))
@@ -756,7 +782,7 @@ def test_one_body_alone():
     solution = ub.simulate(falling, ub.Midpoint(), t=(0, 1.0), dt=0.1)
     for n in (0, -1):  # a scene without any size; and one that has fallen 5 m
         axes = ub.plot(solution, n=n).axes[0]
-        outline = axes.patches[0].get_xy()
+        (outline,) = outlines(axes.figure, "bodies", FILLED)
         (x, y), r = solution.position(falling.bodies[0].middle)[n], np.ptp(outline[:, 0]) / 2
         np.testing.assert_allclose(np.linalg.norm(outline - (x, y), axis=1), r, rtol=1e-12)
         low, high = axes.get_ylim()

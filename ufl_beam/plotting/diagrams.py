@@ -5,32 +5,51 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
-from ufl_beam.model.sections import Section
 from ufl_beam.plotting import drawing, style
-from ufl_beam.plotting.damage_marks import draw_damage
-from ufl_beam.plotting.diagram_labels import MOST, Peak, arrange, fit_figure, keep_figure
-from ufl_beam.plotting.geometry import left_of, unit_vectors
-from ufl_beam.plotting.scene_layout import Pose
-from ufl_beam.plotting.style import BLUE, INK, RED, RESULTANTS, number, shade
+from ufl_beam.plotting.inelastic import draw_damage
+from ufl_beam.plotting.labels import Label, Spot, place
+from ufl_beam.plotting.layout import Pose, directions, joined, left_of, segments, unit_vectors
+from ufl_beam.plotting.style import (
+    BLUE,
+    INK,
+    POINTS,
+    RED,
+    RESULTANTS,
+    figure_of,
+    font_size,
+    half_size,
+    make_room,
+    number,
+    shade,
+    size_of,
+)
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.text import Annotation
 
 LEAST_STRAIN = 1e-10  # strain that rounding and the tolerance of iterations leave behind
 DRAWN_AS_ZERO = 1e-4  # part of the largest value below which a value is drawn as zero
 ALIKE = 0.999  # part of the peak of an area from which on values are as large
 LABELLED = 0.15  # part of the largest value from which on the peak of an area is labelled
 MANY = 60  # beams beyond which both extreme values alone are labelled, and no directions drawn
+
+CROWDED = 0.08  # part of the axes that labels cover, beyond which extreme values alone have some
+FEW = 500  # areas whose ordinates texts should not cover
+MARGIN = 0.03  # part of the axes beyond what is drawn
+
+AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
+"""Room for words and numbers around the axes; least and largest size of a figure; inch."""
 
 SIGNS = {
     "N": ("N > 0: tension", "N < 0: compression"),
@@ -45,7 +64,7 @@ Values = tuple[Member, Array]  # a beam, and the values in points of its cells, 
 def plot_state(solution: Solution, what: str, *, n: int, magnify: float, ax: Axes | None) -> Figure:
     """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
     style.require_choice(what, ("shape", *RESULTANTS), "plot: what")
-    pose = drawing.plane_stage(solution, [n], magnify).pose(n)
+    pose = drawing.plane_stage(solution, [n], magnify, ax, MOST)[0].pose(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
     if what == "shape":
         return draw_frame(ax, solution, n, pose, ("shape", when))
@@ -79,31 +98,33 @@ def draw_frame(
         if _is_loaded(what, diagrams):
             rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
             peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MANY else 1.0)
-        drawing.draw_axes(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
+        drawing.draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
         drawing.draw_symbols(axes, pose)
-        named = {**_signs(axes, what), **draw_damage(axes, solution, n, pose.nodes)}
-        for meaning, artist in named.items():
-            artist.set_label(meaning)
+        meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
+        areas = {area.get_gid(): area for area in axes.collections}
+        named: dict[str, Artist] = {
+            words: areas[color] for color, words in meanings.items() if color in areas
+        }
+        named |= draw_damage(axes, solution, n, pose.nodes)
+        for words, artist in named.items():
+            artist.set_label(words)
         if named:
-            columns = 1 if len(named) <= 2 else 2
-            small = style.font_size(11.0)
             style.draw_legend(
-                axes, ax, [*named.values()], loc="outside lower left", ncols=columns, fontsize=small
-            )
-        arrange(axes, peaks, fit_figure if ax is None else keep_figure)
-    return style.figure_of(axes)
+                axes, ax, [*named.values()], loc="outside lower left",
+                ncols=1 if len(named) <= 2 else 2, fontsize=font_size(11.0),
+            )  # fmt: skip
+        _arrange(axes, peaks, own=ax is None)
+    return figure_of(axes)
 
 
 def _is_loaded(what: str, diagrams: Sequence[Values]) -> bool:
     """Return whether a section force is more than what rounding and iterations leave behind."""
-
-    def stiffness(section: Section) -> float:
-        return {"N": section.EA, "V": section.GA, "M": section.EI / section.depth}[what]
-
-    return any(
-        bool(np.abs(values).max() > LEAST_STRAIN * stiffness(beam.section))
-        for beam, values in diagrams
-    )
+    for beam, values in diagrams:
+        section = beam.section
+        stiffness = {"N": section.EA, "V": section.GA, "M": section.EI / section.depth}[what]
+        if np.abs(values).max() > LEAST_STRAIN * stiffness:
+            return True
+    return False
 
 
 def _draw_diagrams(
@@ -126,23 +147,35 @@ def _draw_diagrams(
     # A beam may have several diagrams, which do not meet.
     diagram = np.repeat(np.arange(len(diagrams)), [len(of_cells) for _, of_cells in diagrams])
     axis, left = _along(solution, cells, diagram, nodes, found.shape[1])
-    up = scale * values[:, None] * left
+    ordinates = scale * values[:, None] * left
     rows: list[Array] = []
     outlines: defaultdict[str, list[Array]] = defaultdict(list)
     diagram = np.repeat(diagram, found.shape[1])
-    for area in _areas(axis, axis + up, values, diagram):
+    for area in _areas(axis, axis + ordinates, values, diagram):
         outlines[RED if area.peak > 0 else BLUE].append(area.outline)
-        rows.append(np.array([area.peak, *axis[area.place], *up[area.place]]))
+        rows.append(np.array([area.peak, *axis[area.place], *ordinates[area.place]]))
     if what != "N" and len(diagrams) <= MANY:
         firsts = {beam: k for k, (beam, _) in reversed([*enumerate(diagrams)])}
         for k in firsts.values():
             first, *_, last = np.flatnonzero(diagram == k)
             low, high = (first + last) // 2, (first + last + 1) // 2
-            _draw_direction(axes, (axis[low] + axis[high]) / 2, left[high])
+            (x, y), (across, up) = (axis[low] + axis[high]) / 2, left[high]
+            turn = math.degrees(math.atan2(up, across)) - 180.0  # of an arrow that points up
+            axes.plot(x, y, marker=(3, 0, turn), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
     for color, group in outlines.items():
         look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}
         axes.add_collection(PolyCollection(group, **look, linewidths=1.0, zorder=2))
     return np.array(rows)
+
+
+class Peak(NamedTuple):
+    """Largest value of an area of a diagram."""
+
+    text: str
+    color: str
+    tip: Array  # point of the diagram; (2,); m
+    outward: Array  # unit vector away from the axis; (2,)
+    extreme: bool  # largest or least of all
 
 
 def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
@@ -223,14 +256,108 @@ def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[
             yield Area(outline, sign * largest, int(places[begin + equal[len(equal) // 2]]))
 
 
-def _draw_direction(axes: Axes, at: Array, left: Array) -> None:
-    """Draw an arrow on a beam from its start to its end, whose left is known."""
-    turn = math.degrees(math.atan2(left[1], left[0])) - 180.0  # of an arrow that points up
-    axes.plot(*at, marker=(3, 0, turn), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
+# -- labels ------------------------------------------------------------------------------------
 
 
-def _signs(axes: Axes, what: str) -> dict[str, Artist]:
-    """Meanings of the signs that are in the picture, with an area of each."""
-    meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
-    areas = {area.get_gid(): area for area in axes.collections}
-    return {meaning: areas[color] for color, meaning in meanings.items() if color in areas}
+def _arrange(axes: Axes, peaks: Sequence[Peak], *, own: bool) -> None:
+    """Fit limits, and a figure of its own, to what is drawn; write peaks where they cover least."""
+    axes.margins(MARGIN)
+    without_texts = axes.dataLim.frozen()
+    written: list[Annotation] = []
+    # Room for the texts changes the scale, and with it what is beside them.
+    for _ in range(3):
+        _fit(axes, own)
+        for text in written:
+            text.remove()
+        written = _write(axes, peaks)
+        axes.dataLim.set(without_texts)
+        make_room(axes)
+    _fit(axes, own)
+
+
+def _fit(axes: Axes, own: bool) -> None:
+    """Make a figure of its own as wide and high as what is drawn, at the largest scale that fits.
+
+    Axes of the user have their limits fitted.
+    """
+    axes.autoscale_view()
+    if not own:
+        return
+    figure = figure_of(axes)
+    figure.draw_without_rendering()
+    wide, high = 0.0, 0.0
+    for legend in figure.legends:
+        wide, high = np.divide(legend.get_window_extent().size, figure.dpi)
+    around = np.array([AROUND[0], AROUND[1] + high])
+    least = np.array([max(LEAST[0], wide + 0.2), LEAST[1] + high])
+    span = np.array([np.ptp(axes.get_xlim()), np.ptp(axes.get_ylim())])
+    inches = span * np.min((MOST - around) / span)
+    figure.set_size_inches(np.clip(inches + around, np.minimum(least, MOST), MOST))
+
+
+def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
+    """Write peaks beside areas and lines; those without room are left out but for extremes."""
+    figure = figure_of(axes)
+    figure.draw_without_rendering()
+    looks: tuple[dict[str, Any], ...] = (
+        {"size": font_size(10.0), "weight": "normal"},
+        {"size": font_size(13.0), "weight": "bold"},
+    )
+    halves = [half_size(axes, peak.text, **looks[peak.extreme]) for peak in peaks]
+    crowded = 4 * sum(map(np.prod, halves)) > CROWDED * np.prod(size_of(axes))
+    chosen = [k for k, peak in enumerate(peaks) if peak.extreme or not crowded]
+    if not chosen:
+        return []
+
+    def in_points(xy: Any) -> Array:
+        return np.asarray(axes.transData.transform(xy) * POINTS / figure.dpi)
+
+    labels = []
+    for k in chosen:
+        # Straight away from the axis first, then more and more aside
+        turns = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
+        x, y = peaks[k].outward
+        at, ways = in_points(peaks[k].tip), directions(math.atan2(y, x) + turns)
+        spots = tuple(Spot(at, way) for way in ways)
+        labels.append(Label(peaks[k].text, peaks[k].color, k, spots))
+    written = []
+    for one in place(labels, [halves[k] for k in chosen], _lines(axes, in_points)):
+        text, color, k, _ = one.label
+        (x, y), (right, up), arrow = peaks[k].tip, one.center - one.spot, None
+        if len(one.leader):
+            end = (one.leader[1] - one.center + one.half) / (2 * one.half)
+            line = {"arrowstyle": "-", "color": color, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
+            arrow = {**line, "relpos": end, "patchA": None}  # by itself it would search that end
+        if one.overlap == 0.0 or peaks[k].extreme:
+            mark = axes.annotate(
+                text, (x, y), (right, up), textcoords="offset points", color=color,
+                ha="center", va="center", zorder=6, arrowprops=arrow, **looks[peaks[k].extreme],
+            )  # fmt: skip
+            written.append(mark)
+    return written
+
+
+def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
+    """Lines that texts should not cover, those within areas too; (n, 4); points."""
+    chains = [
+        np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"
+    ]
+    areas = []
+    for collection in axes.collections:
+        outlines = [np.asarray(path.vertices) for path in collection.get_paths()]
+        chains += outlines
+        areas += outlines if collection.get_gid() in (RED, BLUE) else []
+    pieces = segments(in_points(joined(chains)))
+    found = [pieces[np.isfinite(pieces).all(axis=1)]]
+    for line in axes.lines:
+        half = line.get_markersize() / 2
+        cross = np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
+        if line.get_linestyle() == "None":  # symbols
+            found += [segments(point + cross) for point in in_points(line.get_xydata())]
+    for outline in map(in_points, areas[:FEW]):
+        # Ordinates, from a point of the outline to the one across the axis
+        for part in (0.0, 0.5):
+            between = outline[:-1] + part * np.diff(outline, axis=0)
+            feet = (outline[1:] - part * np.diff(outline, axis=0))[::-1]
+            found.append(np.hstack([between, feet])[1 : len(outline) // 2])
+    return np.concatenate(found)

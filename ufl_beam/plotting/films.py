@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: MIT
-"""Films: sequences of images in GIF and MP4 files, which notebooks play."""
+"""Films in GIF and MP4 files, which notebooks play, and a screen for VTK to draw them."""
 
 from __future__ import annotations
 
 import os
 import shutil
-import socket
 import subprocess
+import sys
 import tempfile
 from base64 import b64encode
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
@@ -77,27 +78,18 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
         str(path.absolute()),
     ]  # fmt: skip
     # Not a pipe: PETSc ends the interpreter at the signal of a broken one.
-    ours, theirs = socket.socketpair()
-    with ours, theirs, tempfile.TemporaryFile() as messages:
-        # Ctrl-C is for this process.
-        writer = subprocess.Popen(
-            command, stdin=theirs.fileno(), stderr=messages, start_new_session=True
-        )
-        theirs.close()
+    with tempfile.TemporaryFile() as images:
+        for frame in chain([first], frames):
+            images.write(np.ascontiguousarray(frame).data)
+        images.seek(0)
         try:
-            for frame in chain([first], frames):
-                ours.sendall(np.ascontiguousarray(frame).data, socket.MSG_NOSIGNAL)
-        except ConnectionError:
-            pass  # it has ended, and said why
+            subprocess.run(command, stdin=images, stderr=subprocess.PIPE, check=True)
+        except subprocess.CalledProcessError as error:
+            words = error.stderr.decode(errors="replace").strip()
+            raise RuntimeError(f"{program}: {words}") from None
         except BaseException:
-            writer.kill()
-            writer.wait()
             path.unlink(missing_ok=True)
             raise
-        ours.close()
-        if writer.wait():
-            messages.seek(0)
-            raise RuntimeError(f"{program}: {messages.read().decode(errors='replace').strip()}")
 
 
 def _ffmpeg() -> str:
@@ -118,3 +110,36 @@ def _ffmpeg() -> str:
 
 WRITERS = {".gif": write_gif, ".mp4": write_mp4}
 """Functions that write films, by the endings of their files."""
+
+
+@contextmanager
+def screen(pyvista: Any) -> Iterator[None]:
+    """Provide a screen by Xvfb if there is none: VTK before 9.4 ends the interpreter without."""
+    needed = sys.platform == "linux" and tuple(pyvista.vtk_version_info) < (9, 4)
+    if not needed or os.environ.get("DISPLAY"):
+        yield
+        return
+    if shutil.which("Xvfb") is None:
+        raise RuntimeError(
+            "PyVista with this VTK needs a screen, and DISPLAY is not set; install Xvfb "
+            "(apt-get install xvfb) or VTK 9.4 or newer"
+        )
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"],
+        start_new_session=True,  # Ctrl-C is for this process; it still needs its screen to end
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        text=True,
+    )
+    assert server.stdout is not None
+    with server:
+        try:
+            number = server.stdout.readline().strip()
+            if not number:
+                raise RuntimeError("Xvfb did not start; try: Xvfb -displayfd 1")
+            os.environ["DISPLAY"] = f":{number}"
+            yield
+        finally:
+            os.environ.pop("DISPLAY", None)
+            server.terminate()

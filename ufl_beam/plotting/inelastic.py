@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of yielding and fracture, by Matplotlib: places, paths and dissipation."""
+"""Pictures of yielding and fracture: places and their marks, paths, and dissipation."""
 
 from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import Place
-from ufl_beam.model.plastic_hinges import law_of
+from ufl_beam.model.bodies import Member, Place
+from ufl_beam.model.connector_laws import HingeLaw
+from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.plotting import drawing, style
-from ufl_beam.plotting.damage_marks import OpenHinge, circle, dissipated_per_length, open_hinges
 from ufl_beam.plotting.style import (
     BLUE,
     GREEN,
@@ -31,10 +31,12 @@ from ufl_beam.plotting.style import (
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
-    from matplotlib.lines import Line2D
+
+FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
 
 
 def plot_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
@@ -129,10 +131,9 @@ def plot_damage(
     grid = solution.grid
     for beam in solution.scene.beams[:1]:
         solution.material(beam)  # or its error
-    stage = drawing.plane_stage(solution, [n], magnify)
+    stage, (width, height) = drawing.plane_stage(solution, [n], magnify, ax)
     pose, density = stage.pose(n), dissipated_per_length(solution, n)
-    points = stage.points()
-    (width, height), (length, rise) = drawing.plane_size(points), np.ptp(points, axis=0)
+    length, rise = np.ptp(stage.points(), axis=0)
     # Upright frames need less; the bar and the legend have their own widths.
     across = height * length / max(rise, 1e-12)
     with style.panel(ax, (min(width, max(6.0, across + 3.0)), height)) as axes:
@@ -140,7 +141,7 @@ def plot_damage(
         style.plane_axes(axes, f"damage at {time}{style.magnified(magnify)}")
         axes.set_adjustable("datalim")  # room for the broad lines of a slender frame
         drawing.draw_undeformed(axes, solution, stage)
-        drawing.draw_axes(axes, solution, pose.nodes, color=shade(INK), linewidth=2.0, zorder=2)
+        drawing.draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.0, zorder=2)
         drawing.draw_symbols(axes, pose)
         yielded = density > 0.0
         if yielded.any():
@@ -149,7 +150,7 @@ def plot_damage(
             zones = LineCollection(
                 list(pose.nodes[grid.cells[yielded]]),
                 colors=colors.to_rgba(density[yielded] / unit),
-                linewidths=11.0, capstyle="butt", zorder=3,
+                linewidths=11.0, capstyle="butt", zorder=3, gid="yielded",
             )  # fmt: skip
             axes.add_collection(zones)
             placed = [beam.section.fibres for beam in solution.scene.beams]
@@ -157,7 +158,10 @@ def plot_damage(
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
             style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
         if hinges := open_hinges(solution, n, pose.nodes):
-            sizes = _draw_hinges(axes, hinges)
+            for hinge in hinges:
+                axes.plot(*hinge.at, **circle(hinge.part))
+            examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
+            sizes = [axes.plot([], [], **circle(part), label=words)[0] for part, words in examples]
             style.draw_legend(axes, ax, sizes, loc="outside upper left", ncols=3)
         style.make_room(axes)
     return style.figure_of(axes)
@@ -246,9 +250,72 @@ def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> None:
     style.draw_bar(axes, colors, named.progress)
 
 
-def _draw_hinges(axes: Axes, hinges: list[OpenHinge]) -> list[Line2D]:
-    """Circles at the hinges that have opened; return examples of their sizes, with words."""
-    for hinge in hinges:
-        axes.plot(*hinge.at, **circle(hinge.part))
-    examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
-    return [axes.plot([], [], **circle(part), label=text)[0] for part, text in examples]
+# -- hinges that have opened, and cells that have yielded --------------------------------------
+
+
+class OpenHinge(NamedTuple):
+    """Hinge that has opened."""
+
+    beam: Member
+    at: Array  # where it is now; (2,); m
+    part: float  # of its fracture energy, from 0 (closed) to 1 (a joint); 0 if it hardens
+
+
+def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
+    """Find hinges, in cells and of zero length, that are open; ``points`` are nodes as drawn."""
+    grid = solution.grid
+    found: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
+    for beam in solution.scene.beams:
+        laws = grid.hinges(beam)
+        if all(law is None or math.isinf(law.limit) for law in laws):
+            continue
+        state = solution.material(beam, n)
+        rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
+        for cell, law, jump, lost in rows:
+            if law is not None and (jump != 0.0 or lost > 0.0):
+                found.append((beam, points[grid.cells[cell]].mean(axis=0), law, float(lost)))
+    for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
+        kept = solution.connector(hinge)
+        if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
+            dissipated = float(kept.dissipated[n])
+            found.append((place_of(hinge).beam, points[vertex], law_of(hinge), dissipated))
+    return [
+        # One that never resisted is a joint.
+        OpenHinge(beam, at, min(lost / law.energy, 1.0) if law.limit > 0.0 else 1.0)
+        for beam, at, law, lost in found
+    ]
+
+
+def dissipated_per_length(solution: Solution, n: int) -> Array:
+    """Compute the energy that plastic strains and cracks dissipated; (num_cells,); J/m."""
+    grid = solution.grid
+    energy = np.zeros(len(grid.cells))
+    for beam in solution.scene.beams:
+        layout = beam.section.layout(None)
+        if layout is not None and not layout.elastic:
+            state = solution.material(beam, n)
+            cracks = state.hinge if beam.section.fibres is not None else 0.0
+            energy[grid.cells_of(beam)] = state.plastic + cracks
+    return energy / grid.lengths(np.arange(len(grid.cells)))
+
+
+def circle(part: float) -> dict[str, Any]:
+    """Return the look of a hinge of which a part of the fracture energy is spent."""
+    paper = shade(WHITE)
+    inside, edge = (paper, BLUE) if part >= FULLY_OPEN else (BLUE, paper)
+    size = 4.0 + 6.0 * math.sqrt(part)
+    look: dict[str, Any] = {"marker": "o", "ms": size, "mfc": inside, "mec": edge, "mew": 1.8}
+    return {**look, "ls": "none", "zorder": 6}
+
+
+def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[str, Artist]:
+    """Mark yielded cells and open hinges on the axes of beams; return their names for a legend."""
+    named: dict[str, Artist] = {}
+    yielded = np.flatnonzero(dissipated_per_length(solution, n))
+    for ends in nodes[solution.grid.cells[yielded]]:
+        (zone,) = axes.plot(*ends.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
+        named["yielded or cracked"] = zone
+    for hinge in open_hinges(solution, n, nodes):
+        (mark,) = axes.plot(*hinge.at, **circle(hinge.part))
+        named["fully open hinge" if hinge.part >= FULLY_OPEN else "hinge, open"] = mark
+    return named

@@ -48,6 +48,13 @@ class Placed(NamedTuple):
     spot: Array  # that it belongs to; (2,)
     overlap: float  # part of its box that other labels cover
 
+    @property
+    def leader(self) -> Array:
+        """Line from the spot to the box if that stands away; (2, 2) or (0, 2)."""
+        edge = np.clip(self.spot, self.center - self.half, self.center + self.half)
+        ends = np.array([self.spot, edge])
+        return ends if np.linalg.norm(edge - self.spot) >= LEADER else ends[:0]
+
 
 def place(
     labels: Sequence[Label], halves: Sequence[Array], lines: Array, frame: Array | None = None
@@ -74,42 +81,33 @@ def _best(
 ) -> Placed:
     """The place of a label that costs least, of all spots at all distances."""
     boxes: Array = np.reshape([(*x.center - x.half, *x.center + x.half) for x in others], (-1, 4))
-    sides = np.concatenate([boxes, boxes[:, [0, 3, 2, 1]]])  # diagonals, which leaders would cross
-    leaders = [leader.ravel() for x in others if len(leader := leader_of(x))]
-    lines = np.vstack([lines, *leaders])
-    gaps, number = np.repeat(GAPS, len(label.spots)), len(GAPS)
-    spots = np.tile([spot.at + spot.gap * spot.way for spot in label.spots], (number, 1))
-    ways = np.tile([spot.way for spot in label.spots], (number, 1))
+    lines = np.vstack([lines, *(x.leader.reshape(-1, 4) for x in others)])
+    number = np.arange(len(label.spots))
+    gaps, choices = np.repeat(GAPS, len(number)), np.tile(number, len(GAPS))
+    ways = np.array([spot.way for spot in label.spots])[choices]
+    spots = np.array([spot.at + spot.gap * spot.way for spot in label.spots])[choices]
     # So far from its spot a box is beyond the line through it, across the way.
     centers = spots + ways * (gaps + np.abs(ways) @ half)[:, None]
     low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
-    ends = np.hstack([spots, np.clip(spots, centers - half, centers + half)])
-    leads = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1) >= LEADER
     # Segments whose own boxes meet one of these
     first, last = np.minimum(lines[:, :2], lines[:, 2:]), np.maximum(lines[:, :2], lines[:, 2:])
-    meets = (first <= high.max(axis=0)) & (last >= low.min(axis=0))
-    near = lines[meets.all(axis=1)]
+    near = lines[((first <= high.max(axis=0)) & (last >= low.min(axis=0))).all(axis=1)]
     covered = areas_covered(low, high, boxes)
-    cost = DISTANCE_COST * gaps + RANK_COST * np.tile(np.arange(len(label.spots)), number)
+    cost = DISTANCE_COST * gaps + RANK_COST * choices
     cost += LINE_COST * lengths_inside(low, high, near) + LABEL_COST * covered
     if frame is not None:
         beyond = np.maximum(frame[:2] - low, 0.0) + np.maximum(high - frame[2:], 0.0)
         cost += OUTSIDE_COST * beyond.sum(axis=1)
-    # Those that would be worse than the best one without a leader are not looked at.
+    # Leaders that would be worse than the best place without one are not looked at.
+    ends = np.hstack([spots, np.clip(spots, centers - half, centers + half)])
+    leads = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1) >= LEADER
     some = np.flatnonzero(leads & (cost < cost[~leads].min(initial=np.inf)))
-    crossed = crossings(ends[some], sides) + 0.1 * crossings(ends[some], near)
+    diagonals = np.concatenate([boxes, boxes[:, [0, 3, 2, 1]]])
+    crossed = crossings(ends[some], diagonals) + 0.1 * crossings(ends[some], near)
     cost[some] += CROSSING_COST * crossed
     best = int(np.argmin(cost))
     overlap = float(covered[best] / np.prod(high[best] - low[best]))
     return Placed(label, centers[best], half, spots[best], overlap)
-
-
-def leader_of(placed: Placed) -> Array:
-    """Return the line from a spot to a box that stands away from it; (2, 2) or (0, 2)."""
-    edge = np.clip(placed.spot, placed.center - placed.half, placed.center + placed.half)
-    if np.linalg.norm(edge - placed.spot) < LEADER:
-        return np.empty((0, 2))
-    return np.array([placed.spot, edge])
 
 
 def crossings(first: Array, second: Array) -> Array:

@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
+import math
 from collections.abc import Callable
 from functools import cache
 from typing import TYPE_CHECKING, Any
@@ -13,15 +13,23 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
-from ufl_beam.model.damping import Damping, Rayleigh
+from ufl_beam.model.damping import Rayleigh
+from ufl_beam.model.loads import Gravity, Load, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.scene_lines import spots_of
 from ufl_beam.plotting.diagrams import plot_state
-from ufl_beam.plotting.geometry import segments
-from ufl_beam.plotting.labels import Placed, leader_of, place
-from ufl_beam.plotting.load_symbols import badge
-from ufl_beam.plotting.model_sheet import CAPTIONS, MOST_LABELS, NAMES, Sheet, Subject
-from ufl_beam.plotting.model_symbols import draw
+from ufl_beam.plotting.drawing import draw_strokes
+from ufl_beam.plotting.labels import Placed, place
+from ufl_beam.plotting.layout import segments
+from ufl_beam.plotting.model_sheet import (
+    CAPTIONS,
+    MOST_LABELS,
+    NAMES,
+    Sheet,
+    Subject,
+    draw,
+    in_time,
+)
 from ufl_beam.plotting.style import (
     POINTS,
     RED,
@@ -32,6 +40,7 @@ from ufl_beam.plotting.style import (
     half_size,
     panel,
     shade,
+    size_of,
     with_unit,
 )
 from ufl_beam.rich_display import picture_of
@@ -102,68 +111,54 @@ def plot(
             f"plot: a scene has no {', '.join(said)} before a run; plot(scene) draws the model, "
             f"plot(solution, {what!r}) what a run found"
         )
-    require_independent(shown)
     return plot_model(shown, ax)
 
 
 @picture_of.register(Scene)
-def picture_of_scene(scene: Scene) -> Figure:
-    """Draw a scene in a notebook, see :func:`plot`."""
-    return plot(scene)
-
-
 def plot_model(scene: Scene, ax: Axes | None = None) -> Figure:
     """Draw the undeformed model with all that is in it; see :func:`plot`."""
+    require_independent(scene)
     subject, notes = Subject(scene), notes_of(scene)
+    numbers = len(scene.beams), subject.cells, len(scene.bodies)
+    names = ("beam", "beams"), ("cell", "cells"), ("body", "bodies")
+    counted = (f"{k:,} {of[k > 1]}" for k, of in zip(numbers, names, strict=True) if k)
+    title = f"model: {'; '.join(counted).replace(',', ' ').replace(';', ',')}"
     with panel(ax, MOST) as axes:
         measure: Measure = cache(lambda text: half_size(axes, text, font_size(LABEL_SIZE)))
-        _write_around(axes, _title(subject), notes)
+        _write_around(axes, title, notes)
         if ax is None:
             figure_of(axes).set_layout_engine("none")
-            least, most = _room(measure, subject, notes)
+            around = LEFT + RIGHT, font_size(BELOW + ABOVE + NOTE * len(notes))
+            least, most = (POINTS * np.array(size) - around for size in (LEAST, MOST))
+            # At least as wide as the words above
+            badges = [2 * measure(text)[0] + BADGE for text, *_ in map(badge, scene.loads) if text]
+            first = 2 * TITLE_SIZE / LABEL_SIZE * measure(title)[0] + sum(badges)
+            words = max([first, *(2 * measure(note)[0] for note in notes)])
+            least[0] = min(max(least[0], words), most[0])
         else:
-            least = most = _size(axes)
+            least = most = size_of(axes)
         sheet, placed, frame = _planned(subject, measure, least, most)
-        _set_limits(axes, sheet.scale, frame)
-        if ax is None:
-            _fit(axes, frame, len(notes))
-        axes.set_aspect("equal")
-        _paint(axes, sheet)
+        _fit(axes, sheet.scale, frame, len(notes) if ax is None else None)
+        for group, strokes in sheet.strokes.items():
+            draw_strokes(axes, strokes, group)
         _write(axes, placed, sheet.scale)
         _write_badges(axes, scene, measure, frame)
     return figure_of(axes)
 
 
-def _planned(
-    subject: Subject, measure: Measure, least: Array, most: Array
-) -> tuple[Sheet, list[Placed], Array]:
-    """The sheet at the largest scale at which it fits, its labels, and the corners of the axes.
-
-    The sizes of the axes, at least and at most, and the corners are in points.
-    """
-    skeleton = _skeleton(subject)
-    width, height = np.ptp(skeleton, axis=0)
-    scale, frame = max(width / 400.0, height / 250.0, subject.scene.size / 500.0), UNBOUNDED
-    # What stands around the beams has a size in points: with the second plan it fits.
-    for _ in range(2):
-        sheet = draw(subject, scale)
-        box = _box(sheet, _arrange(sheet, measure, frame))
-        scale, frame = _plan(skeleton, scale, box, least, most)
-    sheet = draw(subject, scale)
-    return sheet, _arrange(sheet, measure, frame), frame
-
-
-def _title(subject: Subject) -> str:
-    """Numbers of all kinds of parts: "model: 20 000 beams, 1 body"."""
-    beams, bodies = len(subject.scene.beams), len(subject.scene.bodies)
-    parts = (beams, "beam", "beams"), (subject.cells, "cell", "cells"), (bodies, "body", "bodies")
-    counted = (f"{k:,} {one if k == 1 else many}".replace(",", " ") for k, one, many in parts if k)
-    return "model: " + ", ".join(counted)
-
-
 def notes_of(scene: Scene) -> list[str]:
     """Return words on loads of the whole scene, and a legend of the symbols."""
-    notes = [_damping_in_words(damping) for damping in scene.damping]
+    notes = []
+    for damping in scene.damping:
+        if isinstance(damping, Rayleigh):
+            parts = (("mass", damping.mass, "1/s"), ("stiffness", damping.stiffness, "s"))
+            sizes = ", ".join(f"{name} {x:.3g} {unit}" for name, x, unit in parts if x)
+            notes.append(f"Rayleigh damping, {sizes}")
+        else:
+            beams = damping.beams or ()
+            where = " of " + ", ".join(b.name for b in beams[:4]) if beams else ""
+            more = " ..." if len(beams) > 4 else ""
+            notes.append(f"Kelvin–Voigt damping, {with_unit(damping.time, 's')}{where}{more}")
     for work in scene.works:
         where = "" if work.beams is None else " on " + ", ".join(b.name for b in work.beams[:4])
         notes.append(f"{work.name}: acts as its function says{where}")
@@ -174,21 +169,47 @@ def notes_of(scene: Scene) -> list[str]:
     return notes
 
 
-def _damping_in_words(damping: Damping) -> str:
-    if isinstance(damping, Rayleigh):
-        parts = (("mass", damping.mass, "1/s"), ("stiffness", damping.stiffness, "s"))
-        return "Rayleigh damping, " + ", ".join(f"{n} {x:.3g} {u}" for n, x, u in parts if x)
-    where = "" if damping.beams is None else " of " + ", ".join(b.name for b in damping.beams[:4])
-    more = " ..." if len(damping.beams or ()) > 4 else ""
-    return f"Kelvin–Voigt damping, {with_unit(damping.time, 's')}{where}{more}"
+def badge(load: Load) -> tuple[str, str, float]:
+    """Describe a load on the whole scene: words, an arrow, and its angle (degrees); or nothing."""
+    if isinstance(load, Gravity):
+        x, y = load.acceleration
+        size, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
+        return in_time(f"g = {size:.4g} m/s²", load.time), "→" if size else "", angle
+    if isinstance(load, RotatingFrame):
+        x, y = load.about
+        text = f"frame: {load.rate:.4g} rad/s about ({x:g}, {y:g})".replace("-", "−")
+        return text, "↺" if load.rate >= 0 else "↻", 0.0
+    return "", "", 0.0
 
 
-def _skeleton(subject: Subject) -> Array:
-    """Points of the scene without symbols; (n, 2); m."""
+def _planned(
+    subject: Subject, measure: Measure, least: Array, most: Array
+) -> tuple[Sheet, list[Placed], Array]:
+    """The sheet at the largest scale at which it fits, its labels, and the corners of the axes.
+
+    The sizes of the axes, at least and at most, and the corners are in points.
+    """
     scene = subject.scene
     points = [*subject.axes.values(), *(np.array([body.center]) for body in scene.bodies)]
     points += [np.array([spot.point]) for spots in spots_of(scene).values() for spot in spots]
-    return np.concatenate(points)
+    low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
+    scale, frame = max(*(high - low) / (400.0, 250.0), scene.size / 500.0), UNBOUNDED
+    # What stands around the beams has a size in points: with the second plan it fits.
+    for _ in range(2):
+        sheet = draw(subject, scale)
+        placed = _arrange(sheet, measure, frame)
+        points = [stroke.points / scale for stroke in sheet.everything()]
+        points += [one.center + sign * one.half[None] for one in placed for sign in (-1, 1)]
+        everything = np.concatenate(points)
+        below = low / scale - everything.min(axis=0) + 8.0
+        beyond = everything.max(axis=0) - high / scale + 8.0
+        room = np.maximum(most - below - beyond, 0.3 * most)
+        scale = float(np.max((high - low) / room)) or scale
+        first, last = low / scale - below, high / scale + beyond
+        more = np.maximum(least - (last - first), 0.0) / 2
+        frame = np.concatenate([first - more, last + more])
+    sheet = draw(subject, scale)
+    return sheet, _arrange(sheet, measure, frame), frame
 
 
 def _arrange(sheet: Sheet, measure: Measure, frame: Array) -> list[Placed]:
@@ -209,55 +230,6 @@ def _arrange(sheet: Sheet, measure: Measure, frame: Array) -> list[Placed]:
     return [one for one in placed if one.overlap < 0.1]
 
 
-def _box(sheet: Sheet, placed: list[Placed]) -> Array:
-    """Lower left and upper right corner of everything; (4,); points."""
-    points = [stroke.points / sheet.scale for stroke in sheet.everything()]
-    points += [one.center + sign * one.half[None] for one in placed for sign in (-1, 1)]
-    everything = np.concatenate(points)
-    return np.array([*everything.min(axis=0), *everything.max(axis=0)])
-
-
-def _width_of_words(subject: Subject, notes: list[str], measure: Measure) -> float:
-    """Width of the words above the axes; points."""
-    badges = filter(None, map(badge, subject.scene.loads))
-    first = TITLE_SIZE / LABEL_SIZE * 2 * measure(_title(subject))[0]
-    first += sum(2 * measure(text)[0] + BADGE for text, *_ in badges)
-    return float(max([first, *(2 * measure(note)[0] for note in notes)]))
-
-
-def _room(measure: Measure, subject: Subject, notes: list[str]) -> tuple[Array, Array]:
-    """Least and largest size of the axes in a figure of their own; (2,), (2,); points."""
-    around_axes = (LEFT + RIGHT, font_size(BELOW + ABOVE + NOTE * len(notes)))
-    least, most = (POINTS * np.array(size) - around_axes for size in (LEAST, MOST))
-    least[0] = min(max(least[0], _width_of_words(subject, notes, measure)), most[0])
-    return least, most
-
-
-def _size(axes: Axes) -> Array:
-    """Size of axes as they are; (2,); points."""
-    figure = figure_of(axes)
-    figure.draw_without_rendering()
-    box = axes.get_window_extent()
-    return np.asarray(np.array([box.width, box.height]) * POINTS / figure.dpi)
-
-
-def _plan(
-    skeleton: Array, scale: float, box: Array, least: Array, most: Array
-) -> tuple[float, Array]:
-    """The largest scale at which everything fits, and the corners of the axes; points.
-
-    The ``box`` around everything and the sizes of the axes are in points.
-    """
-    low, high = skeleton.min(axis=0), skeleton.max(axis=0)
-    # What stands out beyond the skeleton has a size in points.
-    below, beyond = low / scale - box[:2] + 8.0, box[2:] - high / scale + 8.0
-    room = np.maximum(most - below - beyond, 0.3 * most)
-    scale = float(np.max((high - low) / room)) or scale
-    frame = np.array([*(low / scale - below), *(high / scale + beyond)])
-    more = np.maximum(least - (frame[2:] - frame[:2]), 0.0) / 2
-    return scale, frame + np.concatenate([-more, more])
-
-
 def _write_around(axes: Axes, title: str, notes: list[str]) -> None:
     """Write title, notes and names of the axes."""
     note = font_size(NOTE)
@@ -271,54 +243,35 @@ def _write_around(axes: Axes, title: str, notes: list[str]) -> None:
         )  # fmt: skip
 
 
-def _set_limits(axes: Axes, scale: float, frame: Array) -> None:
-    """Set limits, and as many ticks as there is room for."""
+def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
+    """Set limits and ticks; make a figure of its own as large as axes, and words around, need."""
     from matplotlib.ticker import MaxNLocator
 
-    x0, y0, x1, y1 = frame
+    (x0, y0, x1, y1), (across, up) = frame, frame[2:] - frame[:2]
     axes.set(xlim=(x0 * scale, x1 * scale), ylim=(y0 * scale, y1 * scale))
-    for line, length, each in ((axes.xaxis, x1 - x0, 60.0), (axes.yaxis, y1 - y0, 32.0)):
+    for line, length, each in ((axes.xaxis, across, 60.0), (axes.yaxis, up, 32.0)):
         number = min(max(int(length / font_size(each)), 2), 9)
         line.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10]))
-
-
-def _fit(axes: Axes, frame: Array, notes: int) -> None:
-    """Make the figure as large as the axes, and words around them, need."""
-    figure, (across, up) = figure_of(axes), frame[2:] - frame[:2]
-    below, above = font_size(BELOW), font_size(ABOVE + NOTE * notes)
-    left, width, height = LEFT, across + LEFT + RIGHT, up + below + above
-    for _ in range(2):  # the second time with as much room as the numbers at the axis take
-        figure.set_size_inches(width / POINTS, height / POINTS)
-        axes.set_position((left / width, below / height, across / width, up / height))
-        outer: Any = axes.get_tightbbox()
-        beyond = axes.get_window_extent().x0 - outer.x0
-        more = beyond * POINTS / figure.dpi + 8.0 - left
-        left, width = left + more, width + more
-
-
-def _paint(axes: Axes, sheet: Sheet) -> None:
-    """Draw all strokes of a group that look alike as one collection."""
-    from matplotlib.collections import LineCollection, PolyCollection
-
-    for group, strokes in sheet.strokes.items():
-        alike: defaultdict[tuple[str, float, str | None, float], list[Array]] = defaultdict(list)
-        for points, color, weight, fill, layer in strokes:
-            alike[color, weight, fill, layer].append(points)
-        for (color, weight, fill, layer), chains in alike.items():
-            kind = LineCollection if fill is None else PolyCollection
-            collection = kind(
-                chains, edgecolors=shade(color), facecolors=shade(fill or "none"),
-                linewidths=weight, zorder=layer, joinstyle="round", capstyle="round", gid=group,
-            )  # fmt: skip
-            axes.add_collection(collection, autolim=False)
+    if notes is not None:
+        figure, below, above = figure_of(axes), font_size(BELOW), font_size(ABOVE + NOTE * notes)
+        left, width, height = LEFT, across + LEFT + RIGHT, up + below + above
+        for _ in range(2):  # the second time with as much room as the numbers at the axis take
+            figure.set_size_inches(width / POINTS, height / POINTS)
+            axes.set_position((left / width, below / height, across / width, up / height))
+            outer: Any = axes.get_tightbbox()
+            beyond = axes.get_window_extent().x0 - outer.x0
+            more = beyond * POINTS / figure.dpi + 8.0 - left
+            left, width = left + more, width + more
+    axes.set_aspect("equal")
 
 
 def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
     """The labels, and lines from those that stand away to what they name."""
     for one in placed:
-        leader = scale * leader_of(one)
-        if len(leader):
-            axes.plot(*leader.T, color="#999999", linewidth=0.8, zorder=6, gid="leaders")
+        if len(one.leader):
+            axes.plot(
+                *scale * one.leader.T, color="#999999", linewidth=0.8, zorder=6, gid="leaders"
+            )
         x, y = scale * one.center
         axes.text(
             x, y, one.label.text, color=shade(one.label.color), fontsize=font_size(LABEL_SIZE),
@@ -330,7 +283,7 @@ def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
 def _write_badges(axes: Axes, scene: Scene, measure: Measure, frame: Array) -> None:
     """Write the loads on the whole scene right above the axes."""
     x, y = frame[2:] - frame[:2] + (0.0, 17.0)
-    for text, arrow, angle in filter(None, map(badge, scene.loads)):
+    for text, arrow, angle in filter(any, map(badge, scene.loads)):
         for words, size, turn in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
             axes.annotate(
                 words, (x, y), xycoords="axes points", ha="right", va="center", color=RED,

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -28,8 +28,6 @@ BLUE, RED, GREEN, PINK, ORANGE, SKY = (
 COLORS = (BLUE, RED, GREEN, PINK, ORANGE, SKY)  # of lines in one picture
 INK, TEXT, GREY, WHITE = "#222222", "#444444", "#B5B5B5", "#FFFFFF"
 
-# Layers: beneath the beams, over them, upon the areas there, and over the pins of joints
-BACK, MIDDLE, UPON, FRONT = 2.5, 4.2, 4.3, 5.5
 RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bending moment", "N m")}
 
 POINTS = 72.0  # points of an inch
@@ -50,16 +48,6 @@ STYLE: dict[str, Any] = {
     "legend.frameon": False, "lines.solid_capstyle": "round",
 }  # fmt: skip
 """Settings of Matplotlib."""
-
-
-class Stroke(NamedTuple):
-    """Line, or an area if it is filled."""
-
-    points: Array  # (n, 2); m
-    color: str = INK
-    weight: float = 1.6  # width of the line; points
-    fill: str | None = None  # colour of the area
-    layer: float = MIDDLE
 
 
 def decimal_prefix(value: float) -> tuple[float, str]:
@@ -112,7 +100,10 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 
     from ufl_beam.plotting.figures import Picture
 
-    with mpl.rc_context(_unless_chosen({**STYLE, **_sizes()})):
+    now, default = mpl.rcParams["font.size"], mpl.rcParamsDefault["font.size"]
+    font = FONT if now == default else now  # the others are in proportion to it
+    sizes = {"font.size": font, **{name: size / FONT * font for name, size in SIZES.items()}}
+    with mpl.rc_context(_unless_chosen({**STYLE, **sizes})):
         yield Picture(figsize=size, layout="constrained")
 
 
@@ -120,25 +111,22 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 def panel(ax: Axes | None, size: tuple[float, float]) -> Iterator[Axes]:
     """Open those of a new :func:`picture` of a size, or axes of the user, whose sizes stay."""
     import matplotlib as mpl
-    from matplotlib.axes import Axes
 
     if ax is None:
         with picture(size) as figure:
             yield figure.add_subplot()
         return
-    if not isinstance(ax, Axes):
-        raise SceneError(f"ax = {shorten(ax)} must be axes of Matplotlib, as plt.subplots() makes")
+    require_axes(ax)
     with mpl.rc_context(_unless_chosen(STYLE)):
         yield ax
 
 
-def _sizes() -> dict[str, float]:
-    """Sizes of fonts, in proportion to that of texts if the user has chosen it; points."""
-    import matplotlib as mpl
+def require_axes(ax: Any) -> None:
+    """Raise :class:`SceneError` for what is no axes of Matplotlib."""
+    from matplotlib.axes import Axes
 
-    now, default = mpl.rcParams["font.size"], mpl.rcParamsDefault["font.size"]
-    font = FONT if now == default else now
-    return {"font.size": font, **{name: size / FONT * font for name, size in SIZES.items()}}
+    if not isinstance(ax, Axes):
+        raise SceneError(f"ax = {shorten(ax)} must be axes of Matplotlib, as plt.subplots() makes")
 
 
 def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:
@@ -225,22 +213,24 @@ def draw_bar(axes: Axes, colors: Any, label: str) -> None:
 
 
 def make_room(axes: Axes) -> None:
-    """Extend the limits such that texts and symbols stay off the edge, and off a legend below."""
+    """Extend the limits such that texts stay off the edge, and all of it off a legend below."""
     figure = figure_of(axes)
     figure.draw_without_rendering()
-    boxes = [text.get_window_extent().get_points() for text in axes.texts]
-    for line in axes.lines:
-        at = axes.transData.transform(line.get_xydata())
-        if line.get_linestyle() == "None" and len(at):  # symbols
-            half = line.get_markersize() / 2 * figure.dpi / POINTS
-            boxes.append(np.array([at.min(axis=0) - half, at.max(axis=0) + half]))
-    for box in boxes:
+    for text in axes.texts:
+        box = text.get_window_extent().get_points()
         axes.update_datalim(axes.transData.inverted().transform(box))
     if legend := axes.get_legend():
         x, y = axes.transData.transform(axes.dataLim.min)
         below = x, y - legend.get_window_extent().height
         axes.update_datalim([axes.transData.inverted().transform(below)])
     axes.autoscale_view()
+
+
+def size_of(axes: Axes) -> Array:
+    """Measure axes as they are; width and height; (2,); points."""
+    figure = figure_of(axes)
+    figure.draw_without_rendering()
+    return np.multiply(axes.get_window_extent().size, POINTS / figure.dpi)
 
 
 def half_size(axes: Axes, text: str, size: float, **style: Any) -> Array:

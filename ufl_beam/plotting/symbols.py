@@ -1,27 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""Symbols of bodies, joints, connectors and supports as lines and areas.
+"""Symbols of bodies, joints, connector laws and supports, which all kinds of pictures draw.
 
-Pictures of all kinds draw these, in the plane and solid.
+A support is an entry of :data:`SUPPORTS`, a joint one of :data:`JOINTS`, a connector law one of
+:data:`LAWS`; joints and laws without an entry have a plain symbol.  Half a symbol has the length 1.
+Symbols of loads are in `model_sheet.py`.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.model import connector_laws as laws
 from ufl_beam.model.bodies import GROUND, Anchor, Place, Spot, node
-from ufl_beam.model.connector_laws import Guide
+from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.output.joint_histories import turned
-from ufl_beam.plotting.connector_glyphs import AROUND, STRAIGHT, along, around, kind_of
-from ufl_beam.plotting.geometry import (
+from ufl_beam.plotting.layout import (
+    Pose,
     directions,
     in_frame,
     left_of,
@@ -29,31 +30,56 @@ from ufl_beam.plotting.geometry import (
     points_along,
     unit_vectors,
 )
-from ufl_beam.plotting.scene_layout import Pose
-from ufl_beam.plotting.style import BACK, FRONT, GREY, INK, ORANGE, WHITE, Stroke
+from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, with_unit
+
+# Layers: beneath the beams, over them, upon the areas there, pins, and over these
+BACK, MIDDLE, UPON, PINS, FRONT = 2.5, 4.2, 4.3, 5.0, 5.5
 
 FILLED, EDGE = "#D6E2ED", "#5F7A94"  # colours of bodies
 STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and still supports
 
-LEAST_SLIDE = 4.0  # least length of a connector that slides; half a symbol is 1
+LEAST_SLIDE = 4.0  # least length of a connector that slides
+MOST_BODIES = 300  # number of bodies beyond which they are drawn as dots
 
-# Outlines of the symbols of supports; half a symbol is 1, the place is the origin, the beam comes
-# from above.
+
+class Stroke(NamedTuple):
+    """Line, or an area if it is filled."""
+
+    points: Array  # (n, 2); m, or halves of a symbol in the tables
+    color: str = INK
+    weight: float = 1.6  # width of the line; points
+    fill: str | None = None  # colour of the area
+    layer: float = MIDDLE
+
+
+def _line(*points: tuple[float, float], weight: float = 1.6, layer: float = MIDDLE) -> Stroke:
+    return Stroke(np.array(points), INK, weight, layer=layer)
+
+
+def _box(low: float, high: float, half: float, fill: str) -> Stroke:
+    corners = [(low, half), (high, half), (high, -half), (low, -half), (low, half)]
+    return Stroke(np.array(corners), fill=fill)
+
+
+def disc(at: Array, radius: float, color: str, fill: str, layer: float = PINS) -> Stroke:
+    """Draw a filled circle; m."""
+    circle = directions(np.linspace(0.0, 2 * math.pi, 25))
+    return Stroke(at + radius * circle, color, 1.4, fill, layer)
+
+
+# -- supports ----------------------------------------------------------------------------------
+
 Outline = tuple[tuple[float, float], ...]
-Outlines = tuple[Outline, ...]
+
 _TRIANGLE = ((0.0, 0.0), (-0.6, -0.8), (0.6, -0.8), (0.0, 0.0))
 _CLAMP = ((-1.0, 0.0), (1.0, 0.0), (1.0, -0.5), (-1.0, -0.5), (-1.0, 0.0))
 _PLATE = ((-1.0, -0.8), (1.0, -0.8), (1.0, -0.9), (-1.0, -0.9), (-1.0, -0.8))
 _TRACK = ((-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0))
 _DIAMOND = ((-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0))
 
-
-class Pin(NamedTuple):
-    """Symbol of a joint of places at one point."""
-
-    at: Array  # (2,); m
-    turns: bool  # freely
-    places: tuple[Anchor, ...]
+SUPPORTS = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))
+"""Outlines by the number of displacements that are held; 3 holds the rotation, too.  The place is
+the origin, the beam comes from above."""
 
 
 class Footing(NamedTuple):
@@ -61,196 +87,43 @@ class Footing(NamedTuple):
 
     at: Array  # (2,); m
     angle: float  # by which it is turned; rad
-    outlines: Outlines  # half a symbol is 1, the place is the origin
+    outlines: tuple[Outline, ...]
     color: str  # orange ones move
     place: Anchor
 
 
-def bodies(pose: Pose) -> list[Stroke]:
-    """Draw outlines of the rigid bodies."""
-    outlines = pose.stage.outlines.items()
-    return [Stroke(pose.of_body(body, line), EDGE, 1.6, FILLED, BACK) for body, line in outlines]
-
-
-def centres(pose: Pose) -> Iterator[Stroke]:
-    """Draw centres of mass as circles, two quarters dark."""
-    arc = 0.45 * pose.stage.unit * directions(np.linspace(0.0, math.pi / 2, 13))
-    quarter = np.vstack([(0.0, 0.0), arc, (0.0, 0.0)])
-    for body in pose.stage.scene.bodies:
-        at, ψ = pose.at(body.middle), pose.turn(body.middle)
-        for k, fill in enumerate((EDGE, WHITE, EDGE, WHITE)):
-            angles = np.full(len(quarter), ψ + k * math.pi / 2)
-            yield Stroke(at + turned(quarter, angles), EDGE, 1.0, fill)
-
-
-def rods(pose: Pose) -> Iterator[Stroke]:
-    """Draw rigid links, thick, and links, thin."""
-    for joint in pose.stage.scene.joints:
-        if joint.look in ("RigidLink", "Link"):
-            weight = 6.0 if joint.look == "RigidLink" else 2.6
-            ends = np.array([pose.at(place) for place in joint.places])
-            yield Stroke(ends, DARK, weight)
-
-
-def pins(pose: Pose) -> Iterator[Pin]:
-    """Draw circles where joints turn, squares where they do not."""
-    for joint in pose.stage.scene.joints:
-        places, apart = joint.places, 2 not in joint.shared
-        match joint.look:
-            case "Link":
-                yield from (Pin(pose.at(place), True, (place,)) for place in places)
-            case "Prismatic" | "Guided" if apart:
-                yield Pin(pose.at(places[1]), True, places[1:])
-            case "Rigid" | "Revolute":
-                yield Pin(pose.at(places[0]), _turns(joint), places)
-            case "Release" if apart or 0 in joint.shared:  # else it only slides: rails show it
-                yield Pin(pose.at(places[0]), _turns(joint), places)
-
-
-def rails(pose: Pose) -> Iterator[Stroke]:
-    """Draw rails, guide curves, and the blocks on them."""
-    draw = {"Prismatic": _rail, "Guided": _guide, "Release": _sleeve}
-    for joint in pose.stage.scene.joints:
-        if joint.look in draw:
-            yield from draw[joint.look](pose, joint)
-
-
-def connectors(pose: Pose) -> Iterator[Stroke]:
-    """Draw springs, dampers, motors and their like."""
-    for connector in pose.stage.scene.connectors:
-        draw = _around if connector.turns else _straight
-        yield from draw(pose, connector)
-
-
-def ends_of(pose: Pose, connector: Connector) -> tuple[Array, Array]:
-    """Return the points from which and to which a straight connector is drawn; (2,) each; m.
-
-    One that slides is drawn along its axis and ends where its place b is seen across the axis.  It
-    begins before a if it would be too short in the undeformed scene.
-    """
-    a, b = pose.at(connector.a), pose.at(connector.b)
-    if not connector.follows_a:
-        return a, b
-    ahead = pose.turned(connector.axis, connector.a)
-    start = float(np.dot(connector.apart, connector.axis))
-    least = math.copysign(max(LEAST_SLIDE * pose.stage.unit, abs(start)), start)
-    return a - (least - start) * ahead, a + ((b - a) @ ahead) * ahead
-
-
-def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
-    a, b = ends_of(pose, connector)
-    unit, offset = pose.stage.unit, pose.stage.offsets[connector]
-    length = math.hypot(*connector.apart)
-    if connector.follows_a:
-        yield Stroke(np.array([b, pose.at(connector.b)]), STEEL, 1.0)
-        along_axis = abs(float(np.dot(connector.apart, connector.axis)))
-        length = max(along_axis, LEAST_SLIDE * unit)
-    apart = np.linalg.norm(b - a) > 0.1 * unit
-    axis = unit_vectors(b - a) if apart else pose.turned(connector.axis, connector.a)
-    across = unit * left_of(axis)
-    if offset:
-        for end, far in ((a, b), (b, a)):
-            lane = end + 0.06 * (far - end)
-            yield Stroke(np.array([end, lane, lane + offset * across]))
-        inwards = 0.06 * (b - a)
-        a, b = a + inwards + offset * across, b - inwards + offset * across
-    # It takes the same part of the way at all times, so it stretches with the motion.
-    body = min(0.66, 6.0 * unit / max(length, unit))
-    for stroke in STRAIGHT[kind_of(connector.law)]:
-        yield along(stroke, a, b, across, body)
-
-
-def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
-    glyph, pin = AROUND[kind_of(connector.law)], pose.at(connector.b)
-    radius = (1.6 + pose.stage.offsets[connector]) * pose.stage.unit
-    a, b = pose.turn(connector.a), pose.turn(connector.b)
-    first, sweep = (b, 0.0) if glyph.spins else (a, b - a)
-    first -= 0.5
-    # Where it turns for many times, the symbol stops winding.
-    sweep = glyph.sweep + min(max(sweep, -0.75 * glyph.sweep), 2.0)
-    for stroke in glyph.strokes:
-        yield around(stroke, pin, radius, (first, first + sweep))
-    start = pose.at(connector.a)
-    if np.linalg.norm(pin - start) > radius and node(connector.a) is not GROUND:
-        yield Stroke(np.array([start, pin]), GREY, 1.0)
-
-
 def footings(pose: Pose) -> Iterator[Footing]:
-    """Draw supports, and points of the ground that hold something."""
-    for support in pose.stage.scene.supports:
+    """Find supports, and points of the ground that hold something."""
+    scene = pose.stage.scene
+    for support in scene.supports:
         angle = support_direction(support, pose.turn(support.place))
         color = ORANGE if support.moving else GROUND_GREY
         held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
-        symbol = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))[held]
-        yield Footing(pose.at(support.place), angle, symbol, color, support.place)
-    for spot, (inward, turns) in _grounds(pose.stage.scene).items():
-        symbol = (_TRIANGLE, _PLATE) if turns else (_CLAMP,)
-        angle = _upright(inward) if turns else inward - math.pi / 2
-        yield Footing(np.array(spot.point), angle, symbol, GROUND_GREY, spot)
-
-
-def _turns(joint: Joint) -> bool:
-    return 2 not in joint.shared and not any(holder.turns for holder in joint.holders)
-
-
-def _grounds(scene: Scene) -> dict[Spot, tuple[float, bool]]:
-    """Direction in which a point of the ground holds something; True if that turns freely."""
-    held: list[tuple[Sequence[Anchor], bool]] = [
-        (j.places, _turns(j)) for j in scene.joints if j.look not in ("Prismatic", "Guided")
+        yield Footing(pose.at(support.place), angle, SUPPORTS[held], color, support.place)
+    held_by: list[tuple[Sequence[Anchor], bool]] = [
+        (j.places, _turns(j)) for j in scene.joints if look_of(j).grounded
     ]
-    held += [((c.a, c.b), False) for c in scene.connectors if not c.turns]
-    found: dict[Spot, tuple[float, bool]] = {}
-    for places, turns in held:
+    held_by += [((c.a, c.b), False) for c in scene.connectors if not c.turns]
+    grounds: dict[Spot, tuple[float, bool]] = {}  # direction of what it holds; if that turns freely
+    for places, turns in held_by:
         for spot in places:
             if isinstance(spot, Spot) and spot.body is GROUND:
                 inward = _towards(spot, next(p for p in places if p != spot))
-                known, before = found.get(spot, (inward, True))
-                found[spot] = known, before and turns
-    return found
+                known, before = grounds.get(spot, (inward, True))
+                grounds[spot] = known, before and turns
+    for spot, (inward, turns) in grounds.items():
+        angle = _upright(inward) if turns else inward - math.pi / 2
+        yield Footing(np.array(spot.point), angle, SUPPORTS[2 if turns else 3], GROUND_GREY, spot)
 
 
-def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
-    """The rail as long as the way, and the block on it."""
-    (across,), (base, slider) = joint.holders, joint.places
-    unit, start, block = pose.stage.unit, pose.at(base), pose.at(slider)
-    ahead = -left_of(pose.turned(across.axis, base))
-    s = float((block - start) @ ahead)
-    low, high = pose.stage.travels[across]
-    # Magnified rotations lead elsewhere.
-    low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
-    rail = block + np.outer((low - s, high - s), ahead)
-    yield Stroke(rail, STEEL, 2.2)
-    if node(base) is GROUND:
-        yield from _hatches(rail, unit)
-    else:
-        foot = min(max(0.0, low), high)
-        yield Stroke(np.array([start, block + (foot - s) * ahead]), STEEL, 2.2)
-    corners = [(-0.95, 0.55), (0.95, 0.55), (0.95, -0.55), (-0.95, -0.55), (-0.95, 0.55)]
-    yield Stroke(in_frame(corners, block, unit * ahead), INK, 1.8, WHITE)
-
-
-def _guide(pose: Pose, joint: Joint) -> Iterator[Stroke]:
-    """The guide curve, as far as it was used."""
-    (holder,) = joint.holders
-    assert isinstance(holder.law, Guide)
-    low, high = pose.stage.travels[holder]
-    curve = np.array([holder.law.curve(s) for s in np.linspace(low, high, 200)], dtype=float)
-    yield Stroke(curve, STEEL, 2.2, layer=BACK)
-    yield from (h._replace(layer=BACK) for h in _hatches(curve, pose.stage.unit))
-
-
-def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
-    """Two bars along what a release leaves free; a box if it leaves both free."""
-    if 0 in joint.shared:
-        return
-    place = joint.places[0]
-    held = pose.turned(joint.holders[0].axis if joint.holders else (0.0, 1.0), place)
-    bars = [[(-0.9, t), (0.9, t)] for t in (0.6, -0.6)]
-    if not joint.holders:
-        bars += [[(s, -0.6), (s, 0.6)] for s in (0.9, -0.9)]
-    for bar in bars:
-        points = in_frame(bar, pose.at(place), -pose.stage.unit * left_of(held))
-        yield Stroke(points, INK, 2.4, layer=FRONT)
+def supports(pose: Pose) -> Iterator[Stroke]:
+    """Draw supports; those that do not move on hatched ground."""
+    for at, angle, outlines, color, _ in footings(pose):
+        ahead = pose.stage.outside * directions(angle)
+        yield from (Stroke(in_frame(x, at, ahead), color, 0.5, color, 3.5) for x in outlines)
+        if color != ORANGE:
+            low = min(y for outline in outlines for _, y in outline)
+            yield from _hatches(in_frame([(-1.0, low), (1.0, low)], at, ahead), pose.stage.outside)
 
 
 def support_direction(support: Support, turned: float) -> float:
@@ -290,4 +163,341 @@ def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
     ahead = unit_vectors(np.diff(line, axis=0)[step])
     tops = points_along(line, at)
     for ends in np.stack([tops, tops - 0.4 * unit * (ahead + left_of(ahead))], axis=1):
-        yield Stroke(ends, STEEL, 1.0)
+        yield Stroke(ends, STEEL, 1.0, layer=BACK)
+
+
+# -- bodies and joints -------------------------------------------------------------------------
+
+
+def bodies(pose: Pose) -> list[Stroke]:
+    """Draw outlines of the rigid bodies."""
+    outlines = pose.stage.outlines.items()
+    return [Stroke(pose.of_body(body, line), EDGE, 1.6, FILLED, BACK) for body, line in outlines]
+
+
+def centres(pose: Pose) -> Iterator[Stroke]:
+    """Draw centres of mass as circles, two quarters dark."""
+    arc = 0.45 * pose.stage.unit * directions(np.linspace(0.0, math.pi / 2, 13))
+    quarter = np.vstack([(0.0, 0.0), arc, (0.0, 0.0)])
+    for body in pose.stage.scene.bodies:
+        at, ψ = pose.at(body.middle), pose.turn(body.middle)
+        for k, fill in enumerate((EDGE, WHITE, EDGE, WHITE)):
+            ahead = directions(ψ + k * math.pi / 2)
+            yield Stroke(in_frame(quarter, at, ahead), EDGE, 1.0, fill)
+
+
+class Look(NamedTuple):
+    """Symbol of a joint."""
+
+    rod: float = 0.0  # width of a line from place to place; points
+    pins: tuple[int, ...] = ()  # numbers of the places with a pin, where a rail does not show all
+    rail: Callable[[Pose, Joint], Iterator[Stroke]] | None = None
+    grounded: bool = True  # a point of the ground has the symbol of a support
+
+
+def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
+    """The rail as long as the way, and the block on it."""
+    (across,), (base, slider) = joint.holders, joint.places
+    unit, start, block = pose.stage.unit, pose.at(base), pose.at(slider)
+    ahead = -left_of(pose.turned(across.axis, base))
+    s = float((block - start) @ ahead)
+    low, high = pose.stage.travels[across]
+    # Magnified rotations lead elsewhere.
+    low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
+    rail = block + np.outer((low - s, high - s), ahead)
+    yield Stroke(rail, STEEL, 2.2)
+    if node(base) is GROUND:
+        yield from _hatches(rail, unit)
+    else:
+        foot = min(max(0.0, low), high)
+        yield Stroke(np.array([start, block + (foot - s) * ahead]), STEEL, 2.2)
+    corners = [(-0.95, 0.55), (0.95, 0.55), (0.95, -0.55), (-0.95, -0.55), (-0.95, 0.55)]
+    yield Stroke(in_frame(corners, block, unit * ahead), INK, 1.8, WHITE)
+
+
+def _guide(pose: Pose, joint: Joint) -> Iterator[Stroke]:
+    """The guide curve, as far as it was used."""
+    (holder,) = joint.holders
+    assert isinstance(holder.law, laws.Guide)
+    low, high = pose.stage.travels[holder]
+    curve = np.array([holder.law.curve(s) for s in np.linspace(low, high, 200)], dtype=float)
+    yield Stroke(curve, STEEL, 2.2, layer=BACK)
+    yield from _hatches(curve, pose.stage.unit)
+
+
+def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
+    """Two bars along what a release leaves free; a box if it leaves both free."""
+    if 0 in joint.shared:
+        return
+    place = joint.places[0]
+    held = pose.turned(joint.holders[0].axis if joint.holders else (0.0, 1.0), place)
+    bars = [[(-0.9, t), (0.9, t)] for t in (0.6, -0.6)]
+    if not joint.holders:
+        bars += [[(s, -0.6), (s, 0.6)] for s in (0.9, -0.9)]
+    for bar in bars:
+        points = in_frame(bar, pose.at(place), -pose.stage.unit * left_of(held))
+        yield Stroke(points, INK, 2.4, layer=FRONT)
+
+
+JOINTS = {
+    "Link": Look(rod=2.6, pins=(0, 1)),
+    "RigidLink": Look(rod=6.0),
+    "Prismatic": Look(pins=(1,), rail=_rail, grounded=False),
+    "Guided": Look(pins=(1,), rail=_guide, grounded=False),
+    "Release": Look(pins=(0,), rail=_sleeve),
+}
+"""Symbols of joints by their `look`; others have a pin, or a thin rod if their places are apart."""
+
+
+def look_of(joint: Joint) -> Look:
+    """Return the symbol of a joint."""
+    plain = Look(pins=(0,)) if joint.meets else Look(rod=1.6)
+    return JOINTS.get(joint.look, plain)
+
+
+def _turns(joint: Joint) -> bool:
+    return 2 not in joint.shared and not any(holder.turns for holder in joint.holders)
+
+
+def rods(pose: Pose) -> Iterator[Stroke]:
+    """Draw links, from place to place."""
+    for joint in pose.stage.scene.joints:
+        if weight := look_of(joint).rod:
+            yield Stroke(np.array([pose.at(place) for place in joint.places]), DARK, weight)
+
+
+def rails(pose: Pose) -> Iterator[Stroke]:
+    """Draw rails, guide curves, and the blocks on them."""
+    for joint in pose.stage.scene.joints:
+        if draw := look_of(joint).rail:
+            yield from draw(pose, joint)
+
+
+class Pin(NamedTuple):
+    """Symbol of a joint of places at one point."""
+
+    at: Array  # (2,); m
+    turns: bool  # freely
+    places: tuple[Anchor, ...]
+
+
+def pins(pose: Pose) -> Iterator[Pin]:
+    """Find the pins of joints; what only slides has none."""
+    for joint in pose.stage.scene.joints:
+        look, turns = look_of(joint), _turns(joint)
+        for k in look.pins if turns or look.rail is None else ():
+            places = joint.places[k : k + 1] if look.rod else joint.places[k:]
+            yield Pin(pose.at(joint.places[k]), turns, places)
+
+
+# -- connectors --------------------------------------------------------------------------------
+#
+# A symbol, along a line or around a pin, has coordinates (s, t): s runs along the connector, from
+# -2 at its place a to 2 at its place b, its body from -1 to 1; t is across.
+
+
+def _name_of(law: Any, *units: str) -> str:
+    return type(law).__name__.lower()
+
+
+class Glyph(NamedTuple):
+    """Symbol of a connector law, and words on its size."""
+
+    straight: list[Stroke]
+    words: Callable[[Any, str, str], str] = _name_of  # of a law, and units of force and motion
+    turning: list[Stroke] | None = None  # around a pin; by default the straight one with spokes
+    sweep: float = math.pi + 1.0  # angle from place a to place b in the undeformed scene; rad
+    spins: bool = False  # turns with b as a whole; others begin at a and end at b
+
+
+def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke) -> Glyph:
+    """A drive: around a pin a curved arrow."""
+    head = np.array([(1.45, 0.95), (2.05, 0.0), (1.45, -0.95), (1.45, 0.95)])
+    turning = [_line((tail, 0), (1.6, 0), weight=2.6), Stroke(head, INK, 1.4, fill), *more]
+    return Glyph(straight, turning=turning, sweep=1.4 * math.pi, spins=True)
+
+
+CENTRE = -9.0  # the coordinate t of the pin
+_SPOKES = [_line((s, CENTRE), (s, 0)) for s in (-2, 2)]
+_TEETH = [(float(s), 0.55 * (-1.0) ** k) for k, s in enumerate(np.linspace(-1.0, 1.0, 13)[1::2])]
+_BOXED = [_line((-2, 0), (-0.8, 0)), _line((0.8, 0), (2, 0)), _box(-0.8, 0.8, 0.6, WHITE)]
+_PUSHED = [_line((-2, 0), (-0.8, 0)), _line((0.35, 0), (2, 0), weight=3.2)]
+_CYLINDER = [
+    *(*_PUSHED, _box(-0.8, 0.35, 0.6, WHITE)),
+    _line((-0.6, 0), (0, 0), weight=2.2, layer=UPON),
+    Stroke(
+        np.array([(-0.12, 0.34), (0.2, 0.0), (-0.12, -0.34), (-0.12, 0.34)]), INK, 1.0, ORANGE, UPON
+    ),
+]
+_STATED = [
+    *_BOXED,
+    _line((-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35), layer=UPON),
+]
+
+
+def _spring_in_words(law: laws.Spring, force: str, way: str) -> str:
+    words = [with_unit(law.stiffness, f"{force}/{way}")]
+    return ", ".join([*words, *["yields"] * bool(law.law), *["breaks"] * bool(law.softening)])
+
+
+def _stop_in_words(law: laws.Stop, force: str, way: str) -> str:
+    ends = [end for end in (law.low, law.high) if math.isfinite(end)]
+    words = [with_unit(x, way) if way == "m" else f"{number(x)} {way}" for x in ends]
+    sign = "≤ " if math.isinf(law.low) else "≥ " if math.isinf(law.high) else ""
+    return f"stop {sign}{' … '.join(words)}"
+
+
+def _friction_in_words(law: laws.Coulomb, force: str, way: str) -> str:
+    words = [with_unit(law.force, force)] if law.force else []
+    words += [f"{law.coefficient:g}{' m' * (way == 'rad')} × press"] if law.coefficient else []
+    return f"friction {' + '.join(words)}"
+
+
+LAWS: dict[type, Glyph] = {  # what drives is orange, filled if its motion is given
+    laws.Spring: Glyph(
+        [_line((-2, 0), (-1, 0), *_TEETH, (1, 0), (2, 0))], _spring_in_words,
+        [_line((2, CENTRE), (2, -2.1), (-2, 0))], sweep=4.3 * math.pi,
+    ),
+    laws.Damper: Glyph(
+        [
+            _line((-2, 0), (-0.5, 0)),
+            _line((0.6, 0.6), (-0.5, 0.6), (-0.5, -0.6), (0.6, -0.6)),
+            _line((0.15, 0.42), (0.15, -0.42), weight=2.6),
+            _line((0.15, 0), (2, 0)),
+        ],
+        lambda law, force, way: with_unit(law.viscosity, f"{force} s/{way}"),
+    ),
+    laws.Stop: Glyph(
+        [
+            _line((-2, 0), (-0.25, 0)),
+            _line((-0.25, 0.7), (-0.25, -0.7), weight=3.6),
+            _line((0.25, 0.7), (0.25, -0.7), weight=3.6),
+            _line((0.25, 0), (2, 0)),
+        ],
+        _stop_in_words,
+    ),
+    laws.Coulomb: Glyph(
+        [
+            _line((-2, 0), (-0.8, 0), (-0.8, 0.3), (0.6, 0.3), weight=2.2),
+            _line((2, 0), (0.8, 0), (0.8, -0.3), (-0.6, -0.3), weight=2.2),
+            *(_line((s - 0.1, -0.3), (s + 0.1, 0.3), weight=1.0) for s in (-0.4, -0.13, 0.13, 0.4)),
+        ],
+        _friction_in_words,
+    ),
+    laws.Motor: _drive([*_PUSHED, _box(-0.8, 0.35, 0.6, ORANGE)], ORANGE),
+    laws.Actuator: _drive(_CYLINDER, WHITE),
+    laws.Controller: _drive(
+        [*_CYLINDER, _line((0.9, 0), (0.9, 1.15), (-0.25, 1.15), (-0.25, 0.6), weight=1.0)],
+        WHITE, -1.4, _box(-2.0, -1.4, 0.5, WHITE),
+    ),
+    laws.ForceLaw: Glyph(_STATED),
+    laws.RigidPlastic: Glyph(  # nothing below a limit, flow at it
+        [*_BOXED, _line((-0.55, -0.35), (0, -0.35), (0, 0.35), (0.55, 0.35), layer=UPON)],
+        lambda law, force, way: f"rigid up to {with_unit(float(law.law.limit), force)}",
+    ),
+    ConnectorLaw: Glyph(_STATED, lambda law, force, way: type(law).__name__),  # of a user
+}  # fmt: skip
+
+
+def glyph_of(law: laws.Law) -> Glyph:
+    """Return the symbol of a connector law; those without an entry have one in common."""
+    return LAWS.get(type(law), LAWS[ConnectorLaw])
+
+
+def connectors(pose: Pose) -> Iterator[Stroke]:
+    """Draw springs, dampers, motors and their like."""
+    for connector in pose.stage.scene.connectors:
+        yield from (_around if connector.turns else _straight)(pose, connector)
+
+
+def ends_of(pose: Pose, connector: Connector) -> tuple[Array, Array]:
+    """Return the points from which and to which a straight connector is drawn; (2,) each; m.
+
+    One that slides is drawn along its axis and ends where its place b is seen across the axis.  It
+    begins before a if it would be too short in the undeformed scene.
+    """
+    a, b = pose.at(connector.a), pose.at(connector.b)
+    if not connector.follows_a:
+        return a, b
+    ahead = pose.turned(connector.axis, connector.a)
+    start = float(np.dot(connector.apart, connector.axis))
+    least = math.copysign(max(LEAST_SLIDE * pose.stage.unit, abs(start)), start)
+    return a - (least - start) * ahead, a + ((b - a) @ ahead) * ahead
+
+
+def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
+    a, b = ends_of(pose, connector)
+    unit, offset = pose.stage.unit, pose.stage.offsets[connector]
+    length = math.hypot(*connector.apart)
+    if connector.follows_a:
+        yield Stroke(np.array([b, pose.at(connector.b)]), STEEL, 1.0)
+        along_axis = abs(float(np.dot(connector.apart, connector.axis)))
+        length = max(along_axis, LEAST_SLIDE * unit)
+    apart = np.linalg.norm(b - a) > 0.1 * unit
+    axis = unit_vectors(b - a) if apart else pose.turned(connector.axis, connector.a)
+    across = unit * left_of(axis)
+    if offset:
+        for end, far in ((a, b), (b, a)):
+            lane = end + 0.06 * (far - end)
+            yield Stroke(np.array([end, lane, lane + offset * across]))
+        inwards = 0.06 * (b - a)
+        a, b = a + inwards + offset * across, b - inwards + offset * across
+    # The body takes the same part of the way at all times, so it stretches with the motion.
+    body = min(0.66, 6.0 * unit / max(length, unit))
+    places = 0.0, (1 - body) / 2, (1 + body) / 2, 1.0
+    for stroke in glyph_of(connector.law).straight:
+        s, t = stroke.points.T
+        part = np.interp(s, (-2.0, -1.0, 1.0, 2.0), places)
+        yield stroke._replace(points=a + np.outer(part, b - a) + np.outer(t, across))
+
+
+def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
+    glyph, pin = glyph_of(connector.law), pose.at(connector.b)
+    radius = (1.6 + pose.stage.offsets[connector]) * pose.stage.unit
+    a, b = pose.turn(connector.a), pose.turn(connector.b)
+    first, sweep = (b, 0.0) if glyph.spins else (a, b - a)
+    # Where it turns for many times, the symbol stops winding.
+    sweep = glyph.sweep + min(max(sweep, -0.75 * glyph.sweep), 2.0)
+    for stroke in glyph.turning or [*glyph.straight, *_SPOKES]:
+        # Steps of 5 degrees, such that what is straight between two points is bent.
+        steps = np.abs(np.diff(stroke.points[:, 0])) / 4.0 * sweep / math.radians(5.0)
+        counts = np.maximum(1, np.ceil(steps)).astype(int)
+        at = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
+        s, t = (np.interp(at, np.arange(len(stroke.points)), x) for x in stroke.points.T)
+        r = np.maximum(radius * (1.0 + t / 3.0), 0.18 * radius)
+        way = directions(first - 0.5 + sweep * (s + 2.0) / 4.0)
+        layer = FRONT + stroke.layer - MIDDLE
+        yield stroke._replace(points=pin + r[:, None] * way, layer=layer)
+    start = pose.at(connector.a)
+    if np.linalg.norm(pin - start) > radius and node(connector.a) is not GROUND:
+        yield Stroke(np.array([start, pin]), GREY, 1.0)
+
+
+# -- all together ------------------------------------------------------------------------------
+
+
+def in_plane(pose: Pose) -> dict[str, list[Stroke]]:
+    """Draw bodies, joints, connectors, supports and masses in the plane; many bodies as dots."""
+    scene, unit = pose.stage.scene, pose.stage.unit
+    few = len(scene.bodies) <= MOST_BODIES
+    square = 0.27 * unit * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
+    return {
+        "bodies": bodies(pose)
+        if few
+        else [disc(pose.at(body.middle), 0.4 * unit, INK, GREY) for body in scene.bodies],
+        "joints": [*rods(pose), *rails(pose)],
+        "connectors": [*connectors(pose)],
+        "supports": [*supports(pose)],
+        "centres": [*centres(pose)] if few else [],
+        "pins": [
+            disc(at, unit / 3, INK, WHITE) if turns else Stroke(at + square, INK, 1.0, INK, PINS)
+            for at, turns, _ in pins(pose)
+        ],
+        "masses": masses(pose),
+    }
+
+
+def masses(pose: Pose, color: str = INK) -> list[Stroke]:
+    """Draw point masses as dots."""
+    at = [pose.at(mass.place) for mass in pose.stage.scene.masses]
+    return [disc(point, 0.45 * pose.stage.unit, color, color) for point in at]

@@ -1,0 +1,457 @@
+# SPDX-License-Identifier: MIT
+"""Solid pictures and films of a solution, by PyVista."""
+
+from __future__ import annotations
+
+import gc
+from collections import defaultdict
+from collections.abc import Collection, Generator, Iterable, Iterator
+from contextlib import closing
+from dataclasses import dataclass
+from functools import cached_property, partial
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.errors import SceneError, require_kind, require_number, require_row, require_switch
+from ufl_beam.model.bodies import Anchor, Member, Place, Spot, require_anchors
+from ufl_beam.model.records import Record
+from ufl_beam.parallel import active_comm
+from ufl_beam.plotting import style, symbols
+from ufl_beam.plotting.drawing import evenly
+from ufl_beam.plotting.films import WRITERS, Film, screen
+from ufl_beam.plotting.inelastic import open_hinges
+from ufl_beam.plotting.layout import Pose, Stage, directions, in_frame, left_of, unit_vectors
+from ufl_beam.plotting.style import RESULTANTS
+from ufl_beam.plotting.symbols import FILLED, FRONT, MIDDLE, Pin
+from ufl_beam.progress_bar import progress_bar
+from ufl_beam.simulation.solution import Solution
+
+QUANTITIES = {name: (f"{words} {name}", unit) for name, (words, unit) in RESULTANTS.items()}
+QUANTITIES["rotation"] = "rotation", "rad"
+PIN = "#707070"  # colour of joints
+
+UP = np.array([0.0, 1.0, 0.0])  # upwards in the picture; the frame is in the plane of x and y
+
+Direction = tuple[float, float, float]
+
+
+def _require_direction(value: Any, what: str) -> Direction:
+    direction = require_row(value, what)
+    if direction.shape != (3,) or not np.cross(direction, UP).any():
+        raise SceneError(
+            f"{what} = {value} must be three numbers (x, y, z), and not along y, which is upwards "
+            "in the picture; (0, 0, -1) is the front view"
+        )
+    x, y, z = map(float, direction)
+    return x, y, z
+
+
+def _require_place(value: Any, what: str) -> None:
+    require_anchors(what, value)
+
+
+@dataclass(frozen=True)
+class Camera(Record):
+    """Camera of :func:`render` and :func:`animate`, without perspective.
+
+    By default it stands still and sees the whole motion.
+
+    Attributes:
+        direction: Direction in which it looks; (x, y, z).  The frame is in the plane of x and y; y
+            is upwards in the picture, and (0, 0, -1) is the front view.
+        follow: Place that the camera moves with: it stands still in the picture.
+        width: Width of the picture around the followed place, or around the middle of the motion;
+            m.  By default all that moves stays in the picture.
+
+    Raises:
+        SceneError: A direction along y, or a wrong argument; the message says which.
+
+    Example:
+        >>> front = ub.Camera((0, 0, -1))
+        >>> ub.render(solution, "front.png", camera=front, size=(640, 360))
+        >>> ub.render(solution, "tip.png", camera=ub.Camera(follow=beam.end, width=0.5))
+    """
+
+    direction: Annotated[Direction, _require_direction] = (-0.20, -0.28, -1.0)
+    follow: Annotated[Anchor | None, _require_place] = None
+    width: Annotated[float | None, partial(require_number, positive=True)] = None
+
+    def origin(self, pose: Pose) -> Array:
+        """Return the point of the plane that it moves with; (2,); m."""
+        return np.zeros(2) if self.follow is None else pose.at(self.follow)
+
+    def aim(self, plotter: Any, box: Array, origin: Array, size: tuple[int, int]) -> None:
+        """Fit a box into the picture, above the colour bar and below the time.
+
+        Args:
+            plotter: Plotter of PyVista.
+            box: Lower and upper corner, from the origin; (2, 3); m.
+            origin: Point of the plane; (2,); m.
+            size: Width and height of the picture; pixels.
+        """
+        towards = np.array(self.direction) / np.linalg.norm(self.direction)
+        right = np.cross(towards, UP)
+        right /= np.linalg.norm(right)
+        up = np.cross(right, towards)
+        middle, aspect = box.mean(axis=0), size[1] / size[0]
+        if self.width is None:
+            corners = np.stack(np.meshgrid(*box.T), axis=-1).reshape(-1, 3)
+            width, height = np.ptp(corners @ right), np.ptp(corners @ up)
+            scale = max(height / 0.76, width / 0.96 * aspect) / 2
+        else:
+            scale = self.width * aspect / 2
+            middle = middle if self.follow is None else np.zeros(3)
+        focus = np.append(origin, 0.0) + middle - 0.08 * scale * up
+        plotter.camera.parallel_projection = True
+        plotter.camera.parallel_scale = scale
+        plotter.camera.focal_point = focus
+        plotter.camera.position = focus - 4 * np.linalg.norm(np.ptp(box, axis=0)) * towards
+        plotter.camera.up = up
+        plotter.camera_set = True
+
+
+CAMERA = Camera()  # stands still and sees the whole motion
+
+
+def render(
+    solution: Solution,
+    path: str | Path,
+    *,
+    n: int = -1,
+    color: str = "M",
+    thickness: float = 1.0,
+    magnify: float = 1.0,
+    camera: Camera = CAMERA,
+    size: tuple[int, int] = (1600, 900),
+) -> None:
+    """Write a rendered picture of the frame at the n-th kept time.
+
+    In the plane, beams have the depth of their section; across, they have the same depth, or a
+    visible one if they are slender.  Bodies are plates, see :func:`plot`.  Orange pins are hinges
+    that have opened.  Needs no screen, see :func:`animate`.
+
+    Args:
+        solution: Solution to draw.
+        path: File, ending in ``.png``.
+        n: Number of the kept time; negative from the end.
+        color: Quantity that colours the beams: "N", "V", "M" or "rotation".
+        thickness: Factor on the depth of the sections.
+        magnify: Factor on the displacements.
+        camera: Where the camera looks, and the place that it follows.
+        size: Width and height; pixels.
+
+    Raises:
+        SceneError: A wrong argument; the message says which.
+        ImportError: PyVista is missing.
+        RuntimeError: There is neither a screen nor Xvfb.
+
+    Example:
+        >>> ub.render(solution, "beam.png", color="M", size=(640, 360))
+    """
+    from matplotlib.image import imsave
+
+    solids = Solids(solution, color, thickness, magnify, size)
+    path = _require_suffix(path, (".png",))
+    require_kind(camera, Camera, "render: camera")
+    camera.origin(solids.stage([n]).pose(n))
+    if active_comm().rank == 0:
+        with closing(_film(solids, [n], camera)) as frames:
+            imsave(path, next(frames))
+
+
+def animate(
+    solution: Solution,
+    path: str | Path,
+    *,
+    fps: float = 25.0,
+    seconds: float = 4.0,
+    color: str = "M",
+    thickness: float = 1.0,
+    magnify: float = 1.0,
+    camera: Camera = CAMERA,
+    size: tuple[int, int] = (960, 544),
+    progress: bool = True,
+) -> Film:
+    """Write an animation of the whole motion as GIF or MP4, and return it as a film to show.
+
+    Colours have the same meaning in all frames.  No screen is needed: for VTK before 9.4 an Xvfb is
+    started for the time being.
+
+    Args:
+        solution: Solution to draw.
+        path: File, ending in ``.gif``, or in ``.mp4`` if there is ffmpeg, as in imageio-ffmpeg.
+        fps: Frames per second; browsers show at most 50 of a GIF.
+        seconds: Duration of the film, whatever the duration of the motion; s.
+        color: Quantity that colours the beams: "N", "V", "M" or "rotation".
+        thickness: Factor on the depth of the sections.
+        magnify: Factor on the displacements.
+        camera: Where the camera looks, and the place that it follows.
+        size: Width and height; pixels.
+        progress: Show a progress bar in a terminal or notebook.
+
+    Returns:
+        The film: a path that a notebook plays.
+
+    Raises:
+        SceneError: A wrong argument; the message says which.
+        ImportError: PyVista is missing, or ffmpeg for MP4; the message says how to install it.
+        RuntimeError: There is neither a screen nor Xvfb, or ffmpeg failed.
+
+    Example:
+        >>> ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
+        Film('beam.gif')
+    """
+    solids = Solids(solution, color, thickness, magnify, size)
+    path = _require_suffix(path, WRITERS)
+    require_kind(camera, Camera, "animate: camera")
+    require_switch(progress, "animate: progress")
+    require_number(fps, "animate: fps", positive=True)
+    require_number(seconds, "animate: seconds", positive=True)
+    shown = evenly(solution, max(1, round(fps * seconds)))
+    camera.origin(solids.stage(shown).undeformed)
+    if active_comm().rank == 0:
+        with closing(_film(solids, shown, camera)) as frames:
+            about = {"iterable": frames, "total": len(shown), "unit": "frame"}
+            bar = progress_bar(progress, active_comm(), **about)
+            WRITERS[path.suffix.lower()](path, iter(bar), fps)
+    return Film(path)
+
+
+def _film(solids: Solids, shown: list[int], camera: Camera) -> Generator[Any, None, None]:
+    """Images (height, width, 3) of these states, one after the other."""
+    try:
+        import pyvista
+    except ImportError as error:
+        raise ImportError(
+            "pictures of solid bodies need PyVista; install it by: pip install ufl_beam[view]"
+        ) from error
+    with screen(pyvista):
+        plotter = pyvista.Plotter(off_screen=True, window_size=list(solids.size))
+        try:
+            yield from _frames(plotter, solids, shown, camera)
+        finally:
+            plotter.close()
+            del plotter
+            # A window that is left to the collector would outlive its X server.
+            gc.collect()
+
+
+def _frames(plotter: Any, solids: Solids, shown: list[int], camera: Camera) -> Iterator[Any]:
+    """Images of a plotter, in which only what moves is made anew."""
+    from pyvista import merge
+
+    solution, magnify, size = solids.solution, solids.magnify, solids.size
+    stage, grid, beams = solids.stage(shown), solution.grid, solution.scene.beams
+    largest = max(float(np.abs(solids.values(n)).max(initial=0.0)) for n in set(shown))
+    factor, prefix = style.decimal_prefix(largest)
+    limit, (quantity, unit) = largest / factor or 1.0, QUANTITIES[solids.color]
+    text = {"font_size": size[1] // 40, "color": "black", "viewport": True}
+    bar = {
+        "title": "values", "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.48,
+        "height": 0.09, "position_x": 0.46, "position_y": 0.01, "label_font_size": size[1] // 36,
+    }  # fmt: skip
+    xy = np.concatenate([pose.points() - camera.origin(pose) for pose in stage.poses()])
+    margin, half = 2.2 * solids.symbol, solids.thickest(beams)[1] / 2
+    box = np.array([[*(xy.min(axis=0) - margin), -half], [*(xy.max(axis=0) + margin), half]])
+    plotter.set_background("white")
+    plotter.enable_anti_aliasing("msaa")
+    if beams:
+        undeformed = _lines([grid.points[grid.vertices_of(beam)] for beam in beams])
+        plotter.add_mesh(undeformed, color="#A0A0A0", reset_camera=False)
+        plotter.add_text(f"{quantity} ({prefix}{unit})", position=(0.02, 0.025), **text)
+    for n in shown:
+        plotter.suppress_rendering = True
+        pose = stage.pose(n)
+        camera.aim(plotter, box, camera.origin(pose), size)
+        # Meshes and texts replace those of the same name.
+        if beams:
+            plotter.add_mesh(
+                solids.beams(n, pose, factor), scalars="values", clim=(-limit, limit),
+                cmap="coolwarm", name="beams", scalar_bar_args=bar, reset_camera=False,
+                ambient=0.4, diffuse=0.7,
+            )  # fmt: skip
+            plotter.scalar_bars["values"].SetTitle("")  # VTK would set it over the numbers.
+        for color, meshes in solids.others(n, pose).items():
+            look = {"color": color, "name": color, "ambient": 0.25}
+            plotter.add_mesh(merge(meshes), reset_camera=False, **look)
+        time = f"{solution.parameter.at(solution.times[n], '.3f')}{style.magnified(magnify)}"
+        plotter.add_text(time, position=(0.02, 0.93), name="time", **text)
+        plotter.reset_camera_clipping_range()
+        plotter.suppress_rendering = False
+        plotter.render()
+        yield plotter.screenshot(return_img=True)
+
+
+def _require_suffix(path: str | Path, suffixes: Collection[str]) -> Path:
+    """Return the path of a picture, or raise :class:`SceneError`."""
+    path = Path(path)
+    if path.suffix.lower() not in suffixes:
+        raise SceneError(f"{path}: the name must end in {' or '.join(suffixes)}")
+    if not path.parent.is_dir():
+        raise SceneError(f"{path}: there is no directory {path.parent}; make it first")
+    return path
+
+
+# -- meshes ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Solids:
+    """Solid bodies of a solution, as the arguments of :func:`render` ask for them, checked."""
+
+    solution: Solution
+    color: str
+    thickness: float
+    magnify: float
+    size: tuple[int, int]
+
+    def __post_init__(self) -> None:
+        style.require_choice(self.color, QUANTITIES, "color")
+        require_number(self.thickness, "thickness", positive=True)
+        require_number(self.magnify, "magnify", positive=True)
+        for pixels in self.size:
+            require_number(pixels, "size", at_least=16)
+
+    @cached_property
+    def symbol(self) -> float:
+        """Half the size of the symbols of supports and masses; m."""
+        scene = self.solution.scene
+        return max(0.022 * scene.size, 0.7 * self.thickest(scene.beams)[0])
+
+    def thickest(self, of: Iterable[Member | Anchor]) -> tuple[float, float]:
+        """Return the largest depth in the plane and width across it of beams, or at places; m.
+
+        Slender beams, and bodies, have a least width.
+        """
+        beams = [x.beam if isinstance(x, Place) else x for x in of if not isinstance(x, Spot)]
+        depth = self.thickness * max((float(b.section.depth) for b in beams), default=0.0)
+        return depth, max(depth, 0.04 * self.solution.scene.size)
+
+    def stage(self, shown: list[int]) -> Stage:
+        """Return the stage of bodies, joints, connectors and supports."""
+        return Stage(self.solution, self.magnify, self.symbol, sorted(set(shown)))
+
+    def values(self, n: int) -> Array:
+        """Values of the colours at both ends of all cells; (num_cells, 2)."""
+        solution, grid = self.solution, self.solution.grid
+        if self.color == "rotation":
+            return np.asarray(solution.q[n][grid.dofs[grid.cells, 2]])
+        index = list(RESULTANTS).index(self.color)
+        beams = solution.scene.beams
+        forces = [solution.diagram(beam, n, points=2)[1 + index] for beam in beams]
+        return np.concatenate([np.empty(0), *forces]).reshape(-1, 2)
+
+    def beams(self, n: int, pose: Pose, factor: float) -> Any:
+        """Make a hexahedron for each cell of the beams, with values that are the colours.
+
+        Cross-sections turn with ψ; at corners between cells of a beam they halve the angle.
+        """
+        from pyvista import CellType, UnstructuredGrid
+
+        grid = self.solution.grid
+        vertices = np.arange(grid.cells.max(initial=-1) + 1)
+        along = unit_vectors(np.diff(grid.points[grid.cells], axis=1)[:, 0])
+        sizes = np.reshape([self.thickest([beam]) for beam in self.solution.scene.beams], (-1, 2))
+        mean, halves = np.zeros((len(vertices), 2)), np.zeros((len(vertices), 2))
+        for end in grid.cells.T:
+            mean[end] += along  # no vertex is the same end of two cells
+            halves[end] = sizes[grid.beam_of_cell] / 2
+        angle = np.arctan2(mean[:, 1], mean[:, 0]) + self.solution.q[n][grid.dofs[vertices, 2]]
+        depth, width = halves.T
+        left = depth[:, None] * left_of(directions(angle))
+        corners = np.stack(  # of cross-sections; (num_vertices, 4, 3)
+            [
+                np.column_stack([pose.nodes[vertices] + sign * left, side * width])
+                for sign, side in ((1, 1), (-1, 1), (-1, -1), (1, -1))
+            ],
+            axis=1,
+        )
+        points = corners[grid.cells].reshape(-1, 3)  # of each cell: colours may jump
+        hexahedra = {CellType.HEXAHEDRON: np.arange(len(points)).reshape(-1, 8)}
+        mesh = UnstructuredGrid(hexahedra, points)
+        mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
+        return mesh
+
+    def others(self, n: int, pose: Pose) -> dict[str, list[Any]]:
+        """Make bodies, joints, connectors, masses and supports; meshes by their colours."""
+        from pyvista import Sphere
+
+        found: defaultdict[str, list[Any]] = defaultdict(list)
+        self._add_strokes(found, pose)
+        self._add_pins(found, n, pose)
+        if masses := [pose.at(mass.place) for mass in self.solution.scene.masses]:
+            found[style.INK].append(_copies(Sphere(radius=1.1 * self.symbol), masses))
+        for at, angle, outlines, color, place in symbols.footings(pose):
+            half, ahead = 0.6 * self.thickest([place])[1], self.symbol * directions(angle)
+            found[color] += [_extruded(in_frame(x, at, ahead), -half, half) for x in outlines]
+        return found
+
+    def _add_strokes(self, found: dict[str, list[Any]], pose: Pose) -> None:
+        """Bodies as plates, lines as rods, and filled areas as blocks."""
+        beams = self.solution.scene.beams
+        body, front = self.thickest(())[1], 0.7 * self.thickest(beams)[1]
+        lines: defaultdict[tuple[str, float], list[Array]] = defaultdict(list)
+        for strokes, half in (
+            (symbols.bodies(pose), 0.4 * body),
+            (symbols.centres(pose), 0.48 * body),
+            (symbols.rods(pose), 0.1 * body),
+            (symbols.rails(pose), 0.45 * body),
+            (symbols.connectors(pose), 0.45 * body),
+        ):
+            for points, color, weight, fill, layer in strokes:
+                base = front if layer >= FRONT else half
+                low, high = (-half, half) if layer <= MIDDLE else (base, 1.1 * base)
+                if fill is not None:
+                    found[fill].append(_extruded(points, low, high))
+                if fill != FILLED:
+                    z = 0.0 if fill is None and layer <= MIDDLE else high
+                    lines[color, weight].append(np.insert(points, 2, z, axis=1))
+        for (color, weight), several in lines.items():
+            tubes = _lines(several).tube(radius=weight * self.symbol / 20.0, n_sides=12)
+            found[color].append(tubes)
+
+    def _add_pins(self, found: dict[str, list[Any]], n: int, pose: Pose) -> None:
+        """Joints as cylinders as thick as the beams that they join; open hinges as orange ones."""
+        from pyvista import Cylinder
+
+        pins = [(pin, PIN) for pin in symbols.pins(pose)]
+        for hinge in open_hinges(self.solution, n, pose.nodes):
+            pins.append((Pin(hinge.at, True, (hinge.beam.start,)), style.ORANGE))
+        alike: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)
+        for pin, color in pins:
+            depth, width = self.thickest(pin.places)
+            least = 0.4 * self.symbol if pin.turns or not depth else 0.0
+            height = width * (1.25 if pin.turns else 1.02)
+            alike[max(depth / 2, least), height, color].append(pin.at)
+        for (radius, height, color), places in alike.items():
+            axis = {"direction": (0, 0, 1), "radius": radius, "height": height}
+            found[color].append(_copies(Cylinder(**axis, resolution=32).triangulate(), places))
+
+
+def _copies(mesh: Any, places: list[Array]) -> Any:
+    """Copies of a mesh at places of the plane, in one mesh."""
+    from pyvista import PolyData
+
+    points = PolyData(np.insert(np.array(places), 2, 0.0, axis=1))
+    return points.glyph(geom=mesh, orient=False, scale=False)
+
+
+def _lines(lines: list[Array]) -> Any:
+    """Lines in one mesh, which is fast; each piece of its own: corners make tubes thin."""
+    from pyvista import line_segments_from_points
+
+    ends = np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines])
+    flat = ends.shape[1] == 2
+    return line_segments_from_points(np.insert(ends, 2, 0.0, axis=1) if flat else ends)
+
+
+def _extruded(outline: Array, low: float, high: float) -> Any:
+    """A block between two planes; the outline is closed; m."""
+    from pyvista import PolyData
+
+    flat = np.insert(outline[:-1], 2, low, axis=1)
+    face = PolyData(flat, [len(flat), *range(len(flat))])
+    return face.triangulate().extrude((0.0, 0.0, high - low), capping=True)
