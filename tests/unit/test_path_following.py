@@ -10,8 +10,8 @@ import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam.analysis.critical_points import Direction
-from ufl_beam.analysis.path_stepper import Candidate, PathStepper
+from ufl_beam.analysis.critical_points import Candidate, Direction
+from ufl_beam.analysis.path_following import PathStepper
 from ufl_beam.parallel import active_comm
 from ufl_beam.plotting.drawing import evenly
 
