@@ -200,12 +200,9 @@ class PathCorrector:
         """Return an infinitely slow step to a load factor: rates and viscous forces vanish."""
         return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, fraction=1.0)
 
-    def _drive(self, t: float) -> None:
-        self.simulation.equation.begin(self.step_at(t), self._driven)
-
     def _driven_forces(self, q: Array, t: float) -> Array:
         """Forces of all that depends on the load factor, which is t from now on."""
-        self._drive(t)
+        self.simulation.equation.begin(self.step_at(t), self._driven)
         forces = np.zeros(self.share.size)
         for term in self._driven:
             term.add_residual(q, forces)
@@ -220,7 +217,7 @@ class PathCorrector:
     def arrive(self, x: Array) -> None:
         """Bring the loads to the load factor of an iterate."""
         self._x = x.copy()
-        self._drive(self.t)
+        self.simulation.equation.begin(self.step_at(self.t), self._driven)
 
     def tangent(self, x: Array, r: Array) -> None:
         """Fill the matrix, and the derivative by the load factor, exact for linear functions."""

@@ -279,7 +279,9 @@ class PathStepper:
         corrector.direction = way if self._control.sense(corrector, way, None) > 0 else -way
         here = Trial(corrector.step_at(simulation.t), simulation.q, np.zeros(corrector.share.size))
         # A run that ended at a critical point may go on from there.
-        self._before, self._landed = Candidate(here, stiffness, corrector.direction), not fresh
+        way = corrector.direction
+        slope = abs(way.t) / corrector.size(way)
+        self._before, self._landed = Candidate(here, stiffness, way, slope), not fresh
 
     @property
     def tried(self) -> float:
@@ -327,9 +329,9 @@ class PathStepper:
         self._landed = found.passed(before)
         # The load factor has turned in the state that was found, as at a kink, or its slope
         # vanishes.  It and the eigenvalue need not change their signs in the same last digit.
-        soft = _vanishes(self._softness, found, before, after)
-        limit = self._turned(found) or _vanishes(self._slope, found, before, after)
-        limit = limit and not (soft and self._idle(found, before, after))
+        soft = _vanishes("softness", found, before, after)
+        limit = self._turned(found) or _vanishes("slope", found, before, after)
+        limit = limit and not (soft and _idle(found, before, after))
         if self._landed and not corrector.dissipates and corrector.dissipation(found.trial.q1) > 0:
             self._pass_kink(found, reached - 2 * LOCATION_TOLERANCE * part, part, limit)
             return
@@ -364,19 +366,13 @@ class PathStepper:
         stiffness = corrector.stiffness_at(trial.q1)
         way = corrector.direction_of(stiffness)
         gone = Direction(trial.q1 - simulation.q, trial.step.t1 - simulation.t)
-        if part > UNCHECKED_PART:
-            self._require_near(gone)
+        size, sought = (corrector.length(one) for one in (gone, corrector.sought))
+        aligned = corrector.product(gone, corrector.sought) >= LEAST_COSINE * size * sought
+        if part > UNCHECKED_PART and not (aligned and size <= LARGEST_LENGTH_RATIO * sought):
+            raise StepFailed("the path turns too sharply, or the step leaps to another branch")
         if self._control.sense(corrector, way, gone) < 0:
             way = -way
-        return Candidate(trial, stiffness, way)
-
-    def _require_near(self, gone: Direction) -> None:
-        """Raise if a step has left the direction in which it was sought."""
-        corrector = self._corrector
-        size, sought = (corrector.length(way) for way in (gone, corrector.sought))
-        aligned = corrector.product(gone, corrector.sought) >= LEAST_COSINE * size * sought
-        if not aligned or size > LARGEST_LENGTH_RATIO * sought:
-            raise StepFailed("the path turns too sharply, or the step leaps to another branch")
+        return Candidate(trial, stiffness, way, abs(way.t) / corrector.size(way))
 
     def _locate(self, before: Candidate, after: Candidate, part: float) -> tuple[Candidate, float]:
         """The first state whose signs have changed, and the part of the step that leads there.
@@ -393,14 +389,14 @@ class PathStepper:
             if high - low <= LOCATION_TOLERANCE * part:
                 break
             turned = self._turned(last)
-            if not turned and high - low <= bracket * part and self._soft(last, before, after):
+            if not turned and high - low <= bracket * part and _soft(last, before, after):
                 several = abs(last.stiffness.negative - before.stiffness.negative) > 1
                 if not several or bracket <= SEPARABLE:
                     with suppress(StepFailed):
                         return self._cross((low, high), (first, last), (before, after), part)
                 bracket /= 10
-            measure = self._slope if turned else self._softness
-            here, there = weight_low * measure(first), -weight_high * measure(last)
+            sizes = [one.slope if turned else one.softness for one in (first, last)]
+            here, there = weight_low * sizes[0], -weight_high * sizes[1]
             middle = (low * there - high * here) / (there - here)
             if not turned and high - low > bracket * part:
                 # Beyond the estimate, so that it comes to lie between two states.
@@ -476,46 +472,17 @@ class PathStepper:
             if not near_by and abs(λ) < abs(λ0) / 2:
                 continue
             # Where it falls no more, the eigenvalue is round-off.
-            if not self._soft(found, first, last) or not self._idle(found, before, after):
+            if not _soft(found, first, last) or not _idle(found, before, after):
                 break
             way = (1.0 if way.t * first.way.t > 0 else -1.0) / corrector.length(way) * way
             leave(mode := np.array(stiffness.softest[1][corrector.share.dofs]))
-            return Candidate(found.trial, last.stiffness, way, mode), reached
+            slope = abs(way.t) / corrector.size(way)
+            return Candidate(found.trial, last.stiffness, way, slope, mode), reached
         raise StepFailed("no bifurcation point was found")
-
-    def _idle(self, found: Candidate, before: Candidate, after: Candidate) -> bool:
-        """Return whether the load does no work on the critical mode, or as little as round-off."""
-        least = IDLE * found.stiffness.most_work
-        return self._work(found) < least or _vanishes(self._work, found, before, after)
-
-    def _soft(self, found: Candidate, before: Candidate, after: Candidate) -> bool:
-        """Return whether an eigenvalue is small, compared with those at the ends of a step."""
-        return self._softness(found) < SOFT * max(map(self._softness, (before, after)))
 
     def _turned(self, found: Candidate) -> bool:
         """Return whether the load factor goes the other way than before the step."""
         return found.way.t * self._corrector.direction.t < 0
-
-    def _softness(self, found: Candidate) -> float:
-        """Size of the eigenvalue nearest to zero; N m."""
-        return abs(found.stiffness.softest[0])
-
-    def _slope(self, found: Candidate) -> float:
-        """Change of the load factor along the path over that of the configuration.
-
-        As K q' = f t', a slope of zero means that the direction of the path is a critical one, and
-        that the load f does work on it.  At a bifurcation it does none on the critical direction.
-        """
-        return abs(found.way.t) / self._corrector.size(found.way)
-
-    def _work(self, found: Candidate) -> float:
-        """Work of the load on the critical mode, near a critical point; N m.
-
-        As t'/|q'| = λ/(f·x) where the motion is along a mode x of length 1 with the eigenvalue λ.
-        The quotient tends to zero where the load does no work on it, whatever round-off adds to q'.
-        """
-        slope = self._slope(found)
-        return self._softness(found) / slope if slope else math.inf
 
     def _note(self, found: Candidate, before: Direction, n: int, limit: bool) -> None:
         """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
@@ -538,9 +505,18 @@ class PathStepper:
         self.critical.append(CriticalPoint(kind, simulation.t, n, state, mode))
 
 
-def _vanishes(
-    measure: Callable[[Candidate], float], found: Candidate, before: Candidate, after: Candidate
-) -> bool:
+def _vanishes(what: str, found: Candidate, before: Candidate, after: Candidate) -> bool:
     """Return whether a measure is nearly zero in a state that was located between two others."""
-    size, *ends = map(measure, (found, before, after))
-    return size < SINGULAR_RATIO * max(ends)
+    size, *ends = (getattr(one, what) for one in (found, before, after))
+    return bool(size < SINGULAR_RATIO * max(ends))
+
+
+def _idle(found: Candidate, before: Candidate, after: Candidate) -> bool:
+    """Return whether the load does no work on the critical mode, or as little as round-off."""
+    least = IDLE * found.stiffness.most_work
+    return found.work < least or _vanishes("work", found, before, after)
+
+
+def _soft(found: Candidate, before: Candidate, after: Candidate) -> bool:
+    """Return whether an eigenvalue is small, compared with those at the ends of a step."""
+    return found.softness < SOFT * max(before.softness, after.softness)

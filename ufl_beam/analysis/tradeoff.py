@@ -424,8 +424,10 @@ class _Search:
         """Run what is needed to know the setting and its error; TradeoffError if none serves."""
         while True:
             choice = self._choose(min(self.unsure, NEGLIGIBLE))  # which the limit will be known to
-            base = self._base
-            if self.unsure > self._share(choice):
+            some, base = next(iter(self.crosses.values())), self._base
+            finest = some.cells.finest, some.steps.finest
+            far = any(level > last for level, last in zip(choice.levels, finest, strict=True))
+            if far or self.unsure > self._share(choice):
                 base = [
                     min(max(old, round(level) - 1), old + FURTHER)
                     for old, level in zip(base, choice.levels, strict=True)
@@ -498,7 +500,14 @@ class _Search:
                 self._doubt(failed[0], dial=1)
                 continue
             values = [self._runs.runs[one].values for one in wanted]
-            self._set_units(values[-1])
+            for name, value in values[-1].items():
+                unit = self._target.absolute.get(name, self._target.relative * size(value))
+                if unit == 0:
+                    raise SceneError(
+                        f"tradeoff: quantity {name!r} is zero, so that no part of it can be a "
+                        "tolerance; give tolerances by name, in units of the quantities"
+                    )
+                self.units[name] = unit
             thirds = [self._at(2 ** (i + 2), j), self._at(2**i, j + 2)]
             counts = [self._counts(values[0], found) for found in values[1:]]
             self._runs.run([one for one, needed in zip(thirds, counts, strict=True) if needed])
@@ -516,17 +525,6 @@ class _Search:
             if self.unsure <= LIMIT or self._worst()[1]:
                 return
             self._doubt("".join(f"\n  {name}{cross}" for name, cross in self.crosses.items()))
-
-    def _set_units(self, values: Mapping[str, Array]) -> None:
-        """Set the unit of each quantity: its tolerance, or its size."""
-        for name, value in values.items():
-            unit = self._target.absolute.get(name, self._target.relative * size(value))
-            if unit == 0:
-                raise SceneError(
-                    f"tradeoff: quantity {name!r} is zero, so that no part of it can be a "
-                    "tolerance; give tolerances by name, in units of the quantities"
-                )
-            self.units[name] = unit
 
     def _counts(self, values: Mapping[str, Array], finer: Mapping[str, Array]) -> bool:
         """Return whether a change counts for what was asked."""
@@ -554,13 +552,7 @@ class _Search:
         self._base[self._worst()[0] if dial is None else dial] += 1
 
     def _confirm(self, choice: _Choice) -> None:
-        """Run what is a level finer than a choice, and than the base, in both dials.
-
-        If one of them does not count, the finest level of the other is that run.
-        """
-        some = next(iter(self.crosses.values()))
-        if min(len(some.cells.changes), len(some.steps.changes)) < 2:
-            return
+        """Run what is a level finer than a choice, and than the base, in both dials."""
         i, j = self._base
         parts = 2 * max(round(2**choice.level), 2**j)
         finer = self._at(2 * max(choice.refine, Fraction(2**i)), math.log2(parts))
