@@ -77,7 +77,7 @@ class Convergence:
 
     @property
     def finest(self) -> int:
-        """The finest level."""
+        """The finest of the levels that were run."""
         return self.coarsest + len(self.changes)
 
     def lack(self, level: npt.ArrayLike) -> Array:
@@ -129,17 +129,17 @@ class Cross:
     def confirmed(self, value: Array, i: float, j: float) -> Cross:
         """Return it with the limit that follows from a run in which both dials are finer.
 
-        The limit moves by what errors of cells and steps depend on each other, or by what is
-        irregular, and so as large on all levels.  All of it is in doubt: of an error in proportion
-        to the product of both, of which parts c and s are left, it is a part (1 - c) (1 - s).
+        The limit moves by what errors of cells and steps depend on each other.  An error in
+        proportion to the product of both, as a part c of it for cells that are left and a part s
+        for steps, moves it by a part (1 - c) (1 - s), and leaves the rest in doubt.
         """
         limit = np.asarray(value + self.lack(i, j))
         c, s = (
             2.0 ** (-dial.used * (level - dial.coarsest))
             for dial, level in ((self.cells, i), (self.steps, j))
         )
-        moved = size(limit - self.limit) / ((1 - c) * (1 - s))
-        doubt = self.cells.unsure(i) + self.steps.unsure(j) + moved
+        moved = size(limit - self.limit)
+        doubt = self.cells.unsure(i) + self.steps.unsure(j) + moved / ((1 - c) * (1 - s)) - moved
         return replace(self, limit=limit, uncertainty=doubt)
 
     def __str__(self) -> str:

@@ -432,12 +432,12 @@ class _Search:
                     min(max(old, round(level) - 1), old + FURTHER)
                     for old, level in zip(base, choice.levels, strict=True)
                 ]
-            before = list(self._base)
+            before = self._base.copy()
             if base == self._base:
                 self._confirm(choice)
                 if self.unsure <= LIMIT:
                     break
-                self._doubt("the limit is not known")
+                self._base[self._worst()[0]] += 1
             else:
                 self._base = base
             try:
