@@ -83,13 +83,11 @@ def tradeoff(
 ) -> Tradeoff:
     """Find the cheapest setting for a tolerance, or the most accurate one for a time.
 
-    The scene is run with finer steps, finer cells and both.  From the convergence of the quantities
-    the errors of the runs and the required setting are estimated.  That setting is run as well and
-    compared with the limit that the others are extrapolated to; if the limit is not known well, it
-    is also compared with a finer run.  Its errors shall be 0.3 to 1 times the tolerance, and the
-    steps of all runs are planned to take at most 10 times as long as those of the recommended one
-    where one scheme is given.  All settings are arguments of :func:`simulate`; several schemes,
-    steps and meshes compete.
+    The scene is run on three levels of cells and of steps.  By Richardson's extrapolation the
+    errors of the runs, the limits and the required setting are estimated.  A run that is finer than
+    that one confirms the limits, and the setting is run as well: its errors shall be 0.3 to 1 times
+    the tolerance.  All settings are arguments of :func:`simulate`; several schemes, steps and
+    meshes compete by their coarse runs.
 
     Args:
         scene: Model; ``cells`` of its beams are the coarsest.
@@ -105,8 +103,8 @@ def tradeoff(
         mesh: The coarsest cells, or several kinds; by default of degree 1, and of degree 2 where
             the scene allows it.
         newton: How exactly equilibria are found; of several the first is used, and the others are
-            tried in the end.  Those that differ in ``modified`` alone are compared on coarse runs,
-            and the faster one is used from there on.  By default also the modified Newton method.
+            compared with it on a coarse run.  The fastest one that changes the quantities little is
+            used for the answer.  By default also the modified Newton method.
         most: Wall time of all runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run is done by one of them, several at a time.  Runs that go on
@@ -158,6 +156,8 @@ def tradeoff(
         best, others, notes = _find(runs, target)
         run = best.best()
     for other in others:
+        if other.unsure > LIMIT:
+            continue  # its coarse runs do not know
         for name, cross in other.crosses.items():
             known = best.crosses[name]
             apart = size(cross.limit - known.limit)
