@@ -37,7 +37,7 @@ from ufl_beam.analysis.free_decay import (
     peaks,
 )
 from ufl_beam.analysis.modes import Buckling, Modes, buckling, modes
-from ufl_beam.analysis.parameter_study import study
+from ufl_beam.analysis.parameter_study import Study, study
 from ufl_beam.analysis.path_controls import (
     ArcLength,
     DisplacementControl,
@@ -45,7 +45,6 @@ from ufl_beam.analysis.path_controls import (
     LoadControl,
 )
 from ufl_beam.analysis.path_following import Path, follow
-from ufl_beam.analysis.study_file import Study
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ConvergenceError, CopiesDiffer, ModelWarning, SceneError, TradeoffError

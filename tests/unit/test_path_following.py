@@ -10,8 +10,8 @@ import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam.analysis.critical_points import Direction
-from ufl_beam.analysis.path_stepper import Candidate, PathStepper
+from ufl_beam.analysis.critical_points import Candidate, Direction
+from ufl_beam.analysis.path_following import PathStepper
 from ufl_beam.parallel import active_comm
 from ufl_beam.plotting.drawing import evenly
 
@@ -546,7 +546,7 @@ class Turns(PathStepper):
     def __init__(self, leap):
         self._corrector = SimpleNamespace(
             start=Direction(np.zeros(1), 0.0), direction=Direction(np.ones(1), 1.0),
-            length=lambda way: math.hypot(*way.q, way.t), size=lambda way: abs(float(way.q[0])),
+            length=lambda way: math.hypot(*way.q, way.t),
         )  # fmt: skip
         self._leap = leap
 
@@ -554,7 +554,8 @@ class Turns(PathStepper):
         beyond = part > 0.4
         q, way = np.array([part + self._leap * beyond]), Direction(np.ones(1), 0.4 - part)
         stiffness = SimpleNamespace(passed=lambda other: False)
-        return Candidate(SimpleNamespace(q1=q, step=SimpleNamespace(t1=0.0)), stiffness, way)
+        trial = SimpleNamespace(q1=q, step=SimpleNamespace(t1=0.0))
+        return Candidate(trial, stiffness, way, slope=abs(way.t))
 
 
 @pytest.mark.parametrize("leap", [0.0, 0.5])

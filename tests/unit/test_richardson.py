@@ -2,17 +2,16 @@
 """Orders, limits, errors, costs and fronts of manufactured runs, whose answers are known."""
 
 import math
-from dataclasses import astuple, replace
 
 import numpy as np
 import pytest
 
 from ufl_beam.analysis.richardson import (
-    SURE,
-    UNSURE,
+    DOUBTED,
+    TRUSTED,
     Convergence,
-    Cost,
     Cross,
+    fit_cost,
     pareto,
     size,
 )
@@ -21,175 +20,116 @@ SHAPE = np.array([1.0, -2.0, 0.5])
 """Of the error of an array; its largest entry is 2."""
 
 
-def three(order, *, finest=2, error=1.0, shape=SHAPE):
-    """Values of limit 7 on levels up to the finest, `error * 2**(-order * level)` from it."""
-    levels = range(finest - 2, finest + 1)
-    return tuple(7.0 + error * 2.0 ** (-order * k) * shape for k in levels)
+def three(order, *, first=0, shape=SHAPE):
+    """Values of limit 7 on three levels, `2**(-order * level)` from it."""
+    return tuple(7.0 + 2.0 ** (-order * k) * shape for k in range(first, first + 3))
 
 
 @pytest.mark.parametrize("order", [0.6, 1.0, 1.5, 2.0])
-@pytest.mark.parametrize("finest", [2, 5])
-def test_a_power_is_recognised(order, finest):
-    seen = Convergence.of(three(order, finest=finest), finest, 2.0, 1e-12)
+@pytest.mark.parametrize("first", [0, 3])
+def test_a_power_is_recognised(order, first):
+    seen = Convergence.of(three(order, first=first), first, 2.0)
     assert seen.seen
-    assert seen.aligned
     assert seen.order == pytest.approx(order, abs=1e-9)
     # Whole orders are trusted, others get the larger factor.
     assert seen.trusted == (order in (1.0, 2.0))
-    safety = SURE if seen.trusted else UNSURE
-    assert np.abs(three(order, finest=finest)[2] + seen.rest - 7.0).max() < 1e-12
-    for level in (finest - 2, finest - 0.5, finest):
-        true = -(2.0 ** (-order * level)) * SHAPE
-        assert np.allclose(seen.lack(level), true, rtol=1e-9)
-        # Of coarser levels the changes to the finest are known.
-        doubt = (safety - 1) * 2.0 * 2.0 ** (-order * finest)
-        assert seen.at(level) == pytest.approx(size(true) + doubt, rel=1e-9)
-    # Levels finer than all: by the order that was seen, or by that in theory if it is not whole
-    used = order if seen.trusted else 2.0
-    finer = safety * 2.0 * 2.0 ** (-order * finest - used)
-    assert seen.at(finest + 1) == pytest.approx(finer, rel=1e-9)
+    for level in (first, first + 1.3, first + 2, first + 4.5):
+        assert np.allclose(seen.lack(level), -(2.0 ** (-order * level)) * SHAPE, rtol=1e-9)
+    levels = np.array([first, first + 2.0])
+    assert np.allclose(seen.lack(levels), np.outer(-(2.0 ** (-order * levels)), SHAPE))
+    rest = 2.0 * 2.0 ** (-order * (first + 2))
+    safety = TRUSTED if seen.trusted else DOUBTED
+    assert seen.doubt == pytest.approx((safety - 1) * rest)
+    assert seen.unsure(first) == seen.doubt
+    assert seen.unsure(first + 3) == pytest.approx(seen.doubt / 2**order)
 
 
 def test_two_levels_have_the_order_of_the_method():
-    first, second = three(4.0)[:2]
-    seen = Convergence.of((first, second), 1, 4.0, 1e-12)
+    first, second, _ = three(4.0)
+    seen = Convergence.of((first, second), 0, 4.0)
     assert seen.seen
     assert math.isnan(seen.order)
     assert not seen.trusted
-    assert np.abs(second + seen.rest - 7.0).max() < 1e-12
-    assert seen.doubt == pytest.approx((UNSURE - 1) * size(seen.rest))
+    assert np.abs(second + seen.lack(1) - 7.0).max() < 1e-12
+    assert seen.doubt == pytest.approx((DOUBTED - 1) * size(second - 7.0))
     assert "in theory" in str(seen)
 
 
 def test_what_is_faster_than_the_method_is_not_believed():
     """From order 4 of a method of order 2 an error follows that is too large."""
-    seen = Convergence.of(three(4.0), 2, 2.0, 1e-12)
+    seen = Convergence.of(three(4.0), 0, 2.0)
     assert seen.order == pytest.approx(4.0)
     assert seen.used == 2.0
-    assert seen.at(2) > 2.0 * 2.0**-8
+    assert size(seen.lack(2)) + seen.doubt > 2.0 * 2.0**-8
     # A change that happens to be nothing leaves what the one before it would have become.
-    passing = Convergence.of((np.array(1.0), np.array(0.0), np.array(0.0)), 2, 2.0, 1e-12)
-    assert passing.at(2) == pytest.approx(UNSURE * 1.0 / 4 / 3)
+    passing = Convergence.of((np.array(1.0), np.array(0.0), np.array(0.0)), 0, 2.0)
+    assert passing.doubt == pytest.approx(DOUBTED * 1.0 / 4 / 3)
 
 
 def test_to_and_fro_is_not_trusted():
-    seen = Convergence.of((np.array(1.0), np.array(0.0), np.array(0.25)), 2, 2.0, 1e-12)
+    seen = Convergence.of((np.array(1.0), np.array(0.0), np.array(0.25)), 0, 2.0)
     assert seen.seen
-    assert not seen.aligned
     assert not seen.trusted
-    assert seen.at(2) == pytest.approx(UNSURE * 0.25 / 3)
-    assert "to and fro" in str(seen)
-
-
-def test_errors_of_coarser_levels_grow_with_the_order_of_the_method():
-    seen = Convergence.of(three(1.0, finest=4), 4, 2.0, 1e-12)
-    assert seen.at(1) == pytest.approx(4 * seen.at(2))
-    still = Convergence.of(three(1.0, finest=4), 4, 2.0, 1.0)
-    assert still.used == 0
-    assert still.seen
-    assert still.at(2) == still.at(4)
-    assert still.at(1) == pytest.approx(4 * still.at(2))
-    assert "negligible" in str(still)
+    assert size(seen.lack(2)) + seen.doubt == pytest.approx(DOUBTED * 0.25 / 3)
 
 
 @pytest.mark.parametrize("changes", [(1.0, 1.0), (1.0, 0.8), (1.0, 3.0), (0.0, 1.0)])
 def test_what_does_not_fall_is_not_seen(changes):
-    values = np.cumsum([0.0, *changes])
-    assert not Convergence.of(tuple(map(np.array, values)), 2, 2.0, 1e-12).seen
+    """What is irregular on three levels may be as large on all of them."""
+    values = tuple(map(np.array, np.cumsum([0.0, *changes])))
+    seen = Convergence.of(values, 0, 2.0)
+    assert not seen.seen
+    assert seen.doubt == seen.unsure(9) == DOUBTED * max(changes)
+    assert seen.lack(5) == 0
 
 
-def manufactured(level, cells=(0.3, 2.0), steps=(0.1, 1.0), mixed=0.0):
-    """7 and errors of cells and of steps, and of both together."""
-    i, j = level
-    h, dt = 2.0 ** -(cells[1] * i), 2.0 ** -(steps[1] * j)
-    return 7.0 + (cells[0] * h + steps[0] * dt + mixed * h * dt) * SHAPE
+def test_what_does_not_change_has_no_error():
+    still = Convergence.of((np.array(1.0),) * 3, 0, 2.0)
+    assert still.seen
+    assert (still.doubt, still.lack(0)) == (0, 0)
 
 
-def cross(base, *, whole=True, **law):
-    values = {level: manufactured(level, **law) for level in Cross.levels(base, whole=whole)}
-    return Cross.of(values, base, (2.0, 2.0), 1e-12)
+def cross(base, *, cells=(0.3, 2.0), steps=(0.1, 1.0), mixed=0.0):
+    """7 and errors of cells and of steps, and of both together; the cross and its law."""
+
+    def value(i, j):
+        h, dt = 2.0 ** -(cells[1] * i), 2.0 ** -(steps[1] * j)
+        return 7.0 + (cells[0] * h + steps[0] * dt + mixed * h * dt) * SHAPE
+
+    i, j = base
+    along_cells = Convergence.of([value(i + k, j) for k in range(3)], i, 2.0)
+    along_steps = Convergence.of([value(i, j + k) for k in range(3)], j, 2.0)
+    return Cross.of(value(i, j), along_cells, along_steps), value
 
 
 @pytest.mark.parametrize("base", [(0, 0), (2, 1)])
-@pytest.mark.parametrize("mixed", [0.0, 0.05, -0.05])
-def test_both_dials_together(base, mixed):
-    one = cross(base, mixed=mixed)
-    assert one.seen
-    # Round-off of differences of numbers of size 20
+def test_errors_of_both_dials_add_up(base):
+    one, value = cross(base)
     assert np.abs(one.limit - 7.0).max() < 1e-12
-    for level in ((base[0] + 1, base[1] + 2), (base[0] + 0.5, base[1] + 1.7)):
-        true = 7.0 - manufactured(level, mixed=mixed)
-        assert np.allclose(one.lack(*level), true, rtol=1e-9)
-        # Both have a whole order; the bound adds what may cancel.
-        assert one.error(*level) <= 2 * SURE * size(true) + 2 * abs(mixed)
+    for level in ((base[0] + 1, base[1] + 2), (base[0] + 0.5, base[1] + 3.7)):
+        assert np.allclose(one.lack(*level), 7.0 - value(*level), rtol=1e-9)
 
 
-def test_half_a_cross_has_the_limit_of_theory():
-    one = cross((1, 2), whole=False, steps=(0.1, 2.0))
-    assert one.seen
-    assert np.abs(one.limit - 7.0).max() < 1e-12
+@pytest.mark.parametrize("mixed", [0.05, -0.05, -0.25])
+@pytest.mark.parametrize("finer", [(1, 1), (1.5, 1.3), (2, 2), (3, 3)])
+def test_a_finer_run_shows_errors_that_depend_on_each_other(mixed, finer):
+    one, value = cross((0, 0), mixed=mixed)
+    confirmed = one.confirmed(value(*finer), *finer)
+    assert size(confirmed.limit - 7.0) < size(one.limit - 7.0)
+    assert size(confirmed.limit - 7.0) <= confirmed.uncertainty
 
 
-def test_a_finer_run_sharpens_a_limit():
-    """Both dials are of the same order, so that the part of the error that is left is known."""
-    law = {"cells": (0.3, 1.0), "steps": (0.1, 1.0)}
-    one = cross((0, 0), **law)
-    coarse, fine = (2.5, 3.0), (3.5, 4.0)
-    values = [manufactured(level, **law) for level in (coarse, fine)]
-    off = replace(one, limit=one.limit + 1.0)
-    sharp = off.sharpened(*values, coarse, fine)
-    assert np.abs(sharp.limit - 7.0).max() < 1e-12
-    # The prediction of the change was right.
-    assert sharp.uncertainty == pytest.approx((SURE - 1) * size(values[1] - 7.0))
-    # A change that was not predicted is in doubt as a whole.
-    noise = 0.01 * SHAPE
-    doubtful = off.sharpened(values[0], values[1] + noise, coarse, fine)
-    assert doubtful.uncertainty >= size(noise)
-
-
-@pytest.mark.parametrize("order", [1.0, 1.5, 2.0])
-def test_a_finer_run_bounds_the_limit_of_an_order_that_is_not_known(order):
-    """Two levels of steps, which do not show that their order may be half of that in theory."""
-    law = {"cells": (0.0, 2.0), "steps": (0.1, order)}
-    one = cross((0, 0), whole=False, **law)
-    for first, finer in [(0.0, 0.5), (0.0, 1.0), (0.0, 2.0), (0.5, 1.5), (1.0, 1.5), (1.0, 2.0)]:
-        coarse, fine = (0.0, first), (0.0, finer)
-        sharp = one.sharpened(*(manufactured(at, **law) for at in (coarse, fine)), coarse, fine)
-        assert np.abs(sharp.limit - 7.0).max() <= sharp.uncertainty
-
-
-def test_a_finer_run_does_not_sharpen_what_is_negligible():
-    """Changes below the floor have no order: no part of them is known to be left."""
-    law = {"cells": (0.0, 2.0), "steps": (1e-14, 2.0)}
-    one = cross((0, 0), **law)
-    assert one.cells.used == one.steps.used == 0
-    assert one.error(0, 0) > 0
-    for fine in ((0.0, 1.0), (1.0, 1.0)):
-        values = [manufactured(at, **law) for at in ((0.0, 0.0), fine)]
-        assert one.sharpened(*values, (0.0, 0.0), fine) is one
-    still = cross((0, 0), cells=(0.0, 2.0), steps=(0.0, 2.0))  # and no error at all
-    assert still.error(0, 0) == 0
-    assert still.sharpened(values[0], values[0], (0.0, 0.0), (1.0, 1.0)) is still
-
-
-def test_dials_that_depend_on_each_other_are_not_seen():
-    one = cross((0, 0), mixed=-0.25)
-    assert one.cells.seen
-    assert one.steps.seen
-    assert not one.seen
-    assert "together" in str(one)
-    assert cross((3, 3), mixed=-0.25).seen  # where the product is small
+def test_a_finer_run_that_was_predicted_leaves_less_doubt():
+    one, value = cross((0, 0))
+    assert one.confirmed(value(3, 3), 3, 3).uncertainty < one.uncertainty
 
 
 def test_the_cost_of_a_run_is_recognised():
-    law = Cost(0.05, 1e-4, 2e-5, 1e-6)
+    law = (0.05, 1e-4, 2e-5, 1e-6)
     steps, cells = (x.ravel() for x in np.meshgrid([10.0, 100, 1000], [4.0, 32, 256]))
-    stepping = law.stepping(steps, cells)
-    building = law.seconds(steps, cells) - stepping
-    found = Cost.of(steps, cells, building, stepping)
+    seconds = law[0] + law[1] * cells + steps * (law[2] + law[3] * cells)
     # Of least squares in double precision, conditioned by 1e5
-    assert astuple(found) == pytest.approx(astuple(law), rel=1e-8)
-    assert found.slower(3).seconds(50, 10) == pytest.approx(3 * law.seconds(50, 10), rel=1e-8)
+    assert fit_cost(steps, cells, seconds) == pytest.approx(law, rel=1e-8)
 
 
 def test_the_front_is_what_nothing_beats():

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -239,7 +240,25 @@ class Candidate(NamedTuple):
     trial: Trial
     stiffness: Stiffness
     way: Direction
+    #: Change of the load factor along the path over that of the configuration.  As K q' = f t', a
+    #: slope of zero means that the direction of the path is a critical one, and that the load f
+    #: does work on it.  At a bifurcation it does none on the critical direction.
+    slope: float
     mode: Array | None = None
+
+    @property
+    def softness(self) -> float:
+        """Size of the eigenvalue nearest to zero; N m."""
+        return abs(self.stiffness.softest[0])
+
+    @property
+    def work(self) -> float:
+        """Work of the load on the critical mode, near a critical point; N m.
+
+        As t'/|q'| = λ/(f·x) where the motion is along a mode x of length 1 with the eigenvalue λ.
+        The quotient tends to zero where the load does no work on it, whatever round-off adds to q'.
+        """
+        return self.softness / self.slope if self.slope else math.inf
 
     @property
     def end(self) -> Direction:

@@ -260,14 +260,21 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     guess = np.exp(logarithm), -slope
     try:
         with np.errstate(over="ignore"):
-            found, covariance = scipy.optimize.curve_fit(_exponential, τ, a, guess, jac=_gradient)
+            found, covariance = scipy.optimize.curve_fit(
+                lambda t, initial, rate: initial * np.exp(-rate * t), τ, a, guess,
+                # Differences fail at rate 0.
+                jac=lambda t, initial, rate: np.exp(-rate * t)[:, None] * np.stack(
+                    [np.ones_like(t), -initial * t], axis=1
+                ),
+            )  # fmt: skip
     except RuntimeError:
         raise SceneError(
             f"fit_decay: no exponential fits amplitudes from {A.min():g} to {A.max():g}; "
             "are they successive peaks of one free vibration?"
         ) from None
     half = units * np.sqrt(np.diag(covariance))
-    exponential = _envelope(found * units, half, A - _exponential(s, *(found * units)))
+    initial, rate = found * units
+    exponential = _envelope((initial, rate), half, A - initial * np.exp(-rate * s))
     return Decay(t, A, mean, each, linear, exponential)
 
 
@@ -275,16 +282,6 @@ def _envelope(values: npt.ArrayLike, errors: npt.ArrayLike, residuals: Array) ->
     half = scipy.stats.t.ppf(0.975, len(residuals) - 2) * np.abs(errors)
     rms = np.sqrt(np.mean(residuals**2))
     return Envelope(*np.concatenate([values, half, [rms]]).tolist())
-
-
-def _exponential(t: Array, initial: float, rate: float) -> Array:
-    return np.asarray(initial * np.exp(-rate * t))
-
-
-def _gradient(t: Array, initial: float, rate: float) -> Array:
-    """Derivatives of :func:`_exponential` by parameters; (n, 2).  Differences fail at rate 0."""
-    e = np.exp(-rate * t)
-    return np.stack([e, -initial * t * e], axis=1)
 
 
 def _series(call: str, t: npt.ArrayLike, x: npt.ArrayLike, what: str) -> tuple[Array, Array]:

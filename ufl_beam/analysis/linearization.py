@@ -17,7 +17,7 @@ import numpy.typing as npt
 from scipy.sparse import block_array, csr_array, diags_array, eye_array
 from scipy.sparse.linalg import splu
 
-from ufl_beam.arrays import Array, Complex, Index
+from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.errors import ModelWarning, SceneError
 from ufl_beam.mechanics.classical import Newmark, Static
@@ -112,7 +112,12 @@ class SmallMotions:
         multipliers = self.grid.multipliers
         about_forces = T.diagonal()[multipliers] != 0.0
         self._laws, constraints = multipliers[about_forces], multipliers[~about_forces]
-        self._Z = self._directions(T, constraints)
+        left = np.ones(self.grid.size, dtype=bool)
+        left[simulation.supports.dofs] = left[self._laws] = False
+        scale = np.ones(self.grid.size)
+        scale[constraints] = abs(T.data).max()  # so that they are as stiff as what they hold
+        # Columns: what may move, in the axes of supports, and the forces of constraints.
+        self._Z = (self._axes() @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
         self.K, self.M = self._reduced(T), self._reduced(self._matrix(simulation.inertia.M.data))
         # A constraint takes itself and a motion away; what has no mass moves with the rest.
         self.most = self.K.shape[0] - len(constraints) - int(np.sum(self.M.diagonal() == 0.0))
@@ -124,16 +129,6 @@ class SmallMotions:
     def _derivative(self, q: Array, dt: float) -> csr_array:
         """K + C / dt at ``q``, of all degrees of freedom."""
         return self._matrix(linearise(self._simulation, q, dt)[1])
-
-    def _directions(self, T: csr_array, constraints: Index) -> csr_array:
-        """Columns: what may move, in the axes of supports, and the forces of constraints."""
-        size = self.grid.size
-        left = np.ones(size, dtype=bool)
-        left[self._simulation.supports.dofs] = left[self._laws] = False
-        scale = np.ones(size)
-        # So that constraints are as stiff as what they hold.
-        scale[constraints] = abs(T.data).max()
-        return (self._axes() @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
 
     def _axes(self) -> csr_array:
         """Columns: the components of motion, in the axes of supports."""

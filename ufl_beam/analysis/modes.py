@@ -105,24 +105,22 @@ class Shapes(Rich, ABC):
         require_count(count, "motion: count")
         times = np.arange(count + 1) / count
         swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
-        q = self.q + swing
-        history = {"times": times, "q": q, "every": np.array([1]), "cells": self._cell_forces(q)}
+        states = np.ascontiguousarray(self.q + swing)
+        share = Share(self.grid, MPI.COMM_SELF)
+        fields, r = Fields(share), np.zeros(share.size)
+        form = fields.hot_kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
+        forces_of, cells = CellForces(share, [InCells(lambda: form, lib.STRESS, fields.order)]), []
+        for q in states:
+            form.add(q, r)
+            forces_of.accept()
+            cells.append(forces_of(q, q))
+        history = {
+            "times": times, "q": states, "every": np.array([1]), "cells": np.array(cells),
+        }  # fmt: skip
         none = dict.fromkeys(("v", "reactions", "connections"), np.empty(0))
         solution = Solution(self.scene, self.grid)
         solution.resume(history | none)
         return solution
-
-    def _cell_forces(self, states: Array) -> Array:
-        """Forces of elastic cells in some configurations; (n, 9, num_cells)."""
-        share = Share(self.grid, MPI.COMM_SELF)
-        fields, r = Fields(share), np.zeros(share.size)
-        form = fields.hot_kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
-        of_cells, found = CellForces(share, [InCells(lambda: form, lib.STRESS, fields.order)]), []
-        for q in np.ascontiguousarray(states):
-            form.add(q, r)
-            of_cells.accept()
-            found.append(of_cells(q, q))
-        return np.array(found)
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
         """Write a time series for ParaView with the k-th mode at time k.

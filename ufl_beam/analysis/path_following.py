@@ -1,19 +1,21 @@
 # SPDX-License-Identifier: MIT
-"""Path following: static equilibria with the load factor among the unknowns."""
+"""Path following: static equilibria with the load factor among the unknowns, critical points."""
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from typing import cast
 
 from mpi4py import MPI
 
 import numpy as np
+from scipy.interpolate import CubicHermiteSpline
 
-from ufl_beam.analysis.critical_points import Branch, CriticalPoint
-from ufl_beam.analysis.path_corrector import Control
-from ufl_beam.analysis.path_stepper import PathStepper
+from ufl_beam.analysis.critical_points import Branch, Candidate, CriticalPoint, Direction
+from ufl_beam.analysis.path_controls import Control, Crossing, PathCorrector, Plane
 from ufl_beam.arrays import Array
 from ufl_beam.errors import (
     SceneError,
@@ -38,6 +40,7 @@ from ufl_beam.simulation.run import running
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.solution_files import NAMED
+from ufl_beam.simulation.stepper import Trial
 from ufl_beam.solvers.newton_options import Newton
 
 MOST_POINTS = 5  # critical points that the text of a path names
@@ -46,6 +49,23 @@ ADVICE = (
     "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
     "displacements, DissipationControl through softening that snaps back"
 )
+
+SMALLEST_STEP_PART = 2.0**-12  # a step is cut down to this part of it
+TARGET_ITERATIONS = 12  # steps of more are followed by shorter ones, of fewer by longer ones
+MOST_FAILURES = 4  # of steps, before a critical point is sought from another state
+LOCATION_TOLERANCE = 1e-7  # critical points are located to this part of a step
+BRACKET = 1e-2  # part of a step within which motions along a critical mode are interpolated
+SEPARABLE = 1.5e-5  # critical points closer than this part of a step need not be told apart
+MOST_CROSSING_STEPS = 8  # steps to a bifurcation point from there
+SOFT = 0.1  # part of its size at the ends of a step that an eigenvalue is in such a bracket
+IDLE = 1e-6  # part of the most work of a load, below which it does none
+MOST_LOCATION_STEPS = 60  # steps in which a critical point is sought
+LEAST_COSINE = 0.5  # cosine of the angle by which a step may leave the direction of its predictor
+LARGEST_LENGTH_RATIO = 10.0  # ratio by which a step may be longer than its predictor
+UNCHECKED_PART = 2.0**-6  # shorter parts of a step may leave it: a law may have a kink
+SAME_POINT_PART = 1e-3  # within this part of a step a critical point is the one just reached
+LEAP_PART = 0.1  # part of a step by which states before and at a critical point never differ
+SINGULAR_RATIO = 1e-3  # what is below this part of its size at the ends of a step vanishes
 
 
 class Path(Solution):
@@ -228,3 +248,275 @@ def _require_driven(scene: Scene, t0: float) -> None:
             "follow: no load and no motion depends on time, which is the load factor here; give "
             "the one that is to grow time=lambda t: t"
         )
+
+
+class PathStepper:
+    """Stepper of a path: it sets lengths of steps and locates critical points."""
+
+    def __init__(self, simulation: Simulation, control: Control) -> None:
+        self._simulation, self._control = simulation, control
+        self._corrector = PathCorrector(simulation, control.factor)
+        self.critical: list[CriticalPoint] = []
+        self._part = 1.0
+        self._before: Candidate | None = None
+        self._landed = False
+
+    def begin(self, branch: Branch | None, *, fresh: bool) -> None:
+        """Find the direction in which the path begins; if fresh, its first equilibrium too."""
+        corrector, simulation = self._corrector, self._simulation
+        if branch is not None:
+            corrector.direction = Direction(branch.mode[corrector.share.dofs], 0.0)
+            return
+        if fresh:
+            none = np.zeros(corrector.share.size)
+            still, factor = Direction(none, 0.0), Direction(none, 1.0)
+            # The load factor is given: it ends where it is, 1 beyond one that is smaller by 1.
+            given = Plane(corrector, factor, 1.0, corrector.start + -factor)
+            simulation.accept(corrector.attempt(still, given))
+        corrector.begin()
+        stiffness = corrector.stiffness_at(simulation.q)
+        way = corrector.direction_of(stiffness)
+        corrector.direction = way if self._control.sense(corrector, way, None) > 0 else -way
+        here = Trial(corrector.step_at(simulation.t), simulation.q, np.zeros(corrector.share.size))
+        # A run that ended at a critical point may go on from there.
+        way = corrector.direction
+        slope = abs(way.t) / corrector.size(way)
+        self._before, self._landed = Candidate(here, stiffness, way, slope), not fresh
+
+    @property
+    def tried(self) -> float:
+        """Load factor at which the latest attempt began."""
+        return self._simulation.t + self._corrector.sought.t
+
+    def advance(self) -> None:
+        """Take a step, a shorter one where it fails, only up to a critical point in it.
+
+        Raises:
+            StepFailed: Even the shortest one fails.
+        """
+        while True:
+            iterations = self._simulation.iterations
+            try:
+                found = self._seek(self._part)
+                break
+            except StepFailed:
+                self._part /= 2
+                if self._part < SMALLEST_STEP_PART:
+                    raise
+        count, part = self._simulation.iterations - iterations, self._part
+        self._part = min(1.0, part * min(2.0, TARGET_ITERATIONS / max(count, 1)))
+        self._accept(found, part)
+
+    def _accept(self, found: Candidate, part: float) -> None:
+        """Go to the end of a step, or to a critical point before it."""
+        corrector, before = self._corrector, self._before
+        if before is None or not found.passed(before):
+            self._landed = False
+            self._take(found)
+            return
+        after = found
+        found, reached = self._locate(before, after, part)
+        if self._landed and reached < SAME_POINT_PART * part:
+            # The signs of one critical point need not change in the same last digit.
+            self._landed = False
+            self._take(self._seek(part))
+            return
+        if found.mode is not None:
+            way, self._landed = corrector.direction, False  # signs are those beyond it
+            self._take(found)
+            self._note(found, way, len(self._simulation.solution), limit=False)
+            return
+        self._landed = found.passed(before)
+        # The load factor has turned in the state that was found, as at a kink, or its slope
+        # vanishes.  It and the eigenvalue need not change their signs in the same last digit.
+        soft = _vanishes("softness", found, before, after)
+        limit = self._turned(found) or _vanishes("slope", found, before, after)
+        limit = limit and not (soft and _idle(found, before, after))
+        if self._landed and not corrector.dissipates and corrector.dissipation(found.trial.q1) > 0:
+            self._pass_kink(found, reached - 2 * LOCATION_TOLERANCE * part, part, limit)
+            return
+        # What yields or opens may change signs without an eigenvalue of zero.
+        way = corrector.direction
+        self._take(found)
+        if self._landed and (soft or limit):
+            self._note(found, way, len(self._simulation.solution), limit)
+
+    def _pass_kink(self, after: Candidate, last: float, part: float, limit: bool) -> None:
+        """Go to the last state in which nothing dissipates, if the load factor turns there."""
+        before, n = self._corrector.direction, len(self._simulation.solution)
+        if limit and last > 0:
+            self._take(self._seek(last))
+            self._note(after, before, n, limit)
+            self._before = after
+            return
+        if limit:
+            self._note(after, before, n - 1, limit)
+        self._take(self._seek(part))
+
+    def _take(self, found: Candidate) -> None:
+        corrector = self._corrector
+        corrector.dissipates = corrector.dissipation(found.trial.q1) > 0.0
+        self._simulation.accept(found.trial)
+        corrector.direction, self._before = found.way, found
+
+    def _seek(self, part: float) -> Candidate:
+        corrector, simulation = self._corrector, self._simulation
+        trial = self._control.solve_step(corrector, part)
+        corrector.t = trial.step.t1
+        stiffness = corrector.stiffness_at(trial.q1)
+        way = corrector.direction_of(stiffness)
+        gone = Direction(trial.q1 - simulation.q, trial.step.t1 - simulation.t)
+        size, sought = (corrector.length(one) for one in (gone, corrector.sought))
+        aligned = corrector.product(gone, corrector.sought) >= LEAST_COSINE * size * sought
+        if part > UNCHECKED_PART and not (aligned and size <= LARGEST_LENGTH_RATIO * sought):
+            raise StepFailed("the path turns too sharply, or the step leaps to another branch")
+        if self._control.sense(corrector, way, gone) < 0:
+            way = -way
+        return Candidate(trial, stiffness, way, abs(way.t) / corrector.size(way))
+
+    def _locate(self, before: Candidate, after: Candidate, part: float) -> tuple[Candidate, float]:
+        """The first state whose signs have changed, and the part of the step that leads there.
+
+        By false position with halved weights (Illinois).  At a bifurcation, from states so far on
+        both sides that round-off along the mode is small there, see :meth:`_cross`.  Where a step
+        in between fails, or the signs change in a leap to another branch, the last state before,
+        for shorter steps from there.
+        """
+        low, high, first, last = 0.0, part, before, after
+        weight_low, weight_high, bracket = 1.0, 1.0, BRACKET
+        side = failed = 0
+        for _ in range(MOST_LOCATION_STEPS):
+            if high - low <= LOCATION_TOLERANCE * part:
+                break
+            turned = self._turned(last)
+            if not turned and high - low <= bracket * part and _soft(last, before, after):
+                several = abs(last.stiffness.negative - before.stiffness.negative) > 1
+                if not several or bracket <= SEPARABLE:
+                    with suppress(StepFailed):
+                        return self._cross((low, high), (first, last), (before, after), part)
+                bracket /= 10
+            sizes = [one.slope if turned else one.softness for one in (first, last)]
+            here, there = weight_low * sizes[0], -weight_high * sizes[1]
+            middle = (low * there - high * here) / (there - here)
+            if not turned and high - low > bracket * part:
+                # Beyond the estimate, so that it comes to lie between two states.
+                middle += 0.4 * bracket * part * (1 if here < -there else -1)
+            margin = min(0.01 * (high - low), LOCATION_TOLERANCE * part)
+            middle = min(max(middle, low + margin), high - margin)
+            try:
+                found = self._seek(middle)
+            except StepFailed:
+                failed += 1
+                if failed < MOST_FAILURES:
+                    weight_high *= 4
+                    continue
+                if low > 0:
+                    self._part = (high - low) / 2
+                    return self._seek(low), low
+                break
+            if found.passed(before):
+                weight_low *= 0.5 if side < 0 else 1.0
+                high, last, weight_high, side = middle, found, 1.0, -1
+            else:
+                weight_high *= 0.5 if side > 0 else 1.0
+                low, first, weight_low, side = middle, found, 1.0, 1
+        found, start = self._seek(high), self._corrector.start
+        below = start if low == 0.0 else first.end
+        leap, whole = (self._corrector.length(found.end + -one) for one in (below, start))
+        if low > 0 and leap > LEAP_PART * whole:
+            self._part = (part - low) / 2
+            return self._seek(low), low
+        return found, high
+
+    def _cross(
+        self,
+        parts: tuple[float, float],
+        near: tuple[Candidate, Candidate],
+        ends: tuple[Candidate, Candidate],
+        part: float,
+    ) -> tuple[Candidate, float]:
+        """The bifurcation point between two states near to it, and the part that leads there.
+
+        Close to it, round-off and what the solver leaves would move the state along the mode,
+        perhaps to the other branch.  So motions along the mode and the direction of the path are
+        those of a cubic between the two states.  Signs are those of the second state.
+
+        Raises:
+            StepFailed: It is no bifurcation point, or was not found.
+        """
+        corrector, leave = self._corrector, self._simulation.supports.leave
+        (first, last), (before, after) = near, ends
+        whole, stiffness = last.end + -first.end, last.stiffness
+        if not whole.t * first.way.t * last.way.t:
+            raise StepFailed("the load factor turns here")
+        speeds = [whole.t / one.way.t * one.way.q for one in near]
+        path = CubicHermiteSpline([0.0, 1.0], [first.end.q, last.end.q], speeds)
+        (x0, λ0), (x, λ) = ((float(k), one.stiffness.softest[0]) for k, one in enumerate(near))
+        for _ in range(MOST_CROSSING_STEPS):
+            x0, x = x, (x0 * λ - x * λ0) / (λ - λ0) if λ != λ0 else math.nan
+            if not 0.0 <= x <= 1.0:
+                break
+            end, way = Direction(path(x), first.end.t + x * whole.t), Direction(path(x, 1), whole.t)
+            mode = np.array(stiffness.softest[1][corrector.share.dofs])
+            leave(seen := mode.copy())
+            speed = corrector.product(way, Direction(seen, 0.0)) / way.t
+            corrector.crossing = Crossing(end + -corrector.start, mode, speed)
+            reached = (1 - x) * parts[0] + x * parts[1]
+            try:
+                found = self._seek(reached)
+            finally:
+                corrector.crossing = None
+            stiffness = found.stiffness
+            λ0, λ = λ, stiffness.softest[0]
+            near_by = abs(x - x0) * (parts[1] - parts[0]) <= LOCATION_TOLERANCE * part
+            if not near_by and abs(λ) < abs(λ0) / 2:
+                continue
+            # Where it falls no more, the eigenvalue is round-off.
+            if not _soft(found, first, last) or not _idle(found, before, after):
+                break
+            way = (1.0 if way.t * first.way.t > 0 else -1.0) / corrector.length(way) * way
+            leave(mode := np.array(stiffness.softest[1][corrector.share.dofs]))
+            slope = abs(way.t) / corrector.size(way)
+            return Candidate(found.trial, last.stiffness, way, slope, mode), reached
+        raise StepFailed("no bifurcation point was found")
+
+    def _turned(self, found: Candidate) -> bool:
+        """Return whether the load factor goes the other way than before the step."""
+        return found.way.t * self._corrector.direction.t < 0
+
+    def _note(self, found: Candidate, before: Direction, n: int, limit: bool) -> None:
+        """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
+        corrector, simulation, way = self._corrector, self._simulation, found.way
+        if limit:
+            # At a limit point the path goes along the mode.
+            mode = np.asarray(way.q / corrector.size(way), dtype=np.float64)
+        elif found.mode is not None:
+            mode = found.mode
+        else:
+            mode = np.array(found.stiffness.softest[1][corrector.share.dofs])
+            simulation.supports.leave(mode)
+            # What the path goes along the mode is lost in a singular stiffness.
+            strayed = Direction(way.q - before.q, 0.0)
+            along = corrector.product(strayed, Direction(mode, 0.0))
+            corrector.direction = Direction(way.q - along * mode, way.t)
+        kind = "limit" if limit else "bifurcation"
+        state = simulation.snapshot()
+        mode = corrector.share.gather(mode)
+        self.critical.append(CriticalPoint(kind, simulation.t, n, state, mode))
+
+
+def _vanishes(what: str, found: Candidate, before: Candidate, after: Candidate) -> bool:
+    """Return whether a measure is nearly zero in a state that was located between two others."""
+    size, *ends = (getattr(one, what) for one in (found, before, after))
+    return bool(size < SINGULAR_RATIO * max(ends))
+
+
+def _idle(found: Candidate, before: Candidate, after: Candidate) -> bool:
+    """Return whether the load does no work on the critical mode, or as little as round-off."""
+    least = IDLE * found.stiffness.most_work
+    return found.work < least or _vanishes("work", found, before, after)
+
+
+def _soft(found: Candidate, before: Candidate, after: Candidate) -> bool:
+    """Return whether an eigenvalue is small, compared with those at the ends of a step."""
+    return found.softness < SOFT * max(before.softness, after.softness)

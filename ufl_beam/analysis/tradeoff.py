@@ -4,19 +4,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from itertools import groupby, product
-from typing import TypeVar
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from fractions import Fraction
+from itertools import product
+from typing import Any, NamedTuple, TypeVar, cast
 
 from mpi4py import MPI
 
-from ufl_beam.analysis.found_setting import Found
-from ufl_beam.analysis.refinement_runs import FASTER, Quantity, RefinementRuns
-from ufl_beam.analysis.refinement_search import RefinementSearch
-from ufl_beam.analysis.richardson import size
-from ufl_beam.analysis.targets import Target, target_of
-from ufl_beam.analysis.tradeoff_result import Dials, Run, Tradeoff
+import numpy as np
+import numpy.typing as npt
+
+from ufl_beam.analysis.parameter_study import study
+from ufl_beam.analysis.richardson import Convergence, Cross, fit_cost, size
+from ufl_beam.analysis.tradeoff_result import Dials, Refinement, Run, Target, Tradeoff
+from ufl_beam.arrays import Array
 from ufl_beam.errors import (
+    ConvergenceError,
     SceneError,
     TradeoffError,
     require_kind,
@@ -28,17 +32,36 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.parallel import communicator
+from ufl_beam.parallel import alone, communicator
 from ufl_beam.progress_bar import progress_bar
 from ufl_beam.simulation.initial_state import require_scheme
 from ufl_beam.simulation.run import require_times, simulate
+from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
-NEWTON_SHARE = 0.1  # part of the error that other options of Newton's method may change
-MESHES = Mesh(degree=2), Mesh()  # that compete unless others are given; the likely best first
+MESHES = Mesh(degree=2), Mesh()  # that compete unless others are given
 NEWTONS = Newton(), Newton(modified=True)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
+WRONG = "SceneError: "  # how failures of runs begin that finer dials do not help
+
+LEAST_USED = 0.3  # part of a tolerance that the error of the answer shall use up at least
+# Limits known to the rest of it: a larger uncertainty leaves no room for such an error.
+LIMIT = 1 - LEAST_USED
+# The error that is aimed at is the geometric mean of the least and the largest, 0.55 if the limit
+# is known well.  What is left is for cells and steps that are not refined, for the options of
+# Newton's method, and for the limit, a quarter each.
+NEGLIGIBLE = (1 - math.sqrt(LEAST_USED)) / 4
+NOISE = 1e-9  # part of a quantity: Newton's method leaves 1e-10 of its forces
+STEP_ORDER = 2.0  # of the schemes, at most; that of cells is twice their degree
+FURTHER = 2  # levels to the next base at most: the finest levels of the one before
+REACH = 8  # levels beyond all runs: errors of second order fall to 2**-16, the smallest asked for
+GRID = 8  # settings per level: an error of second order changes by 2**(2/8), a fifth
+DOUBTS = 4  # levels on which no convergence is seen; 16 times finer than the coarsest
+TRIALS = 3  # of settings; together less than the run that confirms the limit, of 4 times the cost
+SCATTER = 0.1  # part by which times of one run differ on a quiet machine, see bench_budget.py
+
+Quantity = Callable[[Solution], npt.ArrayLike]
 
 One = TypeVar("One")
 
@@ -60,13 +83,11 @@ def tradeoff(
 ) -> Tradeoff:
     """Find the cheapest setting for a tolerance, or the most accurate one for a time.
 
-    The scene is run with finer steps, finer cells and both.  From the convergence of the quantities
-    the errors of the runs and the required setting are estimated.  That setting is run as well and
-    compared with the limit that the others are extrapolated to; if the limit is not known well, it
-    is also compared with a finer run.  Its errors shall be 0.3 to 1 times the tolerance, and the
-    steps of all runs are planned to take at most 10 times as long as those of the recommended one
-    where one scheme is given.  All settings are arguments of :func:`simulate`; several schemes,
-    steps and meshes compete.
+    The scene is run on three levels of cells and of steps.  By Richardson's extrapolation the
+    errors of the runs, the limits and the required setting are estimated.  A run that is finer than
+    that one confirms the limits, and the setting is run as well: its errors shall be 0.3 to 1 times
+    the tolerance.  All settings are arguments of :func:`simulate`; several schemes, steps and
+    meshes compete by their coarse runs.
 
     Args:
         scene: Model; ``cells`` of its beams are the coarsest.
@@ -82,8 +103,8 @@ def tradeoff(
         mesh: The coarsest cells, or several kinds; by default of degree 1, and of degree 2 where
             the scene allows it.
         newton: How exactly equilibria are found; of several the first is used, and the others are
-            tried in the end.  Those that differ in ``modified`` alone are compared on coarse runs,
-            and the faster one is used from there on.  By default also the modified Newton method.
+            compared with it on a coarse run.  The fastest one that changes the quantities little is
+            used for the answer.  By default also the modified Newton method.
         most: Wall time of all runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run is done by one of them, several at a time.  Runs that go on
@@ -112,7 +133,7 @@ def tradeoff(
                 f"tradeoff: quantity {name!r} = {shorten(quantity)} cannot be called; give a "
                 "function of a Solution"
             )
-    target = target_of(quantities, tolerance, budget)
+    target = _target_of(quantities, tolerance, budget)
     require_number(most, "tradeoff: most", positive=True)
     require_switch(progress, "tradeoff: progress")
     comm = communicator(comm, "tradeoff: comm")
@@ -129,84 +150,82 @@ def tradeoff(
             require_number(step, what, positive=True)
     families = [Dials(*one, newtons[0]) for one in product(schemes, steps, meshes)]
     with progress_bar(progress, comm, unit="run", bar_format=BAR) as bar:
-        runs = RefinementRuns(
+        runs = _Runs(
             scene, quantities, simulate, families, newtons, t=t, most=most, comm=comm, bar=bar
         )
-        found, notes = _find_all(runs, target)
-        best = min(found, key=lambda one: one.rank(target))
-        run = _other_newton(runs, best)
-    crosses = best.prediction.crosses
-    for other in found:
-        for name, cross in other.prediction.crosses.items():
-            apart = size(cross.limit - crosses[name].limit)
-            if apart > cross.uncertainty + crosses[name].uncertainty:
-                notes.append(f"{other.run.dials}: its limit of {name} is {apart:.2g} away")
-    if not best.accepted(target, run):
-        notes.append(_reason(runs, best, target))
+        best, others, notes = _find(runs, target)
+        run = best.best()
+    for other in others:
+        if other.unsure > LIMIT:
+            continue  # its coarse runs do not know
+        for name, cross in other.crosses.items():
+            known = best.crosses[name]
+            apart = size(cross.limit - known.limit)
+            if apart > cross.uncertainty + known.uncertainty:
+                notes.append(f"{families[other.family]}: its limit of {name} is {apart:.2g} away")
     return Tradeoff(
-        runs=runs.all, best=run, t=t, crosses=crosses,
-        units=dict(best.prediction.units), target=target, families=tuple(map(str, families)),
-        notes=tuple(notes), spent=runs.spent,
+        runs=tuple(runs.runs.values()), best=run, t=t, crosses=best.crosses, units=best.units,
+        target=target, families=tuple(map(str, families)), notes=tuple(notes + best.remarks(run)),
+        spent=runs.spent,
     )  # fmt: skip
 
 
-def _find_all(runs: RefinementRuns, target: Target) -> tuple[list[Found], list[str]]:
-    """Find the setting of each scheme and step that serves; raise if none does.
+def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str]]:
+    """Search with the family that coarse runs predict to be the best, or with the next.
 
-    Also returns notes on the others.
+    Returns the search, those that were given up, and notes on them.
     """
-    found: list[Found] = []
+    searches: list[_Search] = []
     notes: list[str] = []
     wrong: list[SceneError] = []
-    for _, group in groupby(range(len(runs.families)), lambda k: runs.families[k].steps):
-        families = []
-        for family in group:
-            try:
-                runs.begin(family)
-                families.append(family)
-            except SceneError as error:
-                wrong.append(error)
-                notes.append(f"{runs.families[family]}: {error}")
-        if not families:
-            continue
-        search = RefinementSearch(runs, families, target)
+    for k, dials in enumerate(runs.families):
         try:
-            found.append(search.find(found))
+            runs.begin(k)
+            searches.append(_Search(runs, k, target))
+        except SceneError as error:
+            wrong.append(error)
+            notes.append(f"{dials}: {error}")
         except TradeoffError as error:
-            notes.append(f"{runs.families[search.family]}: {error}")
-        notes += search.notes
+            notes.append(f"{dials}: {error}")
     if len(wrong) == len(runs.families):
         raise wrong[0]
-    if not found:
-        raise TradeoffError("tradeoff: " + "\n".join(notes), runs.all)
-    return found, notes
+    searches.sort(key=lambda one: one.objective)
+    for n, best in enumerate(searches):
+        try:
+            best.find()
+        except TradeoffError as error:
+            notes.append(f"{runs.families[best.family]}: {error}")
+            continue
+        notes += [
+            f"{runs.families[one.family]}: given up, others are better by its coarse runs"
+            for one in searches[n + 1 :]
+        ]
+        return best, [one for one in searches if one is not best], notes
+    raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(runs.runs.values()))
 
 
-def _reason(runs: RefinementRuns, best: Found, target: Target) -> str:
-    """Say by how much the recommended run is not what was asked for, and what is next to it."""
-    said = f"no setting was found that is nearer to {target}: errors are {best.ratio:.2g} of it"
-    larger = [
-        ratio for run in runs.of(best.run.refinement.family) if (ratio := best.ratio_of(run)) > 1
-    ]
-    if best.ratio > 1 or math.isinf(target.bounds[1]):
-        return said
-    if larger:
-        return f"{said}; the next coarser of the runs has {min(larger):.2g} of it"
-    return f"{said}; all runs keep it, begin with coarser steps and cells"
-
-
-def _other_newton(runs: RefinementRuns, best: Found) -> Run:
-    """The recommended run, or that with other options which is faster and changes little."""
-    chosen, one = best.run, best.run.refinement
-    for number in range(len(runs.newtons)):
-        run = runs.run_with(one, number) if runs.may_be_faster(number) else None
-        if run is not None:
-            changes = {name: run.values[name] - value for name, value in best.run.values.items()}
-            changed = best.prediction.largest(changes)
-            faster = run.stepping < FASTER * chosen.stepping
-            if faster and changed <= NEWTON_SHARE * best.choice.ratio:
-                chosen = run
-    return chosen
+def _target_of(
+    quantities: Mapping[str, Quantity],
+    tolerance: float | Mapping[str, float] | None,
+    budget: float | None,
+) -> Target:
+    """Return the target of a call for some quantities, checked."""
+    if (tolerance is None) == (budget is None):
+        raise SceneError("tradeoff: give either a tolerance or a budget")
+    if budget is not None:
+        require_number(budget, "tradeoff: budget", positive=True)
+        return Target({}, 1.0, budget)
+    if not isinstance(tolerance, Mapping):
+        require_number(cast("float", tolerance), "tradeoff: tolerance", positive=True)
+        return Target({}, cast("float", tolerance), math.inf)
+    if set(tolerance) != set(quantities):
+        raise SceneError(
+            f"tradeoff: tolerance is of {', '.join(tolerance)}, quantities are "
+            f"{', '.join(quantities)}; name the same"
+        )
+    for name, value in tolerance.items():
+        require_number(value, f"tradeoff: tolerance of {name}", positive=True)
+    return Target(tolerance, 0.0, math.inf)
 
 
 def _several(values: One | Sequence[One], kind: type, what: str) -> tuple[One, ...]:
@@ -219,3 +238,452 @@ def _several(values: One | Sequence[One], kind: type, what: str) -> tuple[One, .
     for i, value in enumerate(values):
         require_kind(value, kind, f"tradeoff: {what}[{i}]")
     return tuple(values)
+
+
+@dataclass(eq=False)
+class _Runs:
+    """Runs of a trade-off, each done once and timed, see :func:`tradeoff`."""
+
+    scene: Scene
+    quantities: Mapping[str, Quantity]
+    simulate: Callable[..., Solution]
+    families: Sequence[Dials]  # coarsest dials to begin with
+    newtons: Sequence[Newton]
+    t: tuple[float, float]
+    most: float  # wall time that all runs together may take; s
+    comm: MPI.Intracomm
+    bar: Any  # progress bar
+    runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
+    failed: dict[Refinement, str] = field(default_factory=dict, init=False)  # why runs failed
+    spent: float = field(default=0.0, init=False)  # wall time of all runs; s
+    _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
+
+    def begin(self, family: int) -> None:
+        """Compile by a single step, and do the coarsest run on every process."""
+        first = Refinement(family, Fraction(1), 0.0)
+        dt = self.families[family].dt
+        until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
+        with alone():
+            try:
+                self._simulate(first, until)
+                self._take(first, self._member(*first))
+                self.bar.update(1)
+            except ConvergenceError as error:
+                self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may do
+
+    def allowed(self, refinements: Sequence[Refinement]) -> bool:
+        """Return whether there is time for runs."""
+        return self.spent + sum(map(self._longest, refinements)) <= self.most
+
+    def run(self, refinements: Sequence[Refinement]) -> None:
+        """Run what is missing, several at a time where there are processes."""
+        missing = [r for r in refinements if r not in self.runs and r not in self.failed]
+        if not missing:
+            return
+        if not self.allowed(missing):
+            needed = sum(map(self._longest, missing))
+            raise TradeoffError(
+                f"the next {len(missing)} runs would take about {needed:.3g} s after "
+                f"{self.spent:.3g} s of runs, more than most = {self.most:g} s; the finest is "
+                f"{self.dials(missing[-1])}"
+            )
+        self.bar.set_postfix_str(f"{len(missing)} more up to {self.dials(missing[-1])}")
+        cases = [one._asdict() | {"refine": str(one.refine)} for one in missing]
+        try:
+            done = study(self._member, cases, progress=False, comm=self.comm)
+        except RuntimeError as error:  # all of them failed
+            text = str(error)
+            if WRONG in text:
+                raise SceneError(text.partition(WRONG)[2]) from None
+            self.failed |= dict.fromkeys(missing, text)
+            return
+        finally:
+            self.bar.set_postfix_str("", refresh=False)
+            self.bar.update(len(missing))
+        for k, one in enumerate(missing):
+            if k not in done.failed:
+                self._take(one, {name: done[name][k] for name in done.results})
+            elif done.failed[k].startswith(WRONG):
+                raise SceneError(done.failed[k].removeprefix(WRONG))
+            else:
+                self.failed[one] = done.failed[k]
+
+    def dials(self, one: Refinement) -> Dials:
+        """Return the dials of a refinement."""
+        finer = self.families[one.family].finer(one.refine, one.level, self.t)
+        return replace(finer, newton=self.newtons[one.newton])
+
+    def of(self, family: int) -> list[Run]:
+        """Return the runs of a family."""
+        return [run for one, run in self.runs.items() if one.family == family]
+
+    def divisor(self, family: int) -> int:
+        """Return the parts of a cell, GRID at most, that make whole numbers between all places."""
+        mesh, scene = self.families[family].mesh, self.scene
+        for q in range(GRID, 1, -1):
+            finer = replace(mesh, refine=mesh.refine * Fraction(q + 1, q))
+            try:
+                for beam in scene.beams:
+                    finer.vertices(beam, scene.attached[beam])
+            except SceneError:
+                continue
+            return q
+        return 1
+
+    def _longest(self, one: Refinement) -> float:
+        """Wall time at most, by the nearest run; s; 0 if there is none."""
+        times = (
+            run.seconds
+            * 2 ** max(0.0, one.level - run.refinement.level)
+            * max(1.0, float(one.refine / run.refinement.refine))
+            for run in self.of(one.family)
+        )
+        return min(times, default=0.0)
+
+    def _simulate(self, one: Refinement, until: float) -> Solution:
+        t = self.t[0], until
+        return self.simulate(self.scene, t=t, progress=False, **self.dials(one).arguments)
+
+    def _member(
+        self, family: int, refine: str | Fraction, level: float, newton: int
+    ) -> dict[str, Any]:
+        """Compute one run, as a member of a study."""
+        solution = self._simulate(Refinement(family, Fraction(refine), level, newton), self.t[1])
+        found: dict[str, Any] = {
+            "seconds": solution.seconds,
+            "building": solution.building,
+            "steps": solution.parts,
+            "cells": len(solution.grid.cells),
+            "iterations": solution.iterations / solution.parts,
+        }
+        for n, (name, quantity) in enumerate(self.quantities.items()):
+            value = np.asarray(quantity(solution), dtype=float)
+            if not np.isfinite(value).all():
+                raise SceneError(f"tradeoff: quantity {name!r} is not finite")
+            before = self._shapes.get(name, value.shape)
+            if before != value.shape:
+                raise SceneError(
+                    f"tradeoff: quantity {name!r} has shape {before} in a run and {value.shape} "
+                    "in another with other steps or cells; give a number, or an array at times "
+                    "and places of your own (np.interp)"
+                )
+            found[f"quantity {n}"] = value
+        return found
+
+    def _take(self, one: Refinement, found: Mapping[str, Any]) -> None:
+        """Keep a run, as the first process has measured it."""
+        found = self.comm.bcast(found)
+        values = {
+            name: np.asarray(found[f"quantity {n}"]) for n, name in enumerate(self.quantities)
+        }
+        self._shapes |= {name: value.shape for name, value in values.items()}
+        measured = ("seconds", "building", "steps", "cells", "iterations")
+        took = {name: float(found[name]) for name in measured}
+        self.spent += took["seconds"]
+        self.runs[one] = Run(one, self.dials(one), values, **took)
+
+
+class _Choice(NamedTuple):
+    """Setting of a run with its predicted time and error."""
+
+    refine: Fraction  # parts of each cell
+    level: float  # steps are about 2**level times as many
+    seconds: float  # wall time
+    likely: float  # largest error, of cells and steps together, in its unit
+    bound: float  # the same if they do not cancel
+
+    @property
+    def levels(self) -> tuple[float, float]:
+        """Levels of cells and of steps."""
+        return math.log2(self.refine), self.level
+
+
+class _Search:
+    """Search with one family: three levels of cells and of steps around a base, and a finer run.
+
+    The base moves until the setting that serves is about a level finer than it, so that the finest
+    levels are about a level finer than the setting.
+    """
+
+    def __init__(self, runs: _Runs, family: int, target: Target) -> None:
+        self.family = family
+        self.crosses: dict[str, Cross] = {}
+        self.units: dict[str, float] = {}
+        self._runs, self._target = runs, target
+        self._base = [0, 0]  # levels of cells and of steps
+        self._doubts: list[str] = []
+        self._larger = 1.0  # errors of runs over those predicted
+        self._speeds = [1.0] * len(runs.newtons)  # the same of times, of options of Newton's method
+        self._newton = 0
+        self._divisor = runs.divisor(family)
+        self._refine_base()
+        choice = self._choose(NEGLIGIBLE)
+        self.objective = choice.seconds if math.isinf(target.budget) else choice.bound
+
+    def find(self) -> None:
+        """Run what is needed to know the setting and its error; TradeoffError if none serves."""
+        while True:
+            choice = self._choose(min(self.unsure, NEGLIGIBLE))  # which the limit will be known to
+            some, base = next(iter(self.crosses.values())), self._base
+            finest = some.cells.finest, some.steps.finest
+            far = any(level > last for level, last in zip(choice.levels, finest, strict=True))
+            if far or self.unsure > self._share(choice):
+                base = [
+                    min(max(old, round(level) - 1), old + FURTHER)
+                    for old, level in zip(base, choice.levels, strict=True)
+                ]
+            before = self._base.copy()
+            if base == self._base:
+                self._confirm(choice)
+                if self.unsure <= LIMIT:
+                    break
+                self._base[self._worst()[0]] += 1
+            else:
+                self._base = base
+            try:
+                self._refine_base()
+            except TradeoffError:
+                if self.unsure > LIMIT:
+                    raise
+                self._base = before  # no time for more, but it may do
+                break
+        self._choose_newton()
+        self._try()
+
+    @property
+    def unsure(self) -> float:
+        """Largest uncertainty of a limit, in its unit."""
+        return max(cross.uncertainty / self.units[n] for n, cross in self.crosses.items())
+
+    def best(self) -> Run:
+        """Return the best of all runs."""
+        return min(self._runs.of(self.family), key=self._rank)
+
+    def remarks(self, run: Run) -> list[str]:
+        """Say whether the order is not seen, and by how much a run is not what was asked for."""
+        notes = [
+            f"the order of convergence is not seen: {name}{cross}"
+            for name, cross in self.crosses.items()
+            if not (cross.cells.seen and cross.steps.seen)
+        ]
+        if not self._accepts(run):
+            ratio = self.ratio(run)
+            said = f"no setting was found that is nearer to {self._target}: errors are "
+            notes.append(f"{said}{ratio:.2g} of it")
+            if ratio < LEAST_USED and run.refinement == self._at(1, 0, run.refinement.newton):
+                notes[-1] += "; begin with coarser steps and cells"
+        return notes
+
+    def ratio(self, run: Run) -> float:
+        """Return the largest distance of a run from a limit, in its unit."""
+        return self._largest({n: run.values[n] - c.limit for n, c in self.crosses.items()})
+
+    def _largest(self, differences: Mapping[str, Array]) -> float:
+        return max(size(d) / self.units[name] for name, d in differences.items())
+
+    # -- runs ----------------------------------------------------------------------------------
+
+    def _at(self, refine: Fraction | int, level: float, newton: int = 0) -> Refinement:
+        return Refinement(self.family, Fraction(refine), float(level), newton)
+
+    def _refine_base(self) -> None:
+        """Run three levels around the base; a finer one where changes do not fall."""
+        while True:
+            i, j = self._base
+            first, *others = wanted = [
+                self._at(2**i, j), self._at(2 ** (i + 1), j), self._at(2**i, j + 1)
+            ]  # fmt: skip
+            self._runs.run(wanted[:1])  # tells how long the others take
+            self._runs.run(wanted)
+            failed = [self._runs.failed[one] for one in wanted if one in self._runs.failed]
+            if failed:
+                self._doubt(failed[0], dial=1)
+                continue
+            values = [self._runs.runs[one].values for one in wanted]
+            for name, value in values[-1].items():
+                unit = self._target.absolute.get(name, self._target.relative * size(value))
+                if unit == 0:
+                    raise SceneError(
+                        f"tradeoff: quantity {name!r} is zero, so that no part of it can be a "
+                        "tolerance; give tolerances by name, in units of the quantities"
+                    )
+                self.units[name] = unit
+            thirds = [self._at(2 ** (i + 2), j), self._at(2**i, j + 2)]
+            counts = [self._counts(values[0], found) for found in values[1:]]
+            self._runs.run([one for one, needed in zip(thirds, counts, strict=True) if needed])
+            along = [
+                [first, other, third] if needed and third in self._runs.runs else [first, other]
+                for other, third, needed in zip(others, thirds, counts, strict=True)
+            ]
+            orders = 2.0 * self._runs.families[self.family].mesh.degree, STEP_ORDER
+            for name in self.units:
+                cells, steps = (
+                    Convergence.of([self._runs.runs[one].values[name] for one in dial], base, order)
+                    for dial, base, order in zip(along, self._base, orders, strict=True)
+                )
+                self.crosses[name] = Cross.of(values[0][name], cells, steps)
+            if self.unsure <= LIMIT or self._worst()[1]:
+                return
+            self._doubt("".join(f"\n  {name}{cross}" for name, cross in self.crosses.items()))
+
+    def _counts(self, values: Mapping[str, Array], finer: Mapping[str, Array]) -> bool:
+        """Return whether a change counts for what was asked."""
+        part = NEGLIGIBLE if math.isinf(self._target.budget) else 0.0
+        return any(
+            size(finer[name] - values[name]) > max(part * unit, NOISE * size(finer[name]))
+            for name, unit in self.units.items()
+        )
+
+    def _worst(self) -> tuple[int, bool]:
+        """Return the dial, 0 or 1, that makes a limit most uncertain, and whether changes fall."""
+        dials = [
+            (convergence.doubt / self.units[name], dial, convergence.seen)
+            for name, cross in self.crosses.items()
+            for dial, convergence in enumerate((cross.cells, cross.steps))
+        ]
+        return max(dials)[1:]
+
+    def _doubt(self, said: str, dial: int | None = None) -> None:
+        """Refine the base in a dial, the worst one by default; raise if that was done too often."""
+        where = self._runs.dials(self._at(2 ** self._base[0], self._base[1]))
+        self._doubts.append(f"\n  from {where} on: {said}")
+        if len(self._doubts) == DOUBTS:
+            raise TradeoffError("self-convergence is not seen" + "".join(self._doubts))
+        self._base[self._worst()[0] if dial is None else dial] += 1
+
+    def _confirm(self, choice: _Choice) -> None:
+        """Run what is a level finer than a choice, and than the base, in both dials."""
+        i, j = self._base
+        parts = 2 * max(round(2**choice.level), 2**j)
+        finer = self._at(2 * max(choice.refine, Fraction(2**i)), math.log2(parts))
+        if self._runs.allowed([finer]):
+            self._runs.run([finer])
+        if finer in self._runs.runs:
+            found, at = self._runs.runs[finer].values, (math.log2(finer.refine), finer.level)
+            for name, cross in self.crosses.items():
+                self.crosses[name] = cross.confirmed(found[name], *at)
+
+    def _choose_newton(self) -> None:
+        """Take the options of Newton's method that are the fastest, if they change little."""
+        first = self._at(2 ** self._base[0], self._base[1])
+        strict = self._runs.runs[first]
+        most = self._share(self._choose(self.unsure))
+        least = (1 - SCATTER) * strict.stepping
+        for newton in range(1, len(self._runs.newtons)):
+            other = first._replace(newton=newton)
+            if self._runs.allowed([other]):
+                self._runs.run([other])
+            run = self._runs.runs.get(other)
+            if run is None:
+                continue
+            self._speeds[newton] = run.seconds / strict.seconds
+            if run.stepping >= least:
+                continue
+            if self._largest({n: run.values[n] - x for n, x in strict.values.items()}) <= most:
+                self._newton, least = newton, run.stepping
+
+    def _try(self) -> None:
+        """Run the setting that serves; correct predictions by it, and run another, if needed."""
+        for _ in range(TRIALS):
+            choice = self._choose(self.unsure)
+            one = self._at(choice.refine, choice.level, self._newton)
+            if not self._rank(self.best())[0] and not self._runs.allowed([one]):
+                return
+            self._runs.run([one])
+            if one in self._runs.failed:
+                raise TradeoffError(f"the chosen setting failed: {self._runs.failed[one]}")
+            run = self._runs.runs[one]
+            if self._accepts(run):
+                return
+            self._speeds[self._newton] *= run.seconds / choice.seconds
+            if choice.likely > 0:
+                # An error below the uncertainty of the limit is not known any better.
+                self._larger *= max(self.ratio(run), self.unsure) / choice.likely
+
+    # -- decisions -----------------------------------------------------------------------------
+
+    def _share(self, choice: _Choice) -> float:
+        """Return the part of its unit that is negligible, where with a choice errors are small."""
+        return NEGLIGIBLE * (1.0 if math.isinf(self._target.budget) else choice.bound)
+
+    def _choose(self, unsure: float) -> _Choice:
+        """Choose the cheapest setting that is accurate enough, or the most accurate in a time.
+
+        The limit is known to a part ``unsure`` of its unit.
+        """
+        some, dials = next(iter(self.crosses.values())), self._runs.families[self.family]
+        top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
+        first = math.ceil(self._divisor / dials.mesh.degree)  # as many nodes as were given
+        refine = [Fraction(k, self._divisor) for k in _spread(first, self._divisor * top[0])]
+        # Where the steps as given end, all others end as well.
+        parts = np.array(_spread(1, top[1]), dtype=float)
+        of_cells, of_steps = np.log2(np.array(refine, dtype=float)), np.log2(parts)
+        likely = bound = np.zeros((len(of_cells), len(of_steps)))
+        for name, cross in self.crosses.items():
+            unit = self.units[name] / self._larger
+            cells = cross.cells.lack(of_cells).reshape(len(of_cells), 1, -1) / unit
+            steps = cross.steps.lack(of_steps).reshape(1, len(of_steps), -1) / unit
+            likely = np.maximum(likely, np.abs(cells + steps).max(axis=2))
+            bound = np.maximum(bound, np.abs(cells).max(axis=2) + np.abs(steps).max(axis=2))
+        seconds = self._speeds[self._newton] * self._seconds(2.0 ** of_cells[:, None], parts)
+        if math.isinf(self._target.budget):
+            # The middle half, on a logarithmic scale, of what may be the error of the answer
+            largest = 1 - unsure
+            least, most = ((LEAST_USED ** (1 - p)) * largest**p for p in (1 / 4, 3 / 4))
+            allowed = (likely <= most) & (bound <= largest)
+            costs = np.where(allowed, seconds, np.inf)
+            # Errors that cancel are smaller than they must be: they cost up to twice as much.
+            used = allowed & (likely >= least) & (seconds <= 2 * costs.min())
+            costs = np.where(used, seconds, np.inf) if used.any() else costs
+            k = costs.argmin() if allowed.any() else bound.argmin()
+        else:
+            allowed = seconds <= (1 - SCATTER) * self._target.budget
+            k = np.where(allowed, bound, np.inf).argmin()
+            if not allowed.any() or bound.flat[k] > 1:
+                k = k if allowed.any() else seconds.argmin()
+                raise TradeoffError(
+                    f"no setting serves; the nearest takes {seconds.flat[k]:.3g} s and has errors "
+                    f"of {bound.flat[k]:.2g} {self._target.measure}; steps and cells as they are "
+                    "given are the coarsest"
+                )
+        row, column = np.unravel_index(k, seconds.shape)
+        numbers = (float(x.flat[k]) for x in (seconds, likely, bound))
+        return _Choice(refine[row], float(of_steps[column]), *numbers)
+
+    def _seconds(self, refine: npt.ArrayLike, parts: npt.ArrayLike) -> Array:
+        """Predict wall times with the first options of Newton's method; s."""
+        runs = [run for run in self._runs.of(self.family) if run.refinement.newton == 0]
+        a, b, c, d = fit_cost(*np.array([(r.steps, r.cells, r.seconds) for r in runs]).T)
+        steps = runs[0].steps / 2 ** runs[0].refinement.level * np.asarray(parts)
+        cells = runs[0].cells / float(runs[0].refinement.refine) * np.asarray(refine)
+        return np.asarray(a + b * cells + steps * (c + d * cells))
+
+    def _accepts(self, run: Run) -> bool:
+        """Return whether a run is accurate or fast enough, and not much more."""
+        budget, ratio = self._target.budget, self.ratio(run)
+        if math.isinf(budget):
+            return LEAST_USED <= ratio <= 1 - self.unsure
+        return (1 - 2 * SCATTER) * budget <= run.seconds <= budget
+
+    def _rank(self, run: Run) -> tuple[bool, bool, float]:
+        """Rank by time where accurate enough, else by errors; with a budget, the other way round.
+
+        What is accurate since errors of cells and steps cancel does not count: others are not.
+        """
+        _, refine, level, newton = run.refinement
+        bound = self._larger * max(
+            (size(c.cells.lack(math.log2(refine))) + size(c.steps.lack(level))) / self.units[name]
+            for name, c in self.crosses.items()
+        )
+        if math.isfinite(self._target.budget):
+            slow = run.seconds > self._target.budget
+            return slow, False, run.seconds if slow else bound
+        wrong = self.ratio(run) + self.unsure > 1 or bound > 1
+        seconds = self._speeds[newton] * float(self._seconds(float(refine), 2**level))
+        return wrong, not self._accepts(run), self.ratio(run) if wrong else seconds
+
+
+def _spread(first: int, last: int) -> list[int]:
+    """Return whole numbers, all the small ones, and fewer of the large ones."""
+    spread = first * 2 ** np.arange(0.0, math.log2(last / first) + 1e-9, 1 / GRID)
+    return [int(one) for one in np.unique(np.round(spread))]

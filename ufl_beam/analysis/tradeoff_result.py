@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Result of a trade-off: its runs, the recommended setting, and how far to trust it."""
+"""Runs of a trade-off, what was asked of them, and its result."""
 
 from __future__ import annotations
 
@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ufl_beam.analysis.richardson import Cross, pareto, size
-from ufl_beam.analysis.targets import Target
 from ufl_beam.arrays import Array
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
@@ -45,11 +44,6 @@ class Dials:
         return replace(self, dt=dt, mesh=replace(self.mesh, refine=self.mesh.refine * refine))
 
     @property
-    def steps(self) -> tuple[Scheme, Any]:
-        """Scheme and steps, which settings with other cells share."""
-        return self.scheme, self.dt
-
-    @property
     def arguments(self) -> dict[str, Any]:
         """Arguments of :func:`simulate`, by name."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
@@ -67,6 +61,7 @@ class Refinement(NamedTuple):
     family: int  # number of the dials that it begins with
     refine: Fraction  # parts of each cell
     level: float  # steps are about 2**level times as many
+    newton: int = 0  # number of the options of Newton's method
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,6 +84,32 @@ class Run:
 
     def __repr__(self) -> str:
         return f"<Run: {self.dials}: {self.seconds:.3g} s>"
+
+
+@dataclass(frozen=True)
+class Target:
+    """Tolerances, of each quantity in its unit or a part of all, or the wall time of a run."""
+
+    absolute: Mapping[str, float]  # by quantity, in its unit; others have ``relative``
+    relative: float  # part of the largest magnitude of a quantity that errors are measured in
+    budget: float  # wall time (s); infinite if errors are given
+
+    @property
+    def measure(self) -> str:
+        """Words for the sizes that errors are parts of."""
+        return "tolerances" if math.isinf(self.budget) else "largest values"
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Largest wall time (s) and largest error over its measure."""
+        return self.budget, 1.0 if math.isinf(self.budget) else math.inf
+
+    def __str__(self) -> str:
+        if math.isfinite(self.budget):
+            return f"runs of {self.budget:g} s"
+        if not self.absolute:
+            return f"errors of {self.relative:g} of each quantity"
+        return "errors of " + ", ".join(f"{value:g} of {n}" for n, value in self.absolute.items())
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from html import escape
 
 from ufl_beam.analysis.modes import Shapes
-from ufl_beam.analysis.study_file import Study
+from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.model.scene import Scene
 from ufl_beam.rich_display import html_of, picture_of

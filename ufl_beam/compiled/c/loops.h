@@ -532,7 +532,7 @@ enum raised { NOTHING, STEP_FAILED, OTHER };
  * those that the last iteration predicted, or those at the iterate; or always these. */
 enum tangents { PREDICTED, FIRST, EXACT };
 
-/* The equation of a path's control, and its unknown t, see path_corrector.py. */
+/* The equation of a path's control, and its unknown t, see path_controls.py. */
 typedef struct {
   void *handle;
   double *t;
