@@ -21,8 +21,9 @@ from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
-from ufl_beam.model.bodies import Body
+from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.scene import Scene
 
 
 class Element:
@@ -228,15 +229,20 @@ def mass_kernel(fields: Fields) -> Kernel:
     return fields.hot_kernel(_mass_times(fields.element), fields.element.q1)
 
 
+def lumps(scene: Scene) -> list[tuple[Anchor, float, float]]:
+    """Places, masses and rotary inertias of the point masses and the bodies; kg, kg m²."""
+    masses = [(one.place, one.mass, one.inertia) for one in scene.masses]
+    return masses + [(one.middle, one.mass, one.inertia) for one in scene.bodies]
+
+
 def mass_matrix(fields: Fields) -> Csr:
     """Mass of the beams, the point masses and the bodies."""
     share, M = fields.share, fields.assembled(mass_form(fields.element))
-    scene = share.grid.scene
-    for one in (*scene.masses, *scene.bodies):
-        dofs = share.at(one.middle if isinstance(one, Body) else one.place)
+    for place, mass, inertia in lumps(share.grid.scene):
+        dofs = share.at(place)
         mine = share.owns(dofs)
         here = share.local(dofs[mine])
-        M.data[M.positions(here, here)] += np.array([one.mass, one.mass, one.inertia])[mine]
+        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
     return M
 
 

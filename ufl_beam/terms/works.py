@@ -14,7 +14,7 @@ import ufl
 from ufl.algorithms import expand_derivatives
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields, element_of
@@ -25,8 +25,8 @@ from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.time_functions import Constant
 from ufl_beam.model.works import Potential, Work
+from ufl_beam.terms.base import InCells
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.phases import Callbacks, Phases, entering
 
@@ -191,11 +191,8 @@ class Works(LoadTerm):
         )  # fmt: skip
         tangents = [part.tangent for part in self._parts if part.tangent is not None]
         self._calls = [_calls([part.residual for part in self._parts]), _calls(tangents)]
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """C loops over the works."""
         force, tangent = (loop("add_calls", calls) for calls, _ in self._calls)
-        return force, tangent
+        self._loops = force, tangent
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the works."""

@@ -54,7 +54,7 @@ struct cells {
   double *each; /* entries of all cells in the latest evaluation, in batches; or none */
 };
 
-/* Strains whose forces the tangents of a static step have, see static_tangents.py. */
+/* Strains whose forces the tangents of a static step have, see PredictedStrains in cells.py. */
 typedef struct {
   const cells *strains;           /* linear about a configuration */
   int at_about;                   /* where they have it */
@@ -526,7 +526,7 @@ enum agreement { TOTAL, HYPOT, LARGEST };
 /* What a function of a user has raised: a failure of the step, or something else, which ends the run. */
 enum raised { NOTHING, STEP_FAILED, OTHER };
 
-/* Whose forces tangents of static steps have, see static_tangents.py: first those before the step, then
+/* Whose forces tangents of static steps have, see PredictedStrains in cells.py: first those before the step, then
  * those that the last iteration predicted, or those at the iterate; or always these. */
 enum tangents { PREDICTED, FIRST, EXACT };
 
