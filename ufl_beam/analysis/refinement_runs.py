@@ -94,14 +94,6 @@ class RefinementRuns:
             self.others |= {(done_one, newton): run for done_one, run in done.items()}
         return self.others.get((one, newton))
 
-    def choose_newton(self, one: Refinement) -> None:
-        """Do a run with all options that only keep tangents longer; use the fastest from now on."""
-        for number in self._of_same_tolerance():
-            before, run = self.runs[one], self.run_with(one, number)
-            if run is not None and run.stepping < FASTER * before.stepping:
-                self.others[one, self.newtons.index(before.dials.newton)] = before
-                self.runs[one], self.newton = self.others.pop((one, number)), number
-
     def may_be_faster(self, newton: int) -> bool:
         """Return whether options were not much slower where they were tried last."""
         tried = [
@@ -110,13 +102,6 @@ class RefinementRuns:
             if number == newton
         ]
         return not tried or tried[-1] < MUCH_SLOWER
-
-    def _of_same_tolerance(self) -> list[int]:
-        first = self.newtons[0]
-        return [
-            k for k, one in enumerate(self.newtons)
-            if k != self.newton and replace(one, modified=first.modified) == first
-        ]  # fmt: skip
 
     def _done(
         self, missing: Sequence[Refinement], newton: int

@@ -44,7 +44,6 @@ class RefinementSearch:
         self._runs, self._families, self._target = runs, families, target
         self._predictions: dict[int, Prediction] = {}  # of the families, by their first runs
         self._base: Level = (0, 0)  # of the last runs
-        self._timed: set[Level] = set()  # bases with which options of Newton's method were chosen
 
     def find(self, others: Sequence[Found]) -> Found:
         """Find the setting; TradeoffError if none serves, or ``others`` are better."""
@@ -278,9 +277,6 @@ class RefinementSearch:
         runs, levels = self._runs, Cross.levels(base, whole=whole)
         wanted = [self._at(family, level) for level in levels]
         runs.run(wanted[:1])  # tells how long the others take
-        if base not in self._timed and wanted[0] in runs.runs:
-            self._timed.add(base)
-            runs.choose_newton(wanted[0])
         runs.run(wanted)
         failed = [f"\n  {runs.dials(r)}: {runs.failed[r]}" for r in wanted if r in runs.failed]
         if failed:

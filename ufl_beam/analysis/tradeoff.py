@@ -37,7 +37,7 @@ from ufl_beam.solvers.newton_options import Newton
 
 NEWTON_SHARE = 0.1  # part of the error that other options of Newton's method may change
 MESHES = Mesh(degree=2), Mesh()  # that compete unless others are given; the likely best first
-NEWTONS = Newton(), Newton(modified=True)
+NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
 
 One = TypeVar("One")
@@ -82,8 +82,7 @@ def tradeoff(
         mesh: The coarsest cells, or several kinds; by default of degree 1, and of degree 2 where
             the scene allows it.
         newton: How exactly equilibria are found; of several the first is used, and the others are
-            tried in the end.  Those that differ in ``modified`` alone are compared on coarse runs,
-            and the faster one is used from there on.  By default also the modified Newton method.
+            tried in the end.
         most: Wall time of all runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run is done by one of them, several at a time.  Runs that go on

@@ -14,7 +14,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Memory, Restoring, Saving, State
-from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import Coulomb
 from ufl_beam.model.constraint_checks import friction_repeats

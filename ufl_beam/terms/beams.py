@@ -115,7 +115,7 @@ class Inertia(Term):
     ) -> None:
         rotations = with_half_tangents(scheme, fields.share.rotations())
         self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
-        self._loops = self._times.loops()
+        self._loops = self._times.loops
         self._fields, self._ledger, self._A, self.scheme = fields, ledger, A, scheme
         self.rates = rates
         if rates.slips:

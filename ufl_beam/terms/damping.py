@@ -19,13 +19,14 @@ from ufl_beam.discretization.function_spaces import (
     Element,
     Fields,
     Strains,
+    applied,
     mass_kernel,
     mass_matrix,
 )
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
-from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import Scheme, with_half_tangents
@@ -78,15 +79,8 @@ class KelvinVoigtForces(OfForms):
 
 @stated
 def _reference_stiffness(of: Element) -> ufl.Form:
-    e, w_e = (virtual_strain(of.q1, w, of.axis) for w in (ufl.TrialFunction(of.space), of.w))
-    return virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
-
-
-@stated
-def _stiffness_times(of: Element) -> ufl.Form:
-    """The reference stiffness times a vector, the unknown q1."""
     rest = of.configuration()
-    e, w_e = (virtual_strain(rest, w, of.axis) for w in (of.q1, of.w))
+    e, w_e = (virtual_strain(rest, w, of.axis) for w in (ufl.TrialFunction(of.space), of.w))
     return virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
 
 
@@ -105,7 +99,7 @@ class RayleighForces(Term):
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
         rotations = with_half_tangents(scheme, fields.share.rotations())
         self._times = StepProduct(C, rotations, A, fields.share.scratch)
-        self._loops = self._times.loops()
+        self._loops = self._times.loops
         self._ledger, self._rates, self._A = ledger, rates, A
 
     def in_cells(self) -> Sequence[InCells]:
@@ -114,7 +108,7 @@ class RayleighForces(Term):
         at = fields.order, self._times.rate
 
         def stiffness() -> Kernel:
-            return fields.hot_kernel(_stiffness_times(of), of.q1)
+            return fields.hot_kernel(applied(_reference_stiffness(of), of.q1), of.q1)
 
         return [
             InCells(stiffness, lib.STRESS, *at, damping.stiffness),

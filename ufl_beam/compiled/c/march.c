@@ -712,20 +712,19 @@ static int solve(march *m, int hold)
 {
   equation *e = m->equation;
   const double t = e->border ? *e->border->t : 0;
-  const int like_last = m->rates && as_last(m->prediction, m->step.dt);
   e->loads = size_of_loads(m);
-  if (!m->opens) return find_equilibrium(e, m->guess, like_last) > 0;
+  if (!m->opens) return find_equilibrium(e, m->guess) > 0;
   int opened = 0;
   if (hold) {
     memset(e->search, 0, SEARCH_FLAGS * sizeof *e->search);
     e->search[HOLD] = 1;
-    int found = find_equilibrium(e, m->guess, like_last) > 0;
+    int found = find_equilibrium(e, m->guess) > 0;
     while (found) {
       const double excess = e->search[OVER] || e->agree ? over_processes(e, LARGEST, largest_excess(m)) : 0;
       if (excess == 0) break;
       open_places(m, pow(FALL, opened++) * excess - TIE);
       memcpy(m->found, e->unknowns, m->size * sizeof *m->found);
-      found = find_equilibrium(e, m->found, like_last) > 0;
+      found = find_equilibrium(e, m->found) > 0;
     }
     const int over = over_processes(e, LARGEST, e->search[OVER]) > 0;
     end_search(m, opened);
@@ -733,7 +732,7 @@ static int solve(march *m, int hold)
     if (!begin_terms(m)) return 0;
     if (e->border) *e->border->t = t;
   }
-  return find_equilibrium(e, m->guess, like_last) > 0;
+  return find_equilibrium(e, m->guess) > 0;
 }
 
 /* -- whether a step can be trusted ------------------------------------------------------------------ */
