@@ -108,10 +108,6 @@ class Callbacks:
 
     # -- handles -----------------------------------------------------------------------------------
 
-    def copy(self, vector: Any) -> Array:
-        """Copy a vector of C."""
-        return np.frombuffer(ffi.buffer(vector, self._bytes)).copy()
-
     def lend(self, vector: Any) -> Array:
         """A vector of C, which C may change."""
         return np.frombuffer(ffi.buffer(vector, self._bytes))

@@ -196,14 +196,6 @@ static void subtract_dense(int rows, int columns, int depth, int stride, const d
   if (j < columns) subtract_columns(1, rows, columns - j, depth, stride, A, B + j, C + j);
 }
 
-static void exchange_rows(int size, double *a, double *b)
-{
-  for (int j = 0; j < size; ++j) {
-    const double x = a[j];
-    a[j] = b[j], b[j] = x;
-  }
-}
-
 /* Eliminate the pivots of a front, rows exchanged among them; reciprocals of the pivots on the
  * diagonal, multipliers below it; whether they are finite. `unit` is space for the largest number of
  * each row, by which those of rows with other dimensions are compared. */

@@ -24,20 +24,16 @@ static double norm_of(const equation *e, const double *forces)
   return over_processes(e, HYPOT, norm(e->size, e->weight, forces));
 }
 
-/* Values of a vector of PETSc that other processes own; or what this one has for them, added there. */
-static int update_ghosts(const equation *e, void *v)
+static int exchange_ghosts(const equation *e, void *v, int mode, int way)
 {
   if (!e->agree) return 0;
-  const int error = petsc.VecGhostUpdateBegin(v, INSERT_VALUES, FORWARD);
-  return error ? error : petsc.VecGhostUpdateEnd(v, INSERT_VALUES, FORWARD);
+  const int error = petsc.VecGhostUpdateBegin(v, mode, way);
+  return error ? error : petsc.VecGhostUpdateEnd(v, mode, way);
 }
 
-static int add_ghosts(const equation *e, void *v)
-{
-  if (!e->agree) return 0;
-  const int error = petsc.VecGhostUpdateBegin(v, ADD_VALUES, REVERSE);
-  return error ? error : petsc.VecGhostUpdateEnd(v, ADD_VALUES, REVERSE);
-}
+/* Values of a vector of PETSc that other processes own; or what this one has for them, added there. */
+static int update_ghosts(const equation *e, void *v) { return exchange_ghosts(e, v, INSERT_VALUES, FORWARD); }
+static int add_ghosts(const equation *e, void *v) { return exchange_ghosts(e, v, ADD_VALUES, REVERSE); }
 
 /* What a function of a user has raised on any process, see enum raised; all know it then. */
 int raised_anywhere(equation *e) { return e->raised = (int)over_processes(e, LARGEST, e->raised); }
@@ -410,49 +406,45 @@ int snes_newton(void *snes, void *x)
   return petsc.SNESSetConvergedReason(snes, e->reason);
 }
 
-/* Local values of a vector, ghosts included. */
-static int open_vector(const equation *e, void *v, void **local, double **values)
+/* Local values of a vector, ghosts included, to be read or to be written. */
+static int open_vector(const equation *e, void *v, void **local, double **values, int read)
 {
   *local = v;
   if (e->agree) TRY(petsc.VecGhostGetLocalForm(v, local));
-  return petsc.VecGetArray(*local, values);
+  return read ? petsc.VecGetArrayRead(*local, (const double **)values) : petsc.VecGetArray(*local, values);
 }
 
-static int close_vector(const equation *e, void *v, void **local, double **values)
+static int close_vector(const equation *e, void *v, void **local, double **values, int read)
 {
-  TRY(petsc.VecRestoreArray(*local, values));
+  TRY(read ? petsc.VecRestoreArrayRead(*local, (const double **)values)
+           : petsc.VecRestoreArray(*local, values));
   return e->agree ? petsc.VecGhostRestoreLocalForm(v, local) : 0;
 }
 
 int snes_function(void *snes, void *x, void *f, void *self)
 {
   equation *e = self;
-  void *local_f, *local_x = x;
-  double *r;
-  const double *q;
+  void *local_f, *local_x;
+  double *r, *q;
   TRY(update_ghosts(e, x));
-  if (e->agree) TRY(petsc.VecGhostGetLocalForm(x, &local_x));
-  TRY(petsc.VecGetArrayRead(local_x, &q));
-  TRY(open_vector(e, f, &local_f, &r));
+  TRY(open_vector(e, x, &local_x, &q, 1));
+  TRY(open_vector(e, f, &local_f, &r, 0));
   TRY(residual(e, q, r, f));
-  TRY(close_vector(e, f, &local_f, &r));
-  TRY(petsc.VecRestoreArrayRead(local_x, &q));
-  return e->agree ? petsc.VecGhostRestoreLocalForm(x, &local_x) : 0;
+  TRY(close_vector(e, f, &local_f, &r, 0));
+  return close_vector(e, x, &local_x, &q, 1);
 }
 
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
 {
   equation *e = self;
-  void *local_x = x;
-  const double *q;
+  void *local_x;
+  double *q;
   if (e->near) return 0;
   TRY(update_ghosts(e, x));
-  if (e->agree) TRY(petsc.VecGhostGetLocalForm(x, &local_x));
-  TRY(petsc.VecGetArrayRead(local_x, &q));
+  TRY(open_vector(e, x, &local_x, &q, 1));
   assemble(e, q);
   TRY(note_change(P));
-  TRY(petsc.VecRestoreArrayRead(local_x, &q));
-  return e->agree ? petsc.VecGhostRestoreLocalForm(x, &local_x) : 0;
+  return close_vector(e, x, &local_x, &q, 1);
 }
 
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
