@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What terms with forces in cells have in common.
+"""Common parts of terms with forces in cells.
 
 Forms of a step; strains that an iteration of a static step predicts; and works of the tangent and
 of its derivative, which buckling needs.

@@ -97,7 +97,7 @@ class Acting:
 
     @property
     def passes_on(self) -> bool:
-        """Whether forces depend on the motion of the last step, and their work is counted on."""
+        """True if forces depend on the motion of the last step, and their work is counted on."""
         return self._work.takes_rates and bool(self._scheme.weight_of_before)
 
     def remember(self, memory: Memory) -> None:
