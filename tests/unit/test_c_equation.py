@@ -70,6 +70,16 @@ def test_options_bring_the_solver_of_petsc(options, make):
     assert np.allclose(of_petsc.q, own.q, rtol=0, atol=1e-11)
 
 
+@pytest.mark.parametrize("make", [elastic, inelastic, machine])
+def test_petsc_may_keep_tangents(make):
+    lagged, full = run(make(), ub.Newton(petsc={"snes_lag_jacobian": "2"})), run(make())
+    assert lagged.parts == full.parts
+    assert lagged.iterations > full.iterations  # tangents were kept
+    # Residuals of 1e-10 of forces of 1e2 N, on stiffnesses of some 10 N/m, in 20 steps.
+    assert np.allclose(full.q, lagged.q, rtol=0, atol=20 * 1e-9)
+    assert lagged.energy.worst < 1e-8
+
+
 def test_what_python_raises_in_the_middle_arrives():
     def force(e, de):
         raise ZeroDivisionError("of the user")

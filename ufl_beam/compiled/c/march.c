@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Steps one after the other with no Python between them; see compiled_steps.py.
+/* Steps one after the other with no Python between them; see stepper.py.
  *
- * A step that fails leaves the state as it was, and Python takes it: it knows what else may help.
+ * A step that fails leaves the state as it was, and is taken in parts.
  */
 
 /* As numpy.interp has it. */
