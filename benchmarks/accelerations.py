@@ -40,7 +40,7 @@ ACCELERATIONS = {
             "compiled/c/newton.c:factor_tangent", "compiled/c/newton.c:solve_tangent",
             "compiled/c/newton.c:find_change", "compiled/c/newton.c:newton",
             "compiled/c/newton.c:snes_newton", "solvers/static_condensation.py:ChainsFirst.drive",
-            "solvers/multifrontal.py:Multifrontal.drive", "solvers/klu.py:Klu.drive",
+            "solvers/multifrontal.py:Multifrontal.drive", "solvers/substructuring.py:Klu.drive",
         ),
     ),
     "SIMD kernels": Acceleration(
@@ -50,9 +50,7 @@ ACCELERATIONS = {
         by.SHIPPED, by.SCALAR,
         (
             "compiled/simd_kernels.py", "compiled/c/lanes.c", "compiled/c/lanes.h",
-            "discretization/compiled_forms.py:vectorise",
-            "discretization/compiled_forms.py:Kernel.address_in_lanes",
-            "discretization/compiled_forms.py:Kernel.compute_in_lanes",
+            "discretization/compiled_forms.py~several|LANES|lanes",
             "discretization/function_spaces.py:Fields._coordinates_in_lanes",
         ),
     ),
@@ -92,23 +90,6 @@ ACCELERATIONS = {
         "tangent.",
         by.SHIPPED, by.TANGENTS,
         ("compiled/c/newton.c~e->near|\\bkept\\b|\\bclose\\b|CLOSE",),
-        (ELASTIC, LARGE, HINGED, JOINTED),
-    ),
-    "`Newton(modified=True)`": Acceleration(
-        "An option: keeps tangents while the residual continues to decrease at the same rate, "
-        "also from step to step. Without it, the default.",
-        by.MODIFIED, by.SHIPPED,
-        (
-            "compiled/c/newton.c~\\brate|MORE|modified", "solvers/convergence.py~rate|modified",
-            "solvers/newton_options.py~modified|This saves",
-        ),
-        (ELASTIC, LARGE, HINGED, JOINTED),
-    ),
-    "tangent of the last step (`like_last`)": Acceleration(
-        "The part of this option that keeps a tangent from one step to the next. Without it, each "
-        "step begins with a new one, as in runs with a checkpoint.",
-        by.MODIFIED, by.ANEW,
-        ("compiled/c/newton.c~like_last", "compiled/c/march.c~like_last"),
         (ELASTIC, LARGE, HINGED, JOINTED),
     ),
 }  # fmt: skip

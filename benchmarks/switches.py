@@ -15,17 +15,17 @@ import numpy as np
 import ufl_beam as ub
 from ufl_beam.compiled import c_library
 from ufl_beam.compiled.jit import compiled
-from ufl_beam.discretization import function_spaces
+from ufl_beam.discretization import compiled_forms
 from ufl_beam.simulation import simulation as stepping
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.solvers import newton, static_condensation
-from ufl_beam.solvers.klu import Klu
+from ufl_beam.solvers.substructuring import Klu
 
 plan = static_condensation._plan
 
 
 def nothing(*_):
-    """Do nothing, in the place of `vectorise`."""
+    """No loop over several cells at once, in the place of `in_lanes`."""
 
 
 def without_chains(cell_dofs, indptr, indices, alone, *more):
@@ -75,14 +75,10 @@ def loop_without_kept_tangents(name, data):
 
 
 class Variant(NamedTuple):
-    """What is replaced while a simulation is built, and options of Newton's method.
-
-    With ``anew`` each step begins with a new tangent.
-    """
+    """What is replaced while a simulation is built, and options of Newton's method."""
 
     replaced: tuple[tuple[Any, str, Any], ...] = ()
     newton: dict[str, Any] = {}  # noqa: RUF012 - of a tuple, which nothing changes
-    anew: bool = False
 
     @contextmanager
     def switched(self):
@@ -95,13 +91,10 @@ class Variant(NamedTuple):
     def simulation(self, scene):
         """A simulation of a scene."""
         with self.switched():
-            simulation = ub.Simulation(scene, ub.Midpoint(), newton=ub.Newton(**self.newton))
-        if self.anew:
-            simulation.solver.begin_steps_anew()
-        return simulation
+            return ub.Simulation(scene, ub.Midpoint(), newton=ub.Newton(**self.newton))
 
 
-CELL_BY_CELL = (function_spaces, "vectorise", nothing)
+CELL_BY_CELL = (compiled_forms, "in_lanes", nothing)
 NO_CHAINS = (static_condensation, "_plan", without_chains)
 NO_FRONTS = (static_condensation, "Multifrontal", klu)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
@@ -111,7 +104,6 @@ SHIPPED, PETSC = "as shipped", "PETSc's `newtonls`"
 SCALAR, WHOLE = "cell by cell", "fronts of the whole tangent"
 LEFT = "KLU in the place of fronts"
 TANGENTS, VELOCITY = "a tangent in each iteration", "guess at the last velocity"
-MODIFIED, ANEW = "`modified=True`", "`modified=True`, a new tangent in each step"
 
 VARIANTS = {
     SHIPPED: Variant(),
@@ -121,7 +113,5 @@ VARIANTS = {
     LEFT: Variant((NO_FRONTS,)),
     TANGENTS: Variant((ALL_TANGENTS,)),
     VELOCITY: Variant((AT_VELOCITY,)),
-    MODIFIED: Variant(newton={"modified": True}),
-    ANEW: Variant(newton={"modified": True}, anew=True),
 }
 """Variants of a simulation by name."""

@@ -49,8 +49,8 @@ from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.errors import ConvergenceError, CopiesDiffer, ModelWarning, SceneError, TradeoffError
 from ufl_beam.mechanics.classical import GeneralizedAlpha, Newmark, Static
-from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
 from ufl_beam.mechanics.energy_momentum import (
+    DecayingMidpoint,
     ExactStatic,
     ExactStep,
     Midpoint,

@@ -43,7 +43,6 @@ SWING = {"end": 1.2}
 """How far the ladders of the swing go: all programs get there, with every scheme."""
 
 CONSERVING = ("Midpoint", {})
-MODIFIED = ("Midpoint, modified Newton", {"modified": True})
 DECAYING = ("decaying Midpoint", {"alpha": 0.01, "beta": 0.01})
 TRAPEZOIDAL = {"rho": "trapezoidal"}
 
@@ -80,7 +79,7 @@ def roll_up(cells, turns):
 
 
 def flying_beam(cells, dt):
-    yield from ours(CONSERVING, MODIFIED)
+    yield from ours(CONSERVING)
     yield from exudyn(cells)
     fewer = {"steps": FEW[cells]} if cells in FEW else {}
     yield from opensees(("Newmark", fewer))
@@ -88,13 +87,13 @@ def flying_beam(cells, dt):
 
 
 def swing(cells, dt):
-    yield from ours(CONSERVING, MODIFIED, DECAYING)
+    yield from ours(CONSERVING, DECAYING)
     yield from exudyn(cells, said=", ρ∞ 0.6", rho=0.6)
     yield from opensees(("TRBDF2", {}))
 
 
 def portal(cells, dt):
-    yield from ours(CONSERVING, MODIFIED)
+    yield from ours(CONSERVING)
     yield from exudyn(cells)
     yield from opensees(
         ("with shear", {"element": "shear"}), ("without shear", {"element": "euler"})
@@ -102,7 +101,7 @@ def portal(cells, dt):
 
 
 def cantilever(cells, dt):
-    yield from ours(("", {}), ("modified Newton", {"modified": True}))
+    yield from ours(("", {}))
     yield from exudyn(cells)
     yield from opensees(("", {}))
     yield from floor()
@@ -121,7 +120,7 @@ TABLES = (  # problem, variants, arguments, and which of them --quick leaves out
 
 
 def flying_ladder(cells, dt):
-    yield from ours(CONSERVING, MODIFIED)
+    yield from ours(CONSERVING)
     for newton in NEWTON:
         yield "exudyn", f"{newton} Newton", {"newton": newton, "solver": "sparse"}
     if cells <= 64 and dt >= 0.02:
@@ -134,14 +133,14 @@ def printed_ladder(cells, dt):
 
 
 def swing_ladder(cells, dt):
-    yield from ours(CONSERVING, MODIFIED)
+    yield from ours(CONSERVING)
     for label, rho in (("trapezoidal", "trapezoidal"), ("ρ∞ 0.9", 0.9)):
         yield "exudyn", label, {"newton": "modified", "solver": "sparse", "rho": rho}
     yield from opensees(("Newmark", {"integrator": "newmark"}), ("TRBDF2", {}))
 
 
 def portal_ladder(cells, dt):
-    yield from ours(CONSERVING, MODIFIED)
+    yield from ours(CONSERVING)
     for newton in NEWTON:
         yield "exudyn", f"{newton} Newton", {"newton": newton, "solver": "sparse"}
     yield from opensees(

@@ -11,10 +11,10 @@ from ufl_beam.dolfinx_compat import dolfinx
 VERSION = f"DOLFINx {dolfinx.__version__}"
 
 
-def discretised(scheme="Midpoint", degree=1, lumped=False, modified=False, **dials):
+def discretised(scheme="Midpoint", degree=1, lumped=False, **dials):
     """A scheme by its name, with its arguments, a mesh, and how Newton's method runs."""
     mesh = ub.Mesh(degree=degree, lumped=lumped)
-    return getattr(ub, scheme)(**dials), mesh, ub.Newton(modified=modified)
+    return getattr(ub, scheme)(**dials), mesh, ub.Newton()
 
 
 def beams_of(chains):

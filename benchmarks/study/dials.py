@@ -36,7 +36,6 @@ class Setting:
         degree: Of the cells.
         lumped: Whether masses are those of nodes.
         rtol: Of Newton's method.
-        modified: Whether it keeps its tangent.
         adaptive: Tolerance of adaptive steps, in the place of equal ones; 0: none.
         every: Steps from one that is kept to the next.
         history: Whether a table of the place is written, a row each step.
@@ -48,7 +47,6 @@ class Setting:
     degree: int = 1
     lumped: bool = False
     rtol: float = 1e-10
-    modified: bool = False
     adaptive: float = 0.0
     every: int = 1
     history: bool = False
@@ -62,7 +60,7 @@ class Setting:
             "t": (0.0, case.end),
             "dt": ub.Adaptive(self.adaptive, stops=stops) if self.adaptive else dt,
             "mesh": ub.Mesh(refine=self.refine, degree=self.degree, lumped=self.lumped),
-            "newton": ub.Newton(rtol=self.rtol, modified=self.modified),
+            "newton": ub.Newton(rtol=self.rtol),
             "every": self.every,
         }
 
@@ -118,7 +116,6 @@ def one_by_one(case: Case, quick: bool) -> Iterator[tuple[str, Setting]]:
         yield "mass: lumped", replace(here, lumped=True)
     for rtol in (1e-8, 1e-6, 1e-4):
         yield f"Newton: rtol {rtol:g}", replace(here, rtol=rtol)
-    yield "Newton: modified", replace(here, modified=True)
     steps = case.steps * 2**here.halvings // len(case.instants)
     yield "output: kept at ten instants", replace(here, every=steps)
     yield "output: a history beside", replace(here, history=True)

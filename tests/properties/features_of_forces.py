@@ -261,7 +261,7 @@ def refined(d):
 @feature("newton")
 def newton(d):
     d.newton = d.one([
-        "ub.Newton(modified=True)", "ub.Newton(rtol=1e-11, max_iterations=20)",
+        "ub.Newton(rtol=1e-11, max_iterations=20)",
         "ub.Newton(petsc={'snes_linesearch_type': 'bt'})",
     ])  # fmt: skip
 

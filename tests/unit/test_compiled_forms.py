@@ -16,8 +16,7 @@ from ufl_beam.compiled.simd_kernels import LANES
 from ufl_beam.discretization import compiled_forms
 from ufl_beam.discretization.compiled_forms import patterns
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.dolfinx_forms import DolfinxFields
-from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.function_spaces import DolfinxFields, Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, strain

@@ -4,6 +4,7 @@
 import numpy as np
 import pytest
 
+from ufl_beam.compiled.c_library import doubles, fill
 from ufl_beam.compiled.csr import Product, StepProduct, coupling
 from ufl_beam.compiled.simd_kernels import in_batches
 
@@ -31,7 +32,9 @@ def test_pattern_of_groups(size):
         expected[np.ix_(group, group)] = True
     found = np.column_stack([structure.rows(), structure.indices])
     assert np.array_equal(np.argwhere(expected), found)
-    assert np.array_equal(structure.diagonal(np.arange(size)), np.flatnonzero(np.equal(*found.T)))
+    assert np.array_equal(
+        structure.positions(*2 * [np.arange(size)]), np.flatnonzero(np.equal(*found.T))
+    )
     some = random.integers(0, size, 4)
     entries = [np.flatnonzero(found[:, 0] == row) for row in some]
     assert np.array_equal(structure.entries_of(some), np.concatenate(entries))
@@ -77,6 +80,17 @@ def test_blocks_of_a_hub_of_many(number, kind):
     assert np.array_equal(found[:, :, 0], expected.reshape(number, 4))
 
 
+def begin(product, q0, factor, back, v):
+    """Begin a step at ``q0``, with velocities ``v``."""
+    fill(product.c, q0=q0, factor=factor, back=back, v=v)
+
+
+def add(loop, q, out):
+    """Add what a loop makes of ``q``."""
+    function, data = loop
+    function(data, doubles(q), doubles(out))
+
+
 @pytest.mark.parametrize("number", [255, 256])
 def test_a_constant_matrix_with_a_hub(number):
     """Its zeros are not kept, and its entries are found in the tangent, also in long rows."""
@@ -84,8 +98,8 @@ def test_a_constant_matrix_with_a_hub(number):
     A.data[:] = np.random.default_rng(1).choice([0.0, 1.0, 3.0], len(A.data))
     tangent, nothing = A.zeros_like(), np.zeros(A.size)
     product = StepProduct(A, np.array([2], dtype=np.int32), tangent, np.empty(A.size))
-    product.begin(nothing, 2.0, 0.0, nothing)
-    product.add_tangent(nothing)  # the derivative of a rotation from rest is one
+    begin(product, nothing, 2.0, 0.0, nothing)
+    add(product.loops[1], nothing, tangent.data)  # the derivative of a rotation from rest is one
     assert np.array_equal(tangent.data, 2 * A.data)
     assert np.array_equal(product.matrix().data, A.data)
     assert len(product.A.data) == np.count_nonzero(A.data)
@@ -130,17 +144,17 @@ def test_the_tangent_of_a_constant_matrix(lumped):
     tangent = A.zeros_like()
     product = StepProduct(A, rotations, tangent, np.empty(A.size))
     q0, q1, v = random.normal(size=(3, A.size))
-    product.begin(q0, 3.0, 2.0, v)
+    begin(product, q0, 3.0, 2.0, v)
 
     def force(q):
         r = np.zeros(A.size)
-        product.add_force(q, r)
+        add(product.loops[0], q, r)
         return r
 
     step = q1 - q0
     step[rotations] = 2 * np.tan(step[rotations] / 2)
     assert np.allclose(force(q1), dense @ (3 * step - 2 * v), rtol=1e-13, atol=1e-12)
-    product.add_tangent(q1)
+    add(product.loops[1], q1, tangent.data)
     found = np.zeros_like(dense)
     found[A.rows(), A.indices] = tangent.data
     differences = [(force(q1 + h) - force(q1 - h)) / 2e-6 for h in 1e-6 * np.eye(A.size)]

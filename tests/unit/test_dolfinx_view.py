@@ -9,7 +9,7 @@ import ufl
 from dolfinx import fem, has_adios2
 
 import ufl_beam as ub
-from ufl_beam.discretization.dolfinx_forms import DolfinxFields
+from ufl_beam.discretization.function_spaces import DolfinxFields
 from ufl_beam.output import dolfinx_view
 from ufl_beam.simulation import replicas
 

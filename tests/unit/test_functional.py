@@ -10,8 +10,7 @@ import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam.discretization.dolfinx_forms import DolfinxFields, dofs_of_cells
-from ufl_beam.discretization.function_spaces import Element
+from ufl_beam.discretization.function_spaces import DolfinxFields, Element, dofs_of_cells
 from ufl_beam.dolfinx_compat import fem, line_mesh
 from ufl_beam.mechanics import functional
 from ufl_beam.mechanics.kinematics import strain

@@ -11,29 +11,29 @@ import ufl_beam as ub
 from ufl_beam.compiled import code_cache, jit, simd_kernels
 from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.simd_kernels import in_batches
-from ufl_beam.discretization.compiled_forms import Kernel, vectorise
+from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 
-def pointwise(expression, values):
-    """The kernel of an expression of one number in each cell, all cells of length 1."""
+def pointwise(expression, values, *, several=False):
+    """The kernel of an expression of one number in each cell, all cells of length 1.
+
+    It computes ``several`` cells at once if it can.
+    """
     n = len(values)
     points = np.column_stack([np.arange(n + 1.0), np.zeros(n + 1)])
     mesh = line_mesh(points, np.column_stack([np.arange(n), np.arange(1, n + 1)]))
     space = fem.functionspace(mesh, ("DG", 0))
     f, z = fem.Function(space), ufl.TestFunction(space)
     form = expression(f) * z * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
-    kernel = Kernel(form, f, np.asarray(space.dofmap.list), cell_coordinates(mesh)[:, :, :2])
+    x = cell_coordinates(mesh)[:, :, :2]
+    in_lanes = [in_batches(x, simd_kernels.LANES)] if several else []
+    kernel = Kernel(form, f, np.asarray(space.dofmap.list), x, *in_lanes)
     by_cell = np.empty(n)
     by_cell[np.asarray(space.dofmap.list)[:, 0]] = values
     return kernel, by_cell
-
-
-def in_lanes(kernel):
-    """Let it compute several cells at once, if it can."""
-    vectorise([kernel], in_batches(kernel._coordinates[:, :, 0], simd_kernels.LANES))
 
 
 def both(expression, values):
@@ -41,7 +41,7 @@ def both(expression, values):
     kernel, q = pointwise(expression, values)
     one, several = np.zeros((2, len(q)))
     kernel.add(q, one)
-    in_lanes(kernel)
+    kernel, _ = pointwise(expression, values, several=True)
     assert kernel.cells.lanes > 1
     kernel.add(q, several)
     return one, several
@@ -121,8 +121,7 @@ def test_expressions(expression, cells):
     ids=["another function", "a broken power", "beside a whole one"],
 )
 def test_what_vectors_cannot_is_computed_cell_by_cell(expression, meant):
-    kernel, q = pointwise(expression, np.linspace(-1.0, 2.0, 5))
-    in_lanes(kernel)
+    kernel, q = pointwise(expression, np.linspace(-1.0, 2.0, 5), several=True)
     assert kernel.cells.lanes == 1
     values = np.zeros(len(q))
     kernel.add(q, values)
@@ -176,8 +175,7 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
     )
     caplog.set_level("INFO", logger="ufl_beam")
     for told in (["WARNING", "INFO"], ["INFO"]):
-        kernel, q = pointwise(ufl.sin, np.linspace(0.1, 1.0, 5))
-        in_lanes(kernel)
+        kernel, q = pointwise(ufl.sin, np.linspace(0.1, 1.0, 5), several=True)
         assert kernel.cells.lanes == 1
         assert [record.levelname for record in caplog.records] == told
         assert "entries are not those of FFCx's kernel" in caplog.text
@@ -195,8 +193,8 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
     ids=["logical", "known"],
 )
 def test_the_compiler_says_nothing(fresh, capfd, condition, lanes):
-    kernel, _ = pointwise(lambda x: ufl.conditional(condition(x), x, -1.0), np.linspace(0, 1, 9))
-    in_lanes(kernel)
+    values = np.linspace(0, 1, 9)
+    kernel, _ = pointwise(lambda x: ufl.conditional(condition(x), x, -1.0), values, several=True)
     assert kernel.cells.lanes == lanes
     assert "error" not in capfd.readouterr().err
 
@@ -209,8 +207,7 @@ def test_the_check_is_made_once(fresh, monkeypatch):
         simd_kernels, "require_agreement", lambda *args: (calls.append(args), check(*args))
     )
     for _ in range(2):
-        kernel, _ = pointwise(ufl.cos, np.ones(2))
-        in_lanes(kernel)
+        kernel, _ = pointwise(ufl.cos, np.ones(2), several=True)
         assert kernel.cells.lanes > 1
         simd_kernels.in_lanes.cache_clear()
     assert len(calls) == 1
@@ -219,12 +216,11 @@ def test_the_check_is_made_once(fresh, monkeypatch):
 @pytest.mark.serial
 def test_what_is_slower_is_said(fresh, caplog, monkeypatch):
     caplog.set_level("INFO", logger="ufl_beam")
-    kernel, _ = pointwise(ufl.atan, np.ones(2))
-    in_lanes(kernel)
+    pointwise(ufl.atan, np.ones(2), several=True)
     assert "computed cell by cell, which is slower: lanes.h has no atan" in caplog.text
-    kernel, _ = pointwise(ufl.sin, np.ones(2))
+    pointwise(ufl.sin, np.ones(2))
     monkeypatch.setenv("CC", "no-such-compiler")
-    in_lanes(kernel)
+    kernel, _ = pointwise(ufl.sin, np.ones(2), several=True)
     assert kernel.cells.lanes == 1
     assert "which is slower: ufl_beam_lanes cannot be compiled" in caplog.text
 
@@ -289,9 +285,9 @@ def cell_by_cell(kernel):
         batches = getattr(kernel, name).transpose(0, 2, 1)
         rows = batches.reshape(len(batches) * batches.shape[1], batches.shape[2])[:n]
         setattr(one, name, in_batches(rows, 1))
-    one._lanes, one._in_lanes = 1, ffi.NULL
-    del one._places
-    one._change()
+    one.lanes, one._in_lanes = 1, ffi.NULL
+    for name in ("_places", "cells"):
+        vars(one).pop(name, None)
     return one
 
 

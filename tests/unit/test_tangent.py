@@ -108,14 +108,14 @@ class Probe:
     @staticmethod
     def at_random(inelastic, random):
         """Random plastic strains, jumps and their sums, the latter at least as large."""
-        cells, state = inelastic.state()
+        state = inelastic.points.state()
         n = inelastic.points["state plastic"].shape[1]
-        p, jump = random.uniform(-0.5, 0.5, (2, len(cells), n))
+        p, jump = random.uniform(-0.5, 0.5, (2, len(state), n))
         if not np.isfinite(inelastic.points["traction"]).any():
             jump[:] = 0.0
-        more = random.uniform(0.0, 0.5, (2, len(cells), n))
+        more = random.uniform(0.0, 0.5, (2, len(state), n))
         rows = np.hstack([p, abs(p) + more[0], jump, abs(jump) + more[1], state[:, 4 * n :]])
-        inelastic.restore(cells, rows)
+        inelastic.points.restore(rows)
 
     def residual(self, x):
         supports = self.simulation.supports

@@ -346,7 +346,7 @@ TABLE = {
     ),
     "Newton": call(
         ub.Newton,
-        rtol=V(1e-8, POSITIVE), max_iterations=V(10, COUNT), modified=V(False, SWITCH),
+        rtol=V(1e-8, POSITIVE), max_iterations=V(10, COUNT),
         petsc=V({}, [None, 1.0, "x", [], {1: None}]), reference=V(False, SWITCH),
     ),
     "Adaptive": call(

@@ -35,9 +35,9 @@ from ufl_beam.parallel import active_comm
 from ufl_beam.rich_display import Rich
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
+from ufl_beam.terms.base import InCells
 from ufl_beam.terms.beams import elastic_forms
 from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.in_cells import InCells
 
 MOST_TITLES = 4  # modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size

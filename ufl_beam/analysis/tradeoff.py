@@ -41,7 +41,7 @@ from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
 MESHES = Mesh(degree=2), Mesh()  # that compete unless others are given
-NEWTONS = Newton(), Newton(modified=True)
+NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
 WRONG = "SceneError: "  # how failures of runs begin that finer dials do not help
 
@@ -104,7 +104,7 @@ def tradeoff(
             the scene allows it.
         newton: How exactly equilibria are found; of several the first is used, and the others are
             compared with it on a coarse run.  The fastest one that changes the quantities little is
-            used for the answer.  By default also the modified Newton method.
+            used for the answer.
         most: Wall time of all runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run is done by one of them, several at a time.  Runs that go on

@@ -45,8 +45,8 @@ extern "Python" void find_conjugates_in_python(void *handle, const double *q);
 extern "Python" int find_idle_in_python(void *handle);
 extern "Python" int forget_idle_in_python(void *handle);
 extern "Python" void arrive_in_python(void *handle, const double *x);
-extern "Python" int change_of_border_in_python(void *handle, const double *x);
-extern "Python" int border_is_met_in_python(void *handle);
+extern "Python" int change_along_in_python(void *handle, const double *x);
+extern "Python" int met_in_python(void *handle);
 extern "Python" void run_in_python(void *handle);
 extern "Python" void begin_in_python(void *handle, double t, double dt);
 """

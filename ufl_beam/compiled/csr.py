@@ -6,14 +6,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from copy import copy
 from functools import cached_property
-from typing import Any
 
 from petsc4py import PETSc
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, loop, struct
 from ufl_beam.structure_cache import of_structure
 
 
@@ -66,10 +65,6 @@ class Csr:
         first, number = self.indptr[rows].astype(np.int64), np.diff(self.indptr)[rows]
         before = np.cumsum(number) - number
         return np.asarray(np.repeat(first - before, number) + np.arange(number.sum()))
-
-    def diagonal(self, rows: Index) -> Index:
-        """Return the entries on the diagonal of some rows."""
-        return self.positions(rows, rows)
 
     def positions(self, rows: Index, columns: Index) -> Index:
         """Find the entries (rows[k], columns[k]) in :attr:`data`; they must exist."""
@@ -195,6 +190,11 @@ class StepProduct:
 
     ``A`` is constant; the derivative is added to ``tangent``, of the same structure.  ``scratch``
     is space for as many numbers as there are rows, which others may use too.
+
+    Attributes:
+        c: ``step_product`` of loops.h; phases give it factors, velocities and the beginning.
+        loops: C functions of the forces and of their derivative.
+        rate: Place of the address of ``factor s - back v`` in the latest forces.
     """
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr, scratch: Array) -> None:
@@ -209,32 +209,11 @@ class StepProduct:
             rotations=len(rotations), rotation=rotations, space=scratch, rate=np.zeros(A.size),
             turn=np.full(len(rotations), np.nan), half=np.empty(len(rotations)),
         )  # fmt: skip
-
-    @property
-    def rate(self) -> Any:
-        """Place of the address of ``factor s - back v`` in the latest forces."""
-        return ffi.addressof(self.c, "rate")
+        self.loops = loop("add_step_force", self.c), loop("add_step_tangent", self.c)
+        self.rate = ffi.addressof(self.c, "rate")
 
     def matrix(self) -> Csr:
         """Return the matrix, a new one."""
         A = self._tangent.zeros_like()
         A.data[A.positions(*self.A.pairs())] = self.A.data
         return A
-
-    def begin(self, q0: Array, factor: float, back: float, v: Array) -> None:
-        """Prepare what stays constant in the step that begins at ``q0``."""
-        c = self.c
-        c.factor, c.back = factor, back
-        self._states = c.v, c.q0 = doubles(v), doubles(q0)
-
-    def loops(self) -> tuple[Loop, Loop]:
-        """Return the loops of :meth:`add_force` and :meth:`add_tangent`."""
-        return loop("add_step_force", self.c), loop("add_step_tangent", self.c)
-
-    def add_force(self, q1: Array, r: Array) -> None:
-        """Add the forces at ``q1``."""
-        lib.add_step_force(self.c, doubles(q1), doubles(r))
-
-    def add_tangent(self, q1: Array) -> None:
-        """Add their derivative at ``q1``."""
-        lib.add_step_tangent(self.c, doubles(q1), doubles(self._tangent.data))

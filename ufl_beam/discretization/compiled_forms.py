@@ -31,14 +31,6 @@ from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
 from ufl_beam.structure_cache import stated as stated
 
 
-def vectorise(kernels: Sequence[Kernel], coordinates: Array) -> None:
-    """Switch kernels on the same cells to SIMD, all or none: they may share numbers."""
-    addresses = [kernel.address_in_lanes() for kernel in kernels]
-    if None not in addresses:
-        for one, address in zip(kernels, addresses, strict=True):
-            one.compute_in_lanes(address, coordinates)
-
-
 def tabulator(compiled: fem.Form) -> Any:
     """Return the C function of a compiled cell form; it lives as long as the form."""
     integral = compiled.ufcx_form.form_integrals[0]
@@ -120,15 +112,21 @@ class Kernel:
         unknown: The configuration that most calls change; it need not appear in the form.
         cell_dofs: Its degrees of freedom; shape (num_cells, 6).
         coordinates: Vertices of the cells; shape (num_cells, 2, 2); m.
+        several: These in batches of :data:`LANES`, see :func:`in_batches`, to compute several cells
+            at once where the form can be.
+
+    Attributes:
+        lanes: Cells that are computed at once.
     """
 
     def __init__(
-        self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array
-    ) -> None:
+        self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index, coordinates: Array,
+        several: Array | None = None,
+    ) -> None:  # fmt: skip
         self._form = ready = prepared(form)
         self._entries = ready.entries
         self._dofs = np.ascontiguousarray(cell_dofs, dtype=np.int32)
-        self._lanes, self._in_lanes, num_cells = 1, ffi.NULL, len(cell_dofs)
+        num_cells = len(cell_dofs)
         spaces = [argument.ufl_function_space() for argument in form.arguments()]
         self._is_functional, self._is_vector = not spaces, len(spaces) == 1
         self._to_dofs = self._is_vector and spaces[0] is unknown.function_space
@@ -140,7 +138,6 @@ class Kernel:
                 f"cells, got rows of {(num_cells, per_cell)} and coordinates of "
                 f"{coordinates.shape}"
             )
-        self._coordinates = in_batches(coordinates, 1)
         self._matrix: Csr | None = None
         self._at, self._unknowns = 0, 0
         self._stated, self._columns = ready.packed, ready.columns  # without the unknown
@@ -153,12 +150,23 @@ class Kernel:
             self._columns = {
                 of: slice(number(x.start), number(x.stop)) for of, x in columns.items()
             }
+        address = None
+        if several is not None:
+            sizes = (self._entries, ready.packed.shape[1], len(ready.constants))
+            tabulate = int(ffi.cast("intptr_t", ready.tabulate))
+            address = in_lanes(ready.source, tabulate, sizes, (self._at, self._unknowns))
+        if several is None or address is None:
+            self.lanes, self._in_lanes = 1, ffi.NULL
+            self._coordinates = in_batches(coordinates, 1)
+        else:
+            self.lanes, self._in_lanes = LANES, ffi.cast("in_lanes *", address)
+            self._coordinates = several
 
     @cached_property
     def _packed(self) -> Array:
         """Values of the coefficients in the cells but for the unknown, in batches."""
         stated = self._stated
-        return in_batches(np.tile(stated, (len(self._dofs) // len(stated), 1)), self._lanes)
+        return in_batches(np.tile(stated, (len(self._dofs) // len(stated), 1)), self.lanes)
 
     @cached_property
     def _places(self) -> dict[str, Any]:
@@ -166,35 +174,30 @@ class Kernel:
         shape = len(self._dofs), self._entries
         if self._to_dofs or self._is_functional:
             return {}
-        if self._is_vector:
-            places = np.arange(math.prod(shape), dtype=np.int32).reshape(shape)
-        elif self._matrix is None:
-            places = np.zeros(shape, dtype=np.int32)
-        else:
-            found = self._matrix.blocks(self._dofs, self._lanes)
+        if self._matrix is not None:
+            found = self._matrix.blocks(self._dofs, self.lanes)
             if found.dtype == np.int32:
                 return {"row": found}
             return {"begin": self._matrix.indptr, **patterns(found)}
-        return {"row": in_batches(places, self._lanes)}
+        places = np.zeros(shape, dtype=np.int32)
+        if self._is_vector:
+            places += np.arange(places.size, dtype=np.int32).reshape(shape)
+        return {"row": in_batches(places, self.lanes)}
 
     @cached_property
     def cells(self) -> Any:
-        """Argument of ``add_cells`` of loops.h; another one once a method changes its arrays."""
+        """Argument of ``add_cells`` of loops.h; made once all of the arrays are known."""
         number, of_cell = self._dofs.shape
         packed, coefficients = self._packed, self._form.packed.shape[1]
         return fill(
             ffi.new("cells *"),
-            tabulate=self._form.tabulate, several=self._in_lanes, lanes=self._lanes,
+            tabulate=self._form.tabulate, several=self._in_lanes, lanes=self.lanes,
             number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
-            width=packed.strides[0] // (packed.itemsize * self._lanes), w=first_of(packed),
+            width=packed.strides[0] // (packed.itemsize * self.lanes), w=first_of(packed),
             constants=self._form.constants, coordinates=self._coordinates, rows=self._entries,
             coefficients=coefficients, all=np.empty(coefficients),
             is_functional=self._is_functional, **self._places,
         )  # fmt: skip
-
-    def _change(self) -> None:
-        """Let :attr:`cells` be made anew of the arrays."""
-        vars(self).pop("cells", None)
 
     def uses(self, function: fem.Function) -> bool:
         """Return whether a function appears in the form."""
@@ -213,17 +216,16 @@ class Kernel:
         """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
         columns = self._columns[id(function)]
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
-        self._packed[:, columns] = in_batches(rows, self._lanes)
+        self._packed[:, columns] = in_batches(rows, self.lanes)
 
     def share(self, other: Kernel) -> bool:
         """Use the packed values of ``other``, if those of this form stand side by side there."""
         mine, others = self._columns, other._columns
         shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}
-        if not mine.keys() <= others.keys() or len(shifts) != 1 or self._lanes != other._lanes:
+        if not mine.keys() <= others.keys() or len(shifts) != 1 or self.lanes != other.lanes:
             return False
         (first,) = shifts
         self._packed = other._packed[:, first : first + self._stated.shape[1]]
-        self._change()
         return True
 
     def place(self, A: Csr) -> None:
@@ -232,23 +234,6 @@ class Kernel:
         if self._entries != per_cell**2:
             raise ValueError(f"a form of {self._entries} entries on {per_cell} degrees of freedom")
         self._matrix = A
-        vars(self).pop("_places", None)
-        self._change()
-
-    def address_in_lanes(self) -> int | None:
-        """Return the address of the SIMD loop, or None."""
-        sizes = (self._entries, self._form.packed.shape[1], len(self._form.constants))
-        kernel = int(ffi.cast("intptr_t", self._form.tabulate))
-        return in_lanes(self._form.source, kernel, sizes, (self._at, self._unknowns))
-
-    def compute_in_lanes(self, address: int | None, coordinates: Array) -> None:
-        """Use the SIMD loop from now on, with coordinates in batches."""
-        if "_packed" in vars(self):
-            self._packed = in_batches(self._packed[:, :, 0], LANES)
-        vars(self).pop("_places", None)
-        self._in_lanes = ffi.cast("in_lanes *", address)
-        self._lanes, self._coordinates = LANES, coordinates
-        self._change()
 
     def keep_entries(self) -> tuple[Any, int, Array]:
         """Keep the entries of all cells in each evaluation from now on; nothing else may change.
@@ -257,10 +242,10 @@ class Kernel:
             A place with the address of an array for them, which C may change; the number of cells
             in a batch, see :func:`in_batches`; and a second such array.
         """
-        batches = -(-len(self._dofs) // self._lanes)
-        each, other = np.zeros((2, batches, self._entries, self._lanes))
+        batches = -(-len(self._dofs) // self.lanes)
+        each, other = np.zeros((2, batches, self._entries, self.lanes))
         fill(self.cells, each=each)
-        return ffi.addressof(self.cells, "each"), self._lanes, other
+        return ffi.addressof(self.cells, "each"), self.lanes, other
 
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""

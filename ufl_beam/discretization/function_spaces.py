@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """The finite element of the beams that forms are stated on, and the cells of a share of the grid.
 
-Forms depend on nothing of a scene: they are stated on one cell, and compiled once in a process.
+Forms depend on nothing of a scene: they are stated on one cell, and compiled once in a process.  A
+user's own integrals are on the cells of a scene as a mesh of DOLFINx.
 """
 
 from __future__ import annotations
@@ -11,18 +12,22 @@ from functools import cached_property
 import basix.ufl
 import numpy as np
 import ufl
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr, coupling
+from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches
-from ufl_beam.discretization.compiled_forms import Kernel, stated, vectorise
+from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.partition import Share
-from ufl_beam.dolfinx_compat import fem, line_mesh
+from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
+from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
-from ufl_beam.model.bodies import Body
+from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.scene import Scene
 
 
 class Element:
@@ -72,6 +77,11 @@ class Element:
         element = basix.ufl.quadrature_element("interval", value_shape=shape, degree=rule)
         return fem.Function(fem.functionspace(self._cell, element))
 
+    def sampled(self, values: Expr) -> ufl.Form:
+        """Values of shape (3,) in the points of ``dx(1)``, each with the weight of its point."""
+        z = ufl.TestFunction(self.at_points(3).function_space)
+        return ufl.dot(values, z) / self.axis.h * self.dx(1)
+
     def constant(self, value: float) -> fem.Constant:
         """A number that forms are not compiled for anew."""
         return fem.Constant(self._cell, value)
@@ -111,6 +121,12 @@ def derivative(work: ufl.Form, q1: fem.Function) -> ufl.Form:
     return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
 
 
+@stated
+def applied(form: ufl.Form, q1: fem.Function) -> ufl.Form:
+    """A bilinear form times a vector, the unknown q1."""
+    return ufl.action(form, q1)
+
+
 class Fields:
     """Cells of one process, or some of them: what forms of the element are evaluated on.
 
@@ -137,41 +153,35 @@ class Fields:
 
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
-        kernel = Kernel(form, unknown, self.cell_dofs, self._coordinates())
-        self._put_sections(kernel)
-        return kernel
+        return self._with_sections(Kernel(form, unknown, self.cell_dofs, self._coordinates()))
 
     def hot_kernel(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index | None = None
     ) -> Kernel:
         """Such a form, several cells at once; ``cell_dofs`` if not all are unknown."""
-        (kernel,) = self._several_at_once(unknown, form, cell_dofs=cell_dofs)
-        self._put_sections(kernel)
-        return kernel
+        dofs = self.cell_dofs if cell_dofs is None else cell_dofs
+        coordinates = self._coordinates(), self._coordinates_in_lanes
+        return self._with_sections(Kernel(form, unknown, dofs, *coordinates))
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
         """Kernels of a virtual work and of its derivative, for ``A``, that share coefficients."""
-        force, tangent = self._several_at_once(q1, work, derivative(work, q1))
-        self._put_sections(force)
+        forms = work, derivative(work, q1)
+        coordinates = self._coordinates(), self._coordinates_in_lanes
+        force, tangent = (Kernel(form, q1, self.cell_dofs, *coordinates) for form in forms)
+        if force.lanes != tangent.lanes:  # they would not share numbers
+            force, tangent = (Kernel(form, q1, self.cell_dofs, coordinates[0]) for form in forms)
+        self._with_sections(force)
         if not tangent.share(force):
             raise ValueError("force and tangent do not have the same coefficients")
         tangent.place(A)
         return force, tangent
 
-    def _several_at_once(
-        self, unknown: fem.Function, *forms: ufl.Form, cell_dofs: Index | None = None
-    ) -> list[Kernel]:
-        """Kernels that compute several cells at once, all or none; without values of sections."""
-        dofs, coordinates = self.cell_dofs if cell_dofs is None else cell_dofs, self._coordinates()
-        kernels = [Kernel(form, unknown, dofs, coordinates) for form in forms]
-        vectorise(kernels, self._coordinates_in_lanes)
-        return kernels
-
-    def _put_sections(self, kernel: Kernel) -> None:
-        """Give a kernel the numbers of the sections that its form has."""
+    def _with_sections(self, kernel: Kernel) -> Kernel:
+        """A kernel with the numbers of the sections that its form has."""
         for function in (self.element.stiffness, self.element.inertia):
             if kernel.uses(function):
                 kernel.put(function, self.of_sections(function))
+        return kernel
 
     def _coordinates(self) -> Array:
         """Vertices of the cells; (num_cells, 2, 2); m."""
@@ -223,32 +233,32 @@ def mass_form(of: Element) -> ufl.Form:
     return ufl.derivative(momentum, v, ufl.TrialFunction(of.space))  # P(67)
 
 
-@stated
-def _mass_times(of: Element) -> ufl.Form:
-    return ufl.action(mass_form(of), of.q1)
-
-
 def mass_kernel(fields: Fields) -> Kernel:
     """Mass of the beams times a vector, the unknown q1."""
-    return fields.hot_kernel(_mass_times(fields.element), fields.element.q1)
+    q1 = fields.element.q1
+    return fields.hot_kernel(applied(mass_form(fields.element), q1), q1)
+
+
+def lumps(scene: Scene) -> list[tuple[Anchor, float, float]]:
+    """Places, masses and rotary inertias of the point masses and the bodies; kg, kg m²."""
+    masses = [(one.place, one.mass, one.inertia) for one in scene.masses]
+    return masses + [(one.middle, one.mass, one.inertia) for one in scene.bodies]
 
 
 def mass_matrix(fields: Fields) -> Csr:
     """Mass of the beams, the point masses and the bodies."""
     share, M = fields.share, fields.assembled(mass_form(fields.element))
-    scene = share.grid.scene
-    for one in (*scene.masses, *scene.bodies):
-        dofs = share.at(one.middle if isinstance(one, Body) else one.place)
+    for place, mass, inertia in lumps(share.grid.scene):
+        dofs = share.at(place)
         mine = share.owns(dofs)
         here = share.local(dofs[mine])
-        M.data[M.positions(here, here)] += np.array([one.mass, one.mass, one.inertia])[mine]
+        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
     return M
 
 
 @stated
 def _weighted_strains(of: Element) -> ufl.Form:
-    z = ufl.TestFunction(of.at_points(3).function_space)
-    return ufl.dot(strain(of.q1, of.axis), z) / of.axis.h * of.dx(1)
+    return of.sampled(strain(of.q1, of.axis))
 
 
 class Strains:
@@ -296,3 +306,60 @@ class SectionForces:
         values = np.zeros(3 * len(self._order))
         self._kernel.add(np.ascontiguousarray(q), values)
         resultants[self._order] = values.reshape(-1, 3)
+
+
+# -- the cells as a mesh of DOLFINx ----------------------------------------------------------------
+
+
+def dofs_of_cells(space: fem.FunctionSpace) -> Index:
+    """Degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
+    blocks, size = space.dofmap.list, space.dofmap.bs
+    return np.asarray(blocks[:, :, None] * size + np.arange(size)).reshape(len(blocks), -1)
+
+
+def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
+    """Integrate a form without arguments, or a scalar expression, over the cells of a mesh.
+
+    Raises:
+        SceneError: It is neither, or it is of another mesh.
+    """
+    if isinstance(integral, Expr) and not integral.ufl_shape:
+        integral = integral * ufl.dx(domain=mesh)
+    if not isinstance(integral, ufl.Form) or integral.arguments():
+        raise SceneError(
+            f"dolfinx.total: {shorten(integral)} must be a form of UFL without test functions, "
+            "such as expression * view.dx, or a scalar expression"
+        )
+    if any(one.integral_type() != "cell" for one in integral.integrals()):
+        raise SceneError(
+            "dolfinx.total: the form has integrals over facets, and the mesh of each process has "
+            "facets of its own where it ends; integrate over cells, with dx"
+        )
+    if any(domain != mesh.ufl_domain() for domain in integral.ufl_domains()):
+        raise SceneError("dolfinx.total: the form is of another mesh; state it on view.mesh")
+    # One by one, as each compiled form has one quadrature rule.
+    forms = (compiled_form(ufl.Form([one]))[0] for one in integral.integrals())
+    return float(sum(fem.assemble_scalar(form) for form in forms))
+
+
+class DolfinxFields(Fields):
+    """Cells whose element is stated on their own mesh, for DOLFINx to assemble.
+
+    Attributes:
+        mesh: Mesh of the cells, which DOLFINx puts in an order of its own.
+    """
+
+    def __init__(self, share: Share, part: Index | None = None) -> None:
+        grid, cells = share.grid, share.cells if part is None else share.cells[part]
+        vertices, numbers = np.unique(grid.cells[cells], return_inverse=True)
+        self.mesh = line_mesh(grid.points[vertices], numbers.reshape(-1, 2))
+        order: Index = np.asarray(self.mesh.topology.original_cell_index)
+        # The order of the vertices of a cell orients the beam.
+        expected = grid.points[grid.cells[cells[order]]]
+        if not np.array_equal(cell_coordinates(self.mesh)[:, :, :2], expected):
+            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
+        super().__init__(share, order if part is None else part[order])
+        self.element = element = Element(grid.mesh, self.mesh)
+        for function in (element.stiffness, element.inertia):
+            dofs = dofs_of_cells(function.function_space)
+            function.x.array[dofs] = self.of_sections(function)

@@ -122,8 +122,7 @@ class Share:
         ghost &= ~own
         self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
         self.num_owned = int(own.sum())
-        self._numbers: Index = number[self.dofs]
-        self.ghosts = self._numbers[self.num_owned :].copy()
+        self.ghosts: Index = number[self.dofs[self.num_owned :]]
         self._local: Index = np.full(grid.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[of_cell]
@@ -132,7 +131,9 @@ class Share:
         self.body_dofs = of_body[(of_body >= 0).all(axis=1)]
         self._all_owned: Index = order
         if self.alone:  # all numbers are the same
-            self._numbers = self._local = self._all_owned = self.dofs
+            self._local = self._all_owned = self.dofs
+        self._rotations = np.sort(self.local(grid.rotations)).astype(np.int32)
+        self._parts: Array = np.empty(0 if self.alone else grid.size)  # new memory is slow
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 
     @property
@@ -162,10 +163,6 @@ class Share:
     def rotations(self) -> Index:
         """Local numbers of all rotations; int32."""
         return self._rotations
-
-    @cached_property
-    def _rotations(self) -> Index:
-        return np.sort(self.local(self.grid.rotations)).astype(np.int32)
 
     def translations(self) -> tuple[Index, Index]:
         """Local numbers of both components of all displacements."""
@@ -203,10 +200,6 @@ class Share:
         weights[self.num_owned :] = 0.0
         return weights
 
-    def numbers(self) -> Index:
-        """Numbers in PETSc's vectors of the local degrees of freedom."""
-        return self._numbers
-
     def local(self, dofs: Index) -> Index:
         """Local numbers of those ``dofs`` (numbers of the grid) that this process has."""
         found = self._local[dofs]
@@ -229,11 +222,6 @@ class Share:
         self.comm.Allgatherv(owned, [parts, self._num_owned_by])
         result[self._all_owned] = parts
         return result
-
-    @cached_property
-    def _parts(self) -> Array:
-        """Array for values of all degrees of freedom, process after process: new memory is slow."""
-        return np.empty(self.grid.size)
 
     def added(self, values: Array) -> Array:
         """Sums over the processes of values at the local degrees of freedom."""

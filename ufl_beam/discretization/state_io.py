@@ -32,35 +32,36 @@ class Memory(ABC):
 
     def number(self, name: str, value: float) -> float:
         """A number that all processes know."""
-        return float(self._alike(name, np.array([value]), *self._one)[0])
+        return float(self._values(name, np.array([value]), *self._one)[0])
 
     def total(self, name: str, value: float) -> float:
         """A number whose sum over the processes means something."""
-        return float(self._summed(name, np.array([value]), *self._one)[0])
+        return float(self._values(name, np.array([value]), *self._one, summed=True)[0])
 
     def at_dofs(self, name: str, values: Array) -> Array:
         """Values at the local degrees of freedom, alike on all processes that have them."""
-        return self._alike(name, values, *self._dofs)
+        return self._values(name, values, *self._dofs)
 
     def added(self, name: str, values: Array) -> Array:
         """Values at the local degrees of freedom whose sums over the processes mean something."""
-        return self._summed(name, values, *self._dofs)
+        return self._values(name, values, *self._dofs, summed=True)
+
+    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
+        """Rows of numbered things that all processes know."""
+        return self.rows(name, numbers, rows)
 
     @abstractmethod
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
         """Rows of numbered things, each on one process only; of any lengths under one name."""
 
     @abstractmethod
-    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Rows of numbered things that all processes know."""
+    def _values(
+        self, name: str, values: Array, size: int, where: Index, owned: int, *, summed: bool = False
+    ) -> Array:
+        """Values at some places of ``size``, of which the first ``owned`` are of this process.
 
-    @abstractmethod
-    def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
-        """Values at some places of ``size``, of which the first ``owned`` are of this process."""
-
-    @abstractmethod
-    def _summed(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
-        """Addends of values at such places."""
+        They are alike on all processes that have a place, or addends where they are ``summed``.
+        """
 
 
 class Saving(Memory):
@@ -71,12 +72,11 @@ class Saving(Memory):
         self._sums: dict[str, tuple[int, Index, Array]] = {}
         self._rows: defaultdict[str, list[Array]] = defaultdict(list)
 
-    def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
-        self._sums[name] = size, where[:owned], values[:owned].copy()
-        return values
-
-    def _summed(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
-        self._sums[name] = size, where, values.copy()
+    def _values(
+        self, name: str, values: Array, size: int, where: Index, owned: int, *, summed: bool = False
+    ) -> Array:
+        mine = len(values) if summed else owned
+        self._sums[name] = size, where[:mine], values[:mine].copy()
         return values
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
@@ -117,12 +117,12 @@ class Restoring(Memory):
         """Return true if the state has numbers of this name."""
         return name in self._state
 
-    def _alike(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
-        return np.asarray(self._found(name, (size,))[where])
-
-    def _summed(self, name: str, values: Array, size: int, where: Index, owned: int) -> Array:
+    def _values(
+        self, name: str, values: Array, size: int, where: Index, owned: int, *, summed: bool = False
+    ) -> Array:
         here = self._found(name, (size,))[where]
-        here[owned:] = 0.0  # the owner has all of it
+        if summed:
+            here[owned:] = 0.0  # the owner has all of it
         return np.asarray(here)
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
@@ -134,10 +134,6 @@ class Restoring(Memory):
         found = np.minimum(np.searchsorted(table[:, 0], numbers), len(table) - 1)
         known = table[found, 0] == numbers
         return np.where(known[:, None], table[found, 1:], rows)
-
-    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Return the saved rows of these numbers."""
-        return self.rows(name, numbers, rows)
 
     def _found(self, name: str, shape: tuple[int, ...]) -> Array:
         """Return an array of the state; :class:`SceneError` if it has not the shape; -1 is any."""

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import singledispatch
 from typing import Any, NamedTuple
 
 import ufl
@@ -21,7 +20,7 @@ from ufl_beam.mechanics.kinematics import split
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.works import Potential, VirtualWork, Work
+from ufl_beam.model.works import VirtualWork, Work
 
 GROWTH = "growth of works"
 """Name of the part of virtual works that acts, which no number of a user can have."""
@@ -72,19 +71,12 @@ def _statement(
     scheme: Scheme,
 ) -> Statement:  # fmt: skip
     work = kind(name, density.function, numbers=dict.fromkeys(names, 1.0), degree=degree)
-    return _state(work, of, scheme, {name: of.in_cells() for name in ("t", "dt", GROWTH, *names)})
+    state = _of_virtual_work if issubclass(kind, VirtualWork) else _of_potential
+    return state(work, of, scheme, {name: of.in_cells() for name in ("t", "dt", GROWTH, *names)})
 
 
-@singledispatch
-def _state(
+def _of_virtual_work(
     work: Work, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
-) -> Statement:
-    raise TypeError(f"{work!r} is no work")
-
-
-@_state.register
-def _(
-    work: VirtualWork, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
 ) -> Statement:
     q0, q1, w = of.q0, of.q1, of.w
     part, v = scheme.load_weight, (q1 - q0) / numbers["dt"]
@@ -101,9 +93,8 @@ def _(
     return Statement(residual, _derivative(residual, of), numbers)
 
 
-@_state.register
-def _(
-    work: Potential, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
+def _of_potential(
+    work: Work, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
 ) -> Statement:
     q0, q1, w, q, dx = of.q0, of.q1, of.w, of.configuration(), of.dx(work.degree)
     energy = _returned(work, {"q": q, "axis": of.anywhere, **numbers}, of)

@@ -11,8 +11,15 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dolfinx_forms import DolfinxFields, dofs_of_cells, integrated
-from ufl_beam.discretization.function_spaces import Fields, Strains, derivative, mass_form
+from ufl_beam.discretization.function_spaces import (
+    DolfinxFields,
+    Fields,
+    Strains,
+    derivative,
+    dofs_of_cells,
+    integrated,
+    mass_form,
+)
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes

@@ -16,7 +16,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import mass_form
 from ufl_beam.errors import SceneError
-from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
 from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import (

@@ -14,7 +14,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Memory, Restoring, Saving, State
-from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import rubs
 from ufl_beam.model.constraint_checks import friction_repeats
@@ -26,22 +26,19 @@ from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import BEFORE, ElasticBeams, Inertia
 from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.cells import Cells
 from ufl_beam.terms.connector_responses import Setting
 from ufl_beam.terms.connectors import couplings
 from ufl_beam.terms.damping import SecondDifferences, damping_forces
-from ufl_beam.terms.dead_loads import DeadLoads
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.follower_loads import FollowerLoads
 from ufl_beam.terms.guide_curves import guides
-from ufl_beam.terms.inelastic_beams import InelasticBeams
-from ufl_beam.terms.inelastic_cells import inelastic_cells
+from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
 from ufl_beam.terms.links import Links
-from ufl_beam.terms.loads import FrameForces, LoadTerm
+from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces, LoadTerm
 from ufl_beam.terms.material_points import expect_entries
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.rates_in_c import RatesInC
 from ufl_beam.terms.supports import Supports
-from ufl_beam.terms.tangent_derivatives import Cells
 from ufl_beam.terms.works import Works
 
 

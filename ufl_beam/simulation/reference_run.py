@@ -18,8 +18,7 @@ from ufl_beam.progress_bar import progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.solvers.newton_options import Newton, require_plain
-from ufl_beam.solvers.petsc_options import checked_newton
+from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
 
 def simulate_by_reference(

@@ -137,8 +137,6 @@ def simulate(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
         )
         solution = simulation.solution
-        if keeper is not None:
-            simulation.solver.begin_steps_anew()
         solution.every, solution.building = every, time.perf_counter() - begin
         stack.enter_context(running(simulation, recorders, outputs, begin))
         pace = steps_of(simulation, t1, dt)

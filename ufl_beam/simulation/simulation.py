@@ -35,8 +35,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.stepper import APPLYING, Extras, Stepper, Trial, begins_loaded
 from ufl_beam.simulation.watches import ForceWatch
 from ufl_beam.solvers.newton import Border
-from ufl_beam.solvers.newton_options import Newton, require_plain
-from ufl_beam.solvers.petsc_options import checked_newton
+from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
 
 class Simulation(StateView):

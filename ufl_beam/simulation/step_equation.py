@@ -16,13 +16,13 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.terms.base import InternalForces, Term
+from ufl_beam.terms.cells import Cells
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Callbacks
 from ufl_beam.terms.rates_in_c import RatesInC
 from ufl_beam.terms.supports import Supports
-from ufl_beam.terms.tangent_derivatives import Cells
 
 MOVING = "inertia", "damping"
 """Kinds of terms that depend on velocities."""

@@ -41,11 +41,12 @@ class Convergence:
         self._owned, self._weights = slice(share.num_owned), share.weights()
         self._moves = np.ones(share.size, dtype=np.uint8)
         self.leave_out(np.zeros(share.size, dtype=bool))
-        self.diagonal = A.diagonal(np.arange(share.size, dtype=np.int32))
+        all_dofs = np.arange(share.size, dtype=np.int32)
+        self.diagonal = A.positions(all_dofs, all_dofs)
         fill(
             c,
-            scene=share.grid.scene.size, rtol=newton.rtol, rate=math.inf,
-            modified=newton.modified, most=newton.max_iterations, space=share.scratch,
+            scene=share.grid.scene.size, rtol=newton.rtol, most=newton.max_iterations,
+            space=share.scratch,
             lengths=share.lengths(), diagonal=self.diagonal,
             moves=ffi.from_buffer("uint8_t[]", self._moves),
         )  # fmt: skip

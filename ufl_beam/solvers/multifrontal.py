@@ -137,21 +137,14 @@ def _pattern(A: Csr) -> csr_array:
 
 
 def _order(A: Csr, stays: npt.NDArray[np.bool_], kind: str) -> Index:
-    """Return all unknowns in an order of elimination, those that stay at the end."""
-    these, last = np.flatnonzero(~stays), np.flatnonzero(stays)
-    if kind == "nd":
-        these = _ordered(A, np.arange(A.size), kind)
-        these = these[~stays[these]]
-    elif len(these):
-        these = _ordered(A, these, kind)
-    return np.concatenate([these, last]).astype(np.int32)
-
-
-def _ordered(A: Csr, unknowns: Index, kind: str) -> Index:
-    """Return some unknowns in an order of PETSc."""
-    part = _pattern(A)[unknowns][:, unknowns].astype(np.float64)
-    _, order = Csr(part.data, part.indices, part.indptr).petsc().getOrdering(kind)
-    return np.asarray(unknowns[order.indices])
+    """Return all unknowns in an order of elimination of PETSc, those that stay at the end."""
+    these: Index = np.arange(A.size) if kind == "nd" else np.flatnonzero(~stays)
+    if len(these):
+        part = _pattern(A)[these][:, these].astype(np.float64)
+        _, found = Csr(part.data, part.indices, part.indptr).petsc().getOrdering(kind)
+        these = these[found.indices]
+    order = np.concatenate([these[~stays[these]], np.flatnonzero(stays)])
+    return np.asarray(order, dtype=np.int32)
 
 
 def _operations(first: Index, begin: Index) -> float:

@@ -27,11 +27,9 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.solvers.convergence import Convergence
-from ufl_beam.solvers.newton_options import PREFIX, Newton
+from ufl_beam.solvers.newton_options import PREFIX, Newton, database, take_options
 from ufl_beam.solvers.null_vectors import IdleMotions
-from ufl_beam.solvers.petsc_options import database, take_options
 from ufl_beam.solvers.static_condensation import ChainsFirst
-from ufl_beam.solvers.vectors import Vectors
 from ufl_beam.terms.phases import Callbacks, from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
@@ -44,7 +42,6 @@ class Equation(Protocol):
     A: Csr
     c: Any
     callbacks: Callbacks
-    weights: Array
 
     @property
     def held(self) -> Index:
@@ -76,6 +73,20 @@ class Border(Protocol):
         """Return whether the equation is."""
 
 
+def _vector(share: Share) -> tuple[PETSc.Vec, Array]:
+    """A vector of the unknowns, and its local values; where processes share a scene, with ghosts.
+
+    PETSc keeps the values where they are.
+    """
+    if share.alone:
+        vector = PETSc.Vec().createSeq(share.size)
+        return vector, vector.array_w
+    size = (share.num_owned, share.grid.size)
+    vector = PETSc.Vec().createGhost(share.ghosts, size=size, comm=share.comm)
+    with vector.localForm() as local:
+        return vector, local.array_w
+
+
 class Solver:
     """Newton's method of newton.c, with the objects of PETSc that it works on.
 
@@ -84,81 +95,79 @@ class Solver:
 
     Attributes:
         change: Of the latest iteration; between solutions others may use it.
+        unknowns: The unknowns of SNES, which C writes to; local values.
     """
 
     def __init__(self, share: Share, equation: Equation, newton: Newton, least: int) -> None:
         self._share, self._equation, self._newton = share, equation, newton
-        self._vectors, self._factors = Vectors(share), ChainsFirst(share, equation.A)
-        self._x, self._f, self._y = (self._vectors.new() for _ in range(3))
-        local = [self._vectors.view(one, writable=True) for one in (self._x, self._f, self._y)]
-        self._q, self._r, self.change = local
+        self._factors = ChainsFirst(share, equation.A)
+        (self._x, self.unknowns), (self._f, self._r), (self._y, self.change) = (
+            _vector(share) for _ in range(3)
+        )
         c = self._c = equation.c
         self.convergence = Convergence(share, c, equation.A, equation.held, newton)
-        handle = equation.callbacks.handle
         fill(
             c,
-            least=least, unknowns=self._q, residual=self._r, change=self.change,
+            least=least, unknowns=self.unknowns, residual=self._r, change=self.change,
             x=opaque(self._x), f=opaque(self._f), y=opaque(self._y),
             find_conjugates=lib.find_conjugates_in_python,
             find_idle=lib.find_idle_in_python, forget_idle=lib.forget_idle_in_python,
             aside=np.zeros(share.size if c.search != ffi.NULL else 0),
         )  # fmt: skip
-        c.handle = handle(self)  # what `fill` keeps must not keep this object
+        c.handle = equation.callbacks.handle(self)  # what `fill` keeps must not keep this object
         if share.alone:
             self._factors.drive(c)
         else:
             fill(c, agree=lib.agree_in_python, solve=lib.solve_in_python)
-        self._ksp = PETSc.KSP().create(self._x.comm)
-        self._ksp.setOptionsPrefix(PREFIX)
-        self._ksp.setType("preonly")
-        self._ksp.getPC().setType("python")
-        self._ksp.getPC().setPythonContext(self._factors)
         self._make_snes()
         self._has_idle = False
 
     # -- PETSc ---------------------------------------------------------------------------------
 
-    def _make_matrix(self) -> PETSc.Mat:
-        if self._share.alone and self._c.monitored:
-            return self._equation.A.petsc()
-        # Nothing but the preconditioner, which has its own, asks for the matrix.
-        self._equation.A.release()
-        give_back_memory(self._share.size)
-        sizes = (self._share.num_owned, self._share.grid.size)
-        matrix = PETSc.Mat().createPython([sizes, sizes], object(), comm=self._share.comm)
-        matrix.setUp()
-        return matrix
-
     def _make_snes(self) -> None:
         chosen = {**database(), **self._newton.petsc}
-        c, snes = self._c, PETSc.SNES().create(self._x.comm)
-        c.monitored, c.searches = bool(chosen), "snes_linesearch_type" not in chosen
-        snes.setOptionsPrefix(PREFIX)
+        ksp, snes = PETSc.KSP().create(self._x.comm), PETSc.SNES().create(self._x.comm)
+        for one in (ksp, snes):
+            one.setOptionsPrefix(PREFIX)
+        ksp.setType("preonly")
+        ksp.getPC().setType("python")
+        ksp.getPC().setPythonContext(self._factors)
+        c, self._snes = self._c, snes
+        c.snes, c.monitored = opaque(snes), bool(chosen)
+        c.searches = "snes_linesearch_type" not in chosen
         petsc("SNESSetFunction", snes, self._f, *loop("snes_function", c))
         petsc("SNESSetConvergenceTest", snes, *loop("snes_test", c), ffi.NULL)
-        self._let_c_fill(snes)
+        self._let_c_fill()
         snes.setTolerances(max_it=self._newton.max_iterations)
         snes.setType("newtonls")
-        snes.setKSP(self._ksp)
+        snes.setKSP(ksp)
         take_options(snes, {**FULL_STEPS, **chosen})
         if not c.monitored:
             snes.setType("shell")
             solve, context = loop("snes_newton", c)
             petsc("SNESShellSetContext", snes, context)
             petsc("SNESShellSetSolve", snes, solve)
-        self._snes, c.snes = snes, opaque(snes)
 
-    def _let_c_fill(self, snes: PETSc.SNES) -> None:
-        self._matrix = self._make_matrix()
+    def _let_c_fill(self) -> None:
+        """Give SNES the matrix: of PETSc where its own method needs that, else none."""
+        if self._share.alone and self._c.monitored:
+            self._matrix = self._equation.A.petsc()
+        else:
+            # Nothing but the preconditioner, which has its own, asks for the matrix.
+            self._equation.A.release()
+            give_back_memory(self._share.size)
+            sizes = (self._share.num_owned, self._share.grid.size)
+            self._matrix = PETSc.Mat().createPython([sizes, sizes], object(), comm=self._share.comm)
+            self._matrix.setUp()
         matrices = self._matrix, self._matrix
-        petsc("SNESSetJacobian", snes, *matrices, *loop("snes_jacobian", self._c))
+        petsc("SNESSetJacobian", self._snes, *matrices, *loop("snes_jacobian", self._c))
 
     @property
     def snes(self) -> PETSc.SNES:
         """SNES of the steps; from when it is asked for, their method is PETSc's ``newtonls``."""
         if not self._c.monitored:
             self._c.monitored = 1
-            self._let_c_fill(self._snes)
+            self._let_c_fill()
             self._snes.setType("newtonls")
             take_options(self._snes, FULL_STEPS)  # SNES has forgotten its line search
         return self._snes
@@ -181,7 +190,7 @@ class Solver:
         owned = slice(self._share.num_owned)
         if anew and not self._factors.factor(self._r[owned]):
             return True
-        return not self._factors.solve(self._r[owned], self.change[owned], reduced=anew)
+        return not self._factors.solve(self._r[owned], self.change[owned], reduced=bool(anew))
 
     def find_conjugates(self, q: Array) -> None:
         """Find what a residual works on in a change."""
@@ -220,52 +229,56 @@ class Solver:
 
     def follow(self, border: Border | None) -> None:
         """Solve for the unknown of a border as well, or no more."""
-        if border is None:
-            self._c.border = ffi.NULL
-            return
-        t, handle = np.array([border.t]), self._equation.callbacks.handle
-        self._border = t, struct(
-            "border", t=t, arrive=lib.arrive_in_python, change=lib.change_of_border_in_python,
-            met=lib.border_is_met_in_python,
-        )  # fmt: skip
-        self._border[1].handle = handle(Bordered(self, border, t))
-        self._c.border = self._border[1]
+        self._c.border = ffi.NULL
+        if border is not None:
+            self._border, self._t = border, np.array([border.t])
+            self._border_in_c = struct(
+                "border", t=self._t, handle=self._c.handle, arrive=lib.arrive_in_python,
+                change=lib.change_along_in_python, met=lib.met_in_python,
+            )  # fmt: skip
+            self._c.border = self._border_in_c
 
-    def bordered_change(self, border: Border, x: Array) -> bool:
+    def arrive(self, x: Array) -> None:
+        """Let the border take note of an iterate."""
+        self._border.t = float(self._t[0])
+        self._border.arrive(x)
+
+    def met(self) -> bool:
+        """Return whether the equation of the border is met."""
+        return self._border.met()
+
+    def change_along(self, x: Array) -> bool:
         """Find the change of an iteration of the bordered equation; return whether that fails.
 
         By elimination of the border: one factorisation and two solutions, as the tangent alone is
         banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
         """
-        rate = self._rate
-        self._rates.fill(0.0)
-        border.tangent(x, self._rates)
+        border, (rate, rates), owned = self._border, self._rate, slice(self._share.num_owned)
+        rates.fill(0.0)
+        border.tangent(x, rates)
         if self._c.idle:
             entries, stiffnesses = self._idle.entries
             self._equation.A.data[entries] += stiffnesses
-        self._vectors.add_ghosts(rate)
-        self._rates[self._equation.held] = 0.0
-        owned = slice(self._share.num_owned)
+        if not self._share.alone:
+            rate.ghostUpdate(PETSc.InsertMode.ADD, PETSc.ScatterMode.REVERSE)
+        rates[self._equation.held] = 0.0
         if not self._factors.factor(self._r[owned]):
             return True
         y, z = np.zeros((2, len(x)))
         self._factors.solve(self._r[owned], y[owned], reduced=True)
-        good = self._factors.solve(self._rates[owned], z[owned], reduced=False)
+        good = self._factors.solve(rates[owned], z[owned], reduced=False)
         for found in (y, z):
             self.change[owned] = found[owned]
-            self._vectors.update_ghosts(self._y)
+            if not self._share.alone:
+                self._y.ghostUpdate(PETSc.InsertMode.INSERT, PETSc.ScatterMode.FORWARD)
             found[:] = self.change
         border.correct(y, z)
-        self.change[:] = y
+        self.change[:], self._t[0] = y, border.t
         return not good
 
     @cached_property
-    def _rate(self) -> PETSc.Vec:
-        return self._vectors.new()
-
-    @cached_property
-    def _rates(self) -> Array:
-        return self._vectors.view(self._rate, writable=True)
+    def _rate(self) -> tuple[PETSc.Vec, Array]:
+        return _vector(self._share)
 
     # -- what is known of it -------------------------------------------------------------------
 
@@ -274,22 +287,12 @@ class Solver:
         """Number of iterations so far."""
         return int(self._c.total)
 
-    @property
-    def unknowns(self) -> Array:
-        """The unknowns of SNES, which C writes to; local values."""
-        return self._q
-
     def iterate(self) -> Array:
         """Return the latest configuration, converged or not; local values, ghosts included."""
-        return self._q.copy()
-
-    def begin_steps_anew(self) -> None:
-        """Keep no tangent from step to step: a run that goes on from a checkpoint has none."""
-        self._c.anew = 1
+        return self.unknowns.copy()
 
     def remember(self, memory: Memory) -> None:
         """Pass on the number of iterations, and motions found to be idle."""
-        self._c.rate = math.inf  # the next tangent is a new one, here and there
         self._c.total = int(memory.number("iterations", self.iterations))
         if memory.number("idle motions are known", float(self._has_idle)):
             self._idle.remember(memory)
@@ -306,28 +309,6 @@ class Solver:
             one.destroy()
 
 
-class Bordered:
-    """Border of the equation as C calls it; ``t`` is its unknown there; (1,)."""
-
-    def __init__(self, solver: Solver, border: Border, t: Array) -> None:
-        self._solver, self._border, self._t = solver, border, t
-
-    def arrive(self, x: Array) -> None:
-        """Take note of an iterate."""
-        self._border.t = float(self._t[0])
-        self._border.arrive(x)
-
-    def change(self, x: Array) -> bool:
-        """Find the change of an iteration; return whether that fails."""
-        failed = self._solver.bordered_change(self._border, x)
-        self._t[0] = self._border.t
-        return failed
-
-    def met(self) -> bool:
-        """Return whether the equation of the border is met."""
-        return self._border.met()
-
-
 @from_c()
 def agree_in_python(handle: Any, number: int, how: Any, values: Any) -> None:
     """Callback of C, declared in c_library.py."""
@@ -335,46 +316,19 @@ def agree_in_python(handle: Any, number: int, how: Any, values: Any) -> None:
     solver.agree(how[0:number], np.frombuffer(ffi.buffer(values, 8 * number)))
 
 
-@from_c(1)
-def solve_in_python(handle: Any, anew: int) -> int:
-    """Callback of C, declared in c_library.py."""
-    return int(ffi.from_handle(handle)[1].solve(bool(anew)))
+def _let_c_call(method: str, error: int | None = None) -> None:
+    """Let C call a method of a solver, see c_library.py; its value if it raises is ``error``."""
+
+    @from_c(error, name=f"{method}_in_python")
+    def call(handle: Any, *given: Any) -> int | None:
+        callbacks, solver, _ = ffi.from_handle(handle)
+        vectors = (callbacks.lend(x) if isinstance(x, ffi.CData) else x for x in given)
+        found = getattr(solver, method)(*vectors)
+        return None if error is None else int(found)
 
 
-@from_c()
-def find_conjugates_in_python(handle: Any, q: Any) -> None:
-    """Callback of C, declared in c_library.py."""
-    callbacks, solver, _ = ffi.from_handle(handle)
-    solver.find_conjugates(callbacks.lend(q))
-
-
-@from_c(0)
-def find_idle_in_python(handle: Any) -> int:
-    """Callback of C, declared in c_library.py."""
-    return int(ffi.from_handle(handle)[1].find_idle())
-
-
-@from_c(0)
-def forget_idle_in_python(handle: Any) -> int:
-    """Callback of C, declared in c_library.py."""
-    return int(ffi.from_handle(handle)[1].forget_idle())
-
-
-@from_c()
-def arrive_in_python(handle: Any, x: Any) -> None:
-    """Callback of C, declared in c_library.py."""
-    callbacks, border, _ = ffi.from_handle(handle)
-    border.arrive(callbacks.lend(x))
-
-
-@from_c(1)
-def change_of_border_in_python(handle: Any, x: Any) -> int:
-    """Callback of C, declared in c_library.py."""
-    callbacks, border, _ = ffi.from_handle(handle)
-    return int(border.change(callbacks.lend(x)))
-
-
-@from_c(0)
-def border_is_met_in_python(handle: Any) -> int:
-    """Callback of C, declared in c_library.py."""
-    return int(ffi.from_handle(handle)[1].met())
+for _method, _error in {
+    "solve": 1, "find_conjugates": None, "find_idle": 0, "forget_idle": 0, "arrive": None,
+    "change_along": 1, "met": 0,
+}.items():  # fmt: skip
+    _let_c_call(_method, _error)

@@ -1,11 +1,18 @@
 # SPDX-License-Identifier: MIT
-"""Options of Newton's method."""
+"""Options of Newton's method, PETSc's among them, which are refused if PETSc has no use."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from difflib import get_close_matches
 from typing import Any
 
+from mpi4py import MPI
+from petsc4py import PETSc
+
+from ufl_beam.collective_errors import Agreement
+from ufl_beam.compiled.c_library import ffi, petsc
 from ufl_beam.errors import (
     SceneError,
     require_count,
@@ -27,9 +34,6 @@ class Newton:
     Args:
         rtol: Tolerance of the residual, as a part of the forces in the scene.
         max_iterations: Iterations before a step is cut.
-        modified: Keep the tangent, also from step to step, while residuals decrease fast enough.
-            This saves more with more cells; final residuals are closer to ``rtol``.  In statics,
-            and with a checkpoint, each step begins with a new one.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option PETSc's Newton method
             is used, otherwise an equivalent one in C, which is faster for few cells.  A
@@ -47,7 +51,6 @@ class Newton:
 
     rtol: float = 1e-10
     max_iterations: int = 30
-    modified: bool = False
     petsc: dict[str, Any] = field(default_factory=dict)
     reference: bool = False
 
@@ -57,7 +60,6 @@ class Newton:
         require_number(self.rtol, "Newton: rtol", positive=True)
         require_count(self.max_iterations, "Newton: max_iterations")
         object.__setattr__(self, "max_iterations", int(self.max_iterations))
-        require_switch(self.modified, "Newton: modified")
         require_kind(self.petsc, dict, "Newton: petsc")
         require_switch(self.reference, "Newton: reference")
         for option in self.petsc:
@@ -71,3 +73,114 @@ def require_plain(newton: Newton | None, what: str) -> None:
             f"Newton: reference=True does not go with {what}: the reference solver computes equal "
             "steps of simulate, on one process and without files; leave it out"
         )
+
+
+# -- options of PETSc ------------------------------------------------------------------------------
+
+WHILE_SOLVING = (
+    "snes_convergence_estimate", "snes_test_jacobian", "snes_test_jacobian_view", "snes_view",
+    "snes_view_pre", "snes_view_solution",
+)  # fmt: skip
+"""Options that PETSc asks for when it solves, and only then: of ``PETSC_OPTIONS`` alone."""
+
+USUAL = (
+    *WHILE_SOLVING, "ksp_atol", "ksp_converged_reason", "ksp_error_if_not_converged",
+    "ksp_gmres_restart", "ksp_max_it", "ksp_monitor", "ksp_monitor_true_residual", "ksp_rtol",
+    "ksp_type", "ksp_view", "pc_factor_mat_ordering_type", "pc_factor_mat_solver_type",
+    "pc_factor_shift_type", "pc_type", "snes_atol", "snes_converged_reason",
+    "snes_divergence_tolerance", "snes_error_if_not_converged", "snes_force_iteration",
+    "snes_lag_jacobian", "snes_lag_preconditioner", "snes_linesearch_damping",
+    "snes_linesearch_max_it", "snes_linesearch_minlambda", "snes_linesearch_monitor",
+    "snes_linesearch_order", "snes_linesearch_type", "snes_max_funcs", "snes_max_it",
+    "snes_monitor", "snes_monitor_residual", "snes_monitor_short", "snes_monitor_solution",
+    "snes_rtol", "snes_stol", "snes_type",
+)  # fmt: skip
+"""Options that a misspelt one may stand for; PETSc has no list of those that it knows."""
+
+
+def database() -> dict[str, Any]:
+    """Return the options of the solver in PETSc's database, without their prefix."""
+    options: dict[str, Any] = PETSc.Options(PREFIX).getAll()
+    return options
+
+
+def take_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
+    """Let a SNES, its KSP and PC take options; return those that none of them has asked for.
+
+    The database is afterwards as it was: other solvers have the same prefix.
+    """
+    options, before = PETSc.Options(PREFIX), database()
+    try:
+        for name in before:
+            del options[name]  # it may be known as used
+        for name, value in chosen.items():
+            options[name] = value
+        snes.setFromOptions()
+        # PETSc may have given those of before 3.24 their new names.
+        unused = [name for name in chosen if name in database() and not _used(name)]
+    finally:
+        for name in {**chosen, **database()}:
+            del options[name]
+        for name, value in before.items():
+            options[name] = value
+    for name in before.keys() - {*unused}:
+        options.hasName(name)  # or PETSc, at its end, would call it unused
+    return unused
+
+
+def _used(name: str) -> bool:
+    """Return whether PETSc has asked for an option, of which it may know more than one name."""
+    used = ffi.new("char[8]")  # a bool of whatever size
+    petsc("PetscOptionsUsed", ffi.NULL, ffi.new("char[]", (PREFIX + name).encode()), used)
+    return any(bytes(ffi.buffer(used)))
+
+
+def checked_newton(newton: Newton | None, comm: MPI.Intracomm) -> Newton:
+    """Return the options of Newton's method, or those by default; all processes call it."""
+    newton = Newton() if newton is None else newton
+    require_kind(newton, Newton, "newton")
+    Agreement(comm)(_require_known, newton)
+    return newton
+
+
+def _require_known(newton: Newton) -> None:
+    """Refuse options that PETSc would not use, before there is anything to solve.
+
+    Raises:
+        SceneError: An option of ``newton`` or of ``PETSC_OPTIONS`` has no effect, or PETSc refuses
+            its value.
+    """
+    given = database()
+    chosen = {**given, **newton.petsc}
+    if not chosen:
+        return
+    snes, ksp = PETSc.SNES().create(MPI.COMM_SELF), PETSc.KSP().create(MPI.COMM_SELF)
+    try:
+        for one in (snes, ksp):
+            one.setOptionsPrefix(PREFIX)
+        snes.setType("newtonls")
+        ksp.setType("preonly")
+        ksp.getPC().setType("python")
+        snes.setKSP(ksp)
+        unused = take_options(snes, chosen)
+    except PETSc.Error as error:
+        raise SceneError(f"PETSc refuses the options {_spelt(chosen)}: {error}") from None
+    finally:
+        snes.destroy()
+        ksp.destroy()
+    for name in unused:
+        if name in newton.petsc:
+            where = "Newton: petsc"
+        elif name in WHILE_SOLVING:
+            continue
+        else:
+            where = "PETSC_OPTIONS"
+        near = [PREFIX + other for other in get_close_matches(name, USUAL, n=3)]
+        hint = f"; did you mean {' or '.join(near)}?" if near else "; leave it out"
+        if name in WHILE_SOLVING:
+            hint = "; such options must stand in PETSC_OPTIONS"
+        raise SceneError(f"{where}: PETSc has no use for the option {PREFIX}{name}{hint}")
+
+
+def _spelt(chosen: Mapping[str, Any]) -> str:
+    return " ".join(f"-{PREFIX}{k}" + ("" if v is None else f" {v}") for k, v in chosen.items())

@@ -9,17 +9,38 @@ what several processes add to one degree of freedom is summed by the solver.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Callbacks, Phases
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
+
+
+class InCells(NamedTuple):
+    """Forces on the nodes of cells, as a term states them; see cell_forces.py.
+
+    Attributes:
+        form: Makes the form whose entries are the forces; those of its latest evaluation count.
+        kind: ``force_kind`` of loops.h.
+        order: Positions in ``share.cells`` of its cells.
+        vector: If the form is linear, and nothing else evaluates it: place of the address of the
+            vector that it is evaluated at.
+        factor: Factor of the forces.
+        q0: If the form depends on the configurations at both ends of the step alone: the first.
+    """
+
+    form: Callable[[], Any]
+    kind: int
+    order: Index
+    vector: Any = None
+    factor: float = 1.0
+    q0: Any = None
 
 
 class Term(ABC):
@@ -31,9 +52,11 @@ class Term(ABC):
     _A: Csr
     """Matrix that takes the tangent."""
 
-    @abstractmethod
+    _loops: tuple[Loop, Loop | None]
+
     def loops(self) -> tuple[Loop, Loop | None]:
         """Return C functions of residual and tangent, with their data."""
+        return self._loops
 
     @abstractmethod
     def phases(self, callbacks: Callbacks) -> Phases:

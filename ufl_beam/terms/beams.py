@@ -11,21 +11,20 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, ffi, lib, loop
+from ufl_beam.compiled.c_library import ffi, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel, mass_matrix
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia, with_half_tangents
+from ufl_beam.terms.base import InCells, Term
+from ufl_beam.terms.cells import Cells, OfForms, PredictedStrains
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
-from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Callbacks, Phases, entering
 from ufl_beam.terms.rates_in_c import RatesInC
-from ufl_beam.terms.static_tangents import StaticTangent
-from ufl_beam.terms.tangent_derivatives import Cells
 
 BEFORE = "velocity before"
 """Name of the velocities at the beginning of the last step, in what is saved."""
@@ -51,42 +50,58 @@ def elastic_forms(of: Element, scheme: Scheme) -> ElasticForms:
     return ElasticForms(virtual_work(r, w_e) * dx, stored, [lost] if scheme.alpha else [])
 
 
+@stated
+def _static_tangent(of: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function]:
+    """Tangent of elastic cells with given strains in its forces; these strains."""
+    q0, q1, C = of.q0, of.q1, of.stiffness
+    e0, e1, e = strain(q0, of.axis), strain(q1, of.axis), of.at_points(3)
+    w_e = scheme.virtual_strain(q0, q1, of.w, of.axis)
+    acting = partial(scheme.resultants, C, e0, constant=of.constant)
+    change = ufl.TrialFunction(of.space)
+    geometric = virtual_work(acting(e), ufl.derivative(w_e, q1, change))
+    material = virtual_work(ufl.derivative(acting(e1), q1, change), w_e)
+    return (geometric + material) * of.dx(1), e
+
+
 class ElasticBeams(OfForms, Cells):
-    """Resultants of elastic cells working on the virtual strains, P(12)."""
+    """Resultants of elastic cells working on the virtual strains, P(12).
+
+    In statics the tangent has the forces of the :class:`PredictedStrains`.
+    """
 
     kind, _entry = "beams", "numerical"
 
     def __init__(self, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger) -> None:
-        forms = elastic_forms(fields.element, scheme)
-        self._static = None if has_inertia(scheme) else StaticTangent(fields, scheme, A)
-        tangent = None if self._static is None else self._static.kernel
-        self.predicted = None if self._static is None else self._static.predicted
+        forms, q1, tangent = elastic_forms(fields.element, scheme), fields.element.q1, None
+        if not has_inertia(scheme):
+            form, e = _static_tangent(fields.element, scheme)
+            tangent, self.predicted = fields.hot_kernel(form, q1), PredictedStrains(fields)
+            tangent.place(A)
+            self._static = struct(
+                "static_tangent", predicted=self.predicted.c, tangent=tangent.cells,
+                at_e=tangent.position(e),
+            )  # fmt: skip
         super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
-        self._fields, self._work_form = fields, forms.work
-        self._stored = fields.hot_kernel(forms.stored, self._q1)
+        self._work_form, self._stored = forms.work, fields.hot_kernel(forms.stored, q1)
         self._stored.share(self._force)
         if tangent is not None:
             self._of_step.append(tangent)
+            self._loops = self._loops[0], loop("add_static_tangent", self._static)
 
     def in_cells(self) -> Sequence[InCells]:
         """The forces of the resultants, which both configurations of a step determine."""
-        return [InCells(lambda: self._force, lib.STRESS, self._order, q0=self._q0)]
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """C loops over the cells, of force and tangent."""
-        force, tangent = super().loops()
-        return force, self._static.loop() if self._static else tangent
+        return [InCells(lambda: self._force, lib.STRESS, self._fields.order, q0=self._q0)]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells."""
-        begin, accept = self._loops_of_step()
-        if self._static is not None:
-            begin.append(self._static.beginning())
+        begin, accept, *_ = super().phases(callbacks)
+        if self.predicted is not None:
+            begin = [*begin, loop("begin_static_tangent", self._static)]
         state = entering(self._stored, self._ledger.state.pointer("stored"))
         return Phases(begin, accept, [state], loop("change_of_form", state[1]))
 
 
-class Inertia(OfMatrix):
+class Inertia(Term):
     """Inertia of beams and point masses: a constant matrix, P(18).
 
     Attributes:
@@ -100,6 +115,7 @@ class Inertia(OfMatrix):
     ) -> None:
         rotations = with_half_tangents(scheme, fields.share.rotations())
         self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
+        self._loops = self._times.loops
         self._fields, self._ledger, self._A, self.scheme = fields, ledger, A, scheme
         self.rates = rates
         if rates.slips:

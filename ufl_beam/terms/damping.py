@@ -19,21 +19,21 @@ from ufl_beam.discretization.function_spaces import (
     Element,
     Fields,
     Strains,
+    applied,
     mass_kernel,
     mass_matrix,
 )
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
-from ufl_beam.mechanics.decaying_midpoint import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import Scheme, with_half_tangents
 from ufl_beam.model.damping import KelvinVoigt, Rayleigh
-from ufl_beam.terms.base import Term
+from ufl_beam.terms.base import InCells, Term
+from ufl_beam.terms.cells import OfForms
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.forms_and_matrices import OfForms, OfMatrix
-from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Callbacks, Phases, knowing
 from ufl_beam.terms.rates_in_c import RatesInC
 
@@ -69,7 +69,7 @@ class KelvinVoigtForces(OfForms):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells; the step is a number of the forms."""
-        begin, accept = self._loops_of_step()
+        begin, accept, *_ = super().phases(callbacks)
         c = struct(
             "viscous_forms", **knowing(self._of_step, self._rate), of_cell=len(self._rate.x.array),
             time=self._time, dt=self._dt,
@@ -79,38 +79,27 @@ class KelvinVoigtForces(OfForms):
 
 @stated
 def _reference_stiffness(of: Element) -> ufl.Form:
-    e, w_e = (virtual_strain(of.q1, w, of.axis) for w in (ufl.TrialFunction(of.space), of.w))
-    return virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
-
-
-@stated
-def _stiffness_times(of: Element) -> ufl.Form:
-    """The reference stiffness times a vector, the unknown q1."""
     rest = of.configuration()
-    e, w_e = (virtual_strain(rest, w, of.axis) for w in (of.q1, of.w))
+    e, w_e = (virtual_strain(rest, w, of.axis) for w in (ufl.TrialFunction(of.space), of.w))
     return virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
 
 
-class RayleighForces(OfMatrix):
+class RayleighForces(Term):
     """A constant matrix times the velocity of the step, P(92)."""
 
     kind = "damping"
 
     def __init__(
-        self,
-        damping: Rayleigh,
-        fields: Fields,
-        scheme: Scheme,
-        A: Csr,
-        ledger: Ledger,
+        self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
         rates: RatesInC,
-    ) -> None:
+    ) -> None:  # fmt: skip
         self._damping, self._fields = damping, fields
         C, M = fields.matrix(), mass_matrix(fields)
         K = fields.assembled(_reference_stiffness(fields.element))
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
         rotations = with_half_tangents(scheme, fields.share.rotations())
         self._times = StepProduct(C, rotations, A, fields.share.scratch)
+        self._loops = self._times.loops
         self._ledger, self._rates, self._A = ledger, rates, A
 
     def in_cells(self) -> Sequence[InCells]:
@@ -119,7 +108,7 @@ class RayleighForces(OfMatrix):
         at = fields.order, self._times.rate
 
         def stiffness() -> Kernel:
-            return fields.hot_kernel(_stiffness_times(of), of.q1)
+            return fields.hot_kernel(applied(_reference_stiffness(of), of.q1), of.q1)
 
         return [
             InCells(stiffness, lib.STRESS, *at, damping.stiffness),
@@ -180,14 +169,13 @@ class SecondDifferences(OfForms):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells and their strains."""
-        begin, accept = self._loops_of_step()
+        begin, accept, *_ = super().phases(callbacks)
         c = struct(
             "second_differences", strains=self._strains.kernel.cells, weight=self._strains.weights,
             of_cell=len(self._strains.weights), **knowing(self._of_step, self._before), e=self._e,
             change=self._change, space=np.zeros(self._e.shape), last_dt=self._last_dt,
         )  # fmt: skip
         before, after = (loop(f"{name}_second_differences", c) for name in ("begin", "accept"))
-
         return Phases([*begin, before], [*accept, after])
 
     def start(self, q: Array) -> None:

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Mapping, MutableMapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,7 +23,7 @@ NOTHING_HELD = 1e-3
 """Part of the works up to which what the scene held and lost shows that they were round-off."""
 
 
-class Account(MutableMapping[str, float]):
+class Account(Mapping[str, float]):
     """Entries of one part of the ledger by name; those that were never written are zero.
 
     Their numbers are in one array, in the order in which the names came, so that C may add to them.
@@ -47,9 +47,6 @@ class Account(MutableMapping[str, float]):
                 raise RuntimeError(f"the entry {name!r} comes after C has learnt where all are")
             self.numbers = np.append(self.numbers, np.zeros(at))
         self.numbers[at] = value
-
-    def __delitem__(self, name: str) -> None:
-        raise TypeError(f"the entry {name!r} of a ledger stays")
 
     def __contains__(self, name: object) -> bool:
         return name in self._at

@@ -14,19 +14,20 @@ from ufl_beam.compiled.c_library import Loop, doubles, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.fibres import Layout
+from ufl_beam.terms.base import InCells
+from ufl_beam.terms.cells import Cells, PredictedStrains
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.openings import SearchFlags
 from ufl_beam.terms.phases import Callbacks, Phases, beginning
-from ufl_beam.terms.static_tangents import PredictedStrains
-from ufl_beam.terms.tangent_derivatives import Cells
 
 KEPT_WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
 """Factors of :attr:`Points.kept` where its jump is a crack of one fibre, and no hinge."""
@@ -100,6 +101,8 @@ class InelasticBeams(Cells):
             forces, last_b, last_D = np.zeros((3, len(lengths), 9))
             of_tangent = {"forces": forces, "last_b": last_b, "last_D": last_D}
             fill(self._in_c, predicted=self.predicted.c, **of_tangent)
+        names = "add_inelastic_force", "add_inelastic_tangent"
+        self._loops = loop(names[0], self._in_c), loop(names[1], self._in_c)
 
     # -- in C ----------------------------------------------------------------------------------
 
@@ -107,17 +110,12 @@ class InelasticBeams(Cells):
         """C function of :meth:`missed`."""
         return loop("missed_by_points", self._in_c) if self.points.c.line else None
 
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """The points, and two forms."""
-        c = self._in_c
-        return loop("add_inelastic_force", c), loop("add_inelastic_tangent", c)
-
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the points."""
         c = struct("inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger))
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
         if self.predicted is not None:
-            begin.append(self.predicted.beginning())
+            begin.append(self.predicted.beginning)
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
         opens = {"cells": self._in_c} if self.points.softens else None
         change = loop("change_of_points", c)
@@ -132,17 +130,9 @@ class InelasticBeams(Cells):
         self.points.start(strains)
         self.points.refresh(strains)
 
-    def _respond(self, q1: Array) -> None:
-        """Let the points answer the strains at ``q1``."""
-        lib.respond_at(self._in_c, doubles(q1))
-
-    def _forget(self) -> None:
-        """Forget the latest response: the points would answer otherwise now."""
-        self._latest.fill(np.nan)
-
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
-        self._respond(q1)
+        lib.respond_at(self._in_c, doubles(q1))
         grid = self._fields.share.grid
         self.points.require_dissipation(lambda cell: grid.describe_cell(self._cells[cell]))
 
@@ -152,14 +142,14 @@ class InelasticBeams(Cells):
 
     def dissipation(self, q1: Array) -> float:
         """Energy that cells of this process dissipate in the step to ``q1``; J."""
-        self._respond(q1)
+        lib.respond_at(self._in_c, doubles(q1))
         return self.points.dissipation()
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         """Resultants around ``q1`` and their derivatives; points go on as they answer."""
         strains = self._strains(q1)
         r, D = self.points.respond(strains)
-        self._forget()
+        self._latest.fill(np.nan)  # the points would answer otherwise now
         around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         return {self._b: around, self._D: D}
 
@@ -176,26 +166,32 @@ class InelasticBeams(Cells):
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore the internal variables."""
-        self.restore(self._cells, memory.rows("cells", *self.state()))
-
-    # -- what solutions keep -------------------------------------------------------------------
+        self.points.restore(memory.rows("cells", self._cells, self.points.state()))
 
     def kept(self) -> tuple[Index, Array]:
         """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6); a view."""
         kept = self.points.kept
-        return self._cells, kept if self._hinges else kept * self.kept_factors
+        return self._cells, kept if self._hinges else kept * KEPT_WITHOUT_JUMP
 
     @property
     def kept_factors(self) -> Array:
         """Factors of :attr:`Points.kept` in what :meth:`kept` returns; (6,)."""
         return np.ones(6) if self._hinges else KEPT_WITHOUT_JUMP
 
-    def state(self) -> tuple[Index, Array]:
-        """Cells (numbers of the grid), and their internal variables; (num_cells, k)."""
-        return self._cells, self.points.state()
 
-    def restore(self, cells: Index, rows: Array) -> None:
-        """Take over internal variables, of those cells that are here too."""
-        _, here, there = np.intersect1d(self._cells, cells, return_indices=True)
-        if len(here):
-            self.points.restore(here, rows[there])
+def inelastic_cells(share: Share) -> list[tuple[Layout, Index]]:
+    """Layouts of material points, and the cells (numbers of the grid) that have them."""
+    grid, groups = share.grid, dict[Layout, list[int]]()
+    sections, of_beam = grid.sections
+    for number, section in enumerate(sections):
+        layout = section.layout(section.hinge)
+        if layout is not None and not layout.elastic:
+            if grid.mesh.degree > 1:
+                beam = grid.scene.beams[int(np.argmax(of_beam == number))]
+                raise SceneError(
+                    f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
+                    "may yield or break; use degree=1 with more cells, or an elastic section"
+                )
+            groups.setdefault(layout, []).append(number)
+    of_cell = of_beam[grid.beam_of_cell]
+    return [(layout, np.flatnonzero(np.isin(of_cell, one))) for layout, one in groups.items()]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Loads: what all kinds have in common, and centrifugal and Coriolis forces."""
+"""Loads: dead loads, follower loads, centrifugal and Coriolis forces."""
 
 from __future__ import annotations
 
@@ -12,28 +12,38 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel, mass_matrix
+from ufl_beam.discretization.function_spaces import (
+    Element,
+    Fields,
+    lumps,
+    mass_kernel,
+    mass_matrix,
+)
+from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.terms.base import Term
+from ufl_beam.model.bodies import carries
+from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
+from ufl_beam.model.time_functions import TimeFunction, value_at
+from ufl_beam.terms.base import InCells, Term
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.phases import Callbacks, Phases
 
 
 class LoadTerm(Term):
-    """Forces that time or the configuration gives."""
+    """Forces that time or the configuration gives.
+
+    Attributes:
+        vector: ``vector`` of loops.h: forces whose size is part of the scale of convergence.
+    """
 
     kind = "loads"
-
     vector: Any
-    """``vector`` of loops.h: forces whose size is part of the scale of convergence."""
 
     def __init__(self, scheme: Scheme, ledger: Ledger) -> None:
         self._scheme, self._ledger = scheme, ledger
@@ -49,21 +59,198 @@ class LoadTerm(Term):
         """Save the forces of the last step that :meth:`carry_on` could not find again."""
 
 
+class _AtDofs(LoadTerm):
+    """Loads at some degrees of freedom, whose sizes are functions of time.
+
+    Attributes:
+        dofs: Local degrees of freedom that are loaded; forces are at these alone.
+    """
+
+    _forces: Array  # rows of forces: the first is that of the equation
+
+    def _load(self, share: Share, loaded: Array, owners: Sequence[Load], rows: int) -> None:
+        """Make ``dofs`` of those that are not zero in ``loaded``, on any process, and forces."""
+        # A process may own degrees of freedom that others load.
+        self.dofs: Index = np.flatnonzero(share.added(loaded)).astype(np.int32)
+        self._size, self._owners = share.size, owners
+        self._forces = np.zeros((rows, len(self.dofs)))
+        self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
+
+    def _in_time(self) -> list[tuple[TimeFunction, object]]:
+        return [(load.time, load) for load in self._owners]
+
+    def _factors_at(self, t: float) -> Array:
+        return np.array([value_at(load.time, t, load) for load in self._owners])
+
+    def _whole(self, forces: Array) -> Array:
+        """Forces at all local degrees of freedom, from those that are loaded."""
+        whole: Array = np.zeros(self._size)
+        whole[self.dofs] = forces
+        return whole
+
+
+class DeadLoads(_AtDofs):
+    """Forces and moments that keep their direction: vectors times functions of time."""
+
+    def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
+        super().__init__(scheme, ledger)
+        # Loads of one time function are one vector, which belongs to the first of them for
+        # messages; functions need not be hashable.
+        vectors: dict[int, tuple[Load, Array]] = {}
+        in_cells: dict[int, Array] = {}
+        for load in loads:
+            key = id(load.time)
+            _, vector = vectors.setdefault(key, (load, np.zeros(share.size)))
+            if (along := _add_forces(load, share, vector)) is not None:
+                in_cells[key] = in_cells.get(key, 0.0) + along
+        for key, along in in_cells.items():
+            np.add.at(vectors[key][1], share.cell_dofs, along)
+        owners, whole = zip(*vectors.values(), strict=True)
+        # Forces in the equation, at the end of the step, and at that of the last one.
+        self._load(share, np.any(whole, axis=0) * 1.0, owners, rows=3)
+        self._vectors = [vector[self.dofs] for vector in whole]
+        # Parts of the vectors that act: now, at the end of the step, at that of the last one, and
+        # in its equation.
+        self._parts: Array = np.zeros((4, len(vectors)))
+        self._along = [in_cells.get(key) for key in vectors]
+        self._loops = loop("subtract_vector", self.vector), None
+
+    def loads_in_cells(self) -> Any:
+        """``loads_in_cells`` of loops.h; null if nothing acts along beams."""
+        if not any(along is not None for along in self._along):
+            return ffi.NULL
+        along = [ffi.NULL if one is None else doubles(one) for one in self._along]
+        c = struct(
+            "loads_in_cells", vectors=len(along), vector=ffi.new("double *[]", along),
+            latest=self._parts[0], accepted=self._parts[3],
+        )  # fmt: skip
+        return ffi.gc(c, lambda _, kept=(c, along): None)  # solutions outlive the term
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops over the vectors."""
+        number = len(self._vectors)
+        c = self._c = struct(
+            "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=number,
+            force=self._forces[0], end=self._forces[1], before=self._forces[2],
+            parts=[doubles(part) for part in self._parts[:3]],
+            factors=np.full(number, math.nan), factor=callbacks.of_time(self._in_time()),
+            vector=ffi.new("double *[]", [doubles(vector) for vector in self._vectors]),
+            work=self._ledger.supplied.pointer("loads"),
+            weight_of_before=self._scheme.weight_of_before,
+        )  # fmt: skip
+        return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
+
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
+        self._parts[:3] = factors = self._factors_at(t)
+        self._forces[:] = sum(f * vector for f, vector in zip(factors, self._vectors, strict=True))
+        return self._whole(self._forces[0])
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces at the end of the last step."""
+        self._forces[:] = memory.added("dead loads", self._whole(self._forces[2]))[self.dofs]
+        for k, part in enumerate(self._parts[2]):
+            self._c.factors[k] = math.nan
+            self._parts[2, k] = memory.number(f"part of dead loads {k}", part)
+
+
+def _add_forces(load: Load, share: Share, forces: Array) -> Array | None:
+    """Add what a dead load of factor one exerts at places, consistent with displacements.
+
+    Returns:
+        What it exerts on the nodes of the cells, (num_cells, dofs of a cell); None if nothing.
+    """
+    grid, per_beam, at_places = share.grid, None, []
+    if isinstance(load, PointLoad):
+        at_places = [(load.place, (*load.force, load.moment))]
+    elif isinstance(load, LineLoad):
+        here = [beam is load.beam for beam in grid.scene.beams]
+        per_beam = np.outer(here, [*load.force, load.moment])
+    elif isinstance(load, Gravity):
+        g_x, g_y = load.acceleration
+        at_places = [(at, (mass * g_x, mass * g_y, 0.0)) for at, mass, _ in lumps(grid.scene)]
+        per_beam = np.outer([beam.section.rhoA for beam in grid.scene.beams], [g_x, g_y, 0.0])
+    else:
+        raise TypeError(f"{type(load).__name__} is not a dead load")
+    for place, force in at_places:
+        if carries(place):  # else Scene.links has connectors for it
+            dofs = share.at(place)
+            mine = share.owns(dofs)
+            forces[share.local(dofs[mine])] += np.array(force)[mine]
+    if per_beam is None:
+        return None
+    loads = per_beam[grid.beam_of_cell[share.cells]] * share.cell_lengths()[:, None]
+    first, *between, last = grid.mesh.parts
+    return np.kron(loads, [first, last, *between])
+
+
+class FollowerLoads(_AtDofs):
+    """Forces that turn with the cross-section they act on."""
+
+    def __init__(
+        self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
+    ) -> None:
+        super().__init__(scheme, ledger)
+        here = [i for i, load in enumerate(loads) if share.computes(load.place)]
+        owners = [loads[i] for i in here]
+        self._numbers: Index = np.array(here, dtype=np.int64)
+        places = [share.local(share.at(load.place)) for load in owners]
+        dofs = np.array(places, dtype=np.int32).reshape(-1, 3)
+        x, y, self._turning = np.ascontiguousarray(dofs.T)
+        loaded: Array = np.zeros(share.size)
+        loaded[dofs] = 1.0
+        # Forces in the latest residual, and in that of the last step.
+        self._load(share, loaded, owners, rows=2)
+        given = [[*load.force, load.moment] for load in owners]
+        self._given = np.array(given, dtype=np.float64).reshape(-1, 3)
+        # In the equation, at the end of the step, and at that of the last one.
+        self._sizes = np.zeros((3, *self._given.shape))
+        self._turns, self._A = np.zeros(len(here)), A
+        self._c = struct(
+            "follower_loads", number=len(here), size=len(self.dofs), dof=self.dofs,
+            at=np.searchsorted(self.dofs, dofs).astype(np.int32), given=self._given,
+            turning=self._turning, turn0=self._turns, part=scheme.load_weight,
+            now=self._sizes[0], end=self._sizes[1], before=self._sizes[2],
+            x=A.positions(x, self._turning), y=A.positions(y, self._turning),
+            force=self._forces[0], force_before=self._forces[1],
+            weight_of_before=scheme.weight_of_before,
+        )  # fmt: skip
+        tangent = loop("add_tangent_of_follower_loads", self._c)
+        self._loops = loop("subtract_follower_loads", self._c), tangent
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops over the loads."""
+        c = fill(self._c, factor=callbacks.of_time(self._in_time()))
+        c.work = self._ledger.supplied.pointer("loads")
+        return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
+
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
+        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
+        self._sizes[:] = self._given * self._factors_at(t).reshape(-1, 1)
+        self._turns[:] = q[self._turning]
+        self.add_residual(q, np.zeros(self._size))
+        self._forces[1] = self._forces[0]
+        return self._whole(self._forces[0])
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The forces in the equation of the last step, and their sizes."""
+        self._forces[:] = memory.added("follower loads", self._whole(self._forces[1]))[self.dofs]
+        self._sizes[:] = memory.rows("follower loads", self._numbers, self._sizes[2])
+
+
 @stated
 def _turned_mass(of: Element) -> ufl.Form:
     (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
     return of.inertia[0] * ufl.dot(turn(u), w_u) * of.dx_of_mass()
 
 
-def turned_mass_matrix(fields: Fields) -> Csr:
+def _turned_mass_matrix(fields: Fields) -> Csr:
     """Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force."""
     share, G = fields.share, fields.assembled(_turned_mass(fields.element))
-    scene = share.grid.scene
-    lumps = [(share.at(one.place), one.mass) for one in scene.masses]
-    lumps += [(share.at(one.middle), one.mass) for one in scene.bodies]
-    for dofs, mass in lumps:
-        if share.owns(dofs[:2]).all():
-            u, v = share.local(dofs[:2])
+    for place, mass, _ in lumps(share.grid.scene):
+        dofs = share.at(place)[:2]
+        if share.owns(dofs).all():
+            u, v = share.local(dofs)
             G.data[G.positions(np.array([u, v]), np.array([v, u]))] += (-mass, mass)
     return G
 
@@ -79,7 +266,7 @@ class FrameForces(LoadTerm):
     ) -> None:
         share = fields.share
         super().__init__(scheme, ledger)
-        S, G = mass_matrix(fields), turned_mass_matrix(fields)
+        S, G = mass_matrix(fields), _turned_mass_matrix(fields)
         coriolis = 2 * frame.rate if has_inertia(scheme) else 0.0
         S.data[np.isin(S.rows(), share.rotations())] = 0.0
         S.data *= frame.rate**2
@@ -89,7 +276,7 @@ class FrameForces(LoadTerm):
         change, place, space, self._force, self._before, rest = np.zeros((6, share.size))
         self._accelerations = rest, ffi.new("double *[1]", [doubles(rest)])
         self.vector = struct("vector", size=share.size, values=self._force)
-        self._c = struct(
+        c = self._c = struct(
             "rotating_frame", size=share.size, entries=len(A.data), places=len(x), x=x, y=y,
             pull=self._matrices[0].c, turn=self._matrices[1].c, pulls=S.data, turns=G.data,
             from_centre=_positions(fields, frame.about), rate=frame.rate, coriolis=coriolis,
@@ -97,10 +284,7 @@ class FrameForces(LoadTerm):
             place=place, space=space, force=self._force, before=self._before,
             accelerations=self._accelerations[1],
         )  # fmt: skip
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """C loops of both forces, and of their derivatives."""
-        return loop("subtract_frame_forces", self._c), loop("add_tangent_of_frame", self._c)
+        self._loops = loop("subtract_frame_forces", c), loop("add_tangent_of_frame", c)
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the degrees of freedom."""

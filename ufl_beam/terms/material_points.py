@@ -17,7 +17,7 @@ import ufl
 from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import StepFailed
@@ -370,27 +370,8 @@ class Points:
 
     # -- the ledger ----------------------------------------------------------------------------
 
-    def enter_losses(self, ledger: Ledger) -> None:
-        """Enter what the last step dissipated."""
-        plastic, broken, lost, _, _, released, _ = self.sums.tolist()
-        if self._yields:
-            ledger.lost["plastic"] += plastic
-        if self.softens:
-            ledger.lost["hinges"] += broken
-        if self._alpha:
-            ledger.lost["numerical"] += 2 * self._alpha * lost
-        if self._releases:
-            ledger.lost["numerical"] += released
-
-    def enter_stored(self, ledger: Ledger) -> None:
-        """Enter what the accepted state stores."""
-        _, _, _, elastic, hardening, *_ = self.sums.tolist()
-        ledger.state["stored"] += elastic
-        if self._yields:
-            ledger.state["hardening"] += hardening
-
     def in_steps(self, ledger: Ledger) -> dict[str, Any]:
-        """Fields of ``inelastic_term`` of loops.h, with the entries of both methods above.
+        """Fields of ``inelastic_term`` of loops.h, with entries of the ledger.
 
         In statics a copy as well, which tells what a step would change.
         """
@@ -413,16 +394,16 @@ class Points:
         stored[:1] = self.sums[3:5]  # of all cells together; to whom it belongs does not matter
         return np.hstack([*(self[name] for name in self._kept), self.kept, self._e0, stored])
 
-    def restore(self, cells: Index, rows: Array) -> None:
-        """Take over :meth:`state` in some of the cells.
+    def restore(self, rows: Array) -> None:
+        """Take over :meth:`state`.
 
         Call :meth:`start` and :meth:`refresh` where strains or laws are not those it is of.
         """
         ends = np.arange(1, len(self._kept) + 1) * self._storage.shape[1]
         *variables, kept, e0, stored = np.split(rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
         for name, values in zip(self._kept, variables, strict=True):
-            self[name][cells] = values
-        self.kept[cells], self._e0[cells] = kept, e0
+            self[name][:] = values
+        self.kept[:], self._e0[:] = kept, e0
         self.sums[3:5] = stored.sum(axis=0)
 
     def refresh(self, strains: Array) -> None:

@@ -108,10 +108,6 @@ class Callbacks:
 
     # -- handles -----------------------------------------------------------------------------------
 
-    def copy(self, vector: Any) -> Array:
-        """Copy a vector of C."""
-        return np.frombuffer(ffi.buffer(vector, self._bytes)).copy()
-
     def lend(self, vector: Any) -> Array:
         """A vector of C, which C may change."""
         return np.frombuffer(ffi.buffer(vector, self._bytes))
@@ -135,10 +131,12 @@ def _note(kind: type, error: BaseException, traceback: Any) -> None:
         np.frombuffer(ffi.buffer(arguments["out"], 8 * size)).fill(math.nan)
 
 
-def from_c(error: float | None = None) -> Callable[[Callable[..., Any]], Any]:
+def from_c(
+    error: float | None = None, name: str | None = None
+) -> Callable[[Callable[..., Any]], Any]:
     """Decorate a callback of C, declared in c_library.py; its value if it raises is ``error``."""
     more = {} if error is None else {"error": error}
-    declared: Any = ffi.def_extern(onerror=_note, **more)
+    declared: Any = ffi.def_extern(name=name, onerror=_note, **more)
     return declared  # type: ignore[no-any-return]
 
 
@@ -157,22 +155,13 @@ def time_in_python(handle: Any, t: float) -> float:
     return float(ffi.from_handle(handle)[1](t))
 
 
-@from_c()
-def run_in_python(handle: Any) -> None:
-    """Callback of C, declared in c_library.py."""
-    ffi.from_handle(handle)[1]()
+def call_in_python(handle: Any, *arguments: Any) -> None:
+    """Callbacks of C, declared in c_library.py."""
+    ffi.from_handle(handle)[1](*arguments)
 
 
-@from_c()
-def begin_in_python(handle: Any, t: float, dt: float) -> None:
-    """Callback of C, declared in c_library.py."""
-    ffi.from_handle(handle)[1](t, dt)
-
-
-@from_c()
-def phase_in_python(handle: Any, step: Any, q1: Any, s: Any) -> None:
-    """Callback of C, declared in c_library.py."""
-    ffi.from_handle(handle)[1](step, q1, s)
+for _name in ("run", "begin", "phase"):
+    from_c(name=f"{_name}_in_python")(call_in_python)
 
 
 def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:

@@ -66,7 +66,7 @@ class _Sprung(Response):
         return self.points.state()
 
     def restore(self, rows: Array) -> None:
-        self.points.restore(np.arange(len(rows)), rows)
+        self.points.restore(rows)
 
     def start(self, e: Array) -> None:
         self.points.start(self._at(e))

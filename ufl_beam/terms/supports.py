@@ -58,7 +58,7 @@ class Supports:
         is_held = np.zeros(A.size, dtype=bool)
         is_held[self.dofs] = True
         of_columns, of_rows = np.flatnonzero(is_held[A.indices]), A.entries_of(self.dofs)
-        self.entries = np.union1d(of_columns, of_rows), A.diagonal(self.dofs)
+        self.entries = np.union1d(of_columns, of_rows), A.positions(self.dofs, self.dofs)
         self.pivots: Array = np.ones(len(self.dofs))
         self._scheme, self._ledger = scheme, ledger
         # True if values depend on time anywhere in the scene

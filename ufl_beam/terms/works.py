@@ -4,8 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -14,7 +13,7 @@ import ufl
 from ufl.algorithms import expand_derivatives
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.c_library import ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields, element_of
@@ -25,8 +24,8 @@ from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.time_functions import Constant
 from ufl_beam.model.works import Potential, Work
+from ufl_beam.terms.base import InCells
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.in_cells import InCells
 from ufl_beam.terms.loads import LoadTerm
 from ufl_beam.terms.phases import Callbacks, Phases, entering
 
@@ -45,20 +44,22 @@ class Acting:
     ) -> None:
         self._work, self._stated, self._fields, self._A = work, stated, fields, A
         self._scheme, self.order = scheme, fields.order
-        self.tangent: Kernel | None = None
-        with _named(work):
-            self.residual = self._kernel(stated.residual)
-            if not stated.tangent.empty():
-                self.tangent = self._kernel(stated.tangent)
-                self.tangent.place(A)
-            energies = stated.energy, stated.lost
-            self._energy, self._lost = (form and self._kernel(form) for form in energies)
+        self._saved_as = f"work of {work.name}"
+        tangent = None if stated.tangent.empty() else stated.tangent
+        forms = stated.residual, tangent, stated.energy, stated.lost
+        try:
+            made: list[Any] = [
+                form and fields.hot_kernel(form, fields.element.q1) for form in forms
+            ]
+        except Exception as error:
+            raise SceneError(f"{work}: its form cannot be compiled: {shorten(error)}") from error
+        self.residual: Kernel = made[0]
+        self.tangent, self._energy, self._lost = made[1:]
+        if self.tangent is not None:
+            self.tangent.place(A)
         self._numbers: Array = np.full(len(stated.numbers), math.nan)
         # Forces of a virtual work in the equation of the last step.
         self._before = np.zeros(0 if self._energy else fields.share.size)
-
-    def _kernel(self, form: ufl.Form) -> Kernel:
-        return self._fields.hot_kernel(form, self._fields.element.q1)
 
     def in_c(self, ledger: Ledger, callbacks: Callbacks) -> Any:
         """Return ``user_work`` of loops.h, with entries of the ledger."""
@@ -83,10 +84,6 @@ class Acting:
             of_time=callbacks.of_time([(number, work) for number in given]), **entries,
         )  # fmt: skip
 
-    def form_of_forces(self) -> Kernel:
-        """The form of the residual."""
-        return self.residual
-
     def take(self, q: Array, past: Restoring | None) -> Array:
         """Take forces at ``q`` as those before the next step, or those that ``past`` knows."""
         force = np.zeros(len(q))
@@ -98,19 +95,15 @@ class Acting:
             self.remember(past)
         return self._before
 
-    def pass_on(self, memory: Saving) -> None:
-        """Save forces that depend on the motion of the last step, if their work is counted on."""
-        if self._work.takes_rates and self._scheme.weight_of_before:
-            self.remember(memory)
+    @property
+    def passes_on(self) -> bool:
+        """True if forces depend on the motion of the last step, and their work is counted on."""
+        return self._work.takes_rates and bool(self._scheme.weight_of_before)
 
     def remember(self, memory: Memory) -> None:
         """The forces of a virtual work in the equation of the last step."""
         if self._energy is None:
             self._before[:] = memory.added(self._saved_as, self._before)
-
-    @property
-    def _saved_as(self) -> str:
-        return f"work of {self._work.name}"
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
@@ -129,7 +122,7 @@ class Acting:
         form = expand_derivatives(ufl.derivative(self._stated.tangent, of.q1, u))
         if form.empty():
             return None, u
-        change = self._kernel(form)
+        change = self._fields.hot_kernel(form, of.q1)
         change.place(self._A)
         return change, u
 
@@ -137,15 +130,6 @@ class Acting:
 def _position(form: Kernel, function: fem.Function) -> int:
     """Where a form has the values of a function; -1 if it has none."""
     return form.position(function) if form.uses(function) else -1
-
-
-@contextmanager
-def _named(work: Work) -> Iterator[None]:
-    """Name the work whose form cannot be compiled."""
-    try:
-        yield
-    except Exception as error:
-        raise SceneError(f"{work}: its form cannot be compiled: {shorten(error)}") from error
 
 
 def _expect(work: Work, stated: Statement, ledger: Ledger) -> None:
@@ -191,11 +175,8 @@ class Works(LoadTerm):
         )  # fmt: skip
         tangents = [part.tangent for part in self._parts if part.tangent is not None]
         self._calls = [_calls([part.residual for part in self._parts]), _calls(tangents)]
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """C loops over the works."""
         force, tangent = (loop("add_calls", calls) for calls, _ in self._calls)
-        return force, tangent
+        self._loops = force, tangent
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the works."""
@@ -220,11 +201,15 @@ class Works(LoadTerm):
     def pass_on(self, memory: Saving) -> None:
         """Save the forces of works that depend on the motion of the last step."""
         for one in self._parts:
-            one.pass_on(memory)
+            if one.passes_on:
+                one.remember(memory)
 
     def in_cells(self) -> Sequence[InCells]:
         """The forces of each work."""
-        return [InCells(one.form_of_forces, lib.WORK, one.order) for one in self._parts]
+        return [
+            InCells(lambda of=one: of.residual, lib.WORK, one.order)  # type: ignore[misc]
+            for one in self._parts
+        ]
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The time and growth of the works, and their forces in the equation of the last step."""

@@ -9,12 +9,6 @@
 
 enum { FEW = 64 }; /* entries by which a front may grow for each pivot, so that it takes one more */
 
-static int compare(const void *a, const void *b)
-{
-  const int32_t x = *(const int32_t *)a, y = *(const int32_t *)b;
-  return (x > y) - (x < y);
-}
-
 /* Find the fronts of a matrix with a symmetric pattern whose first `eliminated` unknowns are to be.
  *
  * Front k has the pivots first[k]... to those of the next; its other unknowns, in order, are
@@ -50,7 +44,7 @@ int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32
       for (int k = begin[s]; k < begin[s + 1]; ++k)
         if (mark[rest[k]] != j) mark[rest[k]] = j, found[number++] = rest[k];
     }
-    qsort(found, number, sizeof *found, compare);
+    qsort(found, number, sizeof *found, in_order);
     const int pivots = count ? j - first[count - 1] : 0;
     const int before = count ? begin[count] - begin[count - 1] : 0;
     if (last && (number + 1 - before) * pivots <= FEW) {
@@ -200,14 +194,6 @@ static void subtract_dense(int rows, int columns, int depth, int stride, const d
     subtract_columns(2, rows, some, depth, stride, A, B + j, C + j);
   }
   if (j < columns) subtract_columns(1, rows, columns - j, depth, stride, A, B + j, C + j);
-}
-
-static void exchange_rows(int size, double *a, double *b)
-{
-  for (int j = 0; j < size; ++j) {
-    const double x = a[j];
-    a[j] = b[j], b[j] = x;
-  }
 }
 
 /* Eliminate the pivots of a front, rows exchanged among them; reciprocals of the pivots on the

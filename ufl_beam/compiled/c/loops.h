@@ -16,7 +16,9 @@ typedef struct {
   int number;
   const call *part;
 } calls;
-void add_calls(void *self, const double *q, double *out);
+part add_calls, add_cells, add_static_tangent, subtract_vector, subtract_follower_loads,
+  add_tangent_of_follower_loads, subtract_frame_forces, add_tangent_of_frame, add_step_force,
+  add_step_tangent, add_inelastic_force, add_inelastic_tangent;
 
 /* -- forms and constant matrices --------------------------------------------------------------- */
 
@@ -54,7 +56,7 @@ struct cells {
   double *each; /* entries of all cells in the latest evaluation, in batches; or none */
 };
 
-/* Strains whose forces the tangents of a static step have, see static_tangents.py. */
+/* Strains whose forces the tangents of a static step have, see PredictedStrains in cells.py. */
 typedef struct {
   const cells *strains;           /* linear about a configuration */
   int at_about;                   /* where they have it */
@@ -106,18 +108,9 @@ typedef struct {
 } step_product;
 
 void set_cells(const cells *c, const double *q, int at);
-void add_cells(void *self, const double *q, double *b);
 double value_of_cells(const cells *c, const double *q);
 void combine(int size, double a, const double *x, double b, const double *y, double *out);
 void predict_strains(predicted_strains *p, const double *q);
-void add_static_tangent(void *self, const double *q, double *tangent);
-void subtract_vector(void *self, const double *q, double *b);
-void subtract_follower_loads(void *self, const double *q, double *r);
-void add_tangent_of_follower_loads(void *self, const double *q, double *tangent);
-void subtract_frame_forces(void *self, const double *q, double *r);
-void add_tangent_of_frame(void *self, const double *q, double *tangent);
-void add_step_force(void *self, const double *q, double *r);
-void add_step_tangent(void *self, const double *q, double *tangent);
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
                  const int32_t *row, const int32_t *column, int32_t *found);
 int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int number, int of_cell,
@@ -345,8 +338,6 @@ double commit_couplings(const couplings *c, const double *q, double dt);
 void respond(points *p);
 void release(const points *p, double least);
 void respond_at(const inelastic *m, const double *q);
-void add_inelastic_force(void *self, const double *q, double *r);
-void add_inelastic_tangent(void *self, const double *q, double *tangent);
 double missed_by_points(void *self, const double *q, const double *r, double scale, double moved);
 int gives_energy(const points *p);
 void commit(points *p);
@@ -528,7 +519,7 @@ enum agreement { TOTAL, HYPOT, LARGEST };
 /* What a function of a user has raised: a failure of the step, or something else, which ends the run. */
 enum raised { NOTHING, STEP_FAILED, OTHER };
 
-/* Whose forces tangents of static steps have, see static_tangents.py: first those before the step, then
+/* Whose forces tangents of static steps have, see PredictedStrains in cells.py: first those before the step, then
  * those that the last iteration predicted, or those at the iterate; or always these. */
 enum tangents { PREDICTED, FIRST, EXACT };
 
@@ -585,10 +576,8 @@ typedef struct {
   int demands, demanding; /* demanding: whether there are any on any process */
   const demand *demand; /* of connectors and points */
   int32_t *switched;    /* a row of a connector is not about what it was in the tangent; see openings.py */
-  double last, best, last_scale;
-  int near, slow, patience, modified; /* near: the tangent is kept in the next iteration */
-  int anew;                           /* no tangent is kept from step to step */
-  double rate;                        /* of a modified Newton's method, by which residuals fall */
+  double last, best;                  /* residuals of the iterate before; least so far */
+  int near, slow, patience; /* near: the tangent is kept in the next iteration */
   int iterations, reason, total;      /* of the latest solution, and of all */
   int careful;           /* whether changes are searched along */
   int monitored;         /* PETSc's own method is asked for: by its options, or monitors */
@@ -628,7 +617,7 @@ int solve_tangent(const equation *e, int reduced);
 void find_motion(equation *e, const double *x);
 void find_round_off(const equation *e, const double *q, double *forces);
 void restart(const equation *e, enum tangents kind);
-int find_equilibrium(equation *e, const double *guess, int like_last);
+int find_equilibrium(equation *e, const double *guess);
 int snes_function(void *snes, void *x, void *f, void *self);
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self);
 int snes_newton(void *snes, void *x);
@@ -985,30 +974,11 @@ typedef struct {
   double begin_of_run, applied_by, applying_turn, short_part;
 } march;
 
-void begin_forms(void *self, const time_step *step, const double *q1, const double *s);
-void add_values(void *self, const time_step *step, const double *q1, const double *s);
-void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s);
-void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s);
-void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
-void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s);
-void begin_follower_loads(void *self, const time_step *step, const double *q1, const double *s);
-void accept_follower_loads(void *self, const time_step *step, const double *q1, const double *s);
-void begin_frame(void *self, const time_step *step, const double *q1, const double *s);
-void accept_frame(void *self, const time_step *step, const double *q1, const double *s);
-void begin_works(void *self, const time_step *step, const double *q1, const double *s);
-void accept_works(void *self, const time_step *step, const double *q1, const double *s);
-void add_energy_of_works(void *self, const time_step *step, const double *q1, const double *s);
-void begin_viscous_forms(void *self, const time_step *step, const double *q1, const double *s);
-void begin_second_differences(void *self, const time_step *step, const double *q1, const double *s);
-void accept_second_differences(void *self, const time_step *step, const double *q1, const double *s);
-void begin_inertia(void *self, const time_step *step, const double *q1, const double *s);
-void accept_inertia(void *self, const time_step *step, const double *q1, const double *s);
-void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s);
-void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s);
-void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s);
-void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s);
-void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s);
-void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s);
+phase begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
+  accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_frame, accept_frame, begin_works,
+  accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
+  accept_second_differences, begin_inertia, accept_inertia, add_kinetic_energy, begin_rayleigh,
+  accept_rayleigh, begin_inelastic, accept_inelastic, add_energy_of_points;
 void begin_couplings(void *self, const time_step *step, const double *q1, const double *s);
 void begin_couplings_again(void *self);
 void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);

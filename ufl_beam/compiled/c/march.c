@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Steps one after the other with no Python between them; see compiled_steps.py.
+/* Steps one after the other with no Python between them; see stepper.py.
  *
- * A step that fails leaves the state as it was, and Python takes it: it knows what else may help.
+ * A step that fails leaves the state as it was, and is taken in parts.
  */
 
 /* As numpy.interp has it. */
@@ -32,6 +32,16 @@ static double dot(int size, const double *x, const double *y)
 #pragma omp simd reduction(+ : sum)
   for (int i = 0; i < size; ++i) sum += x[i] * y[i];
   return sum;
+}
+
+/* Work of forces in a step s: of those in its equation, and with the weight a of those in the one before.
+ * The forces are at the degrees of freedom `dof`, or if that is none at all of them. */
+static double work_in_step(int size, const int32_t *dof, double a, const double *before, const double *force,
+                           const double *s)
+{
+  double work = 0;
+  for (int i = 0; i < size; ++i) work += (a * before[i] + (1 - a) * force[i]) * s[dof ? dof[i] : i];
+  return work;
 }
 
 /* -- phases of terms ---------------------------------------------------------------------------- */
@@ -141,10 +151,7 @@ void accept_dead_loads(void *self, const time_step *step, const double *q1, cons
   dead_loads *l = self;
   memcpy(l->parts[2], l->parts[1], l->vectors * sizeof *l->parts[2]);
   if (!l->acts) return;
-  const double a = l->weight_of_before;
-  double work = 0;
-  for (int i = 0; i < l->size; ++i) work += (a * l->before[i] + (1 - a) * l->force[i]) * s[l->dof[i]];
-  *l->work += work;
+  *l->work += work_in_step(l->size, l->dof, l->weight_of_before, l->before, l->force, s);
   memcpy(l->before, l->end, l->size * sizeof *l->end);
 }
 
@@ -164,11 +171,7 @@ void begin_follower_loads(void *self, const time_step *step, const double *q1, c
 void accept_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
 {
   const follower_loads *f = self;
-  const double a = f->weight_of_before;
-  double work = 0;
-  for (int i = 0; i < f->size; ++i)
-    work += (a * f->force_before[i] + (1 - a) * f->force[i]) * s[f->dof[i]];
-  *f->work += work;
+  *f->work += work_in_step(f->size, f->dof, f->weight_of_before, f->force_before, f->force, s);
   memcpy(f->force_before, f->force, f->size * sizeof *f->force);
   memcpy(f->before, f->end, 3 * (size_t)f->number * sizeof *f->end);
 }
@@ -184,10 +187,9 @@ void begin_frame(void *self, const time_step *step, const double *q1, const doub
 void accept_frame(void *self, const time_step *step, const double *q1, const double *s)
 {
   rotating_frame *f = self;
-  const double a = f->weight_of_before, out = -f->growth * (f->rate * f->rate), across = f->coriolis / f->dt;
-  double work = 0, *to = *f->accelerations;
-  for (int i = 0; i < f->size; ++i) work += (a * f->before[i] + (1 - a) * f->force[i]) * s[i];
-  *f->work += work;
+  const double out = -f->growth * (f->rate * f->rate), across = f->coriolis / f->dt;
+  double *to = *f->accelerations;
+  *f->work += work_in_step(f->size, 0, f->weight_of_before, f->before, f->force, s);
   memcpy(f->before, f->force, f->size * sizeof *f->force);
   f->grown = f->grown_at_end;
   for (int k = 0; k < f->places; ++k) {
@@ -317,9 +319,10 @@ int find_numbers(rates *r, double dt)
 }
 
 /* A row for the step and the rates: factor s - back v, v being a sum of rates or one of them. */
-static void set_product(const matrix_of_rates *m, const double *row)
+static void begin_product(const matrix_of_rates *m, const time_step *step, const double *row)
 {
   step_product *p = m->product;
+  p->q0 = step->q0;
   const rates *r = m->rates;
   int last = 0, some = 0;
   for (int j = 1; j < r->number; ++j)
@@ -333,8 +336,7 @@ static void set_product(const matrix_of_rates *m, const double *row)
 void begin_inertia(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  set_product(m, m->rates->now->inertia);
-  m->product->q0 = step->q0;
+  begin_product(m, step, m->rates->now->inertia);
 }
 
 void accept_inertia(void *self, const time_step *step, const double *q1, const double *s)
@@ -373,8 +375,7 @@ void add_kinetic_energy(void *self, const time_step *step, const double *q1, con
 void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
 {
   const matrix_of_rates *m = self;
-  set_product(m, m->rates->now->velocity);
-  m->product->q0 = step->q0;
+  begin_product(m, step, m->rates->now->velocity);
 }
 
 void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
@@ -719,20 +720,19 @@ static int solve(march *m, int hold)
 {
   equation *e = m->equation;
   const double t = e->border ? *e->border->t : 0;
-  const int like_last = m->rates && as_last(m->prediction, m->step.dt);
   e->loads = size_of_loads(m);
-  if (!m->opens) return find_equilibrium(e, m->guess, like_last) > 0;
+  if (!m->opens) return find_equilibrium(e, m->guess) > 0;
   int opened = 0;
   if (hold) {
     memset(e->search, 0, SEARCH_FLAGS * sizeof *e->search);
     e->search[HOLD] = 1;
-    int found = find_equilibrium(e, m->guess, like_last) > 0;
+    int found = find_equilibrium(e, m->guess) > 0;
     while (found) {
       const double excess = e->search[OVER] || e->agree ? over_processes(e, LARGEST, largest_excess(m)) : 0;
       if (excess == 0) break;
       open_places(m, pow(FALL, opened++) * excess - TIE);
       memcpy(m->found, e->unknowns, m->size * sizeof *m->found);
-      found = find_equilibrium(e, m->found, like_last) > 0;
+      found = find_equilibrium(e, m->found) > 0;
     }
     const int over = over_processes(e, LARGEST, e->search[OVER]) > 0;
     end_search(m, opened);
@@ -740,7 +740,7 @@ static int solve(march *m, int hold)
     if (!begin_terms(m)) return 0;
     if (e->border) *e->border->t = t;
   }
-  return find_equilibrium(e, m->guess, like_last) > 0;
+  return find_equilibrium(e, m->guess) > 0;
 }
 
 /* -- whether a step can be trusted ------------------------------------------------------------------ */
@@ -781,17 +781,15 @@ static int followed(march *m)
 {
   static_path *p = m->path;
   equation *e = m->equation;
-  const double a = p->weight_of_before;
   energy_change sum = {0};
-  double far = 0, work = 0, through = 0, round_off = 0;
+  double far = 0, through = 0, round_off = 0;
   for (int i = 0; i < m->size; ++i)
     if (!(fabs(m->s[i]) * p->per_far[i] <= far)) far = fabs(m->s[i]) * p->per_far[i];
   p->moves = over_processes(e, LARGEST, far);
   if (!(p->moves <= p->far)) return fails(m, LEAVES_MECHANISM);
   if (isinf(p->slack)) return 1;
   for (int k = 0; k < p->terms; ++k) p->change[k].of(p->change[k].self, m->x, &sum);
-  for (int i = 0; i < m->size; ++i)
-    work += (a * p->force[i] + (1 - a) * e->inner_force[i]) * m->s[i];
+  const double work = work_in_step(m->size, 0, p->weight_of_before, p->force, e->inner_force, m->s);
   find_motion(e, e->unknowns);
   find_round_off(e, e->unknowns, e->space);
   for (int i = 0; i < e->owned; ++i) round_off += fabs(e->space[i] * m->s[i]);

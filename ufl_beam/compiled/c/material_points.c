@@ -9,6 +9,14 @@ static void ask(kernel *tabulate, const double *w, int answers, double *e)
   CALL(tabulate, e, w, 0, unit_cell);
 }
 
+static inline void exchange_rows(int size, double *a, double *b)
+{
+  for (int j = 0; j < size; ++j) {
+    const double x = a[j];
+    a[j] = b[j], b[j] = x;
+  }
+}
+
 /* Solve A x = b for several b, the columns of B, which x replace; zero if A is singular. */
 static inline int solve_dense(int n, double *A, int columns, double *B)
 {
@@ -18,15 +26,9 @@ static inline int solve_dense(int n, double *A, int columns, double *B)
       if (fabs(A[n * i + k]) > fabs(A[n * pivot + k])) pivot = i;
     const double largest = A[n * pivot + k];
     if (!(fabs(largest) > 0 && fabs(largest) < INFINITY)) return 0;
-    for (int j = 0; j < n && pivot != k; ++j) {
-      double a = A[n * k + j];
-      A[n * k + j] = A[n * pivot + j];
-      A[n * pivot + j] = a;
-    }
-    for (int j = 0; j < columns && pivot != k; ++j) {
-      double b = B[columns * k + j];
-      B[columns * k + j] = B[columns * pivot + j];
-      B[columns * pivot + j] = b;
+    if (pivot != k) {
+      exchange_rows(n, A + n * k, A + n * pivot);
+      exchange_rows(columns, B + columns * k, B + columns * pivot);
     }
     for (int i = k + 1; i < n; ++i) {
       const double factor = A[n * i + k] / largest;
@@ -402,7 +404,7 @@ static void take_tangent(const inelastic *m)
 
 /* Forces for the tangent of a static step: first those before it, or of points that have lines those at
  * the extrapolated strains; then those that the latest tangent predicts for the strains that it
- * predicts; see static_tangents.py. Stiff points are no prediction. */
+ * predicts; see PredictedStrains in cells.py. Stiff points are no prediction. */
 static const double *predict_forces(const inelastic *m, const double *q)
 {
   const points *p = m->points;

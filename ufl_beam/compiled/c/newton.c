@@ -24,20 +24,16 @@ static double norm_of(const equation *e, const double *forces)
   return over_processes(e, HYPOT, norm(e->size, e->weight, forces));
 }
 
-/* Values of a vector of PETSc that other processes own; or what this one has for them, added there. */
-static int update_ghosts(const equation *e, void *v)
+static int exchange_ghosts(const equation *e, void *v, int mode, int way)
 {
   if (!e->agree) return 0;
-  const int error = petsc.VecGhostUpdateBegin(v, INSERT_VALUES, FORWARD);
-  return error ? error : petsc.VecGhostUpdateEnd(v, INSERT_VALUES, FORWARD);
+  const int error = petsc.VecGhostUpdateBegin(v, mode, way);
+  return error ? error : petsc.VecGhostUpdateEnd(v, mode, way);
 }
 
-static int add_ghosts(const equation *e, void *v)
-{
-  if (!e->agree) return 0;
-  const int error = petsc.VecGhostUpdateBegin(v, ADD_VALUES, REVERSE);
-  return error ? error : petsc.VecGhostUpdateEnd(v, ADD_VALUES, REVERSE);
-}
+/* Values of a vector of PETSc that other processes own; or what this one has for them, added there. */
+static int update_ghosts(const equation *e, void *v) { return exchange_ghosts(e, v, INSERT_VALUES, FORWARD); }
+static int add_ghosts(const equation *e, void *v) { return exchange_ghosts(e, v, ADD_VALUES, REVERSE); }
 
 /* What a function of a user has raised on any process, see enum raised; all know it then. */
 int raised_anywhere(equation *e) { return e->raised = (int)over_processes(e, LARGEST, e->raised); }
@@ -163,9 +159,6 @@ static void assemble(const equation *e, const double *x)
 
 /* -- convergence ------------------------------------------------------------------------------- */
 
-/* Iterations that a tangent may still cost if it is kept: making one costs as much as two. */
-enum { MORE = 3 };
-
 /* Part of the tolerance that is met by no luck, before the least number of iterations. */
 static const double SURE = 1e-4;
 
@@ -210,13 +203,6 @@ static int judge(equation *e, const double *q, int iteration, double residual, d
     /* With that tangent, the residual falls by twice the last factor; works are to come out as with a
      * new one, so it must be far enough. */
     e->near = !kept && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
-  }
-  if (e->modified) {
-    /* The residual goes on to fall as it did, if the tangent is kept; from step to step too. Where forces
-     * fade with it, as when all loads go, it is no nearer to a part of them. */
-    if (iteration > 0) e->rate = residual / e->last * fmax(1, e->last_scale / scale);
-    e->last_scale = scale;
-    e->near |= residual * pow(e->rate, MORE) <= wanted;
   }
   /* With the tangent of a row about a motion, one about a force would move the iterate by as many metres
    * as newtons are missing. */
@@ -268,16 +254,6 @@ static int verdict(equation *e, const double *x, int iteration)
     floor = 8 * norm_of(e, e->space);
   }
   return judge(e, x, iteration, now, scale, floor, of_all[3] > 0);
-}
-
-/* Before the first iterate; `like_last` says that a modified tangent may be that of the last step. A
- * checkpoint does not have that: runs with one begin each step anew, so that they go on bit for bit. */
-void begin_newton(equation *e, int patience, int like_last)
-{
-  e->last = e->best = INFINITY;
-  e->near = e->slow = 0;
-  e->patience = patience;
-  if (!like_last || e->anew) e->rate = INFINITY;
 }
 
 petsc_functions petsc;
@@ -430,49 +406,45 @@ int snes_newton(void *snes, void *x)
   return petsc.SNESSetConvergedReason(snes, e->reason);
 }
 
-/* Local values of a vector, ghosts included. */
-static int open_vector(const equation *e, void *v, void **local, double **values)
+/* Local values of a vector, ghosts included, to be read or to be written. */
+static int open_vector(const equation *e, void *v, void **local, double **values, int read)
 {
   *local = v;
   if (e->agree) TRY(petsc.VecGhostGetLocalForm(v, local));
-  return petsc.VecGetArray(*local, values);
+  return read ? petsc.VecGetArrayRead(*local, (const double **)values) : petsc.VecGetArray(*local, values);
 }
 
-static int close_vector(const equation *e, void *v, void **local, double **values)
+static int close_vector(const equation *e, void *v, void **local, double **values, int read)
 {
-  TRY(petsc.VecRestoreArray(*local, values));
+  TRY(read ? petsc.VecRestoreArrayRead(*local, (const double **)values)
+           : petsc.VecRestoreArray(*local, values));
   return e->agree ? petsc.VecGhostRestoreLocalForm(v, local) : 0;
 }
 
 int snes_function(void *snes, void *x, void *f, void *self)
 {
   equation *e = self;
-  void *local_f, *local_x = x;
-  double *r;
-  const double *q;
+  void *local_f, *local_x;
+  double *r, *q;
   TRY(update_ghosts(e, x));
-  if (e->agree) TRY(petsc.VecGhostGetLocalForm(x, &local_x));
-  TRY(petsc.VecGetArrayRead(local_x, &q));
-  TRY(open_vector(e, f, &local_f, &r));
+  TRY(open_vector(e, x, &local_x, &q, 1));
+  TRY(open_vector(e, f, &local_f, &r, 0));
   TRY(residual(e, q, r, f));
-  TRY(close_vector(e, f, &local_f, &r));
-  TRY(petsc.VecRestoreArrayRead(local_x, &q));
-  return e->agree ? petsc.VecGhostRestoreLocalForm(x, &local_x) : 0;
+  TRY(close_vector(e, f, &local_f, &r, 0));
+  return close_vector(e, x, &local_x, &q, 1);
 }
 
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self)
 {
   equation *e = self;
-  void *local_x = x;
-  const double *q;
+  void *local_x;
+  double *q;
   if (e->near) return 0;
   TRY(update_ghosts(e, x));
-  if (e->agree) TRY(petsc.VecGhostGetLocalForm(x, &local_x));
-  TRY(petsc.VecGetArrayRead(local_x, &q));
+  TRY(open_vector(e, x, &local_x, &q, 1));
   assemble(e, q);
   TRY(note_change(P));
-  TRY(petsc.VecRestoreArrayRead(local_x, &q));
-  return e->agree ? petsc.VecGhostRestoreLocalForm(x, &local_x) : 0;
+  return close_vector(e, x, &local_x, &q, 1);
 }
 
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason, void *self)
@@ -518,10 +490,12 @@ static void unlock(void *v)
 enum { SHORT_PATIENCE = 2, LONG_PATIENCE = 10, PATIENCE_ALONG = 12 };
 
 /* Iterate from the unknowns; the reason to end is the return value. */
-static int iterate(equation *e, int patience, int like_last, int careful)
+static int iterate(equation *e, int patience, int careful)
 {
   const int by_petsc = e->monitored && !e->border && !(careful && e->searches);
-  begin_newton(e, patience, like_last);
+  e->last = e->best = INFINITY;
+  e->near = e->slow = 0;
+  e->patience = patience;
   e->careful = careful && !by_petsc;
   const int error = by_petsc || !e->monitored ? petsc.SNESSolve(e->snes, 0, e->x) : newton(e, e->unknowns);
   e->total += e->iterations;
@@ -538,14 +512,14 @@ static int iterate(equation *e, int patience, int like_last, int careful)
 
 /* The same from a guess, with idle motions held if the tangent is singular; without any if that does not
  * help. */
-static int iterate_from(equation *e, const double *guess, int patience, enum tangents kind, int like_last)
+static int iterate_from(equation *e, const double *guess, int patience, enum tangents kind)
 {
   const double start = e->border ? *e->border->t : 0;
   enum { FRESH, HELD, FREE } motions = FRESH;
   for (;;) {
     if (e->border) *e->border->t = start;
     go_to(e, guess, kind);
-    const int reason = iterate(e, patience, motions == FRESH && like_last, 0);
+    const int reason = iterate(e, patience, 0);
     if (motions == FREE || reason > 0 || e->error || raised_anywhere(e) == OTHER) return reason;
     if (reason == SINGULAR && e->find_idle(e->handle)) motions = HELD;
     else if ((reason == SINGULAR || motions == HELD) && e->forget_idle(e->handle)) motions = FREE;
@@ -563,24 +537,24 @@ static int stiffen(equation *e, int stiff)
 }
 
 /* Find the unknowns at which the residual vanishes from a guess; the reason to end is the return value,
- * positive if they are found. `like_last` says that the tangent of the last solution does for this one. */
-int find_equilibrium(equation *e, const double *guess, int like_last)
+ * positive if they are found. */
+int find_equilibrium(equation *e, const double *guess)
 {
   e->error = 0;
-  if (e->border) return iterate_from(e, guess, PATIENCE_ALONG, FIRST, 0);
-  int reason = iterate_from(e, guess, SHORT_PATIENCE, PREDICTED, like_last);
+  if (e->border) return iterate_from(e, guess, PATIENCE_ALONG, FIRST);
+  int reason = iterate_from(e, guess, SHORT_PATIENCE, PREDICTED);
   if (reason == STALLED) {
     restart(e, EXACT);
-    reason = iterate(e, LONG_PATIENCE, 0, 1);
+    reason = iterate(e, LONG_PATIENCE, 1);
   }
   if (reason > 0 || e->error || raised_anywhere(e) == OTHER || !stiffen(e, 1)) return reason;
   /* Stiffer tangents come near, but slowly; then true ones. */
   go_to(e, guess, PREDICTED);
-  const int slow = iterate(e, LONG_PATIENCE, 0, 0);
+  const int slow = iterate(e, LONG_PATIENCE, 0);
   stiffen(e, 0);
   if (slow != TOO_MANY && slow <= 0) return slow;
   memcpy(e->aside, e->unknowns, e->size * sizeof *e->aside);
-  const int exact = iterate(e, SHORT_PATIENCE, 0, 0);
+  const int exact = iterate(e, SHORT_PATIENCE, 0);
   if (exact > 0) return exact;
   go_to(e, e->aside, PREDICTED);
   return slow;
