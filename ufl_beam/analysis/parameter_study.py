@@ -19,11 +19,9 @@ from mpi4py import MPI
 from mpi4py.futures import MPICommExecutor
 
 from ufl_beam.analysis.study_file import Outcome, Study, numbers_of, text_of
-from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_sequence, require_switch, shorten
 from ufl_beam.output.output_files import part_of, require_apart, require_path, take
-from ufl_beam.parallel import alone, communicator, say
-from ufl_beam.progress_bar import progress_bar
+from ufl_beam.parallel import alone, communicator, on_first, progress_bar, say
 
 Case = dict[str, Any]
 Member = Callable[..., dict[str, Any]]

@@ -15,6 +15,7 @@ from ufl_beam.analysis.critical_points import Branch, CriticalPoint
 from ufl_beam.analysis.path_corrector import Control
 from ufl_beam.analysis.path_stepper import PathStepper
 from ufl_beam.arrays import Array
+from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
     SceneError,
     StepFailed,
@@ -31,9 +32,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import Content, above, below, require_arrays
 from ufl_beam.output.recorders import Recorder, recorders_of
-from ufl_beam.parallel import communicator
-from ufl_beam.parameter import FACTOR
-from ufl_beam.progress_bar import progress_bar
+from ufl_beam.parallel import communicator, progress_bar
 from ufl_beam.simulation.run import running
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution

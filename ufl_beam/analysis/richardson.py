@@ -16,7 +16,7 @@ import numpy as np
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
-from ufl_beam.one_line import one_line
+from ufl_beam.display import one_line
 
 Numbers = TypeVar("Numbers", float, Array)
 Level = tuple[int, int]  # of the cells and of the steps

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.display import Rich
 from ufl_beam.errors import SceneError, require_kind
 from ufl_beam.output.archive import above, below, decoding, plain, read, require_arrays, write
 from ufl_beam.output.output_files import require_path
-from ufl_beam.rich_display import Rich
 
 Outcome = dict[str, Array] | str  # result of a member, or the reason of its failure
 

@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ufl_beam.display import Rich, counted
 from ufl_beam.errors import SceneError, clip, require_kind, require_sequence
-from ufl_beam.garbage_collection import no_garbage_collection
+from ufl_beam.memory import no_garbage_collection
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import (
     GROUND,
@@ -39,8 +40,6 @@ from ufl_beam.model.plastic_hinges import plastic_hinges
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
-from ufl_beam.one_line import counted
-from ufl_beam.rich_display import Rich
 
 
 @dataclass(frozen=True, eq=False)

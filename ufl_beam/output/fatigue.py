@@ -11,9 +11,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array, State
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, require_kind, require_number, require_sequence
 from ufl_beam.model.bodies import Place
-from ufl_beam.one_line import one_line
 from ufl_beam.output.rainflow import Cycles, RainflowCounter, SNCurve
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView

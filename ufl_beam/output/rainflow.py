@@ -13,8 +13,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, is_infinite, require_function, require_number, require_row
-from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True)

@@ -11,11 +11,11 @@ from pathlib import Path
 from mpi4py import MPI
 
 from ufl_beam.arrays import State
-from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_sequence, shorten
+from ufl_beam.model.signatures import require_members
 from ufl_beam.output.output_files import Output, require_apart, require_writable
 from ufl_beam.output.state_view import StateView
-from ufl_beam.protocols import require_members
+from ufl_beam.parallel import on_first
 
 
 class Recorder(ABC):

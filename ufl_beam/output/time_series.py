@@ -13,7 +13,6 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
-from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count
 from ufl_beam.model.bodies import arm
 from ufl_beam.output.joint_histories import turned
@@ -23,6 +22,7 @@ from ufl_beam.output.scene_lines import rods_of
 from ufl_beam.output.state_view import StateView
 from ufl_beam.output.vtkhdf import VtkhdfWriter
 from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
+from ufl_beam.parallel import on_first
 
 LineFields = tuple[dict[str, Array], dict[str, Array]]  # at points, (n,) or (n, 3); in cells, (m,)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.display import picture_of
 from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.damping import Damping, Rayleigh
@@ -34,7 +35,6 @@ from ufl_beam.plotting.style import (
     shade,
     with_unit,
 )
-from ufl_beam.rich_display import picture_of
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:

@@ -12,14 +12,13 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.errors import SceneError, require_kind, require_number, require_switch
-from ufl_beam.parallel import active_comm
+from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting.camera import Camera
 from ufl_beam.plotting.drawing import evenly
 from ufl_beam.plotting.films import WRITERS, Film
 from ufl_beam.plotting.screen import screen
 from ufl_beam.plotting.solids import QUANTITIES, Solids
 from ufl_beam.plotting.style import decimal_prefix, magnified
-from ufl_beam.progress_bar import progress_bar
 from ufl_beam.simulation.solution import Solution
 
 CAMERA = Camera()  # stands still and sees the whole motion

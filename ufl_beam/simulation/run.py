@@ -27,8 +27,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import ADVICE, above, below, decoding
 from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.recorders import Recorder, close_all, recorders_of
-from ufl_beam.parallel import communicator, say
-from ufl_beam.progress_bar import progress_bar
+from ufl_beam.parallel import communicator, progress_bar, say
 from ufl_beam.simulation.checkpoint import FORMAT, Checkpoint, Keeper, end_of
 from ufl_beam.simulation.diagnosis import ROOM, open_ledger
 from ufl_beam.simulation.fingerprint import kind_of

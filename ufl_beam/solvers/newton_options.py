@@ -6,6 +6,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
+from ufl_beam.display import one_line
 from ufl_beam.errors import (
     SceneError,
     require_count,
@@ -14,7 +15,6 @@ from ufl_beam.errors import (
     require_switch,
     require_text,
 )
-from ufl_beam.one_line import one_line
 
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""

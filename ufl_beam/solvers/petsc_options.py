@@ -10,9 +10,9 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import ffi, petsc
 from ufl_beam.errors import SceneError, require_kind
+from ufl_beam.parallel import Agreement
 from ufl_beam.solvers.newton_options import PREFIX, Newton
 
 WHILE_SOLVING = (

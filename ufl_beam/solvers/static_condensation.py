@@ -19,10 +19,10 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
+from ufl_beam.memory import of_structure
 from ufl_beam.solvers.klu import BAD_PIVOT, GOOD, Klu, succeeds
 from ufl_beam.solvers.multifrontal import ONE_FRONT, Multifrontal
 from ufl_beam.solvers.substructuring import Condensed, Summed
-from ufl_beam.structure_cache import of_structure
 
 
 class Chains:

@@ -1,18 +1,45 @@
 # SPDX-License-Identifier: MIT
-"""Check of objects that users write: they have what a protocol or an abstract class asks for."""
+"""Signatures of what users write: parameters of functions by name, members of objects."""
 
 from __future__ import annotations
 
 import inspect
 from abc import ABC
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import lru_cache
-from typing import Any, Generic, Protocol
+from typing import Any, Generic, NamedTuple, Protocol
 from weakref import WeakKeyDictionary
 
 from ufl_beam.errors import SceneError
 
 NO_MEMBERS = {object, ABC, Protocol, Generic}
+
+
+class Named(NamedTuple):
+    """Parameters of a function: names with a meaning; others, without which it cannot be called."""
+
+    asked: tuple[str, ...]
+    unknown: tuple[str, ...]
+
+
+def parameters_by_name(
+    function: Callable[..., Any], known: Sequence[str], after: int = 0
+) -> Named | None:
+    """Return the names by which a function asks, after so many parameters by position.
+
+    A function with ``**more`` asks for all that is known; None if the function does not tell.
+    """
+    try:
+        parameters = [*inspect.signature(function).parameters.values()]
+    except (TypeError, ValueError):
+        return None
+    if any(p.kind is p.VAR_KEYWORD for p in parameters):
+        return Named(tuple(known), ())
+    named = [p for p in parameters[after:] if p.kind is not p.VAR_POSITIONAL]
+    return Named(
+        tuple(p.name for p in named if p.name in known),
+        tuple(p.name for p in named if p.name not in known and p.default is p.empty),
+    )
 
 
 _calls_match: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
