@@ -101,9 +101,8 @@ from ufl_beam.output.archive import version
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
-from ufl_beam.output.fatigue import Fatigue, HotSpot
+from ufl_beam.output.fatigue import Cycles, Fatigue, Gerber, Goodman, HotSpot, SNCurve, rainflow
 from ufl_beam.output.history import History
-from ufl_beam.output.rainflow import Cycles, Gerber, Goodman, SNCurve, rainflow
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.time_series import VTKHDF, XDMF
 from ufl_beam.parallel import say
