@@ -22,6 +22,12 @@ T = TypeVar("T")
 LONGEST = 80
 """Characters that a message shows of a value."""
 
+BYTES_PER_CELL = 400
+"""Least memory of a cell on each process: its vertices and the numbers of its unknowns."""
+
+MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+"""Memory of this machine; B."""
+
 PACKAGE = os.path.join(os.path.dirname(__file__), "")
 """The directory of this package."""
 
@@ -306,6 +312,24 @@ def require_function(value: Any, what: str, of: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless ``value`` is a function ``of`` something."""
     if not callable(value):
         raise SceneError(f"{what} = {shorten(value)} must be a function of {of}")
+
+
+def require_memory(cells: int, what: str) -> None:
+    """Raise :class:`SceneError` naming ``what`` if so many cells cannot be held in memory.
+
+    Each process has the numbering of the whole scene.
+    """
+    needed = cells * BYTES_PER_CELL
+    if needed > MEMORY:
+        raise SceneError(
+            f"{what} would take {needed / 1e9:.3g} GB of memory; this machine has "
+            f"{MEMORY / 1e9:.3g} GB. Take fewer cells"
+        )
+    if 3 * cells >= 2**31:
+        raise SceneError(
+            f"{what} has more degrees of freedom than the 32-bit indices of PETSc can number. "
+            "Take fewer cells"
+        )
 
 
 def require_vector(value: Any, what: str) -> tuple[float, float]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Memory: the cache of what scenes of one structure share, garbage collection, how much there is.
+"""Memory: the cache of what scenes of one structure share, and garbage collection.
 
 Sparsity patterns, chains and groups of nodes follow from the structure of a scene.  Scenes that
 differ in numbers only, such as the members of a study, have the same structure.  What follows from
@@ -10,15 +10,12 @@ simulation is to the last bit what it would be alone.
 from __future__ import annotations
 
 import gc
-import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import lru_cache, wraps
 from typing import Any, ParamSpec, TypeVar, cast
 
 import numpy as np
-
-from ufl_beam.errors import SceneError
 
 T = TypeVar("T", bound=tuple[Any, ...])
 P = ParamSpec("P")
@@ -32,12 +29,6 @@ LARGEST = 2**16
 
 That are some 500 cells, of which a hundred steps take longer than all of the building.
 """
-
-BYTES_PER_CELL = 400
-"""Least memory of a cell on each process: its vertices and the numbers of its unknowns."""
-
-MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-"""Memory of this machine; B."""
 
 
 def stated(function: Callable[P, Stated]) -> Callable[P, Stated]:
@@ -100,21 +91,3 @@ def no_garbage_collection() -> Iterator[None]:
     finally:
         if was_enabled:
             gc.enable()
-
-
-def require_memory(cells: int, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` if so many cells cannot be held in memory.
-
-    Each process has the numbering of the whole scene.
-    """
-    needed = cells * BYTES_PER_CELL
-    if needed > MEMORY:
-        raise SceneError(
-            f"{what} would take {needed / 1e9:.3g} GB of memory; this machine has "
-            f"{MEMORY / 1e9:.3g} GB. Take fewer cells"
-        )
-    if 3 * cells >= 2**31:
-        raise SceneError(
-            f"{what} has more degrees of freedom than the 32-bit indices of PETSc can number. "
-            "Take fewer cells"
-        )

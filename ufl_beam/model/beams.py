@@ -12,13 +12,13 @@ from ufl_beam.errors import (
     SceneError,
     require_count,
     require_kind,
+    require_memory,
     require_number,
     require_sequence,
     require_text,
     require_vector,
     warn,
 )
-from ufl_beam.memory import require_memory
 from ufl_beam.model.bodies import TOGETHER, Member, Place
 from ufl_beam.model.connector_laws import HingeLaw, require_hinge_law
 from ufl_beam.model.curves import Arc, Curve, Point, Polyline, Straight, point_of

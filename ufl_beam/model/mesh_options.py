@@ -15,8 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.display import one_line
-from ufl_beam.errors import SceneError, require_kind, require_number, shorten
-from ufl_beam.memory import require_memory
+from ufl_beam.errors import SceneError, require_kind, require_memory, require_number, shorten
 from ufl_beam.model.bodies import Member
 
 
