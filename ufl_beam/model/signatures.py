@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Signatures of what users write: parameters of functions by name, members of objects."""
+"""Signatures of what users write: parameters of functions by name, methods of objects."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from functools import lru_cache
 from typing import Any, Generic, NamedTuple, Protocol
 from weakref import WeakKeyDictionary
 
-from ufl_beam.errors import SceneError
-
 NO_MEMBERS = {object, ABC, Protocol, Generic}
+
+_alike: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
+"""Protocols that objects of a class were found to satisfy; signatures take a millisecond."""
 
 
 class Named(NamedTuple):
@@ -42,60 +43,37 @@ def parameters_by_name(
     )
 
 
-_calls_match: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
-"""Protocols that objects of a class were found to satisfy; signatures take a millisecond."""
-
-
 @lru_cache(maxsize=32)
 def members(of: type) -> dict[str, Callable[..., Any] | None]:
     """Public methods, by name, of a protocol or an abstract class; attributes are None."""
     found: dict[str, Callable[..., Any] | None] = {}
-    for base in reversed(of.__mro__):
-        if base in NO_MEMBERS:
-            continue
-        names = dict.fromkeys(inspect.get_annotations(base)) | vars(base)
-        found |= {
-            name: thing if inspect.isfunction(thing) else None
-            for name, thing in names.items()
-            if not name.startswith("_")
-        }
+    for base in reversed([base for base in of.__mro__ if base not in NO_MEMBERS]):
+        for name, thing in (dict.fromkeys(inspect.get_annotations(base)) | vars(base)).items():
+            if not name.startswith("_"):
+                found[name] = thing if inspect.isfunction(thing) else None
     return found
 
 
-def require_members(value: object, of: type, what: str, kind: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless an object has the members of a protocol.
+def unlike(value: object, of: type) -> str:
+    """Return why an object has not the members of a protocol; empty if it has them.
 
-    Methods must take the arguments that the protocol calls them with.  ``kind`` is what the object
-    should be, such as "a time scheme".
+    Methods must take the arguments that the protocol calls them with.
     """
-    name = type(value).__name__
     if missing := [name for name in members(of) if not hasattr(value, name)]:
-        raise SceneError(f"{what}: {name} is not {kind}: it lacks {', '.join(missing)}")
-    known = _calls_match.setdefault(type(value), set())
-    if of in known:
-        return
-    for method, expected in members(of).items():
-        if expected is not None and not _takes(getattr(value, method), expected):
-            there = list(inspect.signature(expected).parameters)[1:]
-            raise SceneError(
-                f"{what}: {name} is not {kind}: its method {method} cannot be called as "
-                f"{method}({', '.join(there)})"
-            )
+        return f"it lacks {', '.join(missing)}"
+    known = _alike.setdefault(type(value), set())
+    for name, expected in members(of).items():
+        if expected is None or of in known:
+            continue
+        _, *parameters = inspect.signature(expected).parameters.values()
+        by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+        positions = (len(parameters) - len(by_name)) * [None]
+        try:
+            inspect.signature(getattr(value, name)).bind(*positions, **dict.fromkeys(by_name))
+        except ValueError:
+            pass  # of a builtin, which has no signature
+        except TypeError:  # also of what cannot be called
+            call = ", ".join(p.name for p in parameters)
+            return f"its method {name} cannot be called as {name}({call})"
     known.add(of)
-
-
-def _takes(method: Any, expected: Callable[..., Any]) -> bool:
-    """Return whether a bound method takes the arguments of a function but its first."""
-    try:
-        signature = inspect.signature(method)
-    except ValueError:  # of a builtin
-        return True
-    except TypeError:  # not callable
-        return False
-    _, *parameters = inspect.signature(expected).parameters.values()
-    by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
-    try:
-        signature.bind(*(len(parameters) - len(by_name)) * [None], **dict.fromkeys(by_name))
-    except TypeError:
-        return False
-    return True
+    return ""

@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 from ufl_beam.arrays import State
 from ufl_beam.errors import SceneError, require_sequence, shorten
-from ufl_beam.model.signatures import require_members
+from ufl_beam.model.signatures import unlike
 from ufl_beam.output.output_files import Output, require_apart, require_writable
 from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import on_first
@@ -92,7 +92,9 @@ def recorders_of(
                 f"{call}: {name} = {shorten(recorder)} is not a Recorder; classes of your own are "
                 "derived from ub.Recorder"
             )
-        require_members(recorder, Recorder, f"{call}: {name}", "a recorder")
+        if why := unlike(recorder, Recorder):
+            kind = type(recorder).__name__
+            raise SceneError(f"{call}: {name}: {kind} is not a recorder: {why}")
         first = next(k for k, one in enumerate(recorders) if one is recorder)
         if first != i:
             raise SceneError(

@@ -15,8 +15,7 @@ from ufl_beam.display import picture_of
 from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.damping import Damping, Rayleigh
-from ufl_beam.model.scene import Scene
-from ufl_beam.output.scene_lines import spots_of
+from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.plotting.diagrams import plot_state
 from ufl_beam.plotting.geometry import segments
 from ufl_beam.plotting.labels import Placed, leader_of, place
