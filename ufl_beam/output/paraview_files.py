@@ -87,7 +87,7 @@ class XdmfWriter:
             f"{_attribute('part', 'Cell', lines.parts, items[2])}"
         )
         new = complete is None
-        self.complete = Complete(0, len(HEAD), ROOM, len(mesh)) if new else Complete(*complete)
+        self.complete = Complete(*(complete or (0, len(HEAD), ROOM, len(mesh))))
         self._data, self._xml = OutputFile(data_path(path), new=new), OutputFile(path, new=new)
         self._writing = False
         if new:

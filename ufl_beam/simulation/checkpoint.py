@@ -17,7 +17,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
-from ufl_beam.file_locks import Lock
+from ufl_beam.file_system import Lock
 from ufl_beam.output.archive import Content, above, decoding, read, write
 from ufl_beam.output.output_files import part_of, require_path, require_writable
 from ufl_beam.parallel import on_first
