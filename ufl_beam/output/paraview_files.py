@@ -286,7 +286,7 @@ class VtkhdfWriter:
         dataset, rows = self._growing[name]
         first = self.steps * rows
         dataset.resize(first + rows, axis=0)
-        dataset.write_direct(values, dest_sel=np.s_[first : first + rows])
+        dataset[first:] = values
 
     def _cut(self) -> None:
         """Cut off what is behind the last step; times first, of too many VTK 9.3 crashes."""
