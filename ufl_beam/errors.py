@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import math
-import numbers
 import os
 import sys
 import traceback
@@ -203,16 +202,24 @@ def as_float(value: object) -> float:
 
 
 def require_number(
-    value: Any, what: str, *, positive: bool = False, at_least: float = -math.inf
+    value: Any,
+    what: str,
+    *,
+    positive: bool = False,
+    at_least: float = -math.inf,
+    infinite: bool = False,
 ) -> float:
-    """Return ``value`` as a finite float in range, or raise :class:`SceneError` naming ``what``."""
+    """Return ``value`` as a float in range, or raise :class:`SceneError` naming ``what``.
+
+    It must be finite, unless ``infinite`` lets it be positive infinity.
+    """
     try:
         number = as_float(value)
     except (TypeError, ValueError):
         raise SceneError(f"{what} = {shorten(value)} is not a number") from None
     except OverflowError:
         raise SceneError(f"{what} = {shorten(value)} is too large for a number") from None
-    if not math.isfinite(number):
+    if not math.isfinite(number) and not (infinite and number == math.inf):
         raise SceneError(f"{what} = {number} is not finite")
     if positive and number <= 0:
         raise SceneError(f"{what} = {number:g} must be positive")
@@ -223,8 +230,7 @@ def require_number(
 
 def require_from_zero_to_infinity(value: Any, what: str) -> None:
     """Raise :class:`SceneError` unless ``value`` is a non-negative number or infinity."""
-    if not is_infinite(value):
-        require_number(value, what, at_least=0.0)
+    require_number(value, what, at_least=0.0, infinite=True)
 
 
 def require_returned(value: object, function: str, at: str, *, finite: bool = False) -> float:
@@ -238,11 +244,6 @@ def require_returned(value: object, function: str, at: str, *, finite: bool = Fa
     if finite and not math.isfinite(number):
         raise SceneError(f"{function} returned {number} at {at}; it must return a finite number")
     return number
-
-
-def is_infinite(value: object) -> bool:
-    """Return true for positive infinity, which some parameters take for "never"."""
-    return isinstance(value, numbers.Real) and value == math.inf
 
 
 def require_count(value: Any, what: str) -> int:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,6 @@ from ufl_beam.arrays import Array, State
 from ufl_beam.display import one_line
 from ufl_beam.errors import (
     SceneError,
-    is_infinite,
     require_function,
     require_kind,
     require_number,
@@ -89,12 +88,7 @@ def any_mean(range: Array, mean: Array) -> Array:
     return range
 
 
-def _positive_or_infinite(value: Any, what: str) -> None:
-    if not is_infinite(value):
-        require_number(value, what, positive=True)
-
-
-Life = Annotated[float, _positive_or_infinite]
+Life = Annotated[float, partial(require_number, positive=True, infinite=True)]
 MeanStress = Annotated[
     Callable[[Array, Array], Array], partial(require_function, of="(range, mean)")
 ]
@@ -216,8 +210,8 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
         >>> print(cycles.range, cycles.mean, cycles.count)
         [1. 3.] [1.5 1.5] [1. 1.]
     """
-    counter = RainflowCounter(1.0)
-    counter.count(require_row(series, "rainflow: series"))
+    counter = RainflowCounter()
+    counter.add(require_row(series, "rainflow: series"))
     return counter.cycles()
 
 
@@ -225,23 +219,20 @@ class RainflowCounter:
     """Rainflow counter of a series that comes in pieces, in constant memory.
 
     Values are rounded to multiples of ``resolution`` (Pa), so that cycles fall into classes, and no
-    more turning points wait than there are classes.
+    more turning points wait than there are classes.  Without it they are counted as they are.
     """
 
-    def __init__(self, resolution: float) -> None:
-        require_number(resolution, "RainflowCounter: resolution", positive=True)
-        self._resolution = resolution
+    def __init__(self, resolution: float | None = None) -> None:
+        self._rounds, self._unit = resolution is not None, 1.0
+        if resolution is not None:
+            self._unit = require_number(resolution, "RainflowCounter: resolution", positive=True)
         self._counts: defaultdict[tuple[float, float], float] = defaultdict(float)  # by both ends
         self._waiting: list[float] = []  # turning points between which ranges become smaller
 
     def add(self, series: Array) -> None:
-        """Count the next piece; (n,)."""
-        self.count(np.rint(series / self._resolution))
-
-    def count(self, values: Array) -> None:
-        """Count the next values, multiples of the resolution, by the method of ASTM E1049."""
+        """Count the next piece by the method of ASTM E1049; (n,)."""
         points = self._waiting
-        for value in map(float, values):
+        for value in map(float, np.rint(series / self._unit) if self._rounds else series):
             if points and value == points[-1]:
                 continue
             if len(points) > 1 and (value > points[-1]) == (points[-1] > points[-2]):
@@ -259,7 +250,7 @@ class RainflowCounter:
         for ends in pairwise(self._waiting):
             counts[min(ends), max(ends)] += 0.5
         low, high = np.array(list(counts), dtype=float).reshape(-1, 2).T
-        order, unit = np.lexsort((low, high - low)), self._resolution
+        order, unit = np.lexsort((low, high - low)), self._unit
         count = np.array(list(counts.values()), dtype=float)
         return Cycles(unit * (high - low)[order], unit / 2 * (low + high)[order], count[order])
 
@@ -273,8 +264,7 @@ class RainflowCounter:
         self._counts.clear()
         for low, high, count in (map(float, row) for row in counted):
             self._counts[low, high] = count
-        self._waiting = []
-        self.count(waiting)
+        self._waiting = [*map(float, waiting)]
 
 
 # -- counting in a run ----------------------------------------------------------------------------

@@ -140,27 +140,37 @@ class TimeSeries(Recorder):
 
     def open(self, simulation: StateView) -> None:
         """Write the mesh and the initial state."""
-        self._count = 0
-        fields = self._prepare(simulation)
+        self._begin(simulation, 0)
 
-        def begin() -> None:
-            self.close()
-            self._writers = [self.writer(self._path, self._data.lines, fields)]
-            self._writers[0].write(simulation.t, fields)
+    def resume(self, simulation: StateView, state: State) -> None:
+        """Cut off what was written after the state, and go on."""
+        count, *complete = (int(n) for n in state["sizes"])
+        self._begin(simulation, count, complete, state["digest"].tobytes())
 
-        on_first(self._comm, begin)
-
-    def _prepare(self, simulation: StateView) -> LineFields:
-        """Note the mesh; the fields of the present state."""
+    def _begin(self, simulation: StateView, count: int, *before: Any) -> None:
+        """Make the writer of a new file, or of one with what was ``before``."""
         self._comm: MPI.Intracomm = simulation.comm
-        self._data = LineData(simulation)
-        return self._data.fields(simulation)
+        self._scene, self._count = LineData(simulation), count
+        fields = self._scene.fields(simulation)
+
+        def make() -> None:
+            self.close()
+            try:
+                self._writers = [self.writer(self._path, self._scene.lines, fields, *before)]
+            except (FileNotFoundError, ValueError):
+                if not before:
+                    raise
+                raise changed(f"{type(self).__name__} {self._path}") from None
+            if not before:
+                self._writers[0].write(simulation.t, fields)
+
+        on_first(self._comm, make)
 
     def write(self, simulation: StateView) -> None:
         """Write the state, every so many steps."""
         self._count += 1
         if self._count % self._every == 0:
-            fields = self._data.fields(simulation)
+            fields = self._scene.fields(simulation)
             on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
 
     def state(self) -> State:
@@ -172,20 +182,6 @@ class TimeSeries(Recorder):
             "sizes": np.array([self._count, *sizes], dtype=float),
             "digest": np.frombuffer(b"".join(digests), dtype=np.uint8),
         }
-
-    def resume(self, simulation: StateView, state: State) -> None:
-        """Cut off what was written after the state, and go on."""
-        self._count, *complete = (int(n) for n in state["sizes"])
-        fields, digest = self._prepare(simulation), state["digest"].tobytes()
-
-        def go_on() -> None:
-            try:
-                writer = self.writer(self._path, self._data.lines, fields, complete, digest)
-            except (FileNotFoundError, ValueError):
-                raise changed(f"{type(self).__name__} {self._path}") from None
-            self._writers = [writer]
-
-        on_first(self._comm, go_on)
 
     def close(self) -> None:
         """Close the files of the time series."""

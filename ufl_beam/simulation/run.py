@@ -29,7 +29,6 @@ from ufl_beam.output.recorders import Recorder, close_all, recorders_of
 from ufl_beam.parallel import communicator, progress_bar, say
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
 from ufl_beam.simulation.diagnosis import ROOM, open_ledger
-from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.reference_run import simulate_by_reference
 from ufl_beam.simulation.simulation import Simulation
@@ -123,8 +122,8 @@ def simulate(
             call = {
                 "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every,
                 "most": most, "newton": newton or Newton(), "start": end_of(start),
-                "mesh": mesh_of(start, mesh), "record": [*map(kind_of, recorders)],
-                "t[1]": t1 if step is None else "any",
+                "mesh": mesh_of(start, mesh), "t[1]": t1 if step is None else "any",
+                "record": [type(recorder).__qualname__ for recorder in recorders],
             }  # fmt: skip
             keeper = Keeper(checkpoint, call, step, t1, recorders, comm)
             stack.callback(keeper.close)
