@@ -89,7 +89,6 @@ class XdmfWriter:
         new = complete is None
         self.complete = Complete(*(complete or (0, len(HEAD), ROOM, len(mesh))))
         self._data, self._xml = OutputFile(data_path(path), new=new), OutputFile(path, new=new)
-        self._writing = False
         if new:
             self._data.put(0, mesh)
             self._xml.put(0, (HEAD + TAIL).ljust(ROOM) + CLOSING)
@@ -103,9 +102,8 @@ class XdmfWriter:
 
     def write(self, t: float, fields: LineFields) -> None:
         """Append a step with its fields."""
-        if self._writing:  # an interrupt has left a part of a step
+        if self._data.size > self.complete.data:  # an interrupt has left a part of a step
             self._cut()
-        self._writing = True
         steps, tail, room, length = self.complete
         text = f'<Grid Name="{steps}" GridType="Uniform"><Time Value="{t!r}"/>{self._mesh}'
         data = bytearray()
@@ -117,7 +115,6 @@ class XdmfWriter:
         self._data.put(length, data)
         tail, room = self._append((text + "</Grid>\n").encode(), tail, room)
         self.complete = Complete(steps + 1, tail, room, length + len(data))
-        self._writing = False
 
     def _append(self, grid: bytes, tail: int, room: int) -> tuple[int, int]:
         """Make a grid the last one of the document; where its tail and its spare room end now."""
@@ -137,7 +134,10 @@ class XdmfWriter:
         return new_tail, room
 
     def _cut(self) -> None:
-        """Cut off what is behind the last complete step; the document is valid all the time."""
+        """Cut off what is behind the last complete step; the document is valid all the time.
+
+        Numbers of a step are written before its text, and cut off after it.
+        """
         _, tail, room, length = self.complete
         self._xml.put(tail, TAIL)
         spare, after = tail + len(TAIL), room + len(CLOSING)
@@ -146,7 +146,6 @@ class XdmfWriter:
         self._xml.put(room, CLOSING)
         self._xml.cut(after)
         self._data.cut(length)
-        self._writing = False
 
     def sync(self) -> bytes:
         """Bring everything to the disk; return its checksum; raises if a file was removed."""
@@ -161,7 +160,7 @@ class XdmfWriter:
     def close(self) -> None:
         """Close the text file and the file of numbers."""
         try:
-            if self._writing:
+            if self._data.size > self.complete.data:
                 self._cut()
         finally:
             self._data.close()
