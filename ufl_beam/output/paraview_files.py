@@ -281,11 +281,15 @@ class VtkhdfWriter:
         self.steps += 1
 
     def _put(self, name: str, values: Array) -> None:
-        """Write the rows of the next step into a data set."""
-        dataset, rows = self._growing[name]
+        """Write the rows of the next step by HDF5's own functions, which are the fastest."""
+        from h5py import h5s
+
+        dataset, (rows, *components) = self._growing[name][0].id, values.shape
         first = self.steps * rows
-        dataset.resize(first + rows, axis=0)
-        dataset[first:] = values
+        dataset.set_extent((first + rows, *components))
+        space = h5s.create_simple((first + rows, *components))
+        space.select_hyperslab((first, *(0 for _ in components)), values.shape)
+        dataset.write(h5s.create_simple(values.shape), space, np.ascontiguousarray(values))
 
     def _cut(self) -> None:
         """Cut off what is behind the last step; times first, of too many VTK 9.3 crashes."""
