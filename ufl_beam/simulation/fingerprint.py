@@ -120,7 +120,7 @@ def has_state(value: Any) -> bool:
 
 
 def _text_of(code: CodeType, names: set[str]) -> str:
-    """What a code does, as text; the names that it uses are added to ``names``."""
+    """Return a code as text that can be compared, and add the names that it uses to ``names``."""
     names.update(code.co_names)
     constants = [
         _text_of(c, names)
