@@ -20,10 +20,6 @@ FEW = 4  # numbers of an array that are written
 class _Short(reprlib.Repr):
     """Six digits of numbers, names of functions, shapes of arrays; long lists are cut."""
 
-    def __init__(self) -> None:
-        super().__init__()
-        self.maxother = self.maxstring = 120
-
     def repr1(self, x: Any, level: int) -> str:
         if isinstance(x, float):
             return f"{x:.6g}"
@@ -37,15 +33,16 @@ class _Short(reprlib.Repr):
         return super().repr1(x, level)
 
 
-_SHORT = _Short().repr
+_SHORT = _Short()
+_SHORT.maxother = _SHORT.maxstring = 120
 
 
 def one_line(record: Any) -> str:
     """Write a record: ``Mesh(refine=2)``; fields as by default and empty ones are left out."""
     fields = []
     for name, parameter in signature(type(record)).parameters.items():
-        value = _SHORT(getattr(record, name))
-        if value not in (_SHORT(parameter.default), "{}"):
+        value = _SHORT.repr(getattr(record, name))
+        if value not in (_SHORT.repr(parameter.default), "{}"):
             fields.append(f"{name}={value}")
     return f"{type(record).__name__}({', '.join(fields)})"
 

@@ -43,38 +43,32 @@ def of_structure(function: Callable[..., T]) -> Callable[..., T]:
     arrays in it, as others have them too.
     """
 
+    def locked(result: T) -> T:
+        for one in result:
+            one.flags.writeable = False
+        return result
+
     @lru_cache(maxsize=KEPT)
     def kept(*keys: Any) -> T:
-        return _locked(function(*map(_argument, keys)))
+        # Of an array the type, the shape and the bytes, which have a hash
+        arguments = (
+            np.frombuffer(key[2], key[0]).reshape(key[1]) if isinstance(key, tuple) else key
+            for key in keys
+        )
+        return locked(function(*arguments))
 
     @wraps(function)
     def call(*arguments: Any) -> T:
         sizes = (one.nbytes if isinstance(one, np.ndarray) else one for one in arguments)
         if sum(sizes) > LARGEST:
-            return _locked(function(*arguments))
-        return kept(*map(_key, arguments))
+            return locked(function(*arguments))
+        keys = (
+            (one.dtype.str, one.shape, one.tobytes()) if isinstance(one, np.ndarray) else one
+            for one in arguments
+        )
+        return kept(*keys)
 
     return call
-
-
-def _key(argument: Any) -> Any:
-    """Return an argument as something with a hash: of an array the type, the shape, the bytes."""
-    if isinstance(argument, np.ndarray):
-        return argument.dtype.str, argument.shape, argument.tobytes()
-    return argument
-
-
-def _argument(key: Any) -> Any:
-    if isinstance(key, tuple):
-        kind, shape, content = key
-        return np.frombuffer(content, kind).reshape(shape)
-    return key
-
-
-def _locked(result: T) -> T:
-    for one in result:
-        one.flags.writeable = False
-    return result
 
 
 @contextmanager

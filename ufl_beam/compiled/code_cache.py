@@ -55,7 +55,9 @@ def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tu
     place, foreign = _place(), False
     if intact(place / name):
         try:
-            _note_use(place / name)
+            if _age(place / name / CHECKSUMS) > DAY:  # note that it is in use
+                with suppress(PermissionError):  # of the administrator
+                    os.utime(place / name / CHECKSUMS)
             return load(place / name), place / name
         except FileNotFoundError:
             pass  # removed in between, as it was not used for long
@@ -117,15 +119,8 @@ def _checksums(entry: Path, name: str) -> str:
 
 
 def _age(path: Path) -> float:
-    """Time since a file was written, or used as :func:`_note_use` notes it; s."""
+    """Time since a file was written, or was used, which is noted once a day; s."""
     return time.time() - path.stat().st_mtime
-
-
-def _note_use(entry: Path) -> None:
-    """Note that an entry is in use, at most once a day; FileNotFoundError if it is gone."""
-    if _age(entry / CHECKSUMS) > DAY:
-        with suppress(PermissionError):  # of the administrator
-            os.utime(entry / CHECKSUMS)
 
 
 def sweep(place: Path) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 
 from mpi4py import MPI
@@ -106,10 +105,3 @@ def recorders_of(
     outputs += others
     on_first(comm, lambda: require_apart(outputs, call))
     return recorders, outputs
-
-
-def close_all(recorders: Sequence[Recorder]) -> None:
-    """Close all recorders, also when closing one of them fails."""
-    with ExitStack() as stack:
-        for recorder in reversed(recorders):
-            stack.callback(recorder.close)

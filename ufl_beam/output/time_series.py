@@ -100,21 +100,18 @@ class LineData:
             velocity = np.insert(v[:, :2], 2, 0.0, axis=1)
             velocity[self._ends, :2] += v[self._ends, 2:] * arms[:, ::-1] * (-1.0, 1.0)
             at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
-        return at_points, self._in_cells(simulation)
-
-    def _in_cells(self, simulation: StateView) -> dict[str, Array]:
         forces = simulation.section_forces()
-        in_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
+        of_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
         if simulation.may_break:
-            in_cells["jump"], in_cells["dissipated energy"] = simulation.damage()
-        in_lines = {
+            of_cells["jump"], of_cells["dissipated energy"] = simulation.damage()
+        in_cells = {
             name: np.append(np.repeat(values, self._pieces_of_cell), np.zeros(self._num_rods))
-            for name, values in in_cells.items()
+            for name, values in of_cells.items()
         }
         if self._pulls:
-            rods = in_lines["N"][len(self.lines.cells) - self._num_rods :]
+            rods = in_cells["N"][len(self.lines.cells) - self._num_rods :]
             rods[[*self._pulls]] = simulation.connections()[[*self._pulls.values()], 1]
-        return in_lines
+        return at_points, in_cells
 
 
 class TimeSeries(Recorder):

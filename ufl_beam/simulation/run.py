@@ -25,7 +25,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Output, take
-from ufl_beam.output.recorders import Recorder, close_all, recorders_of
+from ufl_beam.output.recorders import Recorder, recorders_of
 from ufl_beam.parallel import communicator, progress_bar, say
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
 from ufl_beam.simulation.diagnosis import ROOM, open_ledger
@@ -210,7 +210,8 @@ def running(
     """
     with ExitStack() as stack:
         stack.callback(simulation.close)
-        stack.callback(close_all, recorders)
+        for recorder in recorders:
+            stack.callback(recorder.close)
         stack.callback(take(outputs))
         try:
             yield
