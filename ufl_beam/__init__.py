@@ -18,11 +18,7 @@ Example:
     >>> broken = ub.simulate(hinged, ub.Static(), t=(0, 1), dt=0.02)
 """
 
-from ufl_beam import dolfinx_compat  # noqa: F401 - first, because it explains what is not installed
-
-# isort: split
-
-from ufl_beam import broken_pipes  # noqa: F401 - after PETSc, whose signal handler it replaces
+from ufl_beam import dolfinx_compat  # noqa: F401 - first: it explains what is missing
 
 # isort: split
 
@@ -101,12 +97,12 @@ from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningL
 from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
 from ufl_beam.model.time_functions import Table, ramp
 from ufl_beam.model.works import Potential, VirtualWork
+from ufl_beam.output.archive import version
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
-from ufl_beam.output.fatigue import Fatigue, HotSpot
+from ufl_beam.output.fatigue import Cycles, Fatigue, Gerber, Goodman, HotSpot, SNCurve, rainflow
 from ufl_beam.output.history import History
-from ufl_beam.output.rainflow import Cycles, Gerber, Goodman, SNCurve, rainflow
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.time_series import VTKHDF, XDMF
 from ufl_beam.parallel import say
@@ -139,7 +135,6 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.energy_ledger import Energy
-from ufl_beam.version import version
 
 __version__ = version()
 

@@ -6,7 +6,6 @@ from __future__ import annotations
 import contextlib
 import functools
 import math
-import numbers
 import os
 import sys
 import traceback
@@ -24,6 +23,9 @@ LONGEST = 80
 
 BYTES_PER_CELL = 400
 """Least memory of a cell on each process: its vertices and the numbers of its unknowns."""
+
+MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+"""Memory of this machine; B."""
 
 PACKAGE = os.path.join(os.path.dirname(__file__), "")
 """The directory of this package."""
@@ -200,16 +202,24 @@ def as_float(value: object) -> float:
 
 
 def require_number(
-    value: Any, what: str, *, positive: bool = False, at_least: float = -math.inf
+    value: Any,
+    what: str,
+    *,
+    positive: bool = False,
+    at_least: float = -math.inf,
+    infinite: bool = False,
 ) -> float:
-    """Return ``value`` as a finite float in range, or raise :class:`SceneError` naming ``what``."""
+    """Return ``value`` as a float in range, or raise :class:`SceneError` naming ``what``.
+
+    It must be finite, unless ``infinite`` lets it be positive infinity.
+    """
     try:
         number = as_float(value)
     except (TypeError, ValueError):
         raise SceneError(f"{what} = {shorten(value)} is not a number") from None
     except OverflowError:
         raise SceneError(f"{what} = {shorten(value)} is too large for a number") from None
-    if not math.isfinite(number):
+    if not math.isfinite(number) and not (infinite and number == math.inf):
         raise SceneError(f"{what} = {number} is not finite")
     if positive and number <= 0:
         raise SceneError(f"{what} = {number:g} must be positive")
@@ -220,8 +230,7 @@ def require_number(
 
 def require_from_zero_to_infinity(value: Any, what: str) -> None:
     """Raise :class:`SceneError` unless ``value`` is a non-negative number or infinity."""
-    if not is_infinite(value):
-        require_number(value, what, at_least=0.0)
+    require_number(value, what, at_least=0.0, infinite=True)
 
 
 def require_returned(value: object, function: str, at: str, *, finite: bool = False) -> float:
@@ -235,11 +244,6 @@ def require_returned(value: object, function: str, at: str, *, finite: bool = Fa
     if finite and not math.isfinite(number):
         raise SceneError(f"{function} returned {number} at {at}; it must return a finite number")
     return number
-
-
-def is_infinite(value: object) -> bool:
-    """Return true for positive infinity, which some parameters take for "never"."""
-    return isinstance(value, numbers.Real) and value == math.inf
 
 
 def require_count(value: Any, what: str) -> int:
@@ -311,22 +315,16 @@ def require_function(value: Any, what: str, of: str) -> None:
         raise SceneError(f"{what} = {shorten(value)} must be a function of {of}")
 
 
-@functools.cache
-def _memory() -> int:
-    """Memory of this machine; B."""
-    return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-
-
 def require_memory(cells: int, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` if so many cells cannot be held in memory.
 
     Each process has the numbering of the whole scene.
     """
-    needed, there = cells * BYTES_PER_CELL, _memory()
-    if needed > there:
+    needed = cells * BYTES_PER_CELL
+    if needed > MEMORY:
         raise SceneError(
             f"{what} would take {needed / 1e9:.3g} GB of memory; this machine has "
-            f"{there / 1e9:.3g} GB. Take fewer cells"
+            f"{MEMORY / 1e9:.3g} GB. Take fewer cells"
         )
     if 3 * cells >= 2**31:
         raise SceneError(

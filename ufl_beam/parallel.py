@@ -1,17 +1,52 @@
 # SPDX-License-Identifier: MIT
-"""Which processes compute a scene together: all of them, or within a study one alone."""
+"""Processes of MPI: which compute a scene together, how they fail together, what they print.
+
+Without agreement a process that fails alone leaves the others waiting for ever in a collective
+call.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
+import atexit
+import os
+import pickle
+import select
+import signal
+import sys
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
+from types import TracebackType
+from typing import Any, TypeVar
 
 from mpi4py import MPI
 
-from ufl_beam.errors import SceneError, shorten
+import numpy as np
+
+from ufl_beam.errors import SceneError, StepFailed, shorten
+
+with warnings.catch_warnings():
+    warnings.simplefilter("ignore")  # of a notebook without ipywidgets, where bars are text
+    from tqdm.auto import tqdm
+
+T = TypeVar("T")
+
+GRACE = 3.0
+"""Time for which a process that failed waits for the others; s."""
+
+FAILED = 32_749
+"""Tag of the messages of processes that end with an exception; MPI has tags up to 32767."""
+
+DELAY = 0.5
+"""Time before a progress bar is shown, and between its updates; s."""
 
 _ACTIVE: ContextVar[MPI.Intracomm] = ContextVar("processes of a scene", default=MPI.COMM_WORLD)
+
+
+# -- processes of a scene --------------------------------------------------------------------------
 
 
 def active_comm() -> MPI.Intracomm:
@@ -38,9 +73,164 @@ def alone() -> Iterator[None]:
         _ACTIVE.reset(before)
 
 
-def in_study() -> bool:
-    """Return whether this is a member of a study, which shows no progress of its own."""
-    return _ACTIVE.get() != MPI.COMM_WORLD
+_DUPLICATE = MPI.Comm.Create_keyval()
+
+
+def duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
+    """Communicator of the same processes for agreements only; made once and kept with ``comm``."""
+    known: Any = comm.Get_attr(_DUPLICATE)
+    if known is None:
+        known = comm.Dup()
+        comm.Set_attr(_DUPLICATE, known)
+    found: MPI.Intracomm = known
+    return found
+
+
+# -- exceptions that all processes raise -----------------------------------------------------------
+
+
+class Agreement:
+    """Calls that raise on all processes if they raise on one.
+
+    On one process they are plain calls.  On several they cost one reduction of an integer.  If the
+    others do not come within :data:`GRACE`, because they wait for the failed process elsewhere, it
+    prints its exception and aborts all of them.
+    """
+
+    def __init__(self, comm: MPI.Intracomm) -> None:
+        self._comm = duplicate(comm) if comm.size > 1 else None
+        self.raised: BaseException | None = None  # the latest that all processes raised together
+
+    def __call__(self, function: Callable[..., T], *arguments: Any) -> T:
+        """Call a function on all processes."""
+        if self._comm is None:
+            return function(*arguments)
+        error: BaseException | None = None
+        try:
+            value = function(*arguments)
+        except BaseException as caught:
+            error = caught
+        self.settle(error)
+        return value
+
+    def settle(self, error: BaseException | None) -> None:
+        """Raise on all processes if one of them has an exception; all call it together.
+
+        A failed step, after which the run may go on, gives way to any other exception.
+        """
+        comm = self._comm
+        if comm is None:
+            if error is not None:
+                raise error
+            return
+        urgency = 2 if error is None else int(isinstance(error, StepFailed))
+        first = np.array([urgency * comm.size + comm.rank])
+        request = comm.Iallreduce(MPI.IN_PLACE, first, op=MPI.MIN)
+        if error is None:
+            request.Wait()
+        elif not _completed(request):
+            traceback.print_exception(error)
+            _abort(comm)
+        urgency, rank = divmod(int(first[0]), comm.size)
+        if urgency == 2:
+            return
+        known = comm.bcast(portable(error) if comm.rank == rank else None, root=rank)
+        self.raised = known if error is None or comm.rank != rank else error
+        raise self.raised
+
+
+def on_first(comm: MPI.Intracomm, action: Callable[[], object]) -> None:
+    """Do something on the first process; what it raises there is raised on all of them."""
+    error: BaseException | None = None
+    if comm.rank == 0:
+        try:
+            action()
+        except BaseException as caught:
+            error = caught
+    if comm.size > 1:
+        error = comm.bcast(portable(error))
+    if error is not None:
+        raise error
+
+
+def portable(error: BaseException | None) -> BaseException | None:
+    """Return an exception that other processes can receive: itself, or one with its message."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error
+
+
+def _completed(*requests: MPI.Request) -> bool:
+    """Wait for communication with the others, but not for ever."""
+    end = time.monotonic() + GRACE
+    while not MPI.Request.Testall(list(requests)):
+        if time.monotonic() > end:
+            return False
+        time.sleep(1e-3)
+    return True
+
+
+def _abort(comm: MPI.Intracomm) -> None:
+    """End all processes, and say why."""
+    print(  # noqa: T201
+        f"ufl_beam: process {comm.rank} of {comm.size} failed; the others have not failed within "
+        f"{GRACE:g} s and may wait for it, so all are ended",
+        file=sys.stderr,
+    )
+    sys.stdout.flush()
+    sys.stderr.flush()
+    time.sleep(0.3)  # mpirun forwards what was printed, but not after an abort
+    comm.Abort(1)
+
+
+# -- exceptions that nobody catches ----------------------------------------------------------------
+
+
+def _end(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
+    """Print an exception that nobody catches; abort unless all processes end with one.
+
+    The script ends without a word if nobody reads its output any more, as in ``script | head``.
+    """
+    if not (issubclass(kind, BrokenPipeError) and _write_to_nowhere()):
+        _print_exception(kind, error, trace)
+    if MPI.Is_finalized() or MPI.COMM_WORLD.size == 1:
+        return
+    # MPI ends a process only when all of them end.  No collective call, which might meet one of
+    # those that the others are in.
+    world = MPI.COMM_WORLD
+    others = [rank for rank in range(world.size) if rank != world.rank]
+    told = [world.Isend(bytearray(), rank, FAILED) for rank in others]
+    heard = [world.Irecv(bytearray(), rank, FAILED) for rank in others]
+    if not _completed(*told, *heard):
+        _abort(world)
+
+
+def _write_to_nowhere() -> bool:
+    """Return whether nobody reads the output; then send what is left of it to nowhere."""
+    try:
+        output = sys.stdout.fileno()
+        poll = select.poll()
+        poll.register(output, 0)
+        broken = any(event & select.POLLERR for _, event in poll.poll(0))
+    except (AttributeError, OSError, ValueError):  # closed, or no file
+        return False
+    if broken:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), output)
+    return broken
+
+
+_print_exception = sys.excepthook
+sys.excepthook = _end
+atexit.register(_write_to_nowhere)
+with suppress(ValueError):  # in a thread
+    # PETSc, which `dolfinx_compat` has imported before, has taken the signal, and ends with a page
+    # about it; back to Python's exception.
+    signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
+
+
+# -- output ----------------------------------------------------------------------------------------
 
 
 def say(*words: object, sep: str = " ") -> None:
@@ -52,3 +242,24 @@ def say(*words: object, sep: str = " ") -> None:
     """
     if active_comm().rank == 0:
         print(*words, sep=sep, flush=True)  # noqa: T201
+
+
+def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
+    """Make a bar of tqdm, which the first process shows if someone can see it.
+
+    Nothing is printed by members of a study, nor if the output is neither a terminal nor a
+    notebook, nor by what takes less than half a second.  A notebook whose kernel has TQDM_DISABLE=1
+    in its environment shows none, as in a documentation.
+
+    Args:
+        shown: Whether the user wants it.
+        comm: Processes that share the work.
+        options: Arguments of tqdm.
+    """
+    ipython: Any = sys.modules.get("IPython")
+    shell = ipython.get_ipython() if ipython else None
+    if not shown or comm.rank > 0 or active_comm() != MPI.COMM_WORLD:
+        options["disable"] = True
+    elif shell is None or "IPKernelApp" not in shell.config:
+        options["disable"] = None  # unless the output is a terminal
+    return tqdm(delay=DELAY, mininterval=DELAY, **options)

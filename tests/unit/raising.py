@@ -13,7 +13,7 @@ from pathlib import Path
 from mpi4py import MPI
 
 import ufl_beam as ub
-from ufl_beam import collective_errors
+from ufl_beam import parallel
 from ufl_beam.simulation import replicas
 
 WORLD = MPI.COMM_WORLD
@@ -252,6 +252,6 @@ if __name__ == "__main__":
     else:
         name, rank = sys.argv[1:]
         # Where both fail, nothing need be short, and a busy machine may start them far apart.
-        collective_errors.GRACE = 30.0 if int(rank) < 0 else 0.5
+        parallel.GRACE = 30.0 if int(rank) < 0 else 0.5
         print(f"begun at {time.time()}", file=sys.stderr, flush=True)
         globals()[name](failure(int(rank), lambda: RuntimeError(f"user, {name}")))

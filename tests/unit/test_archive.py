@@ -4,8 +4,10 @@
 import copy
 import json
 import math
+import os
 import pickle
 import re
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
@@ -413,11 +415,8 @@ def test_version_of_an_installed_package(tmp_path, monkeypatch):
     (tmp_path / "ufl_beam-9.8.7.dist-info").mkdir()
     text = "Metadata-Version: 2.1\nName: ufl_beam\nVersion: 9.8.7\n"
     (tmp_path / "ufl_beam-9.8.7.dist-info" / "METADATA").write_text(text)
-    source = Path(__file__).parents[2] / "ufl_beam" / "version.py"
-    (tmp_path / "ufl_beam").mkdir()
-    (tmp_path / "ufl_beam" / "version.py").write_text(source.read_text())
-    code = "from ufl_beam.version import version; print(version())"
-    command = [sys.executable, "-c", code]
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    shutil.copytree(Path(__file__).parents[2] / "ufl_beam", tmp_path / "ufl_beam")
+    command = [sys.executable, "-c", "import ufl_beam; print(ufl_beam.__version__)"]
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path), prepend=os.pathsep)
     done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
     assert done.stdout == "9.8.7\n"

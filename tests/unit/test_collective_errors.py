@@ -14,8 +14,8 @@ from mpi4py import MPI
 
 import pytest
 
-from ufl_beam.collective_errors import Agreement, portable
 from ufl_beam.errors import StepFailed
+from ufl_beam.parallel import Agreement, portable
 
 COMM = MPI.COMM_WORLD
 SCRIPT = Path(__file__).with_name("raising.py")

@@ -16,9 +16,8 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.output import archive
-from ufl_beam.output.archive import above
-from ufl_beam.output.time_series import data_path
-from ufl_beam.version import version
+from ufl_beam.output.archive import above, version
+from ufl_beam.output.paraview_files import data_path
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1, bending=ub.Hardening(0.5, 10.0))
 

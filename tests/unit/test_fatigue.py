@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 import ufl_beam as ub
 from ufl_beam.output import fatigue
-from ufl_beam.output.rainflow import RainflowCounter
+from ufl_beam.output.fatigue import RainflowCounter
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, **STEEL)

@@ -14,7 +14,7 @@ from mpi4py import MPI
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.file_locks import Lock, locked
+from ufl_beam.file_system import Lock, locked
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
@@ -116,7 +116,7 @@ def test_a_run_that_is_refused_lets_go(shared_path):
 def test_the_lock_ends_with_its_process(tmp_path):
     """Its file may stay behind."""
     script = (
-        "import sys; from pathlib import Path; from ufl_beam.file_locks import Lock; "
+        "import sys; from pathlib import Path; from ufl_beam.file_system import Lock; "
         "lock = Lock(Path(sys.argv[1])); print(repr(lock.take()), flush=True); sys.stdin.read()"
     )
     command = [sys.executable, "-c", script, str(tmp_path / "run.h5")]

@@ -6,7 +6,7 @@ import gc
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.garbage_collection import no_garbage_collection
+from ufl_beam.memory import no_garbage_collection
 
 
 @pytest.mark.parametrize("enabled", [True, False])

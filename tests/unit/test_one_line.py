@@ -8,8 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 import ufl_beam as ub
+from ufl_beam.display import counted, one_line
 from ufl_beam.model.supports import still
-from ufl_beam.one_line import counted, one_line
 
 
 class Pair(NamedTuple):

@@ -21,8 +21,7 @@ import ufl_beam as ub
 from ufl_beam.output import output_files
 from ufl_beam.output.archive import read
 from ufl_beam.output.output_files import OutputFile
-from ufl_beam.output.vtkhdf import VtkhdfWriter
-from ufl_beam.output.xdmf import PAGE, XdmfWriter
+from ufl_beam.output.paraview_files import PAGE, Lines, VtkhdfWriter, XdmfWriter
 from ufl_beam.simulation.checkpoint import FORMAT
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
@@ -315,7 +314,7 @@ def test_a_disk_that_is_full(recorder, limit, tmp_path):
 
 # -- interrupts and kills --------------------------------------------------------------------------
 
-POINTS, CELLS = np.eye(3), np.array([[0, 1], [1, 2]])
+LINES = Lines(np.eye(3), np.array([[0, 1], [1, 2]]), np.zeros(2))
 
 
 def fields(n):
@@ -323,9 +322,8 @@ def fields(n):
 
 
 def writer_of(path, *complete):
-    if path.suffix == ".xdmf":
-        return XdmfWriter(path, POINTS, CELLS, np.zeros(2), *complete)
-    return VtkhdfWriter(path, POINTS, CELLS, np.zeros(2), fields(0), *complete)
+    kind = XdmfWriter if path.suffix == ".xdmf" else VtkhdfWriter
+    return kind(path, LINES, fields(0), *complete)
 
 
 def write(writer, steps):
@@ -372,7 +370,7 @@ def test_xdmf_is_complete_whenever_a_kill_comes(tmp_path, monkeypatch):
     What a kill leaves is read, then gone on with from five steps before.
     """
     path, first = tmp_path / "a.xdmf", 20
-    monkeypatch.setattr("ufl_beam.output.xdmf.ROOM", 2 * PAGE)
+    monkeypatch.setattr("ufl_beam.output.paraview_files.ROOM", 2 * PAGE)
     writer = writer_of(path)
     kept = []
     for n in range(first):
@@ -433,11 +431,11 @@ def test_an_interrupt_in_a_write_of_xdmf(n, tmp_path, monkeypatch):
 def test_an_interrupt_in_a_write_of_vtkhdf(n, tmp_path, monkeypatch):
     path, put, calls = tmp_path / "a.vtkhdf", VtkhdfWriter._put, []
 
-    def interrupted(self, dataset, step, values):
-        calls.append(step)
+    def interrupted(self, name, values):
+        calls.append(name)
         if len(calls) == n:
             raise KeyboardInterrupt
-        put(self, dataset, step, values)
+        put(self, name, values)
 
     writer = writer_of(path)
     monkeypatch.setattr(VtkhdfWriter, "_put", interrupted)
@@ -473,7 +471,7 @@ def test_vtkhdf_never_has_more_times_than_steps(tmp_path, monkeypatch):
     writer.close()
     assert found == {(n, n) for n in range(4)}
     found.clear()
-    writer_of(path, 1, digest).close()
+    writer_of(path, (1,), digest).close()
     assert found == {(3, 3), (1, 1)}  # the file before, and the one in its place
 
 

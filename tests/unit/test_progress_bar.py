@@ -12,7 +12,7 @@ from mpi4py import MPI
 import pytest
 
 import ufl_beam as ub
-from ufl_beam import progress_bar
+from ufl_beam import parallel
 
 FIRST = MPI.COMM_WORLD.rank == 0
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
@@ -61,7 +61,7 @@ def in_terminal(run, **more):
 
 @pytest.fixture
 def at_once(monkeypatch):
-    monkeypatch.setattr(progress_bar, "DELAY", 0.0)
+    monkeypatch.setattr(parallel, "DELAY", 0.0)
 
 
 @pytest.mark.parametrize("call", CALLS)
@@ -88,7 +88,7 @@ def test_no_progress_without_a_terminal(call, at_once, capsys):
 
 def test_short_runs_show_no_progress(monkeypatch):
     """The delay, here of an hour, has not passed at the end."""
-    monkeypatch.setattr(progress_bar, "DELAY", 3600.0)
+    monkeypatch.setattr(parallel, "DELAY", 3600.0)
     assert in_terminal(simulate) == ""
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+from ufl_beam.display import html_of, picture_of
 from ufl_beam.plotting import plots
-from ufl_beam.rich_display import html_of, picture_of
 
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 BEAM = ub.Beam((0, 0), (2, 0), SECTION, cells=4)

@@ -14,8 +14,8 @@ from scipy.sparse import block_array, coo_array, csr_array, diags_array
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
+from ufl_beam.display import bracketed, one_line
 from ufl_beam.errors import SceneError, StepFailed
-from ufl_beam.one_line import bracketed, one_line
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.stepper import Trial
 from ufl_beam.solvers.factorization import Factorisation, SingularMatrix

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, require_array, require_number, require_row
-from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True)

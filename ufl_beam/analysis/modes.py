@@ -15,12 +15,12 @@ import numpy as np
 
 from ufl_beam.analysis.linearization import SmallMotions, reference_state
 from ufl_beam.arrays import Array, Complex
-from ufl_beam.collective_errors import on_first
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, SectionForces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
+from ufl_beam.display import Rich
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number, warn
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.bodies import Anchor
@@ -31,8 +31,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.joint_histories import Connection, velocity_of
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
-from ufl_beam.parallel import active_comm
-from ufl_beam.rich_display import Rich
+from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.base import InCells

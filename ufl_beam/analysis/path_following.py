@@ -17,6 +17,7 @@ from scipy.interpolate import CubicHermiteSpline
 from ufl_beam.analysis.critical_points import Branch, Candidate, CriticalPoint, Direction
 from ufl_beam.analysis.path_controls import Control, Crossing, PathCorrector, Plane
 from ufl_beam.arrays import Array
+from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
     SceneError,
     StepFailed,
@@ -33,9 +34,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import Content, above, below, require_arrays
 from ufl_beam.output.recorders import Recorder, recorders_of
-from ufl_beam.parallel import communicator
-from ufl_beam.parameter import FACTOR
-from ufl_beam.progress_bar import progress_bar
+from ufl_beam.parallel import communicator, progress_bar
 from ufl_beam.simulation.run import running
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution

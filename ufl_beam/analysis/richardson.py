@@ -16,7 +16,7 @@ import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
-from ufl_beam.one_line import one_line
+from ufl_beam.display import one_line
 
 # Roache's safety factors on the error of the finest level: if the observed order is that of a
 # theory, and if it is not, or not known since there are two levels only

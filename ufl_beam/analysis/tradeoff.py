@@ -32,8 +32,7 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.parallel import alone, communicator
-from ufl_beam.progress_bar import progress_bar
+from ufl_beam.parallel import alone, communicator, progress_bar
 from ufl_beam.simulation.initial_state import require_scheme
 from ufl_beam.simulation.run import require_times, simulate
 from ufl_beam.simulation.solution import Solution

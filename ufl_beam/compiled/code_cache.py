@@ -26,12 +26,24 @@ from typing import TypeVar
 from mpi4py import MPI
 
 from ufl_beam.dolfinx_compat import jit_directory
-from ufl_beam.file_locks import locked
+from ufl_beam.file_system import locked, sync
 
 T = TypeVar("T")
 
 CHECKSUMS = "checksums"
 """File of an entry with its name and the checksums of its other files."""
+
+SWEPT = "swept"
+"""File whose time of change is when unused entries were looked for last."""
+
+DAY = 86_400.0
+"""Time after which a use is noted again, and unused entries are looked for again; s."""
+
+UNUSED = 30 * DAY
+"""Time after which an entry that was not used is removed; s."""
+
+TRUSTED = os.geteuid(), 0
+"""Users whose files are loaded: this one and the administrator."""
 
 
 def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tuple[T, Path]:
@@ -43,7 +55,9 @@ def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tu
     place, foreign = _place(), False
     if intact(place / name):
         try:
-            _note_use(place / name)
+            if _age(place / name / CHECKSUMS) > DAY:  # note that it is in use
+                with suppress(PermissionError):  # of the administrator
+                    os.utime(place / name / CHECKSUMS)
             return load(place / name), place / name
         except FileNotFoundError:
             pass  # removed in between, as it was not used for long
@@ -55,24 +69,30 @@ def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tu
     with locked(place / f"{name}.lock"):
         if not foreign and intact(entry):  # another process was faster
             return load(entry), entry
-        for rest in place.glob(f"{name}.*.part"):
-            shutil.rmtree(rest, ignore_errors=True)  # of a process that was killed
+        _remove_parts(entry)
         scratch = Path(tempfile.mkdtemp(prefix=f"{name}.", suffix=".part", dir=place))
         try:
             new = scratch / "new"
             new.mkdir()
             loaded = build(new)
-            _seal(new, name)
+            for path in new.glob("*.o"):
+                path.unlink()
+            (new / CHECKSUMS).write_text(_checksums(new, name))
+            for path in (*new.iterdir(), new):
+                sync(path)
             if os.path.lexists(entry):
                 entry.rename(scratch / "damaged")
             new.rename(entry)
-            _sync(place)
+            sync(place)
         finally:
             shutil.rmtree(scratch, ignore_errors=True)
     return loaded, entry
 
 
-# -- entries -------------------------------------------------------------------------------------
+def _remove_parts(entry: Path) -> None:
+    """Remove what processes that were killed have left of an entry."""
+    for rest in entry.parent.glob(f"{entry.name}.*.part"):
+        shutil.rmtree(rest, ignore_errors=True)
 
 
 def intact(entry: Path) -> bool:
@@ -88,53 +108,19 @@ def _checksums(entry: Path, name: str) -> str:
     lines = [name]
     for path in sorted(entry.iterdir()):
         status = path.lstat()
-        if not stat.S_ISREG(status.st_mode) or status.st_uid not in _trusted():
+        if not stat.S_ISREG(status.st_mode) or status.st_uid not in TRUSTED:
             raise ValueError(f"{path} is no file of this user")
         if path.name != CHECKSUMS:
             lines.append(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}")
     return "\n".join(lines) + "\n"
 
 
-def _seal(entry: Path, name: str) -> None:
-    """Add the checksums; bring all files to the disk."""
-    for path in entry.glob("*.o"):
-        path.unlink()
-    (entry / CHECKSUMS).write_text(_checksums(entry, name))
-    for path in (*entry.iterdir(), entry):
-        _sync(path)
-
-
-def _sync(path: Path) -> None:
-    """Wait until a file or a directory is on the disk."""
-    descriptor = os.open(path, os.O_RDONLY)
-    try:
-        os.fsync(descriptor)
-    finally:
-        os.close(descriptor)
-
-
 # -- what was not used for long ------------------------------------------------------------------
-
-DAY = 86_400.0
-"""Time after which a use is noted again, and unused entries are looked for again; s."""
-
-UNUSED = 30 * DAY
-"""Time after which an entry that was not used is removed; s."""
-
-SWEPT = "swept"
-"""File whose time of change is when unused entries were looked for last."""
 
 
 def _age(path: Path) -> float:
-    """Time since a file was written, or used as :func:`_note_use` notes it; s."""
+    """Time since a file was written, or was used, which is noted once a day; s."""
     return time.time() - path.stat().st_mtime
-
-
-def _note_use(entry: Path) -> None:
-    """Note that an entry is in use, at most once a day; FileNotFoundError if it is gone."""
-    if _age(entry / CHECKSUMS) > DAY:
-        with suppress(PermissionError):  # of the administrator
-            os.utime(entry / CHECKSUMS)
 
 
 def sweep(place: Path) -> None:
@@ -146,58 +132,42 @@ def sweep(place: Path) -> None:
         if (place / SWEPT).exists() and _age(place / SWEPT) < DAY:
             return
         (place / SWEPT).touch()
-        for lock in place.glob("*.lock"):
-            if _age(lock) > UNUSED:
-                with locked(lock):
-                    _remove_unused(lock.with_suffix(""), lock)
-
-
-def _remove_unused(entry: Path, lock: Path) -> None:
-    """Remove an entry, unless it was used, and its lock, which is held."""
-    aside = entry.with_name(f"{entry.name}.unused.part")
-    if entry.exists():
-        if _age(entry / CHECKSUMS) < UNUSED:
-            return
-        entry.rename(aside)
-        if _age(aside / CHECKSUMS) < UNUSED:  # by a process that found it just before
-            aside.rename(entry)
-            return
-    for rest in entry.parent.glob(f"{entry.name}.*.part"):
-        shutil.rmtree(rest, ignore_errors=True)
-    lock.unlink()
+        for lock in (lock for lock in place.glob("*.lock") if _age(lock) > UNUSED):
+            entry = lock.with_suffix("")
+            aside = entry.with_name(f"{entry.name}.unused.part")
+            with locked(lock):
+                if entry.exists():
+                    if _age(entry / CHECKSUMS) < UNUSED:
+                        continue
+                    entry.rename(aside)
+                    if _age(aside / CHECKSUMS) < UNUSED:  # by a process that found it just before
+                        aside.rename(entry)
+                        continue
+                _remove_parts(entry)
+                lock.unlink()
 
 
 # -- directories ---------------------------------------------------------------------------------
 
 
-def _trusted() -> tuple[int, int]:
-    """Users whose files are loaded: this one and the administrator."""
-    return os.geteuid(), 0
-
-
-def _distrust(directory: Path) -> str:
-    """Return why code in a directory may be someone else's; empty if it may not."""
-    status = directory.lstat()
-    if not stat.S_ISDIR(status.st_mode):
-        return "it is no directory"
-    if status.st_uid not in _trusted():
-        return f"it belongs to the user with the number {status.st_uid}"
-    if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        return f"others may write to it (mode {stat.S_IMODE(status.st_mode):o}); remove it"
-    for parent in directory.absolute().parents:
-        mode = parent.stat().st_mode
-        if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
-            return f"others may write to {parent} (mode {stat.S_IMODE(mode):o})"
-    return ""
-
-
 def _made(directory: Path) -> str:
-    """Make a private directory if it is missing; return why it cannot be used, empty if it can."""
+    """Make a private directory if it is missing; return why it cannot be used, or empty."""
     try:
         directory.mkdir(mode=0o700, parents=True, exist_ok=True)
-        return _distrust(directory)
+        status = directory.lstat()
+        if not stat.S_ISDIR(status.st_mode):
+            return "it is no directory"
+        if status.st_uid not in TRUSTED:
+            return f"it belongs to the user with the number {status.st_uid}"
+        if status.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+            return f"others may write to it (mode {stat.S_IMODE(status.st_mode):o}); remove it"
+        for parent in directory.absolute().parents:
+            mode = parent.stat().st_mode
+            if mode & stat.S_IWOTH and not mode & stat.S_ISVTX:
+                return f"others may write to {parent} (mode {stat.S_IMODE(mode):o})"
     except OSError as error:
         return error.strerror or str(error)
+    return ""
 
 
 @cache

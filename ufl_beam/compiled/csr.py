@@ -13,7 +13,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, loop, struct
-from ufl_beam.structure_cache import of_structure
+from ufl_beam.memory import of_structure
 
 
 class Csr:

@@ -28,7 +28,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
-from ufl_beam.structure_cache import stated as stated
+from ufl_beam.memory import stated as stated
 
 
 def tabulator(compiled: fem.Form) -> Any:

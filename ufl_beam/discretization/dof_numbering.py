@@ -18,6 +18,7 @@ from zlib import crc32
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.display import counted
 from ufl_beam.errors import SceneError, require_kind, shorten
 from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
 from ufl_beam.model.connectors import Connector
@@ -27,7 +28,6 @@ from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.model.supports import COMPONENTS
-from ufl_beam.one_line import counted
 
 
 class Grid:

@@ -15,13 +15,13 @@ from scipy.spatial import KDTree
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import warn
+from ufl_beam.memory import of_structure
 from ufl_beam.model.bodies import GROUND, Place, Spot, carries
 from ufl_beam.model.connector_laws import HELD, Motor
 from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.model.time_functions import value_at
-from ufl_beam.structure_cache import of_structure
 
 TOUCHING = 1e-3
 """Distance of places that touch, as a part of the length of the shorter beam."""

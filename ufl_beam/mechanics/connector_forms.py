@@ -15,7 +15,7 @@ from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.relative_motions import MOTIONS, Numbers, Pair
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.structure_cache import stated
+from ufl_beam.memory import stated
 
 
 class ConnectorForms(NamedTuple):

@@ -17,11 +17,11 @@ import numpy as np
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
-from ufl_beam.one_line import one_line
 
 Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ufl_beam.display import bracketed
 from ufl_beam.errors import (
     SceneError,
     require_kind,
@@ -23,7 +24,6 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.curves import Curve, Point, tangent_within
 from ufl_beam.model.records import NotNegative, Record, Vector
-from ufl_beam.one_line import bracketed
 
 TOGETHER = 1e-9
 """Distance below which two places of a beam are one, as a part of a cell."""

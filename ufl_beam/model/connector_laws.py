@@ -10,6 +10,7 @@ from functools import partial
 from numbers import Real
 from typing import Annotated, Any, Protocol
 
+from ufl_beam.display import one_line
 from ufl_beam.errors import (
     SceneError,
     closed,
@@ -34,7 +35,6 @@ from ufl_beam.model.softening_laws import (
     require_softening,
 )
 from ufl_beam.model.time_functions import Constant, Timed
-from ufl_beam.one_line import one_line
 
 OWN_LAW = "state a ConnectorLaw of your own"
 """Message of classes that are closed."""

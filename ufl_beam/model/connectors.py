@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from ufl_beam.display import bracketed
 from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, arm, require_anchors
 from ufl_beam.model.connector_law import ConnectorLaw
@@ -13,7 +14,6 @@ from ufl_beam.model.connector_law_checks import require_connector_law
 from ufl_beam.model.connector_laws import Guide, Law, Motor, RigidPlastic, rubs
 from ufl_beam.model.curves import Point
 from ufl_beam.model.records import Record
-from ufl_beam.one_line import bracketed
 
 Factors = tuple[float, float, float]
 """Derivatives of a relative motion by (u, v, ψ) of a node."""

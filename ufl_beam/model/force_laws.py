@@ -7,9 +7,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, closed, require_function, require_row
-from ufl_beam.model.named_parameters import parameters_by_name
-from ufl_beam.one_line import one_line
+from ufl_beam.model.signatures import parameters_by_name
 
 
 @closed("give it a function of your own")

@@ -6,12 +6,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 
+from ufl_beam.display import bracketed
 from ufl_beam.errors import SceneError, require_kind, require_switch, require_text
 from ufl_beam.model.bodies import Anchor, NodeDof, Place, carries, ground, node, require_anchors
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Connector, require_apart, unit_axis
 from ufl_beam.model.curves import Curve, Point, point_of
-from ufl_beam.one_line import bracketed
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,11 +6,11 @@ from __future__ import annotations
 from abc import ABC
 from dataclasses import dataclass
 
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, closed
 from ufl_beam.model.bodies import Anchor, Member, carries, require_anchors, require_beam
 from ufl_beam.model.records import Number, Record, Vector
 from ufl_beam.model.time_functions import Timed, TimeFunction, steady
-from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,9 +14,9 @@ from numbers import Rational, Real
 import numpy as np
 import numpy.typing as npt
 
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, require_kind, require_memory, require_number, shorten
 from ufl_beam.model.bodies import Member
-from ufl_beam.one_line import one_line
 
 
 @dataclass(frozen=True)

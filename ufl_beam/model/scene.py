@@ -11,8 +11,9 @@ from typing import Any
 
 import numpy as np
 
+from ufl_beam.display import Rich, counted
 from ufl_beam.errors import SceneError, clip, require_kind, require_sequence
-from ufl_beam.garbage_collection import no_garbage_collection
+from ufl_beam.memory import no_garbage_collection
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import (
     GROUND,
@@ -33,14 +34,12 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import enclosing_diameter, points_along
 from ufl_beam.model.damping import Damping, KelvinVoigt
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.loads import LineLoad, Load, LoadAtPlace, PointLoad, RotatingFrame
+from ufl_beam.model.loads import FollowerLoad, LineLoad, Load, LoadAtPlace, PointLoad, RotatingFrame
 from ufl_beam.model.masses import PointMass, Velocity
 from ufl_beam.model.plastic_hinges import plastic_hinges
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
-from ufl_beam.one_line import counted
-from ufl_beam.rich_display import Rich
 
 
 @dataclass(frozen=True, eq=False)
@@ -331,6 +330,18 @@ class Scene(Rich):
                         f"{COMPONENTS[component]}; remove one"
                     )
                 holders[dof] = str(support)
+
+
+def spots_of(scene: Scene) -> dict[Body, list[Spot]]:
+    """Find the points of bodies and of the ground that something is attached to, each once."""
+    anchors = [place for joint in scene.joints for place in joint.places]
+    anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
+    anchors += [x.place for x in scene.loads if isinstance(x, PointLoad | FollowerLoad)]
+    found: dict[Body, dict[Spot, None]] = {body: {} for body in (*scene.bodies, GROUND)}
+    for anchor in anchors:
+        if isinstance(anchor, Spot):
+            found[anchor.body][anchor] = None
+    return {body: list(spots) for body, spots in found.items()}
 
 
 def _off_center(load: PointLoad) -> tuple[Connector, ...]:

@@ -6,12 +6,12 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from ufl_beam.display import bracketed
 from ufl_beam.errors import SceneError, require_number, require_vector
 from ufl_beam.model.bodies import Anchor, require_node
 from ufl_beam.model.connector_laws import Bearing
 from ufl_beam.model.curves import Point
 from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_function
-from ufl_beam.one_line import bracketed
 
 COMPONENTS = ("u", "v", "psi")
 

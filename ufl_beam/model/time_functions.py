@@ -11,6 +11,7 @@ from typing import Annotated
 
 import numpy as np
 
+from ufl_beam.display import one_line
 from ufl_beam.errors import (
     NoNumber,
     SceneError,
@@ -20,7 +21,6 @@ from ufl_beam.errors import (
     require_sequence,
     shorten,
 )
-from ufl_beam.one_line import one_line
 
 TimeFunction = Callable[[float], float]
 

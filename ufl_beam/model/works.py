@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from typing import Any, ClassVar
 
+from ufl_beam.display import bracketed
 from ufl_beam.errors import (
     SceneError,
     closed,
@@ -19,9 +20,8 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.ledger_entries import ENTRIES
-from ufl_beam.model.named_parameters import parameters_by_name
+from ufl_beam.model.signatures import parameters_by_name
 from ufl_beam.model.time_functions import TimeFunction, require_time_function
-from ufl_beam.one_line import bracketed
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,6 +17,8 @@ import shutil
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from functools import cache
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +26,6 @@ import numpy as np
 
 from ufl_beam.errors import SceneError, warn
 from ufl_beam.output.output_files import put_in_place, require_writable
-from ufl_beam.version import version
 
 Content = dict[str, Any]
 """Arrays by name; what is not an array is JSON."""
@@ -44,6 +45,18 @@ DIGEST = 64
 
 END = re.compile(rb"(?s).*?(\w+ of ufl_beam, \d+); written by ufl_beam ([!-~]+); sha256 \w{64}")
 """The end of a file: format, and version of the package."""
+
+
+@cache
+def version() -> str:
+    """The version of the source tree that is imported, else that of the installed package."""
+    project = Path(__file__).resolve().parents[2] / "pyproject.toml"
+    if project.is_file():
+        text = project.read_text(encoding="utf-8")
+        stated = re.search(r'^name = "ufl_beam"\nversion = "([^"]+)"', text, re.MULTILINE)
+        if stated:
+            return stated[1]
+    return metadata.version("ufl_beam")
 
 
 def above(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:

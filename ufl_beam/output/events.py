@@ -10,16 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import State
-from ufl_beam.collective_errors import on_first
+from ufl_beam.display import TIME, Parameter, bracketed
 from ufl_beam.errors import require_function
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.one_line import bracketed
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
-from ufl_beam.parameter import TIME, Parameter
+from ufl_beam.parallel import on_first
 
 Flags = npt.NDArray[np.bool_]
 

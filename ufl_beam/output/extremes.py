@@ -9,9 +9,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Body, Member
-from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import require_arrays
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from ufl_beam.arrays import State
-from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_kind, require_sequence
 from ufl_beam.model.bodies import Anchor, require_anchors
 from ufl_beam.model.connectors import Connector
@@ -22,6 +21,7 @@ from ufl_beam.output.joint_histories import links_of, motion_of
 from ufl_beam.output.output_files import OutputFile, changed, part_of, require_path
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
+from ufl_beam.parallel import on_first
 
 MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))  # columns of a place, and their units
 FORMULA = ("=", "+", "-", "@", "\t", "\r")  # beginnings of formulas in spreadsheets

@@ -9,6 +9,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Blocks
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
 from ufl_beam.model.connector_laws import Guide
@@ -16,7 +17,6 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
-from ufl_beam.one_line import one_line
 
 Vectors: TypeAlias = Array | Blocks
 """Configurations or velocities at some times; (n, size)."""

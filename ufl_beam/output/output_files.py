@@ -9,11 +9,12 @@ import os
 import shutil
 import stat
 import warnings
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 
 from ufl_beam.errors import SceneError, shorten
-from ufl_beam.file_locks import is_at
+from ufl_beam.file_system import is_at, sync
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
 _in_use: list[Output] = []  # outputs of the runs that go on in this process, the outer ones first
@@ -91,16 +92,30 @@ def part_of(path: Path) -> Path:
     return path.with_name(f"{path.name}.part")
 
 
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Let errors of writing say which file, why, how much space there is, and what is kept."""
+    try:
+        yield
+    except OSError as error:
+        space = ""
+        if error.errno == errno.ENOSPC and path.is_file():
+            space = f" ({shutil.disk_usage(path.parent).free / 1e6:.3g} MB are free)"
+        raise OSError(
+            error.errno or errno.EIO,
+            f"output {path} cannot be written: {error.strerror or error}{space}; what was written "
+            "before is complete",
+        ) from None
+
+
 class OutputFile:
     """File that is written at given positions, emptied or made if new; errors name it."""
 
     def __init__(self, path: Path, *, new: bool = True) -> None:
         self.path = path
         flags = os.O_RDWR | os.O_CLOEXEC | (os.O_CREAT | os.O_TRUNC if new else 0)
-        try:
+        with naming(path):
             self._file = os.open(path, flags, 0o666)
-        except OSError as error:
-            raise failure(error, path) from None
         self._regular = stat.S_ISREG(os.fstat(self._file).st_mode)
         self._digest, self._hashed = hashlib.sha256(), 0
 
@@ -110,16 +125,13 @@ class OutputFile:
         return os.fstat(self._file).st_size
 
     def put(self, at: int, data: bytes | bytearray) -> None:
-        """Write at a position of the file."""
+        """Write at a position of the file; pipes and terminals have none."""
         rest = memoryview(data)
-        try:
+        with naming(self.path):
             while rest:
-                # Pipes and terminals have no positions.
-                file, put = self._file, self._regular
-                done = os.pwrite(file, rest, at) if put else os.write(file, rest)
+                file = self._file
+                done = os.pwrite(file, rest, at) if self._regular else os.write(file, rest)
                 rest, at = rest[done:], at + done
-        except OSError as error:
-            raise failure(error, self.path) from None
 
     def read(self, at: int, count: int) -> bytes:
         """Read some bytes, fewer at the end of the file."""
@@ -147,11 +159,12 @@ class OutputFile:
         """Let the disk be full now rather than when a library writes up to a length."""
         missing = length - self.size
         if missing > 0 and hasattr(os, "posix_fallocate"):
-            try:
-                os.posix_fallocate(self._file, self.size, missing)
-            except OSError as error:
-                if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # no such thing there
-                    raise failure(error, self.path) from None
+            with naming(self.path):
+                try:
+                    os.posix_fallocate(self._file, self.size, missing)
+                except OSError as error:
+                    if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # no such thing there
+                        raise
 
     def rename(self, path: Path) -> None:
         """Move the file, in the place of another one if that exists."""
@@ -167,11 +180,12 @@ class OutputFile:
                 "can count on it; the checkpoint before is kept, and the solution so far is in the "
                 "error",
             )
-        try:
-            os.fsync(self._file)
-        except OSError as error:
-            if error.errno not in (errno.EINVAL, errno.EROFS):  # not of a file
-                raise failure(error, self.path) from None
+        with naming(self.path):
+            try:
+                os.fsync(self._file)
+            except OSError as error:
+                if error.errno not in (errno.EINVAL, errno.EROFS):  # not of a file
+                    raise
 
     def close(self) -> None:
         """Close the file; warn if it is not where it was."""
@@ -198,23 +212,7 @@ def put_in_place(path: Path, data: bytes | memoryview) -> None:
     except BaseException:
         part.unlink(missing_ok=True)
         raise
-    folder = os.open(path.parent, os.O_RDONLY)
-    try:
-        os.fsync(folder)
-    finally:
-        os.close(folder)
-
-
-def failure(error: OSError, path: Path) -> OSError:
-    """Describe an error of writing: the file, the reason, free space, and that content is kept."""
-    space = ""
-    if error.errno == errno.ENOSPC and path.is_file():
-        space = f" ({shutil.disk_usage(path.parent).free / 1e6:.3g} MB are free)"
-    return OSError(
-        error.errno or errno.EIO,
-        f"output {path} cannot be written: {error.strerror or error}{space}; what was written "
-        "before is complete",
-    )
+    sync(path.parent)
 
 
 def changed(what: str) -> SceneError:

@@ -5,17 +5,16 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from contextlib import ExitStack
 from pathlib import Path
 
 from mpi4py import MPI
 
 from ufl_beam.arrays import State
-from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_sequence, shorten
+from ufl_beam.model.signatures import unlike
 from ufl_beam.output.output_files import Output, require_apart, require_writable
 from ufl_beam.output.state_view import StateView
-from ufl_beam.protocols import require_members
+from ufl_beam.parallel import on_first
 
 
 class Recorder(ABC):
@@ -92,7 +91,9 @@ def recorders_of(
                 f"{call}: {name} = {shorten(recorder)} is not a Recorder; classes of your own are "
                 "derived from ub.Recorder"
             )
-        require_members(recorder, Recorder, f"{call}: {name}", "a recorder")
+        if why := unlike(recorder, Recorder):
+            kind = type(recorder).__name__
+            raise SceneError(f"{call}: {name}: {kind} is not a recorder: {why}")
         first = next(k for k, one in enumerate(recorders) if one is recorder)
         if first != i:
             raise SceneError(
@@ -104,10 +105,3 @@ def recorders_of(
     outputs += others
     on_first(comm, lambda: require_apart(outputs, call))
     return recorders, outputs
-
-
-def close_all(recorders: Sequence[Recorder]) -> None:
-    """Close all recorders, also when closing one of them fails."""
-    with ExitStack() as stack:
-        for recorder in reversed(recorders):
-            stack.callback(recorder.close)

@@ -9,7 +9,6 @@ numbers and the name of the class are saved, to be compared with a scene that th
 from __future__ import annotations
 
 import dataclasses
-import math
 import warnings
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping
@@ -19,6 +18,7 @@ from pkgutil import iter_modules
 from typing import Any, NoReturn, TypeVar
 
 import numpy as np
+from scipy.interpolate import KroghInterpolator
 
 from ufl_beam.errors import ModelWarning, SceneError
 from ufl_beam.model.bodies import GROUND
@@ -88,12 +88,9 @@ class SavedCurve:
             return self.points[n]
         count = 4 if 0 < n < len(self.s) else 2
         first = max(min(n - count // 2, len(self.s) - count), 0)
-        x = y = 0.0
-        near = range(first, min(first + count, len(self.s)))
-        for i in near:
-            weight = math.prod((s - self.s[j]) / (self.s[i] - self.s[j]) for j in near if j != i)
-            x, y = x + weight * self.points[i][0], y + weight * self.points[i][1]
-        return x, y
+        near = slice(first, first + count)
+        x, y = KroghInterpolator(self.s[near], self.points[near])(s)
+        return float(x), float(y)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -17,6 +17,7 @@ from ufl_beam.compiled.csr import as_slice
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
+from ufl_beam.display import Parameter
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
@@ -27,7 +28,6 @@ from ufl_beam.model.supports import Support
 from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
 from ufl_beam.output.joint_histories import Connection, connection, links_of, motion_of, velocity_of
 from ufl_beam.output.watches import Watch
-from ufl_beam.parameter import Parameter
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.cell_forces import CellForces

@@ -1,30 +1,66 @@
 # SPDX-License-Identifier: MIT
-"""Time series for ParaView and PyVista: recorders of a scene as one data set of lines."""
+"""Time series for ParaView and PyVista: a recorders of a scene as one data set of lines."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
-from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar, NamedTuple
 
 from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index, State
-from ufl_beam.collective_errors import on_first
+from ufl_beam.arrays import Array, State
 from ufl_beam.errors import SceneError, require_count
-from ufl_beam.model.bodies import arm
+from ufl_beam.model.bodies import Anchor, arm
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.output.joint_histories import turned
 from ufl_beam.output.output_files import changed, part_of, require_path
+from ufl_beam.output.paraview_files import (
+    LineFields,
+    Lines,
+    VtkhdfWriter,
+    XdmfWriter,
+    data_path,
+)
 from ufl_beam.output.recorders import Recorder
-from ufl_beam.output.scene_lines import rods_of
 from ufl_beam.output.state_view import StateView
-from ufl_beam.output.vtkhdf import VtkhdfWriter
-from ufl_beam.output.xdmf import Complete, XdmfWriter, data_path
+from ufl_beam.parallel import on_first
 
-LineFields = tuple[dict[str, Array], dict[str, Array]]  # at points, (n,) or (n, 3); in cells, (m,)
+BODY, LINK = 1, 2
+"""Numbers of bodies and links among the parts of a scene; beams are 0."""
+
+
+class Rod(NamedTuple):
+    """Straight line between two anchors, of a body or a connector."""
+
+    a: Anchor
+    b: Anchor
+    part: int  # BODY or LINK
+    along: Connector | None = None  # whose force acts along it
+
+
+def rods_of(scene: Scene) -> list[Rod]:
+    """List the lines from the centre of each body to its points, and along links and springs."""
+    spots, rods = spots_of(scene), []
+    for body in scene.bodies:
+        x, y = body.center
+        # If something is attached to its centre alone, it is shown too, and turns.
+        beside = body.at(x + 0.02 * scene.size, y)
+        others = [s for s in spots[body] if s.point != body.center] or [beside]
+        rods += [Rod(body.middle, spot, BODY) for spot in others]
+    for joint in scene.joints:
+        if joint.look in ("RigidLink", "Link"):
+            a, b = joint.places
+            pulls = next((c for c in joint.holders if c.stretches), None)
+            rods.append(Rod(a, b, LINK, pulls))
+    rods += [
+        Rod(c.a, c.b, LINK, c if c.stretches else None)
+        for c in scene.connectors
+        if not c.turns and c.apart != (0.0, 0.0)
+    ]
+    return rods
 
 
 class LineData:
@@ -38,10 +74,12 @@ class LineData:
         grid, rods = simulation.grid, rods_of(simulation.scene)
         ends = [anchor for rod in rods for anchor in (rod.a, rod.b)]
         corners = np.reshape([anchor.point for anchor in ends], (-1, 2))
-        self.points = np.insert(np.concatenate([grid.points, corners]), 2, 0.0, axis=1)
-        lines = len(grid.points) + np.arange(len(ends)).reshape(-1, 2)
-        self.cells: Index = np.concatenate([grid.pieces, lines])
-        self.parts = np.append(np.zeros(len(grid.pieces)), [rod.part for rod in rods])
+        own = len(grid.points) + np.arange(len(ends)).reshape(-1, 2)
+        self.lines = Lines(
+            np.insert(np.concatenate([grid.points, corners]), 2, 0.0, axis=1),
+            np.concatenate([grid.pieces, own]),
+            np.append(np.zeros(len(grid.pieces)), [rod.part for rod in rods]),
+        )
         self._nodes = np.concatenate([grid.dofs, *(grid.node(a)[None] for a in ends)])
         self._ends = slice(len(grid.points), None)
         self._arms = np.reshape([arm(anchor) for anchor in ends], (-1, 2))
@@ -62,27 +100,31 @@ class LineData:
             velocity = np.insert(v[:, :2], 2, 0.0, axis=1)
             velocity[self._ends, :2] += v[self._ends, 2:] * arms[:, ::-1] * (-1.0, 1.0)
             at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
-        return at_points, self._in_cells(simulation)
-
-    def _in_cells(self, simulation: StateView) -> dict[str, Array]:
         forces = simulation.section_forces()
-        in_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
+        of_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
         if simulation.may_break:
-            in_cells["jump"], in_cells["dissipated energy"] = simulation.damage()
-        in_lines = {
+            of_cells["jump"], of_cells["dissipated energy"] = simulation.damage()
+        in_cells = {
             name: np.append(np.repeat(values, self._pieces_of_cell), np.zeros(self._num_rods))
-            for name, values in in_cells.items()
+            for name, values in of_cells.items()
         }
         if self._pulls:
-            rods = in_lines["N"][len(self.cells) - self._num_rods :]
+            rods = in_cells["N"][len(self.lines.cells) - self._num_rods :]
             rods[[*self._pulls]] = simulation.connections()[[*self._pulls.values()], 1]
-        return in_lines
+        return at_points, in_cells
 
 
 class TimeSeries(Recorder):
-    """Time series of a scene as one data set of lines, see :class:`XDMF` and :class:`VTKHDF`."""
+    """Base of recorders of a scene as one data set of lines, see :class:`XDMF` and :class:`VTKHDF`.
 
-    ending: str
+    Attributes:
+        ending: End of the name of the file.
+        writer: Class of the writer, made of path, lines and fields of the first state; and to go
+            on of what ``complete`` and ``sync()`` of an earlier one gave.
+    """
+
+    ending: ClassVar[str]
+    writer: ClassVar[Any]
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
         kind = type(self).__name__
@@ -91,36 +133,41 @@ class TimeSeries(Recorder):
         self._every, self._count = every, 0
         if self._path.suffix != self.ending:
             raise SceneError(f"{kind} {path}: the name of the file must end in {self.ending}")
-        self._writers: list[Any] = []
+        self._writers: list[Any] = []  # on the first process one, while it is open
 
     def open(self, simulation: StateView) -> None:
         """Write the mesh and the initial state."""
-        self._count = 0
-        fields = self._prepare(simulation)
-        on_first(simulation.comm, lambda: self._begin(simulation.t, fields))
+        self._begin(simulation, 0)
 
-    def _prepare(self, simulation: StateView) -> LineFields:
-        """Note the mesh; the fields of the present state."""
+    def resume(self, simulation: StateView, state: State) -> None:
+        """Cut off what was written after the state, and go on."""
+        count, *complete = (int(n) for n in state["sizes"])
+        self._begin(simulation, count, complete, state["digest"].tobytes())
+
+    def _begin(self, simulation: StateView, count: int, *before: Any) -> None:
+        """Make the writer of a new file, or of one with what was ``before``."""
         self._comm: MPI.Intracomm = simulation.comm
-        self._lines = LineData(simulation)
-        return self._lines.fields(simulation)
+        self._scene, self._count = LineData(simulation), count
+        fields = self._scene.fields(simulation)
 
-    def _begin(self, t: float, fields: LineFields) -> None:
-        self.close()
-        self._writers = [self._writer(fields)]
-        self._writers[0].write(t, fields)
+        def make() -> None:
+            self.close()
+            try:
+                self._writers = [self.writer(self._path, self._scene.lines, fields, *before)]
+            except (FileNotFoundError, ValueError):
+                if not before:
+                    raise
+                raise changed(f"{type(self).__name__} {self._path}") from None
+            if not before:
+                self._writers[0].write(simulation.t, fields)
 
-    @abstractmethod
-    def _writer(
-        self, fields: LineFields, complete: Sequence[int] | None = None, digest: bytes = b""
-    ) -> Any:
-        """Make the writer of a file, or of one that is complete up to some sizes."""
+        on_first(self._comm, make)
 
     def write(self, simulation: StateView) -> None:
         """Write the state, every so many steps."""
         self._count += 1
         if self._count % self._every == 0:
-            fields = self._lines.fields(simulation)
+            fields = self._scene.fields(simulation)
             on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
 
     def state(self) -> State:
@@ -132,18 +179,6 @@ class TimeSeries(Recorder):
             "sizes": np.array([self._count, *sizes], dtype=float),
             "digest": np.frombuffer(b"".join(digests), dtype=np.uint8),
         }
-
-    def resume(self, simulation: StateView, state: State) -> None:
-        """Cut off what was written after the state, and go on."""
-        self._count, *sizes = (int(n) for n in state["sizes"])
-        fields, digest = self._prepare(simulation), state["digest"].tobytes()
-        on_first(simulation.comm, lambda: self._take_back(fields, sizes, digest))
-
-    def _take_back(self, fields: LineFields, sizes: list[int], digest: bytes) -> None:
-        try:
-            self._writers = [self._writer(fields, sizes, digest)]
-        except (FileNotFoundError, ValueError):
-            raise changed(f"{type(self).__name__} {self._path}") from None
 
     def close(self) -> None:
         """Close the files of the time series."""
@@ -180,6 +215,7 @@ class XDMF(TimeSeries):
     """
 
     ending = ".xdmf"
+    writer = XdmfWriter
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -195,12 +231,6 @@ class XDMF(TimeSeries):
                 "survive in XML; take another name"
             )
         super().require_writable()
-
-    def _writer(
-        self, fields: LineFields, complete: Sequence[int] | None = None, digest: bytes = b""
-    ) -> XdmfWriter:
-        lines, sizes = self._lines, None if complete is None else Complete(*complete)
-        return XdmfWriter(self._path, lines.points, lines.cells, lines.parts, sizes, digest)
 
 
 class VTKHDF(TimeSeries):
@@ -226,15 +256,9 @@ class VTKHDF(TimeSeries):
     """
 
     ending = ".vtkhdf"
+    writer = VtkhdfWriter
 
     @property
     def files(self) -> tuple[Path, ...]:
         """Path of the file, and of the one that takes its place when a run is restarted."""
         return self._path, part_of(self._path)
-
-    def _writer(
-        self, fields: LineFields, complete: Sequence[int] | None = None, digest: bytes = b""
-    ) -> VtkhdfWriter:
-        lines, steps = self._lines, None if complete is None else complete[0]
-        mesh = lines.points, lines.cells, lines.parts
-        return VtkhdfWriter(self._path, *mesh, fields, steps, digest)

@@ -18,9 +18,8 @@ from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import nearest, parameter_step, tangent
-from ufl_beam.model.scene import Scene
+from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.output.joint_histories import motion_of
-from ufl_beam.output.scene_lines import spots_of
 from ufl_beam.simulation.solution import Solution
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3

@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.display import picture_of
 from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.damping import Rayleigh
 from ufl_beam.model.loads import Gravity, Load, RotatingFrame
-from ufl_beam.model.scene import Scene
-from ufl_beam.output.scene_lines import spots_of
+from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.plotting.diagrams import plot_state
 from ufl_beam.plotting.drawing import draw_strokes
 from ufl_beam.plotting.labels import Placed, place
@@ -43,7 +43,6 @@ from ufl_beam.plotting.style import (
     size_of,
     with_unit,
 )
-from ufl_beam.rich_display import picture_of
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:

@@ -10,8 +10,8 @@ from html import escape
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
+from ufl_beam.display import html_of, picture_of
 from ufl_beam.model.scene import Scene
-from ufl_beam.rich_display import html_of, picture_of
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.energy_ledger import Energy
 

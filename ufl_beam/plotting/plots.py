@@ -11,6 +11,7 @@ import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.tradeoff_result import Run, Tradeoff
+from ufl_beam.display import picture_of
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.output.extremes import Extremes
@@ -18,7 +19,6 @@ from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import drawing, style, symbols
 from ufl_beam.plotting.diagrams import MOST, draw_frame
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture, shade
-from ufl_beam.rich_display import picture_of
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
@@ -20,6 +19,7 @@ from ufl_beam.model.connector_laws import rubs
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
+from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.step_equation import StepEquation

@@ -16,12 +16,14 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.collective_errors import on_first
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
-from ufl_beam.file_locks import Lock
-from ufl_beam.output.archive import Content, above, decoding, read, write
+from ufl_beam.file_system import Lock
+from ufl_beam.output.archive import ADVICE, Content, above, below, decoding, read, write
 from ufl_beam.output.output_files import part_of, require_path, require_writable
+from ufl_beam.output.recorders import Recorder
+from ufl_beam.parallel import on_first
 from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state
+from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 
 FORMAT = "checkpoint of ufl_beam, 3"
@@ -95,10 +97,14 @@ class Keeper:
         call: Mapping[str, Any],
         step: float | None,
         t1: float,
+        recorders: Sequence[Recorder],
         comm: MPI.Intracomm,
     ) -> None:
+        for recorder in recorders:
+            if type(recorder).state is Recorder.state:
+                recorder.state()  # raises: it does not say how to go on
         self._choice, self._call, self._step, self._t1, self._comm = choice, call, step, t1, comm
-        self.path = Path(choice.path)
+        self.path, self._recorders = Path(choice.path), recorders
         self._described = Description(call)
         also = {f"also[{i}]": one for i, one in enumerate(choice.also)}
         self._stateful = {**self._described.stateful, **also}
@@ -113,9 +119,14 @@ class Keeper:
             self.found = comm.bcast(self.found)
         self._last_time, self._last_step = time.perf_counter(), -1
 
+    def close(self) -> None:
+        """Let other runs have the file."""
+        self._lock.release()
+
     # -- going on ------------------------------------------------------------------------------
 
     def _find(self) -> None:
+        """Lock the file, and read it if it exists."""
         folder = self.path.parent
         if not folder.is_dir():
             raise SceneError(f"checkpoint {self.path}: there is no directory {folder}; make it")
@@ -136,40 +147,53 @@ class Keeper:
         if exists:
             with decoding(self.path, FORMAT):
                 self.found = read(self.path, FORMAT)
-                self._require_same(self.found)
+                if differs := self._other(self.found):
+                    raise SceneError(f"it is of another run: {differs}")
+                t, t1 = float(self.found["state/t"][0]), self._t1
+                if t > t1 and t - t1 > 1e-9 * (self._step or 0.0):
+                    raise SceneError(f"it is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s")
         require_writable(self.path)
 
-    def _require_same(self, found: Content) -> None:
+    def _other(self, found: Content) -> str:
+        """The first thing in which this run differs from that of a file; empty if there is none."""
         now, then = self._described.texts, found["call"]
         if found["python"] != PYTHON:
             now, then = (
                 {name: text for name, text in texts.items() if not name.endswith(f".{CODE}")}
                 for texts in (now, then)
             )
-        differs = difference(now, then)
         step, before = self._step, found["step"]
-        if not differs and (step is None) != (before is None):
-            differs = "steps are equal in one of both, and adaptive in the other"
-        if not differs and step and abs(step - before) > 1e-9 * before:
-            differs = f"the step is {step!r} s, in the file {before!r} s"
-        if not differs and [*self._stateful] != [*found["stateful"]]:
-            differs = "other objects have a state"
-        if differs:
-            raise SceneError(f"it is of another run: {differs}")
-        t, t1 = float(found["state/t"][0]), self._t1
-        if t > t1 and t - t1 > 1e-9 * (step or 0.0):
-            raise SceneError(f"it is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s")
+        if differs := difference(now, then):
+            return differs
+        if (step is None) != (before is None):
+            return "steps are equal in one of both, and adaptive in the other"
+        if step and abs(step - before) > 1e-9 * before:
+            return f"the step is {step!r} s, in the file {before!r} s"
+        return "other objects have a state" * ([*self._stateful] != [*found["stateful"]])
 
-    def close(self) -> None:
-        """Let other runs have the file."""
-        self._lock.release()
-
-    def resume(self, steps: int) -> None:
-        """Restore the objects with a state, and forget the file; so many steps are done."""
-        states = self.found["stateful"].values()
+    def resume(self, simulation: Simulation, pace: Any) -> None:
+        """Restore all from the file: the run, its step control ``pace``, recorders; forget it."""
+        found, solution = self.found, simulation.solution
+        with decoding(self.path, FORMAT):
+            simulation.resume(below("state/", found))
+            solution.resume(below("history/", found))
+            pace.restore(found["pace"])
+            solution.seconds = float(found["seconds"])
+        solution.parts, solution.iterations = simulation.parts, simulation.iterations
+        solution.time_error = pace.error
+        solution.warnings = found["warnings"]
+        states = found["stateful"].values()
         for one, state in zip(self._stateful.values(), states, strict=True):
             _restore(one, state)
-        self._last_step, self.found = steps, {}
+        for i, recorder in enumerate(self._recorders):
+            try:
+                recorder.resume(simulation, below(f"recorder {i}/", found))
+            except SceneError as error:
+                raise SceneError(f"checkpoint {self.path}: {error}") from None
+            except (LookupError, TypeError, ValueError) as error:
+                why = f"checkpoint {self.path}: {recorder} cannot go on from it: {error!r}"
+                raise SceneError(f"{why}. {ADVICE['checkpoint']}") from error
+        self._last_step, self.found = pace.steps, {}
 
     # -- writing -------------------------------------------------------------------------------
 
@@ -185,12 +209,20 @@ class Keeper:
             due = due or bool(self._comm.bcast(over) if self._comm.size > 1 else over)
         return due
 
-    def states(self) -> dict[str, Any]:
-        """Return the states of the objects that have one, by name."""
-        return {name: _state(one) for name, one in self._stateful.items()}
+    def write(self, simulation: Simulation, pace: Any, seconds: float) -> None:
+        """Write the file after so many seconds of the run; all processes call it together."""
 
-    def write(self, content: Content, solution: Solution, steps: int) -> None:
-        """Write what :attr:`found` is to be, and the history; all processes call it together."""
+        def states() -> dict[str, Any]:
+            return {name: _state(one) for name, one in self._stateful.items()}
+
+        solution = simulation.solution
+        content = {
+            "seconds": solution.seconds + seconds, "pace": pace.state(),
+            "stateful": simulation.together(states), "warnings": solution.warnings,
+            **above("state/", simulation.state()),
+        }  # fmt: skip
+        for i, recorder in enumerate(self._recorders):
+            content |= above(f"recorder {i}/", recorder.state())
         self._require_told()
         mine = {"python": PYTHON, "call": self._described.texts, "step": self._step}
 
@@ -200,7 +232,7 @@ class Keeper:
             write(self.path, FORMAT, {**mine, **content, **history}, at)
 
         on_first(self._comm, put)
-        self._last_time, self._last_step = time.perf_counter(), steps
+        self._last_time, self._last_step = time.perf_counter(), pace.steps
 
     def _require_told(self) -> None:
         """Raise if what functions use changes without their saying so: it would be lost."""

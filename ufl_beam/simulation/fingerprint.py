@@ -57,9 +57,9 @@ class Description:
         """Note what a thing is; the things it consists of, and how they are called."""
         if has_state(value):
             self.stateful[name] = value
-            self.texts[name] = kind_of(value)
+            self.texts[name] = type(value).__qualname__
         elif dataclasses.is_dataclass(value):
-            self.texts[name] = kind_of(value)
+            self.texts[name] = type(value).__qualname__
             for field in dataclasses.fields(value):
                 yield f".{field.name}", getattr(value, field.name)
         elif isinstance(value, np.ndarray):
@@ -85,14 +85,15 @@ class Description:
             self.texts[name] = "partial"
             yield from ((f".{p}", getattr(value, p)) for p in ("func", "args", "keywords"))
         else:
-            self.texts[name] = kind_of(value)
+            self.texts[name] = type(value).__qualname__
             if not type(value).__module__.startswith("ufl_beam."):
                 members = getattr(value, "__dict__", {})
                 yield from ((f".{key}", part) for key, part in members.items())
 
     def _of_function(self, name: str, function: FunctionType) -> Iterator[tuple[str, Any]]:
-        code = function.__code__
-        self.texts[f"{name}.{CODE}"] = hashlib.sha256(_text_of(code).encode()).hexdigest()[:16]
+        code, names = function.__code__, set[str]()
+        text = _text_of(code, names)
+        self.texts[f"{name}.{CODE}"] = hashlib.sha256(text.encode()).hexdigest()[:16]
         for variable, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
             try:
                 yield f".{variable}", cell.cell_contents
@@ -100,7 +101,7 @@ class Description:
                 self.texts[f"{name}.{variable}"] = "nothing"
         yield ".defaults", function.__defaults__
         yield ".defaults by name", function.__kwdefaults__
-        for variable in sorted(_names_in(code) & function.__globals__.keys()):
+        for variable in sorted(names & function.__globals__.keys()):
             used = function.__globals__[variable]
             mine = getattr(used, "__module__", None) == function.__module__
             plain = isinstance(
@@ -118,24 +119,16 @@ def has_state(value: Any) -> bool:
     return own or isinstance(value, np.random.Generator | np.random.RandomState)
 
 
-def kind_of(value: Any) -> str:
-    """The name of a class."""
-    return type(value).__qualname__
-
-
-def _text_of(code: CodeType) -> str:
+def _text_of(code: CodeType, names: set[str]) -> str:
+    """Return a code as text that can be compared, and add the names that it uses to ``names``."""
+    names.update(code.co_names)
     constants = [
-        _text_of(c)
+        _text_of(c, names)
         if isinstance(c, CodeType)
         else repr(sorted(c, key=repr) if isinstance(c, frozenset) else c)
         for c in code.co_consts
     ]
     return repr((code.co_code, code.co_names, constants))
-
-
-def _names_in(code: CodeType) -> set[str]:
-    inner = (c for c in code.co_consts if isinstance(c, CodeType))
-    return set(code.co_names).union(*map(_names_in, inner))
 
 
 def difference(now: Mapping[str, str], then: Mapping[str, str]) -> str:

@@ -6,7 +6,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from ufl_beam.arrays import Array
-from ufl_beam.one_line import one_line
+from ufl_beam.display import one_line
 
 
 class Diagram(NamedTuple):

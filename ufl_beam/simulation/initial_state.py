@@ -22,8 +22,8 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.discretization.work_forms import require_works
 from ufl_beam.errors import SceneError, require_kind, shorten, warn
-from ufl_beam.garbage_collection import no_garbage_collection
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
+from ufl_beam.memory import no_garbage_collection
 from ufl_beam.model.connector_laws import HELD
 from ufl_beam.model.constraint_checks import (
     require_independent,
@@ -35,8 +35,8 @@ from ufl_beam.model.constraint_checks import (
 )
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
+from ufl_beam.model.signatures import unlike
 from ufl_beam.model.supports import COMPONENTS
-from ufl_beam.protocols import require_members
 from ufl_beam.simulation.solution import Solution
 
 
@@ -81,7 +81,8 @@ def require_scheme(scheme: Any, what: str) -> None:
             f"{what} = {shorten(scheme)} must be a scheme, such as Static() or Midpoint()"
         )
     dynamic = getattr(scheme, "dynamic", False)
-    require_members(scheme, DynamicScheme if dynamic else Scheme, what, "a time scheme")
+    if why := unlike(scheme, DynamicScheme if dynamic else Scheme):
+        raise SceneError(f"{what}: {type(scheme).__name__} is not a time scheme: {why}")
     try:
         hash(scheme)
     except TypeError:

@@ -24,9 +24,9 @@ from ufl_beam.discretization.function_spaces import (
 )
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
+from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
-from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import above, below, require_arrays
 from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
 

@@ -14,7 +14,7 @@ from ufl_beam.errors import ConvergenceError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.progress_bar import progress_bar
+from ufl_beam.parallel import progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.solution import Solution

@@ -11,9 +11,9 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.collective_errors import duplicate
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import CopiesDiffer, warn
+from ufl_beam.parallel import duplicate
 
 TOLERANCE = 1e-8
 """Difference of motions that counts, as a part of their size: far above round-off."""

@@ -24,14 +24,11 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import ADVICE, above, below, decoding
 from ufl_beam.output.output_files import Output, take
-from ufl_beam.output.recorders import Recorder, close_all, recorders_of
-from ufl_beam.parallel import communicator, say
-from ufl_beam.progress_bar import progress_bar
-from ufl_beam.simulation.checkpoint import FORMAT, Checkpoint, Keeper, end_of
+from ufl_beam.output.recorders import Recorder, recorders_of
+from ufl_beam.parallel import communicator, progress_bar, say
+from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
 from ufl_beam.simulation.diagnosis import ROOM, open_ledger
-from ufl_beam.simulation.fingerprint import kind_of
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.reference_run import simulate_by_reference
 from ufl_beam.simulation.simulation import Simulation
@@ -118,20 +115,17 @@ def simulate(
             scene, scheme, newton, (t0, t1), number, start=start, mesh=mesh, every=every, most=most,
             comm=comm, progress=progress,
         )  # fmt: skip
-    keeper: Keeper | None = None
-    if checkpoint is not None:
-        step = None if isinstance(dt, Adaptive) else (t1 - t0) / number_of_steps(t1 - t0, dt)
-        call = {
-            "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every, "most": most,
-            "newton": newton or Newton(), "start": end_of(start), "mesh": mesh_of(start, mesh),
-            "record": [*map(kind_of, recorders)], "t[1]": t1 if step is None else "any",
-        }  # fmt: skip
-        for recorder in recorders:
-            if type(recorder).state is Recorder.state:
-                recorder.state()  # raises: it does not say how to go on
-        keeper = Keeper(checkpoint, call, step, t1, comm)
     with ExitStack() as stack:
-        if keeper is not None:
+        keeper: Keeper | None = None
+        if checkpoint is not None:
+            step = None if isinstance(dt, Adaptive) else (t1 - t0) / number_of_steps(t1 - t0, dt)
+            call = {
+                "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every,
+                "most": most, "newton": newton or Newton(), "start": end_of(start),
+                "mesh": mesh_of(start, mesh), "t[1]": t1 if step is None else "any",
+                "record": [type(recorder).__qualname__ for recorder in recorders],
+            }  # fmt: skip
+            keeper = Keeper(checkpoint, call, step, t1, recorders, comm)
             stack.callback(keeper.close)
         simulation = Simulation(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
@@ -141,36 +135,6 @@ def simulate(
         stack.enter_context(running(simulation, recorders, outputs, begin))
         pace = steps_of(simulation, t1, dt)
         watch = LedgerWatch(simulation.grid, scheme, ROOM * simulation.solver.convergence.c.rtol)
-
-        def go_on(keeper: Keeper) -> None:
-            found = keeper.found
-            with decoding(keeper.path, FORMAT):
-                simulation.resume(below("state/", found))
-                solution.resume(below("history/", found))
-                pace.restore(found["pace"])
-                solution.seconds = float(found["seconds"])
-            solution.parts, solution.iterations = simulation.parts, simulation.iterations
-            solution.time_error = pace.error
-            solution.warnings = found["warnings"]
-            keeper.resume(pace.steps)
-            for i, recorder in enumerate(recorders):
-                try:
-                    recorder.resume(simulation, below(f"recorder {i}/", found))
-                except SceneError as error:
-                    raise SceneError(f"checkpoint {keeper.path}: {error}") from None
-                except (LookupError, TypeError, ValueError) as error:
-                    why = f"checkpoint {keeper.path}: {recorder} cannot go on from it: {error!r}"
-                    raise SceneError(f"{why}. {ADVICE['checkpoint']}") from error
-
-        def write(keeper: Keeper) -> None:
-            content = {
-                "seconds": solution.seconds + time.perf_counter() - begin, "pace": pace.state(),
-                "stateful": simulation.together(keeper.states), "warnings": solution.warnings,
-                **above("state/", simulation.state()),
-            }  # fmt: skip
-            for i, recorder in enumerate(recorders):
-                content |= above(f"recorder {i}/", recorder.state())
-            keeper.write(content, solution, pace.steps)
 
         def after_step() -> None:
             solution.time_error = pace.error
@@ -187,10 +151,10 @@ def simulate(
             for recorder in recorders:
                 recorder.write(simulation)
             if keeper is not None and (keeper.due(pace.steps) or pace.finished):
-                write(keeper)
+                keeper.write(simulation, pace, time.perf_counter() - begin)
 
         if keeper is not None and keeper.found:
-            simulation.together(go_on, keeper)
+            simulation.together(keeper.resume, simulation, pace)
             say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
         else:
             for recorder in recorders:
@@ -244,7 +208,8 @@ def running(
     """
     with ExitStack() as stack:
         stack.callback(simulation.close)
-        stack.callback(close_all, recorders)
+        for recorder in recorders:
+            stack.callback(recorder.close)
         stack.callback(take(outputs))
         try:
             yield

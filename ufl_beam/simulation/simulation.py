@@ -12,10 +12,10 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Later, Snapshots
-from ufl_beam.collective_errors import Agreement
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
+from ufl_beam.display import Parameter
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten, warn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.connectors import Connector
@@ -24,8 +24,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.state_view import StateView
 from ufl_beam.output.watches import Watch
-from ufl_beam.parallel import communicator
-from ufl_beam.parameter import Parameter
+from ufl_beam.parallel import Agreement, communicator
 from ufl_beam.simulation.assembly import assemble
 from ufl_beam.simulation.diagnosis import no_equilibrium, require_held
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array, Later, Snapshots
-from ufl_beam.collective_errors import on_first
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
+from ufl_beam.display import TIME, Rich
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor, Member, Place
@@ -33,9 +33,7 @@ from ufl_beam.output.joint_histories import (
 )
 from ufl_beam.output.output_files import require_path
 from ufl_beam.output.saved_scene import require_no_code
-from ufl_beam.parallel import active_comm
-from ufl_beam.parameter import TIME
-from ufl_beam.rich_display import Rich
+from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.force_diagrams import Diagram
 from ufl_beam.simulation.kept_states import KeptStates, Material
 from ufl_beam.simulation.opened_hinges import Opened

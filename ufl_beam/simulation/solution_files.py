@@ -17,9 +17,9 @@ from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.archive import version
 from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data
 from ufl_beam.simulation.fingerprint import Description, difference
-from ufl_beam.version import version
 
 FORMAT = "solution of ufl_beam, 2"
 """The number grows whenever the meaning of files changes."""

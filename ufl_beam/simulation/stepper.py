@@ -17,13 +17,13 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, Later, Snapshots
-from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia, with_half_tangents
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.watches import Watch
+from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.prediction import Prediction

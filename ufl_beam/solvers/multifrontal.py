@@ -12,8 +12,8 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, struct
 from ufl_beam.compiled.csr import Csr
+from ufl_beam.memory import of_structure
 from ufl_beam.solvers.substructuring import Condensed
-from ufl_beam.structure_cache import of_structure
 
 ONE_FRONT = int(lib.ONE_FRONT)
 """Unknowns of a system that is one dense front at most."""

@@ -11,8 +11,8 @@ from typing import Any
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ufl_beam.collective_errors import Agreement
 from ufl_beam.compiled.c_library import ffi, petsc
+from ufl_beam.display import one_line
 from ufl_beam.errors import (
     SceneError,
     require_count,
@@ -21,7 +21,7 @@ from ufl_beam.errors import (
     require_switch,
     require_text,
 )
-from ufl_beam.one_line import one_line
+from ufl_beam.parallel import Agreement
 
 PREFIX = "ub_"
 """Prefix of the PETSc options of the solver, as in ``-ub_snes_monitor``."""

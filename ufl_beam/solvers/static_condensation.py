@@ -19,6 +19,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
+from ufl_beam.memory import of_structure
 from ufl_beam.solvers.multifrontal import ONE_FRONT, Multifrontal
 from ufl_beam.solvers.substructuring import (
     BAD_PIVOT,
@@ -28,7 +29,6 @@ from ufl_beam.solvers.substructuring import (
     Summed,
     succeeds,
 )
-from ufl_beam.structure_cache import of_structure
 
 
 class Chains:

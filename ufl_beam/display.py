@@ -1,0 +1,111 @@
+# SPDX-License-Identifier: MIT
+"""Texts for prompts, notebooks and pictures: representations of one line, HTML, names and units.
+
+Models and results know no pictures: the modules that draw them register how, see `notebook.py`.
+"""
+
+from __future__ import annotations
+
+import html
+import reprlib
+from fractions import Fraction
+from functools import singledispatch
+from inspect import signature
+from types import FunctionType
+from typing import Any, NamedTuple
+
+FEW = 4  # numbers of an array that are written
+
+
+class _Short(reprlib.Repr):
+    """Six digits of numbers, names of functions, shapes of arrays; long lists are cut."""
+
+    def repr1(self, x: Any, level: int) -> str:
+        if isinstance(x, float):
+            return f"{x:.6g}"
+        if isinstance(x, Fraction):
+            return str(x)
+        if isinstance(x, FunctionType):
+            return x.__name__
+        if type(x).__name__ == "ndarray":
+            one_row = x.ndim == 1 and x.size <= FEW
+            return self.repr_list([*x], level) if one_row else f"array of shape {x.shape}"
+        return super().repr1(x, level)
+
+
+_SHORT = _Short()
+_SHORT.maxother = _SHORT.maxstring = 120
+
+
+def one_line(record: Any) -> str:
+    """Write a record: ``Mesh(refine=2)``; fields as by default and empty ones are left out."""
+    fields = []
+    for name, parameter in signature(type(record)).parameters.items():
+        value = _SHORT.repr(getattr(record, name))
+        if value not in (_SHORT.repr(parameter.default), "{}"):
+            fields.append(f"{name}={value}")
+    return f"{type(record).__name__}({', '.join(fields)})"
+
+
+def bracketed(named: Any) -> str:
+    """Write what has a text of one line: ``<column.end (0, 3)>``."""
+    return f"<{named}>"
+
+
+def counted(*things: tuple[int, str, str]) -> str:
+    """Write the numbers of things of which there are any: ``1 beam, 8 cells``."""
+    return ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in things if n)
+
+
+# -- notebooks -----------------------------------------------------------------------------------
+
+
+@singledispatch
+def html_of(shown: object) -> str:
+    """Write an object as HTML: its text, unless a function is registered for its class."""
+    return f"<pre>{html.escape(str(shown))}</pre>"
+
+
+@singledispatch
+def picture_of(shown: object) -> Any:
+    """Draw the figure that stands for an object in a notebook, by the function for its class."""
+    raise TypeError(f"a {type(shown).__name__} has no picture")
+
+
+class Rich:
+    """Base of models and results that a notebook shows as tables and a picture."""
+
+    def _repr_html_(self) -> str:
+        return html_of(self)
+
+
+# -- the parameter of a solution -----------------------------------------------------------------
+
+
+class Parameter(NamedTuple):
+    """Words for the parameter of a solution, time or load factor, in pictures and messages."""
+
+    name: str  # title of an axis or a colour bar
+    value: str  # format of a value in a sentence
+    step: str  # format of a step in a sentence
+    column: str  # title of a column
+    progress: str  # title of an axis along which a solution goes one way only
+
+    def at(self, value: float, digits: str = ".4g") -> str:
+        """A value in words."""
+        return self.value.format(format(value, digits))
+
+    def over(self, step: float) -> str:
+        """A step in words."""
+        return self.step.format(format(step, ".3g"))
+
+
+TIME = Parameter("time t (s)", "t = {} s", "dt = {} s", "t [s]", "time t (s)")
+
+FACTOR = Parameter(
+    "load factor",
+    "load factor {}",
+    "a change of the load factor by {}",
+    "load factor [-]",
+    "way along the path, root mean square of the nodes (m)",
+)

@@ -1,0 +1,90 @@
+# SPDX-License-Identifier: MIT
+"""File system: what is brought to the disk, and locks between processes.
+
+The operating system frees a lock when its process ends.  A file system that knows no locks locks
+nothing.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO
+
+
+def is_at(file: int, path: Path) -> bool:
+    """Return whether a path leads to an open file."""
+    try:
+        return os.path.samestat(os.fstat(file), os.stat(path))
+    except OSError:
+        return False
+
+
+def sync(path: Path) -> None:
+    """Wait until a file or a directory is on the disk."""
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)
+
+
+def _open_and_lock(path: Path, more: int = 0) -> IO[str]:
+    """Open a file with an exclusive lock; a new one if another process has just removed it."""
+    while True:
+        file = path.open("a+", encoding="utf-8", errors="replace")
+        try:
+            fcntl.flock(file, fcntl.LOCK_EX | more)
+        except BlockingIOError:
+            with file:
+                file.seek(0)
+                raise BlockingIOError(file.read().strip() or "another process") from None
+        except OSError:
+            pass
+        if is_at(file.fileno(), path):
+            return file
+        file.close()
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[None]:
+    """Wait until no other process is in a context with this path; the file stays.
+
+    It may be removed within the context: those who wait for it take a new one.
+    """
+    with _open_and_lock(path):
+        yield
+
+
+class Lock:
+    """An exclusive lock beside a file, in a file with ``.lock`` after its name."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path.with_name(path.name + ".lock")
+        self._file: IO[str] | None = None
+
+    def take(self) -> str:
+        """Take the lock, or return who has it; an empty text if it was free.
+
+        Raises:
+            OSError: The file cannot be written.
+        """
+        try:
+            self._file = _open_and_lock(self.path, fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            return str(error)
+        self._file.truncate(0)
+        self._file.write(f"process {os.getpid()} on {socket.gethostname()}\n")
+        self._file.flush()
+        return ""
+
+    def release(self) -> None:
+        """Give the lock back, if it was taken, and remove its file."""
+        if self._file is not None:
+            self.path.unlink(missing_ok=True)
+            self._file.close()
+            self._file = None
