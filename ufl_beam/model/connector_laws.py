@@ -305,7 +305,7 @@ class Clearance(Record, ConnectorLaw):
         return {"deflection": 0.0} if self.rubs else {}
 
     def numbers(self) -> dict[str, Any]:
-        """Those that the law has."""
+        """Numbers that the law has, by name."""
         unused = () if self.rubs else ("friction", "radius")
         return {name: x for name, x in super().numbers().items() if name not in unused}
 

@@ -211,4 +211,4 @@ class RubbingLaws(Rubbing, CompiledLaws):
         return np.zeros((len(self._links), 1))
 
     def freeze(self) -> None:
-        """What sticks does so from now on."""
+        """Let what sticks stick from now on."""
