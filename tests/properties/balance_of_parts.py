@@ -80,6 +80,9 @@ class Balance:
                 yield joint.places[1], self.at(joint.places[1], history.force[last], moment)
 
     def _of_connector(self, one, force):
+        if one.components:
+            each = zip(one.components, force, strict=True)
+            return sum(self._of_connector(component, x) for component, x in each)
         if one.turns:
             return np.array([0.0, 0.0, -force])
         away = self.solution.position(one.b)[-1] - np.array(one.a.point)

@@ -249,6 +249,11 @@ TABLE = {
         ub.Slide,
         a=PLACE, b=V(OTHER.end, OBJECT), law=V(SPRING, OBJECT), axis=V(None, optional(VECTOR)),
     ),
+    "Bushing": call(
+        ub.Bushing,
+        a=PLACE, b=V(OTHER.end, OBJECT), law=V(ub.Clearance(1.0, gap=1.0), OBJECT),
+        axis=V((1.0, 0.0), VECTOR),
+    ),
     "Spring": call(
         ub.Spring,
         stiffness=V(1.0, POSITIVE), law=V(None, optional(OBJECT)),
@@ -259,6 +264,11 @@ TABLE = {
         ub.Stop,
         stiffness=V(1.0, POSITIVE), low=V(-1.0, [*NO_NUMBER, None, NAN, 1.0]),
         high=V(1.0, [*NO_NUMBER, None, NAN, -1.0]), damping=V(1.0, FROM_ZERO),
+    ),
+    "Clearance": call(
+        ub.Clearance,
+        stiffness=V(1.0, POSITIVE), gap=V(1.0, POSITIVE), damping=V(1.0, FROM_ZERO),
+        friction=V(1.0, FROM_ZERO), radius=V(1.0, FROM_ZERO),
     ),
     "Coulomb": call(
         ub.Coulomb,

@@ -185,7 +185,7 @@ def Bushing(a: Anchor, b: Anchor, law: ConnectorLaw, *, axis: Point = (1.0, 0.0)
         >>> print(np.hypot(*run.connector(pin).motion[-1]).round(3))  # m, to the edge of the hole
         0.001
     """
-    x, y = unit_axis(a, b, axis, "Bushing")
+    x, y = unit_axis(a, b, require_vector(axis, "Bushing: axis"), "Bushing")
     require_kind(law, ConnectorLaw, f"Bushing({a}, {b}): law")
     motions = (("sliding", (x, y)), ("sliding", (-y, x)), ("turning", (x, y)))
     components = tuple(

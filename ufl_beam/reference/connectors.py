@@ -129,7 +129,7 @@ class Connectors(Linked):
         """Forces on the nodes, and the rows of the laws."""
         given = map(self._of_each, (self.motion(q1), q1[self.forces_at]))
         rows = [law.row(e, λ) for law, e, λ in zip(self.laws, *given, strict=True)]
-        self._rows = np.reshape(rows, self._rows.shape)
+        self._rows = np.vstack([np.reshape(row, (self._k, -1)) for row in rows])
         put(self._stated.row, self._rows.reshape(len(self.laws), -1))
         return self._work.vector()
 
@@ -183,7 +183,7 @@ class Connectors(Linked):
         """Begin at the motions of ``q``."""
         self._e0 = self.motion(q)
         each = zip(self.laws, self._of_each(self._e0), strict=True)
-        self.at_rest = np.ravel([law.start(e) for law, e in each])
+        self.at_rest = np.concatenate([np.atleast_1d(law.start(e)) for law, e in each])
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
