@@ -30,6 +30,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.joint_histories import Connection, velocity_of
+from ufl_beam.output.state_rows import FORCES
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import active_comm
 from ufl_beam.rich_display import Rich
@@ -106,10 +107,9 @@ class Shapes(Rich, ABC):
         times = np.arange(count + 1) / count
         swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
         q = self.q + swing
-        history = {"times": times, "q": q, "every": np.array([1]), "cells": self._cell_forces(q)}
-        none = dict.fromkeys(("v", "reactions", "connections"), np.empty(0))
+        history = {"t": times, "q": q, "every": np.array([1]), FORCES: self._cell_forces(q)}
         solution = Solution(self.scene, self.grid)
-        solution.resume(history | none)
+        solution.resume(history)
         return solution
 
     def _cell_forces(self, states: Array) -> Array:

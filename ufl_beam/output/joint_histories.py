@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Blocks
+from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
@@ -18,8 +18,8 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.one_line import one_line
 
-Vectors: TypeAlias = Array | Blocks
-"""Configurations or velocities at some times; (n, size)."""
+Vectors: TypeAlias = Any
+"""Configurations or velocities at some times, an array or a ``Column``; (n, size)."""
 
 
 class Connection(NamedTuple):

@@ -15,7 +15,7 @@ from petsc4py import PETSc
 import numpy as np
 from scipy.sparse import csr_array
 
-from ufl_beam.arrays import Array, Snapshot
+from ufl_beam.arrays import Array, State
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia, nodal_step
@@ -23,6 +23,7 @@ from ufl_beam.model.connector_laws import Controller, Coulomb
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import RotatingFrame
+from ufl_beam.output.state_rows import BEFORE, FORCES, LEDGER
 from ufl_beam.reference.beams import (
     CellForce,
     ElasticBeams,
@@ -580,19 +581,24 @@ class Solver:
             table[one.numbers] = one.kept(self.q)
         return table
 
-    def snapshot(self) -> Snapshot:
-        """The state now, as solutions keep it."""
+    def snapshot(self) -> State:
+        """The state now, by the names of the columns of solutions."""
         reactions = self.supports.forces()
         if self.parts == 0 and self.inertia is not None:
             reactions = np.full_like(reactions, np.nan)  # nobody knows them
         material = [one.material() for one in self.yielding]
         rows = np.concatenate([np.zeros((0, 7)), *material])
+        state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
+        if self.inertia is not None:
+            state["v"] = self.inertia.v
+        for part, entries in zip(LEDGER, self.ledger.copy(), strict=True):
+            state |= {f"{part}: {name}": np.array(value) for name, value in entries.items()}
+        state |= {
+            "connectors": self.connections(), "material": rows[np.argsort(rows[:, 0]), 1:],
+            FORCES: self._numbers_of_cells(),
+        }  # fmt: skip
         over_step = float(self.scheme.average(0.0, 1.0)) < 1
-        return Snapshot(
-            self.t, self.q, None if self.inertia is None else self.inertia.v, reactions,
-            self.ledger.copy(), rows[np.argsort(rows[:, 0])], self.connections(),
-            self._numbers_of_cells(), self.q_before if over_step else None,
-        )  # fmt: skip
+        return {**state, BEFORE: self.q_before} if over_step else state
 
     def _numbers_of_cells(self) -> Array:
         """Forces at both ends of the cells, and how they are distributed; (9, num_cells).

@@ -152,7 +152,7 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
 
     # Each kind makes its entries of the ledger: their order is that of the columns of tables.  It
     # follows from the scene alone, also where a process lacks cells or connectors of a kind.
-    groups = inelastic_cells(share)
+    groups = inelastic_cells(share.grid)
     inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
     for layout, cells in groups:
         expect_entries(layout, scheme, ledger)

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Cells of a process whose material yields, flows or breaks."""
+"""Cells whose material yields, flows or breaks."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
 from ufl_beam.arrays import Index
-from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError
 from ufl_beam.model.fibres import Layout
 
 
-def inelastic_cells(share: Share) -> list[tuple[Layout, Index]]:
+def inelastic_cells(grid: Any) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them."""
-    grid, groups = share.grid, dict[Layout, list[int]]()
+    groups = dict[Layout, list[int]]()
     sections, of_beam = grid.sections
     for number, section in enumerate(sections):
         layout = section.layout(section.hinge)

@@ -1,0 +1,138 @@
+# SPDX-License-Identifier: MIT
+"""A state of a scene as one row of numbers: the table of its columns, and growing arrays of rows.
+
+C writes rows of running simulations, see ``simulation/state_writer.py``; solutions, the view of a
+run and files read them by the names of the table.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import lib
+from ufl_beam.output.joint_histories import Connection
+
+LEDGER = ("state", "supplied", "lost")
+"""The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
+
+FORCES, RECORD, BEFORE = "cell forces", "record", "before"
+"""Columns that not all states have: ``cell_number`` of loops.h of all cells, or what these follow
+from, see :attr:`CellForces.kept`; q at the beginning of the step, if it is not that of the row
+before (of the same row in the first one), and if forces depend on it."""
+
+
+class Columns:
+    """Table of the numbers of a state: their names and shapes, in the order of the row.
+
+    Attributes:
+        shapes: Shapes by name; () of a single number.
+        at: Places in a row, by name.
+        width: Numbers of a row.
+        ledger: Places of the entries of each part of the ledger, by name.
+    """
+
+    def __init__(self, shapes: Mapping[str, Sequence[int]]) -> None:
+        self.shapes = {name: tuple(shape) for name, shape in shapes.items()}
+        ends = [0, *accumulate(map(math.prod, self.shapes.values()))]
+        self.at = dict(zip(self.shapes, (slice(*pair) for pair in pairwise(ends)), strict=True))
+        self.width = ends[-1]
+        self.ledger = tuple(
+            {name[len(part) + 2 :]: at.start for name, at in self.at.items()
+             if name.startswith(f"{part}: ")}
+            for part in LEDGER
+        )  # fmt: skip
+        self._others: dict[tuple[str, str], Columns] = {}
+
+    @classmethod
+    def of(
+        cls, grid: Any, *, moving: bool, cells: int, ledger: Iterable[str], record: int | None
+    ) -> Columns:
+        """Table of a scene; a line of it is all that a quantity of connectors or cells needs.
+
+        Args:
+            grid: Its numbering.
+            moving: Whether there are velocities.
+            cells: Number of the cells that can yield or break.
+            ledger: Entries, such as "lost: plastic".
+            record: Numbers that forces of cells follow from; None if the forces are in the row.
+        """
+        size, scene = grid.size, grid.scene
+        return cls({
+            "t": (),  # time, s; or the load factor of a path
+            "q": (size,),  # configuration, all degrees of freedom in the order of the grid
+            **({"v": (size,)} if moving else {}),  # velocities
+            "reactions": (len(scene.supports), 3),  # forces of supports, in their axes
+            "connectors": (len(scene.links), len(Connection._fields)),
+            "material": (cells, int(lib.POINT_KEPT)),  # `Points.kept`
+            **dict.fromkeys(ledger, ()),  # J
+            **({FORCES: (lib.CELL_NUMBERS, len(grid.cells))} if record is None
+               else {RECORD: (record,)}),
+        })  # fmt: skip
+
+    def of_rows(self, name: str, rows: Array) -> Array:
+        """A column of a row, or of some rows: a view, in its shape."""
+        return rows[..., self.at[name]].reshape(rows.shape[:-1] + self.shapes[name])
+
+    def plus(self, name: str, shape: Sequence[int], *, without: str = "") -> Columns:
+        """The same table with a column more at its end, and without another one."""
+        key = name, without
+        if key not in self._others:
+            shapes = {n: of for n, of in self.shapes.items() if n != without}
+            self._others[key] = Columns({**shapes, name: shape})
+        return self._others[key]
+
+
+class Block:
+    """Rows with the same columns, one below the other, and room for more."""
+
+    def __init__(self, columns: Columns, rows: Array | None = None) -> None:
+        self.columns = columns
+        self._space: Array = np.empty((0, columns.width)) if rows is None else rows
+        self.number = len(self._space)
+
+    @property
+    def rows(self) -> Array:
+        """The rows; (number, width)."""
+        return self._space[: self.number]
+
+    def room(self, number: int) -> Array:
+        """So many rows behind the last one, which count once :attr:`number` includes them."""
+        end = self.number + number
+        if end > len(self._space):
+            space = np.empty((max(end, 2 * len(self._space)), self.columns.width))
+            space[: self.number] = self.rows
+            self._space = space
+        return self._space[self.number : end]
+
+    def trim(self) -> None:
+        """Give back room that is larger than the rows."""
+        if len(self._space) > 2 * self.number:
+            self._space = self.rows.copy()
+
+
+class Column:
+    """A column of states in several blocks, without those that lack it; (n+1, ...)."""
+
+    def __init__(self, blocks: Sequence[Block], name: str) -> None:
+        self._name = name
+        self._blocks = [b for b in blocks if b.number and name in b.columns.at]
+
+    def __len__(self) -> int:
+        return sum(block.number for block in self._blocks)
+
+    def __getitem__(self, at: tuple[Any, ...]) -> Array:
+        """A new array; the first index is ``:``."""
+        parts = [block.columns.of_rows(self._name, block.rows)[at] for block in self._blocks]
+        return np.concatenate(parts) if parts else np.empty(0)
+
+    @property
+    def last(self) -> Array:
+        """That of the last state; a view."""
+        block = self._blocks[-1]
+        return block.columns.of_rows(self._name, block.rows[-1])
