@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -17,7 +17,6 @@ from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.time_schemes import has_inertia
-from ufl_beam.output.state_view import StateView
 from ufl_beam.terms.beams import elastic_forms
 from ufl_beam.terms.inelastic_beams import inelastic_forms
 
@@ -65,7 +64,7 @@ class DolfinxView:
         True
     """
 
-    def __init__(self, of: StateView) -> None:
+    def __init__(self, of: Any) -> None:  # a `StateView`, which is above this module
         self._of = of
         self._functions: dict[str, fem.Function] = {}
 

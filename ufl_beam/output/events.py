@@ -18,10 +18,9 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.one_line import bracketed
 from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC
 from ufl_beam.output.state_view import StateView
-from ufl_beam.output.states import HINGE, PLASTIC
 from ufl_beam.parameter import TIME, Parameter
-from ufl_beam.terms.links import DISSIPATED, FORCE
 
 Flags = npt.NDArray[np.bool_]
 

@@ -38,7 +38,7 @@ class History(Recorder):
         path: File, ending in ``.csv``.
         places: Places to follow, on beams and bodies.
         connectors: Connectors to follow, see
-            :class:`~ufl_beam.output.joint_histories.Connection`; of joints, all the connectors that
+            :class:`~ufl_beam.output.state_rows.Connection`; of joints, all the connectors that
             hold them.
         every: Write every so many steps.
         most: Largest number of rows, besides the initial one.  When it is exceeded, every other row

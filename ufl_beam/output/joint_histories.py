@@ -22,29 +22,6 @@ Vectors: TypeAlias = Any
 """Configurations or velocities at some times, an array or a ``Column``; (n, size)."""
 
 
-class Connection(NamedTuple):
-    """History of a connector.
-
-    Attributes:
-        motion: Relative motion since the undeformed scene; (n+1,); m or rad.
-        force: That resisted its growth during the step that ends there; (n+1,); N or N m.
-        work: That the connector has taken since the beginning: what springs store and dissipate,
-            what dampers and friction dissipate, and minus what motors supply; (n+1,); J.
-        rate: Mean rate of the motion in the step that ends there; (n+1,); m/s or rad/s.
-        dissipated: Energy that yielding, softening and plastic hinges have dissipated, or that a
-            :class:`ConnectorLaw` has lost; (n+1,); J.
-    """
-
-    motion: Any
-    force: Any
-    work: Any
-    rate: Any
-    dissipated: Any
-
-    def __repr__(self) -> str:
-        return one_line(self)
-
-
 class JointHistory(NamedTuple):
     """History of a joint, b being its second place and a its first.
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import accumulate, pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.output.joint_histories import Connection
+from ufl_beam.one_line import one_line
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
@@ -25,6 +25,37 @@ FORCES, RECORD, BEFORE = "cell forces", "record", "before"
 """Columns that not all states have: ``cell_number`` of loops.h of all cells, or what these follow
 from, see :attr:`CellForces.kept`; q at the beginning of the step, if it is not that of the row
 before (of the same row in the first one), and if forces depend on it."""
+
+
+class Connection(NamedTuple):
+    """History of a connector.
+
+    Attributes:
+        motion: Relative motion since the undeformed scene; (n+1,); m or rad.
+        force: That resisted its growth during the step that ends there; (n+1,); N or N m.
+        work: That the connector has taken since the beginning: what springs store and dissipate,
+            what dampers and friction dissipate, and minus what motors supply; (n+1,); J.
+        rate: Mean rate of the motion in the step that ends there; (n+1,); m/s or rad/s.
+        dissipated: Energy that yielding, softening and plastic hinges have dissipated, or that a
+            :class:`ConnectorLaw` has lost; (n+1,); J.
+    """
+
+    motion: Any
+    force: Any
+    work: Any
+    rate: Any
+    dissipated: Any
+
+    def __repr__(self) -> str:
+        return one_line(self)
+
+
+FORCE, WORK, DISSIPATED = map(Connection._fields.index, ("force", "work", "dissipated"))
+"""Columns of "connectors" in states, which are these fields."""
+
+
+PLASTIC, HINGE = 4, 5
+"""Columns of "material": (N, V, M), jump, plastic, hinge; see :class:`Material`."""
 
 
 class Columns:

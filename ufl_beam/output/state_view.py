@@ -21,7 +21,8 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.output.joint_histories import Connection, links_of
+from ufl_beam.output.joint_histories import links_of
+from ufl_beam.output.state_rows import FORCE, Connection
 from ufl_beam.output.states import States
 from ufl_beam.output.watches import Watch
 from ufl_beam.parameter import Parameter
@@ -29,7 +30,6 @@ from ufl_beam.solvers.newton import Solver
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.inelastic_beams import InelasticBeams
-from ufl_beam.terms.links import FORCE
 
 
 class StateView(ABC):

@@ -26,7 +26,6 @@ from ufl_beam.one_line import one_line
 from ufl_beam.output.archive import require_arrays
 from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
 from ufl_beam.output.joint_histories import (
-    Connection,
     JointHistory,
     links_of,
     motion_of,
@@ -35,10 +34,21 @@ from ufl_beam.output.joint_histories import (
     turned,
     velocity_of,
 )
-from ufl_beam.output.state_rows import BEFORE, FORCES, LEDGER, RECORD, Block, Column, Columns
+from ufl_beam.output.state_rows import (
+    BEFORE,
+    FORCE,
+    FORCES,
+    HINGE,
+    LEDGER,
+    PLASTIC,
+    RECORD,
+    Block,
+    Column,
+    Columns,
+    Connection,
+)
 from ufl_beam.terms.energy_ledger import Energy
 from ufl_beam.terms.inelastic_cells import inelastic_cells
-from ufl_beam.terms.links import FORCE
 
 
 class Diagram(NamedTuple):
@@ -82,10 +92,6 @@ class Material(NamedTuple):
 
     def __repr__(self) -> str:
         return one_line(self)
-
-
-PLASTIC, HINGE = 4, 5
-"""Columns of "material": (N, V, M), jump, plastic, hinge; see :class:`Material`."""
 
 
 class Cells:
@@ -157,7 +163,7 @@ class States:
         self._blocks[-1].number += number
 
     def append(self, columns: Columns, row: Array) -> None:
-        """Append a state."""
+        """Append a state, a row with these columns."""
         self.room(columns)[0] = row
         self.grow()
 

@@ -13,7 +13,8 @@ from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.supports import Support
-from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
+from ufl_beam.output.joint_histories import links_of, motion_of, velocity_of
+from ufl_beam.output.state_rows import Connection
 
 
 class Now:

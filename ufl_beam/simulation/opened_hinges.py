@@ -17,8 +17,7 @@ from ufl_beam.errors import warn
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.fibres import Layout
-from ufl_beam.output.state_rows import Column
-from ufl_beam.output.states import HINGE
+from ufl_beam.output.state_rows import HINGE, Column
 
 LARGE = 0.05
 """Shift of a limit by the place of its hinge from which a run warns, as a part of the limit."""

@@ -340,7 +340,7 @@ class Simulation(StateView):
             >>> simulation = ub.Simulation(scene, ub.Midpoint())
             >>> simulation.step_to(0.05)
             >>> print(simulation.now.diagram(beam, points=2).M[:2].round(-3))
-            [-195000. -146000.]
+            [-5000. -4000.]
             >>> simulation.close()
         """
         if self._now is None:

@@ -13,12 +13,12 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
 from ufl_beam.discretization.partition import Share
-from ufl_beam.output.state_rows import LEDGER, RECORD, Columns
+from ufl_beam.output.state_rows import FORCE, LEDGER, RECORD, Columns, Connection
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.inelastic_cells import inelastic_cells
-from ufl_beam.terms.links import FORCE, Links
+from ufl_beam.terms.links import Links
 from ufl_beam.terms.rates_in_c import V
 from ufl_beam.terms.supports import Supports
 
@@ -87,9 +87,9 @@ class StateWriter:
         for link in couplings:
             rows = at["connectors"].start + columns.shapes["connectors"][1] * link.numbers
             self._add(now, link.forces_at, rows + FORCE)
-            for column, numbers in link.kept(q):
-                apart = numbers.strides[0] // numbers.itemsize
-                self._add(self._place(numbers), apart * np.arange(len(rows)), rows + column)
+            for field, numbers in link.kept(q):
+                apart = numbers.strides[0] // numbers.itemsize * np.arange(len(rows))
+                self._add(self._place(numbers), apart, rows + Connection._fields.index(field))
         first = at[RECORD].start
         for place, number in record:
             self._copy(place, first, number)

@@ -81,7 +81,7 @@ class Stepping(Protocol):
 
     @property
     def q(self) -> Array:
-        """Local configuration."""
+        """Configuration at the local degrees of freedom."""
 
     def moved(self, t: float) -> None:
         """Take note that the state is another one, at the time ``t``."""

@@ -31,10 +31,11 @@ from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
 from ufl_beam.model.ledger_entries import ENTRIES
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.states import HINGE, PLASTIC, States
+from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
+from ufl_beam.output.states import States
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.links import DISSIPATED, WORK, Links
+from ufl_beam.terms.links import Links
 
 STATES = 100
 """Number of successive steps in which numerical losses are added."""
