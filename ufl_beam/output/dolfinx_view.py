@@ -167,7 +167,7 @@ class DolfinxView:
             >>> print(round(length, 9), bool(view.total(u_y) < 0))
             2.0 True
         """
-        return self._of.share.total(integrated(integral, self.mesh))
+        return float(self._of.share.total(integrated(integral, self.mesh)))
 
     # -- functions -------------------------------------------------------------------------------
 

@@ -161,9 +161,3 @@ class Column:
         """A new array; the first index is ``:``."""
         parts = [block.columns.of_rows(self._name, block.rows)[at] for block in self._blocks]
         return np.concatenate(parts) if parts else np.empty(0)
-
-    @property
-    def last(self) -> Array:
-        """That of the last state; a view."""
-        block = self._blocks[-1]
-        return block.columns.of_rows(self._name, block.rows[-1])

@@ -133,6 +133,7 @@ class States:
         grid: Its vertices, cells and numbering.
         between: Part of a step at whose configuration its forces are in equilibrium.
         begun: Whether forces depend on the configuration at the beginning of the step.
+        cells: Section forces, strains and masses of its cells.
         of_record: Forces of cells that follow from a record, q, and q at the beginning of the step;
             ``cell_number`` of loops.h; (9, num_cells).
     """
@@ -143,11 +144,11 @@ class States:
         self.between, self.begun = 1.0, False
         self.of_record: Callable[[Array, Array, Array], Array] | None = None
         self._blocks: list[Block] = []
-        self._cells = Cells(grid)
+        self.cells = Cells(grid)
         self._computed: tuple[tuple[int, bytes], Array] | None = None  # forces asked for last
         if like is not None:
             self.between, self.begun, self.of_record = like.between, like.begun, like.of_record
-            self._cells = like._cells
+            self.cells = like.cells
 
     # -- rows ----------------------------------------------------------------------------------
 
@@ -235,10 +236,8 @@ class States:
         arrays[FORCES] = np.array([self.numbers(n) for n in number])
         if BEFORE in arrays:
             arrays[BEFORE] = np.array([self.before(n) for n in number])
-            if np.array_equal(arrays[BEFORE][1:], arrays["q"][:-1]) and np.array_equal(
-                arrays[BEFORE][0], arrays["q"][0]
-            ):
-                arrays.pop(BEFORE)  # each step begins where the one before ends
+            if np.array_equal(arrays[BEFORE], arrays["q"][[0, *number[:-1]]]):
+                del arrays[BEFORE]  # each step begins where the one before ends
         for part, entries in zip(LEDGER, self.ledger(), strict=True):
             arrays |= {f"{part}: {name}": values for name, values in entries.items()}
         return arrays
@@ -254,14 +253,14 @@ class States:
         self._blocks, self._computed = [], None
         ledger = [name for name in history if name.startswith(tuple(f"{x}: " for x in LEDGER))]
         columns = Columns.of(
-            self.grid, moving="v" in history, cells=len(self._cells.inelastic), ledger=ledger,
+            self.grid, moving="v" in history, cells=len(self.cells.inelastic), ledger=ledger,
             record=None,
         )  # fmt: skip
         if begins:
             columns = columns.plus(BEFORE, (self.grid.size,))
         rows: Array = np.zeros((n, columns.width))
         for name, shape in columns.shapes.items():
-            if name in history or name == "q":
+            if name in history or name in ("q", FORCES):
                 require_arrays(history, {name: (n, *shape)})
                 columns.of_rows(name, rows)[:] = history[name]
         self._blocks = [Block(columns, rows)]
@@ -364,7 +363,7 @@ class States:
             q = self._one("q", n)
             if self.between < 1:
                 q = (1 - self.between) * self.before(n) + self.between * q
-            along = self._cells.along
+            along = self.cells.along
             forces = along(slice(None), parts, self.numbers(n), q[along.dofs])
             forces.flags.writeable = False
             self._computed = asked, forces
@@ -383,13 +382,13 @@ class States:
             SceneError: The beam of the place is not in the scene.
         """
         cell, part = self.grid.cell_and_part(place)
-        n, dofs = range(len(self)), self._cells.along.dofs[cell]
+        n, dofs = range(len(self)), self.cells.along.dofs[cell]
         q = self.column("q")[:, dofs]
         if self.between < 1:
             before = np.array([self.before(k)[dofs] for k in n])
             q = (1 - self.between) * before + self.between * q
         numbers = np.array([self.numbers(k)[:, cell] for k in n]).T
-        forces = self._cells.along(np.full(len(n), cell), np.array([part]), numbers, q)
+        forces = self.cells.along(np.full(len(n), cell), np.array([part]), numbers, q)
         return np.asarray(forces[:, 0])
 
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
@@ -426,7 +425,7 @@ class States:
 
     def _strains(self, n: int) -> Array:
         strains = np.empty((len(self.grid.cells), 3))
-        strains[self._cells.fields.order] = self._cells.strains.mean(self._one("q", n))
+        strains[self.cells.fields.order] = self.cells.strains.mean(self._one("q", n))
         return strains
 
     def material(self, beam: Member, n: int = -1) -> Material:
@@ -438,7 +437,7 @@ class States:
         return self._material(n, self.grid.cells_of(beam))
 
     def _material(self, n: int, cells: Index | int) -> Material:
-        if not len(self._cells.inelastic) and not self.scene.hinges:
+        if not len(self.cells.inelastic) and not self.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
         chosen = self.cells_of(n, self.cell_forces(n)[:, 0])[cells].T
         return Material(chosen[:3].T, *chosen[3:])
@@ -447,7 +446,7 @@ class States:
         """Column "material" of all cells; elastic ones have these forces; (num_cells, 6)."""
         everything = np.zeros((len(self.grid.cells), self.row(n)[0].shapes["material"][1]))
         everything[:, :3] = forces
-        everything[self._cells.inelastic] = self._one("material", n)
+        everything[self.cells.inelastic] = self._one("material", n)
         return everything
 
     def material_at(self, place: Place) -> Material:
@@ -511,7 +510,7 @@ class States:
         """
         if not len(self.column("v")):
             raise SceneError("momentum: the run was static; there is none")
-        times, grid = Product(mass_matrix(self._cells.fields)), self.grid
+        times, grid = Product(mass_matrix(self.cells.fields)), self.grid
         dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])
         centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
         _, first = np.unique(dofs[:, 0], return_index=True)

@@ -135,7 +135,7 @@ class Solution(States, Rich):
     @property
     def opened(self) -> Opened:
         """The cells whose embedded hinge or cracks opened in the run."""
-        return Opened(self.grid, self._cells.inelastic, self.column("material"))
+        return Opened(self)
 
     def hinge_place_error(self) -> dict[Member, float]:
         """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
