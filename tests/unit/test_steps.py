@@ -272,6 +272,24 @@ def test_kept_rows_are_states(make, scheme):
     same_states(many.solution, single.solution)
 
 
+@pytest.mark.parametrize("make", [elastic, inelastic, connected, jointed, driven])
+@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1, 0.05), ub.Static()], ids=str)
+def test_now_is_read_as_the_solution(make, scheme):
+    """The state of a running simulation, and the last one of its solution, in all columns."""
+    simulation = ub.Simulation(make(), scheme)
+    for t in np.linspace(0.0, 0.3, 16)[1:]:
+        simulation.step_to(t)
+        simulation.keep()
+        now, solution = simulation.now, simulation.solution
+        state, states = now.history(), solution.history()
+        assert {*states} - {"before", "every"} == {*state} - {"before"}
+        for name in state.keys() & states.keys():
+            assert np.array_equal(state[name][0], states[name][-1]), name
+        assert np.array_equal(now.before(0), solution.before(-1)) or not solution.begun
+        for beam in simulation.scene.beams:
+            assert np.array_equal(now.diagram(beam), solution.diagram(beam))
+
+
 def same_states(one, other):
     """Whether all states are the same to the last digit, and all that they are asked for."""
 

@@ -142,7 +142,7 @@ class Block:
         return self._space[self.number : end]
 
     def trim(self) -> None:
-        """Give back room that is larger than the rows."""
+        """Give back the room, if it is larger than the rows."""
         if len(self._space) > 2 * self.number:
             self._space = self.rows.copy()
 

@@ -163,6 +163,11 @@ class States:
         """Append so many states, which were written in :meth:`room`."""
         self._blocks[-1].number += number
 
+    def trim(self) -> None:
+        """Give back the memory of :meth:`room` that was not used."""
+        for block in self._blocks:
+            block.trim()
+
     def append(self, columns: Columns, row: Array) -> None:
         """Append a state, a row with these columns."""
         self.room(columns)[0] = row

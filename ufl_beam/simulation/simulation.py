@@ -444,6 +444,7 @@ class Simulation(StateView):
         self.settle()
         if self.t not in self.solution.times[-1:]:
             self.keep()
+        self.solution.trim()
         self.solution.parts, self.solution.iterations = self.parts, self.iterations  # of failures
         self.solution.internal = self._assembly.internal_variables(self.q, self.t)
 
