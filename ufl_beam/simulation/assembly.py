@@ -54,7 +54,6 @@ class Assembly:
     controllers: Controllers  # with their forces, and the limits of friction, in the step
     beams: list[Cells]  # those with material points first
     inelastic: list[InelasticBeams]  # those with material points
-    yields: bool  # True if any process has such cells
     couplings: list[Links]  # connectors, those alike together
     loads: list[LoadTerm]
     inertia: Inertia | None
@@ -196,7 +195,7 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     parts = share, A, beams, coupled, loads, others, supports, search
     equation = StepEquation(*parts, rates)
     return Assembly(
-        fields, ledger, controllers, beams, inelastic, bool(groups), coupled, loads, inertia,
+        fields, ledger, controllers, beams, inelastic, coupled, loads, inertia,
         supports, equation, _cell_forces(share, equation.terms),
     )  # fmt: skip
 

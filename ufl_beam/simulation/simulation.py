@@ -127,11 +127,10 @@ class Simulation(StateView):
         self._begun_at: Array | None = None  # of the state before the first step
         weights, in_motion = self.equation.weights, has_inertia(scheme)
         self.prediction = Prediction(share, q_here, weights, in_motion=in_motion)
-        self._continues = start is not None
         loaded: list[Array] = []
         same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
         goes_on = same and "reactions" in internal and start is not None and not len(start.v)
-        if self._continues or (has_inertia(scheme) and scheme.kept):
+        if not fresh or (has_inertia(scheme) and scheme.kept):
             loaded = together(parts.carry_on, t0, q_here, internal if same else None)
         if start is not None:
             parts.take_over(q_here, t0, internal, same=same)
