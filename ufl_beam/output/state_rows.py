@@ -120,31 +120,21 @@ class Columns:
 
 
 class Block:
-    """Rows with the same columns, one below the other, and room for more."""
+    """Rows with the same columns, one below the other, with room for more that is never moved.
 
-    def __init__(self, columns: Columns, rows: Array | None = None) -> None:
-        self.columns = columns
-        self._space: Array = np.empty((0, columns.width)) if rows is None else rows
-        self.number = len(self._space)
+    Attributes:
+        columns: Of the rows.
+        number: Number of rows.
+        space: The rows, and behind them the room.
+    """
+
+    def __init__(self, columns: Columns, space: Array, number: int) -> None:
+        self.columns, self.space, self.number = columns, space, number
 
     @property
     def rows(self) -> Array:
         """The rows; (number, width)."""
-        return self._space[: self.number]
-
-    def room(self, number: int) -> Array:
-        """So many rows behind the last one, which count once :attr:`number` includes them."""
-        end = self.number + number
-        if end > len(self._space):
-            space = np.empty((max(end, 2 * len(self._space)), self.columns.width))
-            space[: self.number] = self.rows
-            self._space = space
-        return self._space[self.number : end]
-
-    def trim(self) -> None:
-        """Give back the room, if it is larger than the rows."""
-        if len(self._space) > 2 * self.number:
-            self._space = self.rows.copy()
+        return self.space[: self.number]
 
 
 class Column:

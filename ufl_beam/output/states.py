@@ -94,6 +94,10 @@ class Material(NamedTuple):
         return one_line(self)
 
 
+LEAST_ROOM = 8
+"""Least number of rows that are made at once."""
+
+
 class Cells:
     """What computes results of the cells of a whole scene, made when it is asked for first.
 
@@ -138,12 +142,12 @@ class States:
             ``cell_number`` of loops.h; (9, num_cells).
     """
 
-    def __init__(self, grid: Grid, like: States | None = None) -> None:
+    def __init__(self, grid: Grid, like: States | None = None, *blocks: Block) -> None:
         self.scene: Scene = grid.scene
         self.grid = grid
         self.between, self.begun = 1.0, False
         self.of_record: Callable[[Array, Array, Array], Array] | None = None
-        self._blocks: list[Block] = []
+        self._blocks = [*blocks]
         self.cells = Cells(grid)
         self._computed: tuple[tuple[int, bytes], Array] | None = None  # forces asked for last
         if like is not None:
@@ -153,20 +157,23 @@ class States:
     # -- rows ----------------------------------------------------------------------------------
 
     def room(self, columns: Columns, number: int = 1) -> Array:
-        """Rows behind the last state, to write states in, which count after :meth:`grow`."""
+        """So many rows behind the last state, or fewer, which count after :meth:`grow`.
+
+        Memory that was freed may stay with the process, so rows are not copied to make room.
+        """
         block = self._blocks[-1] if self._blocks else None
-        if block is None or (block.columns is not columns and block.columns.at != columns.at):
-            self._blocks.append(block := Block(columns))
-        return block.room(number)
+        if (
+            block is None
+            or (block.columns is not columns and block.columns.at != columns.at)
+            or block.number == len(block.space)
+        ):
+            space = np.empty((max(number, len(self), LEAST_ROOM), columns.width))
+            self._blocks.append(block := Block(columns, space, 0))
+        return block.space[block.number : block.number + number]
 
     def grow(self, number: int = 1) -> None:
         """Append so many states, which were written in :meth:`room`."""
         self._blocks[-1].number += number
-
-    def trim(self) -> None:
-        """Give back the memory of :meth:`room` that was not used."""
-        for block in self._blocks:
-            block.trim()
 
     def append(self, columns: Columns, row: Array) -> None:
         """Append a state, a row with these columns."""
@@ -175,12 +182,12 @@ class States:
 
     def part(self, first: int, last: int) -> States:
         """Views of the states from the first number to before the last one."""
-        part, end = States(self.grid, self), 0
+        blocks, end = [], 0
         for block in self._blocks:
             begin, end = end, end + block.number
             rows = block.rows[max(first - begin, 0) : max(last - begin, 0)]
-            part._blocks.append(Block(block.columns, rows))
-        return part
+            blocks.append(Block(block.columns, rows, len(rows)))
+        return States(self.grid, self, *blocks)
 
     def thin(self) -> None:
         """Forget every other state; the first one stays."""
@@ -268,7 +275,7 @@ class States:
             if name in history or name in ("q", FORCES):
                 require_arrays(history, {name: (n, *shape)})
                 columns.of_rows(name, rows)[:] = history[name]
-        self._blocks = [Block(columns, rows)]
+        self._blocks = [Block(columns, rows, n)]
 
     # -- motion --------------------------------------------------------------------------------
 

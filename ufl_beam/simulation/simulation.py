@@ -24,7 +24,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.forces_along_cells import ForcesAlongCells
-from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD
+from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block
 from ufl_beam.output.state_view import StateView
 from ufl_beam.output.states import States
 from ufl_beam.output.watches import Watch
@@ -350,8 +350,7 @@ class Simulation(StateView):
             if self.solution.begun:
                 row[size:] = self.share.gather(self.q_before)
                 columns = columns.plus(BEFORE, (self.grid.size,))
-            self._now = States(self.grid, self.solution)
-            self._now.append(columns, row)
+            self._now = States(self.grid, self.solution, Block(columns, row[None], 1))
             if self._gathers:
                 self._now.of_record = partial(self._gathered_forces, self.parts)
         return self._now
@@ -443,7 +442,6 @@ class Simulation(StateView):
         self.settle()
         if self.t not in self.solution.times[-1:]:
             self.keep()
-        self.solution.trim()
         self.solution.parts, self.solution.iterations = self.parts, self.iterations  # of failures
         self.solution.internal = self._assembly.internal_variables(self.q, self.t)
 
