@@ -104,6 +104,7 @@ from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Cycles, Fatigue, Gerber, Goodman, HotSpot, SNCurve, rainflow
 from ufl_beam.output.history import History
 from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.states import Diagram
 from ufl_beam.output.time_series import VTKHDF, XDMF
 from ufl_beam.parallel import say
 from ufl_beam.plotting import notebook  # noqa: F401 - says how notebooks show models and results
@@ -127,7 +128,6 @@ from ufl_beam.plotting.plots import (
 from ufl_beam.plotting.render import Camera, animate, render
 from ufl_beam.plotting.style import picture
 from ufl_beam.simulation.checkpoint import Checkpoint
-from ufl_beam.simulation.force_diagrams import Diagram
 from ufl_beam.simulation.loading import load
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation

@@ -173,12 +173,6 @@ def end(simulation, steps, dt=0.02):
     return simulation
 
 
-def of_state(state, cells):
-    fields = state._replace(entries=(), cells=cells)
-    yield from (np.array(x) for x in fields if x is not None and not isinstance(x, tuple))
-    yield from (np.array(list(part.values())) for part in state.entries)
-
-
 SCENES = [elastic, inelastic, connected, jointed, damped, followed, driven, slipping]
 
 
@@ -206,7 +200,7 @@ def test_the_same_as_the_reference_solver(make, scheme):
 def test_velocities_before_the_last_step(scheme, steps):
     """C writes new velocities over the oldest, where nothing asks for those."""
     simulation = end(ub.Simulation(elastic(), scheme), steps)
-    before = simulation.gather().v
+    before = simulation.now.v[0]
     simulation.step_to((steps + 1) * 0.02)
     assert np.array_equal(simulation.inertia.rates.v_before, before)
     assert not np.array_equal(simulation.inertia.v, before)
@@ -278,20 +272,31 @@ def test_kept_rows_are_states(make, scheme):
     same_states(many.solution, single.solution)
 
 
+@pytest.mark.parametrize("make", [elastic, inelastic, connected, jointed, driven])
+@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1, 0.05), ub.Static()], ids=str)
+def test_now_is_read_as_the_solution(make, scheme):
+    """The state of a running simulation, and the last one of its solution, in all columns."""
+    simulation = ub.Simulation(make(), scheme)
+    for t in np.linspace(0.0, 0.3, 16)[1:]:
+        simulation.step_to(t)
+        simulation.keep()
+        now, solution = simulation.now, simulation.solution
+        state, states = now.history(), solution.history()
+        assert {*states} - {"before", "every"} == {*state} - {"before"}
+        for name in state.keys() & states.keys():
+            assert np.array_equal(state[name][0], states[name][-1]), name
+        assert np.array_equal(now.before(0), solution.before(-1)) or not solution.begun
+        for beam in simulation.scene.beams:
+            assert np.array_equal(now.diagram(beam), solution.diagram(beam))
+
+
 def same_states(one, other):
     """Whether all states are the same to the last digit, and all that they are asked for."""
-
-    def of(solution, n):
-        state = solution._kept[n]
-        return of_state(state, solution._kept.numbers(state))
 
     states, others = one.history(), other.history()
     assert [*states] == [*others]
     for name in states:
         assert np.array_equal(states[name], others[name]), name
-    for n in (0, len(other) // 2, -1):
-        for x, y in zip(of(one, n), of(other, n), strict=True):
-            assert np.array_equal(x, y)
     assert (one.parts, one.iterations) == (other.parts, other.iterations)
 
 
@@ -317,12 +322,11 @@ def test_thinned_states(make):
         ends = ends[simulation.steps_to(ends, keep=True) :]
     solution = simulation.solution
     before, beams = solution.history(), solution.scene.beams
+    begun = np.array([solution.before(n) for n in range(31)])
     forces = [[solution.section_forces(beam, n) for beam in beams] for n in range(0, 31, 2)]
     solution.thin()
     after = solution.history()
     assert len(solution) == 16
-    # Of states one after the other, the beginnings of the steps are those of the states before.
-    begun = np.concatenate([before["q"][:1], before["q"][:-1]])
     for name in after.keys() - {"every"}:
         whole = begun if name == "before" else before[name]
         assert np.array_equal(after[name], whole[::2], equal_nan=True), name

@@ -84,7 +84,7 @@ class Probe:
             scene, scheme, mesh=mesh, newton=newton, comm=MPI.COMM_SELF
         )
         size = simulation.share.size
-        simulation.q = random.uniform(-0.5, 0.5, size)
+        simulation._q = random.uniform(-0.5, 0.5, size)
         if scheme.dynamic:
             self.in_motion(simulation, random)
         for inelastic in simulation.inelastic:

@@ -12,11 +12,10 @@ import pytest
 
 import ufl_beam as ub
 from tests.unit.laws_of_ones_own import Dashpot, PowerLaw
-from ufl_beam.arrays import Later
 from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
+from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms import connector_laws
-from ufl_beam.terms.links import DISSIPATED
 
 STEEL = {"EA": 4e8, "GA": 1e8, "EI": 1.4e6, "rhoA": 40.0}
 
@@ -75,24 +74,27 @@ FALL = 1e4  # J, more than a step dissipates
 
 def falling(after, entry="plastic"):
     """Let an entry of kept states fall once after a time, with its cell or connector."""
-    keep = Solution.keep
+    grow = Solution.grow
 
-    def keep_less(self, states, parts, iterations):
-        states = states.make() if isinstance(states, Later) else states
-        late = states.t > after
-        states.entries[2][entry][late] -= FALL
-        states.material[late, 0:1, 5 if entry == "plastic" else 6] -= FALL
-        states.connections[late, 0:1, DISSIPATED] -= FALL
-        keep(self, states, parts, iterations)
+    def grow_less(self, number=1):
+        grow(self, number)
+        for n in range(len(self) - number, len(self)):
+            columns, row = self.row(n)
+            if columns.of_rows("t", row) > after:
+                columns.of_rows(f"lost: {entry}", row)[...] -= FALL
+                columns.of_rows("material", row)[0:1, PLASTIC if entry == "plastic" else HINGE] -= (
+                    FALL
+                )
+                columns.of_rows("connectors", row)[0:1, DISSIPATED] -= FALL
 
-    return keep_less
+    return grow_less
 
 
 @pytest.mark.parametrize("more", [{}, {"every": 2}, {"most": 30}, {"record": ub.Events()}])
 @pytest.mark.parametrize(("entry", "begin"), [("plastic", 1.5), ("hinges", 1.0)])
 def test_dissipation_that_falls_names_the_cell(entry, begin, more, monkeypatch):
     """In steps that C keeps and in those of Python, in states of all steps or of some."""
-    monkeypatch.setattr(Solution, "keep", falling(begin, entry))
+    monkeypatch.setattr(Solution, "grow", falling(begin, entry))
     section = {"bending": YIELDS} if entry == "plastic" else {"hinge": ub.Softening(1.4e4, 1e4)}
     said, solution = run(bent(**section), **more)
     one = about(said, solution, "girder, cell at s = 0.25: ", repr(entry), "falls by")
@@ -101,7 +103,7 @@ def test_dissipation_that_falls_names_the_cell(entry, begin, more, monkeypatch):
 
 
 def test_dissipation_of_a_spring_names_the_connector(monkeypatch):
-    monkeypatch.setattr(Solution, "keep", falling(1.5))
+    monkeypatch.setattr(Solution, "grow", falling(1.5))
     said, solution = run(bent(spring=ub.Spring(1e7, law=YIELDS)))
     about(said, solution, "Turn(ground (0, 0), girder.start (0, 0)): ", "'plastic'", "falls by")
 
@@ -212,7 +214,7 @@ def test_a_blow_that_dies_out():
 
 
 def test_a_run_that_goes_on_remembers_its_warnings(tmp_path, monkeypatch):
-    monkeypatch.setattr(Solution, "keep", falling(0.5))
+    monkeypatch.setattr(Solution, "grow", falling(0.5))
     backup = ub.Checkpoint(tmp_path / "run.checkpoint", every=10)
     said, _ = run(bent(bending=YIELDS), t=(0, 1), dt=0.02, checkpoint=backup)
     monkeypatch.undo()

@@ -29,7 +29,8 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
-from ufl_beam.output.joint_histories import Connection, velocity_of
+from ufl_beam.output.joint_histories import velocity_of
+from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
@@ -113,12 +114,9 @@ class Shapes(Rich, ABC):
             form.add(q, r)
             forces_of.accept()
             cells.append(forces_of(q, q))
-        history = {
-            "times": times, "q": states, "every": np.array([1]), "cells": np.array(cells),
-        }  # fmt: skip
-        none = dict.fromkeys(("v", "reactions", "connections"), np.empty(0))
+        history = {"t": times, "q": states, "every": np.array([1]), FORCES: np.array(cells)}
         solution = Solution(self.scene, self.grid)
-        solution.resume(history | none)
+        solution.resume(history)
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:

@@ -186,8 +186,7 @@ def _without_checksum(data: bytes) -> tuple[str, Content]:
     with h5py.File(io.BytesIO(data), "r") as file:
         found = str(file.attrs.get("format", ""))
         if found.startswith("solution"):
-            text: Content = json.loads(file["text"][()])
-            return found, {**text, **{name: file[name][()] for name in text.pop("arrays")}}
+            return found, {}
         if found.startswith("study"):
             text = {name: [*file[name].asstr()[()]] for name in ("cases", "errors")}
             results = {name: values[()] for name, values in file["results"].items()}

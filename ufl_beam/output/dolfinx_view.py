@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -20,33 +20,12 @@ from ufl_beam.discretization.function_spaces import (
     integrated,
     mass_form,
 )
-from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import SceneError
-from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.scene import Scene
+from ufl_beam.mechanics.time_schemes import has_inertia
 from ufl_beam.terms.beams import elastic_forms
-from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_forms
-
-
-class Viewed(Protocol):
-    """Source of a view: a simulation, see :class:`StateView`."""
-
-    scene: Scene
-    scheme: Scheme
-    share: Share
-    q: Array
-    inelastic: list[InelasticBeams]
-
-    def velocities(self) -> list[Array]:
-        """Velocities at the local degrees of freedom; none in statics."""
-
-    def section_forces(self) -> Array:
-        """(N, V, M) in all cells; (num_cells, 3); N, N, N m."""
-
-    def damage(self) -> tuple[Array, Array]:
-        """Jump of rotation (rad) and dissipated energy (J) of each cell; both (num_cells,)."""
+from ufl_beam.terms.inelastic_beams import inelastic_forms
 
 
 class BeamForms(NamedTuple):
@@ -92,7 +71,7 @@ class DolfinxView:
         True
     """
 
-    def __init__(self, of: Viewed) -> None:
+    def __init__(self, of: Any) -> None:  # a `StateView`, which is above this module
         self._of = of
         self._functions: dict[str, fem.Function] = {}
 
@@ -195,7 +174,7 @@ class DolfinxView:
             >>> print(round(length, 9), bool(view.total(u_y) < 0))
             2.0 True
         """
-        return self._of.share.total(integrated(integral, self.mesh))
+        return float(self._of.share.total(integrated(integral, self.mesh)))
 
     # -- functions -------------------------------------------------------------------------------
 

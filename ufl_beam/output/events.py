@@ -17,6 +17,7 @@ from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC
 from ufl_beam.output.state_view import StateView
 from ufl_beam.parallel import on_first
 
@@ -108,18 +109,18 @@ class Events(Recorder):
     def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
         """Return the events of each cell and hinge, (n, 3), and which connectors touch or slide."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
-        for cells, rows in simulation.material():
-            plastic, broken = rows[:, 4], rows[:, 5]
-            happened = (plastic > 0, broken > 0, broken >= self._enough[cells])
-            in_cells[cells] = np.column_stack(happened)
-        if simulation.scene.hinges:
-            hinges = slice(len(simulation.grid.cells), None)
-            lost, breaks = simulation.hinges()[:, -1], self._breaks[hinges]
-            happened = ((lost > 0) & ~breaks, (lost > 0) & breaks, lost >= self._enough[hinges])
-            in_cells[hinges] = np.column_stack(happened)
+        num_cells, hinges = len(simulation.grid.cells), simulation.scene.hinges
+        plastic, broken = simulation.now.cells_of(0)[:, [PLASTIC, HINGE]].T
+        happened = (plastic > 0, broken > 0, broken >= self._enough[:num_cells])
+        in_cells[:num_cells] = np.column_stack(happened)
+        if hinges:
+            lost = simulation.connections()[-len(hinges) :, DISSIPATED]
+            breaks, enough = self._breaks[num_cells:], self._enough[num_cells:]
+            happened = ((lost > 0) & ~breaks, (lost > 0) & breaks, lost >= enough)
+            in_cells[num_cells:] = np.column_stack(happened)
         if not self._links:
             return in_cells, np.zeros(0, dtype=bool)
-        forces = np.abs(simulation.connections()[self._links, 1])
+        forces = np.abs(simulation.connections()[self._links, FORCE])
         # Forces above which they touch, or slide; the limit of friction is known to some digits
         links = (simulation.scene.links[link] for link in self._links)
         limits = [(1 - 1e-9) * simulation.asked.get(link, 0.0) for link in links]

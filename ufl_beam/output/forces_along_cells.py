@@ -9,18 +9,59 @@ along the cell: its resultant, its couple, and how it is distributed, as far as 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Complex, Index
+from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
 
 MIDDLE: Array = np.full(1, 0.5)
 """The middle of a cell, as a part of it."""
 
-Cells = Index | slice
+Way = Callable[[Any], tuple[Any, Any]]
+"""Derivative of the place by the part of the cell, at a part."""
+
+
+def section_force(numbers: Any, way: Way, *, works: bool) -> Callable[[Any], tuple[Any, Any, Any]]:
+    """State the force in the plane and the moment at a part of a cell, from 0 to 1 at its end.
+
+    Args:
+        numbers: Forces of the cell, ``cell_number`` of loops.h: arrays, or expressions of UFL.
+        way: In the configuration in which they are in equilibrium.
+        works: Whether forces across the cell may be distributed in any way, by works of a user.
+    """
+    start, end, skew = ((numbers[k], numbers[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X))
+    at_start, at_end, couple = (numbers[k] for k in (lib.START_M, lib.END_M, lib.COUPLE))
+    points = gauss_rule()
+
+    def force(part: Any) -> list[Any]:
+        bend = -6 * part * (1 - part)
+        return [part * (a + b) - a + bend * c for a, b, c in zip(start, end, skew, strict=True)]
+
+    def lever(part: Any) -> Any:
+        """Moment of the section forces up to a part about the place there, over the part."""
+        pairs = ((weight, way(at * part), force(at * part)) for at, weight in points)
+        return sum(weight * (x[0] * f[1] - x[1] * f[0]) for weight, x, f in pairs)
+
+    # What moments at both ends say besides: couples, or how works are distributed across.
+    missed = at_start + at_end - couple + lever(1.0)
+    if works:
+        ways = [[6 * w * at * (1 - at) * x for x in way(at)] for at, w in points]
+        x, y = (sum(one) for one in zip(*ways, strict=True))
+        turned = missed / (x * x + y * y)
+        skew = skew[0] - turned * y, skew[1] + turned * x
+    else:
+        couple = couple + missed
+    return lambda part: (*force(part), part * (couple - lever(part)) - at_start)
+
+
+def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, Any]:
+    """(N, V, M) of a force in the plane and a moment; (c, s) is the axis of the section."""
+    x, y, M = plane
+    return c * x + s * y, c * y - s * x, M
 
 
 class ForcesAlongCells:
@@ -28,80 +69,54 @@ class ForcesAlongCells:
 
     Args:
         grid: Cells and numbering.
-        between: Part of a step at whose configuration its forces are in equilibrium.
 
     Attributes:
         angles: Of the undeformed axis at both ends of the cells; (num_cells, 2); rad.
+        dofs: Degrees of freedom (u, v, ψ) of the nodes of cells; (num_cells, 3, degree + 1).
     """
 
-    def __init__(self, grid: Any, between: float) -> None:
-        mesh, nodes = grid.mesh, grid.nodes_of_cells
+    def __init__(self, grid: Any) -> None:
+        nodes = grid.nodes_of_cells
         start, end, *inner = range(nodes.shape[1])
-        self._mesh, self.between, self._along = mesh, between, [start, *inner, end]
+        self._mesh, self._along = grid.mesh, [start, *inner, end]
+        self.dofs: Index = grid.dofs[nodes].transpose(0, 2, 1)
         self._works = bool(grid.scene.works)
-        places = grid.points[nodes[:, self._along]]
-        self._places: Complex = places[..., 0] + 1j * places[..., 1]
-        angles = np.asarray(np.angle(self._places[:, -1] - self._places[:, 0]), np.float64)
+        self._places: Array = grid.points[nodes[:, self._along]].transpose(2, 0, 1)
+        x, y = self._places[:, :, -1] - self._places[:, :, 0]
+        angles = np.asarray(np.arctan2(y, x))
         self.angles = angles[:, None] + _turns(grid, angles)
 
-    def __call__(
-        self,
-        cells: Cells,
-        parts: Array,
-        numbers: Array,
-        q: Array,
-        before: Array | None,
-    ) -> Array:
+    def __call__(self, cells: Index | slice, parts: Array, numbers: Array, q: Array) -> Array:
         """Compute them at parts of cells, from 0 at the start to 1 at the end; N, N, N m.
 
         Args:
             cells: Numbers of the cells, or of one cell at many times.
             parts: Parts; (points,).
             numbers: Forces of the cells, ``cell_number`` of loops.h; (9, num_cells).
-            q: Their configurations (u, v, ψ) in the nodes; (num_cells, 3, degree + 1).
-            before: Those at the beginning of the step; none if they do not matter.
+            q: Configurations (u, v, ψ) of their nodes, those between the ends of the step at which
+                its forces are in equilibrium; (num_cells, 3, degree + 1).
 
         Returns:
             (N, V, M); (num_cells, points, 3).
         """
-        if before is not None:
-            q = (1 - self.between) * before + self.between * q
-        q = q[:, :, self._along]
-        x = self._places[cells] + q[:, 0] + 1j * q[:, 1]
-        forces = numbers[[lib.START_X, lib.END_X]] + 1j * numbers[[lib.START_Y, lib.END_Y]]
-        moments = numbers[[lib.START_M, lib.END_M]]
-        all_of_it, couple = -forces.sum(axis=0), -numbers[lib.COUPLE]
-        skew = -6 * (numbers[lib.SKEW_X] + 1j * numbers[lib.SKEW_Y])
-        points, weights, slopes = gauss_rule(self._mesh)
-        ways = x @ slopes.T  # derivatives of the place by the part, in points of the rule
+        u, v, ψ = q[:, :, self._along].transpose(1, 0, 2)
+        x, y = self._places[:, cells] + (u, v)
+        mesh, (start, end) = self._mesh, self.angles[cells].T
 
-        def force(at: Array) -> Complex:
-            """Section force, as a vector of the plane; (num_cells, len(at))."""
-            linear = -forces[0][:, None] - np.multiply.outer(all_of_it, at)
-            return np.asarray(linear + np.multiply.outer(skew, at * (1 - at)))
+        def way(part: Array | float) -> tuple[Array, Array]:
+            slopes = mesh.slopes(np.ravel(part)).T
+            return x @ slopes, y @ slopes
 
-        # What moments at both ends say besides: couples, or how works are distributed across.
-        missed = moments.sum(axis=0) + couple + np.imag(ways.conj() * force(points)) @ weights
-        if self._works:
-            way = 6 * (ways * (points * (1 - points))) @ weights
-            skew -= 6j * way * missed / np.abs(way) ** 2
-        else:
-            couple -= missed
-        before_point = np.multiply.outer(parts, points).ravel()
-        lever = (x @ self._mesh.slopes(before_point).T).conj() * force(before_point)
-        lever = parts * (np.imag(lever).reshape(len(x), len(parts), len(points)) @ weights)
-        M = -moments[0][:, None] - lever - np.multiply.outer(couple, parts)
-        angles = self.angles[cells] @ np.array([1 - parts, parts])
-        angles += q[:, 2] @ self._mesh.weights(parts).T
-        F = force(parts) * np.exp(-1j * angles)
-        return np.stack([F.real, F.imag, M], axis=2)
+        angle = np.outer(start, 1 - parts) + np.outer(end, parts) + ψ @ mesh.weights(parts).T
+        at = section_force(numbers[:, :, None], way, works=self._works)
+        return np.stack(in_section(at(parts), np.cos(angle), np.sin(angle)), axis=2)
 
 
 @cache
-def gauss_rule(mesh: Any) -> tuple[Array, Array, Array]:
-    """Points of Gauss's rule on a cell, their weights, and slopes there; exact for all here."""
+def gauss_rule() -> tuple[tuple[float, float], ...]:
+    """Points of Gauss's rule on a cell, and their weights; exact for all here."""
     points, weights = np.polynomial.legendre.leggauss(3)
-    return (1 + points) / 2, weights / 2, mesh.slopes((1 + points) / 2)
+    return tuple((float(1 + x) / 2, float(w) / 2) for x, w in zip(points, weights, strict=True))
 
 
 def _turns(grid: Any, angles: Array) -> Array:

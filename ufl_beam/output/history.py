@@ -17,7 +17,7 @@ from ufl_beam.model.bodies import Anchor, require_anchors
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.joint_histories import links_of, motion_of
+from ufl_beam.output.joint_histories import links_of
 from ufl_beam.output.output_files import OutputFile, changed, part_of, require_path
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.output.state_view import StateView
@@ -39,7 +39,7 @@ class History(Recorder):
         path: File, ending in ``.csv``.
         places: Places to follow, on beams and bodies.
         connectors: Connectors to follow, see
-            :class:`~ufl_beam.output.joint_histories.Connection`; of joints, all the connectors that
+            :class:`~ufl_beam.output.state_rows.Connection`; of joints, all the connectors that
             hold them.
         every: Write every so many steps.
         most: Largest number of rows, besides the initial one.  When it is exceeded, every other row
@@ -138,8 +138,7 @@ class History(Recorder):
         self._files[0].rename(self._path)
 
     def _row(self, simulation: StateView) -> bytes:
-        q = simulation.share.gather(simulation.q)
-        motion = [motion_of(simulation.grid, place, q[None])[0] for place in self._places]
+        motion = [simulation.displacement(place) for place in self._places]
         links = list(self._links)
         connections = simulation.connections()[links, :3] if links else ()
         energies = [energy for group in simulation.entries() for energy in group.values()]

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Blocks
+from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError
@@ -18,33 +18,8 @@ from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 
-Vectors: TypeAlias = Array | Blocks
-"""Configurations or velocities at some times; (n, size)."""
-
-
-class Connection(NamedTuple):
-    """History of a connector.
-
-    Motion, force and rate of a :func:`Bushing` are of all components; (n+1, 2) or (n+1, 3).
-
-    Attributes:
-        motion: Relative motion since the undeformed scene; (n+1,); m or rad.
-        force: That resisted its growth during the step that ends there; (n+1,); N or N m.
-        work: That the connector has taken since the beginning: what springs store and dissipate,
-            what dampers and friction dissipate, and minus what motors supply; (n+1,); J.
-        rate: Mean rate of the motion in the step that ends there; (n+1,); m/s or rad/s.
-        dissipated: Energy that yielding, softening and plastic hinges have dissipated, or that a
-            :class:`ConnectorLaw` has lost; (n+1,); J.
-    """
-
-    motion: Any
-    force: Any
-    work: Any
-    rate: Any
-    dissipated: Any
-
-    def __repr__(self) -> str:
-        return one_line(self)
+Vectors: TypeAlias = Any
+"""Configurations or velocities at some times, an array or a ``Column``; (n, size)."""
 
 
 class JointHistory(NamedTuple):
@@ -67,15 +42,6 @@ class JointHistory(NamedTuple):
 
     def __repr__(self) -> str:
         return one_line(self)
-
-
-def connection(numbers: Array) -> Connection:
-    """History of the columns of k components, of which works are added; (..., k, 5)."""
-    if numbers.shape[-2] == 1:
-        columns = np.moveaxis(numbers[..., 0, :], -1, 0)
-        return Connection(*(x if x.ndim else float(x) for x in columns))
-    motion, force, work, rate, dissipated = np.moveaxis(numbers, -1, 0)
-    return Connection(motion, force, work.sum(-1), rate, dissipated.sum(-1))
 
 
 def links_of(scene: Scene, of: Connector | Joint) -> list[int]:

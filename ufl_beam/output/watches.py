@@ -16,7 +16,7 @@ from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.model.mesh_options import Mesh
-from ufl_beam.output.forces_along_cells import ForcesAlongCells, gauss_rule
+from ufl_beam.output.forces_along_cells import ForcesAlongCells, in_section, section_force
 from ufl_beam.terms.cell_forces import CellForces
 
 EXTENT = ("low", "high", "time_low", "time_high")
@@ -46,7 +46,7 @@ class AlongCells(NamedTuple):
 
 @stated
 def along_cells(of: Element, parts: tuple[float, ...], works: bool) -> AlongCells:
-    """State what :class:`ForcesAlongCells` computes; entries (N, V, M)."""
+    """State :func:`section_force` as a form; its entries are (N, V, M)."""
     mesh, h, between = Mesh(degree=of.degree), of.axis.h, set(parts) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
@@ -54,49 +54,25 @@ def along_cells(of: Element, parts: tuple[float, ...], works: bool) -> AlongCell
     motions, numbers, angles, values = map(of.in_cells, (moves, first, 2, 3 * len(parts)))
     order = [0, *range(2, n), 1]  # of the nodes along a cell
     *displacements, rotations = ([motions[k + i] for i in order] for k in range(0, moves, n))
-    points, weights, _ = gauss_rule(mesh)
-    pairs = [(float(a), float(b)) for a, b in zip(points, weights, strict=True)]
-
-    def vector(x: Any, y: Any) -> Expr:
-        return ufl.as_vector([x, y])
-
-    def cross(a: Expr, b: Expr) -> Expr:
-        return a[0] * b[1] - a[1] * b[0]
 
     def weighted(weights: Array, values: list[Expr]) -> Expr:
         return sum(float(a) * x for a, x in zip(weights, values, strict=True))
 
-    start, end = (vector(numbers[x], numbers[x + 1]) for x in (lib.START_X, lib.END_X))
-    at_start, at_end = numbers[lib.START_M], numbers[lib.END_M]
-    couple, skew = 0.0, 0.0 * start
-    if between:
-        couple, skew = -numbers[lib.COUPLE], -6 * vector(numbers[lib.SKEW_X], numbers[lib.SKEW_Y])
+    def way(part: float) -> tuple[Any, Any]:
+        x, y = h * of.axis.t0[0], h * of.axis.t0[1]
+        if not between:
+            return x, y
+        u, v = (weighted(mesh.slopes(part), nodes) for nodes in displacements)
+        return x + u, y + v
 
-    def way(part: float) -> Expr:
-        """Derivative of the place by the part."""
-        way = h * of.axis.t0
-        if between:
-            way += vector(*(weighted(mesh.slopes(part), nodes) for nodes in displacements))
-        return way
-
-    def force(part: float, skew: Expr) -> Expr:
-        return part * (start + end) - start + part * (1 - part) * skew
-
-    missed = at_start + at_end + couple + sum(b * cross(way(a), force(a, skew)) for a, b in pairs)
-    if works:
-        x, y = sum(6 * b * a * (1 - a) * way(a) for a, b in pairs)
-        skew += 6 * missed / (x**2 + y**2) * vector(y, -x)
-    else:
-        couple -= missed
-    found = []
+    known = [numbers[k] for k in range(first)] + [0.0] * (lib.CELL_NUMBERS - first)
+    at, at_end = section_force(known, way, works=works), known[lib.END_X : lib.END_M + 1]
+    found = list[Expr]()
     for part in parts:
-        M, F = at_end, end
-        if part < 1:
-            levers = sum(b * cross(way(a * part), force(a * part, skew)) for a, b in pairs)
-            M, F = -at_start - part * (levers + couple), force(part, skew)
-        angle = (1 - part) * angles[0] + part * angles[1] + weighted(mesh.weights(part), rotations)
-        c, s = ufl.cos(angle), ufl.sin(angle)
-        found += [c * F[0] + s * F[1], c * F[1] - s * F[0], M]
+        turn = weighted(mesh.weights(part), rotations)
+        angle = (1 - part) * angles[0] + part * angles[1] + turn
+        plane = at(part) if part < 1 else tuple(at_end)
+        found += in_section(plane, ufl.cos(angle), ufl.sin(angle))
     form = ufl.dot(ufl.as_vector(found), ufl.TestFunction(values.function_space)) / h * of.dx(1)
     return AlongCells(form, motions, numbers, angles, first, moves)
 
@@ -110,8 +86,9 @@ class Watch:
     """
 
     def __init__(
-        self, fields: Fields, cell_forces: CellForces, along: ForcesAlongCells, parts: Array
-    ) -> None:
+        self, fields: Fields, cell_forces: CellForces, along: ForcesAlongCells, between: float,
+        parts: Array,
+    ) -> None:  # fmt: skip
         size, works = fields.share.size, bool(fields.share.grid.scene.works)
         of = along_cells(fields.element, tuple(map(float, parts)), works)
         self._kernel = fields.hot_kernel(of.form, of.motions, fields.cell_dofs[:, -of.moves :])
@@ -121,7 +98,7 @@ class Watch:
         self._extents = [dict(zip(EXTENT, np.zeros((4, n)), strict=True)) for n in sizes]
         cell_forces.keep_latest()
         self.c = struct(
-            "watch", forces=cell_forces.c, along=self._kernel.cells, between=along.between,
+            "watch", forces=cell_forces.c, along=self._kernel.cells, between=between,
             angles=in_batches(along.angles, self._lanes), q=np.zeros(size), first=of.first,
             at_angles=self._kernel.position(of.angles),
             at_numbers=self._kernel.position(of.numbers),

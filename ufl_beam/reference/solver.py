@@ -19,7 +19,7 @@ from petsc4py import PETSc
 import numpy as np
 from scipy.sparse import csr_array
 
-from ufl_beam.arrays import Array, Snapshot
+from ufl_beam.arrays import Array, State
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia, nodal_step
@@ -30,7 +30,8 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.supports import Support
-from ufl_beam.output.joint_histories import Connection, links_of, motion_of, velocity_of
+from ufl_beam.output.joint_histories import links_of, motion_of, velocity_of
+from ufl_beam.output.state_rows import BEFORE, FORCES, LEDGER, Connection
 from ufl_beam.reference.beams import (
     ElasticBeams,
     Inertia,
@@ -610,16 +611,20 @@ class Solver:
         """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
         return self.supports.forces()
 
-    def snapshot(self) -> Snapshot:
-        """The state now, as solutions keep it."""
+    def snapshot(self) -> State:
+        """The state now, by the names of the columns of solutions."""
         reactions = self.reactions()
         if self.parts == 0 and self.inertia is not None:
             reactions = np.full_like(reactions, np.nan)  # nobody knows them
         rows = np.concatenate([np.zeros((0, 7)), *(one.material() for one in self.yielding)])
+        state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
+        if self.inertia is not None:
+            state["v"] = self.inertia.v
+        for part, entries in zip(LEDGER, self.ledger.copy(), strict=True):
+            state |= {f"{part}: {name}": np.array(value) for name, value in entries.items()}
+        state |= {
+            "connectors": self.connections(), "material": rows[np.argsort(rows[:, 0]), 1:],
+            FORCES: np.zeros((9, len(self.grid.cells))) + self.on_nodes,
+        }  # fmt: skip
         over_step = float(self.scheme.average(0.0, 1.0)) < 1
-        cells = np.zeros((9, len(self.grid.cells)))
-        return Snapshot(
-            self.t, self.q, None if self.inertia is None else self.inertia.v, reactions,
-            self.ledger.copy(), rows[np.argsort(rows[:, 0])], self.connections(),
-            cells + self.on_nodes, self.q_before if over_step else None,
-        )  # fmt: skip
+        return {**state, BEFORE: self.q_before} if over_step else state

@@ -51,7 +51,6 @@ class Assembly:
     controllers: Controllers  # with their forces, and the limits of friction, in the step
     beams: list[Cells]  # those with material points first
     inelastic: list[InelasticBeams]  # those with material points
-    yields: bool  # True if any process has such cells
     couplings: list[Links]  # connectors, those alike together
     loads: list[LoadTerm]
     inertia: Inertia | None
@@ -149,7 +148,7 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
 
     # Each kind makes its entries of the ledger: their order is that of the columns of tables.  It
     # follows from the scene alone, also where a process lacks cells or connectors of a kind.
-    groups = inelastic_cells(share)
+    groups = inelastic_cells(share.grid)
     inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
     for layout, cells in groups:
         expect_entries(layout, scheme, ledger)
@@ -193,7 +192,7 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     parts = share, A, beams, coupled, loads, others, supports, search
     equation = StepEquation(*parts, rates)
     return Assembly(
-        fields, ledger, controllers, beams, inelastic, bool(groups), coupled, loads, inertia,
+        fields, ledger, controllers, beams, inelastic, coupled, loads, inertia,
         supports, equation, _cell_forces(share, equation.terms),
     )  # fmt: skip
 

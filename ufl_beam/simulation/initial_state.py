@@ -124,10 +124,8 @@ def last_forces(
     between = float(scheme.average(0.0, 1.0))
     if start is None or start.between != between or not same_unknowns(start.grid, grid):
         return None, None
-    cells, before = start.last_forces()
-    return np.ascontiguousarray(cells[:, share.cells]), None if before is None else before[
-        share.dofs
-    ]
+    before = start.before(-1)[share.dofs] if start.begun else None
+    return np.ascontiguousarray(start.numbers(-1)[:, share.cells]), before
 
 
 def _initial_velocity(grid: Grid) -> Array:

@@ -11,12 +11,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Blocks
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.arrays import Array
 from ufl_beam.errors import warn
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.fibres import Layout
+from ufl_beam.output.state_rows import HINGE
+from ufl_beam.output.states import States
 
 LARGE = 0.05
 """Shift of a limit by the place of its hinge from which a run warns, as a part of the limit."""
@@ -49,19 +50,17 @@ class Opened:
         dissipated: By hinges and cracks at the end; (num_cells,); J.
     """
 
-    def __init__(self, grid: Grid, material: Blocks) -> None:
-        self._grid = grid
+    def __init__(self, states: States) -> None:
+        self._grid = grid = states.grid
         self.first, self.shear = np.full(len(grid.cells), -1), np.zeros(len(grid.cells))
         self.dissipated = np.zeros(len(grid.cells))
-        if not len(material):
+        if len(states):
+            self.dissipated[:] = states.cells_of(-1)[:, HINGE]
+        cells = np.flatnonzero(self.dissipated > 0)
+        if not len(cells):
             return
-        last = material.last
-        open_now = last[:, 6] > 0
-        if not open_now.any():
-            return
-        cells = last[open_now, 0].astype(np.int64)
-        dissipated, V = (material[:, open_now, k] for k in (6, 2))
-        self.dissipated[cells] = last[open_now, 6]
+        rows = np.searchsorted(states.cells.inelastic, cells)
+        dissipated, V = (states.column("material")[:, rows, k] for k in (HINGE, 1))
         self.first[cells] = first = (dissipated > 0).argmax(axis=0)
         # After an opening in a jump V is that of vibrations.
         n = np.where(first > 1, first - 1, first)

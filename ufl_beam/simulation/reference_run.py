@@ -8,12 +8,15 @@ from typing import Any
 
 from mpi4py import MPI
 
-from ufl_beam.arrays import Snapshots
+import numpy as np
+
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ConvergenceError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.joint_histories import turned
+from ufl_beam.output.state_rows import Columns
 from ufl_beam.parallel import progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
@@ -41,15 +44,19 @@ def simulate_by_reference(
     if start is not None and start.between == between and same_unknowns(start.grid, grid):
         goes_on = same and "reactions" in internal and not len(start.v)
         if goes_on or has_inertia(scheme):
-            solver.on_nodes, before = start.last_forces()
-            solver.q_before = q if before is None else before
+            solver.on_nodes, solver.q_before = start.numbers(-1), start.before(-1)
     solution = Solution(scene, grid)
-    solution.between = between
-    solution.find_cell_forces(scheme, None)
+    solution.between, solution.begun, solution.scheme = between, between < 1, scheme
     solution.every, solution.building = every, time.perf_counter() - begin
 
     def keep() -> None:
-        solution.keep(Snapshots.of(solver.snapshot()), solver.parts, solver.iterations)
+        state = solver.snapshot()
+        forces = state["reactions"][:, :2]
+        for k, support in enumerate(scene.supports):
+            forces[k] = turned(forces[k], np.full(1, -support.angle))[0]  # in its axes
+        columns = Columns({name: np.shape(values) for name, values in state.items()})
+        solution.append(columns, np.concatenate([*map(np.ravel, state.values())]))
+        solution.count(solver.parts, solver.iterations)
 
     keep()
     try:

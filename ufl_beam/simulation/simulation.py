@@ -3,15 +3,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from functools import cached_property
+from functools import cached_property, partial
 from typing import NoReturn
 
 from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Later, Snapshots
+from ufl_beam.arrays import Array
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
@@ -22,7 +23,10 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
+from ufl_beam.output.forces_along_cells import ForcesAlongCells
+from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block
 from ufl_beam.output.state_view import StateView
+from ufl_beam.output.states import States
 from ufl_beam.output.watches import Watch
 from ufl_beam.parallel import Agreement, communicator
 from ufl_beam.simulation.assembly import assemble
@@ -31,10 +35,20 @@ from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.stepper import APPLYING, Extras, Stepper, Trial, begins_loaded
+from ufl_beam.simulation.state_writer import StateWriter
+from ufl_beam.simulation.stepper import (
+    APPLYING,
+    Extras,
+    Stepper,
+    Trial,
+    begins_loaded,
+)
 from ufl_beam.simulation.watches import ForceWatch
 from ufl_beam.solvers.newton import Border
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
+
+ROOM = 2**20
+"""Numbers that C writes of states in a call."""
 
 
 class Simulation(StateView):
@@ -55,7 +69,6 @@ class Simulation(StateView):
 
     Attributes:
         t: Time; s.
-        q: Configuration at the local degrees of freedom.
         ledger: Energies of this process.
         equation: The equation of a step.
         solution: The motion so far.
@@ -105,44 +118,40 @@ class Simulation(StateView):
         self._assembly = parts = assemble(share, scheme, t0, v[share.dofs], together)
         self.fields, self.ledger, self.controllers = parts.fields, parts.ledger, parts.controllers
         self.beams, self.inelastic, self.couplings = parts.beams, parts.inelastic, parts.couplings
-        self.loads, self.supports, self._has_inelastic = parts.loads, parts.supports, parts.yields
+        self.loads, self.supports = parts.loads, parts.supports
         self.equation, self.terms = parts.equation, parts.equation.terms
 
-        self.t, self.parts, self.q = t0, 0, q[share.dofs]
+        self.t, self.parts, q_here = t0, 0, q[share.dofs]
         self._begun_at: Array | None = None  # of the state before the first step
         weights, in_motion = self.equation.weights, has_inertia(scheme)
-        self.prediction = Prediction(share, self.q, weights, in_motion=in_motion)
-        self._continues = start is not None
+        self.prediction = Prediction(share, q_here, weights, in_motion=in_motion)
         loaded: list[Array] = []
         same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
         goes_on = same and "reactions" in internal and start is not None and not len(start.v)
-        if self._continues or (has_inertia(scheme) and scheme.kept):
-            loaded = together(parts.carry_on, t0, self.q, internal if same else None)
+        if not fresh or (has_inertia(scheme) and scheme.kept):
+            loaded = together(parts.carry_on, t0, q_here, internal if same else None)
         if start is not None:
-            parts.take_over(self.q, t0, internal, same=same)
-        self.equation.start(self.q)
-        self.equation.add_state(self.q)
+            parts.take_over(q_here, t0, internal, same=same)
+        self.equation.start(q_here)
+        self.equation.add_state(q_here)
         for coupling in parts.couplings if start is None else ():
-            coupling.put_forces(self.q)
+            coupling.put_forces(q_here)
         if parts.inertia is not None:
             self.inertia = parts.inertia
-            if scene.links or scene.supports:
-                together(warn_of_jumps, grid, t0, q, self.connections()[:, 0])
-        self._branch = parts.static_path(scheme, self.q, t0, loaded, together, goes_on=goes_on)
-        self.reactions_known = self._branch is not None
-        self.cell_forces, self.between = parts.cell_forces, float(scheme.average(0.0, 1.0))
-        if not self.reactions_known:
-            together(self.equation.forces_at_rest, scheme, self.q)
-        goes_on = goes_on or not self.reactions_known
+        self._branch = parts.static_path(scheme, q_here, t0, loaded, together, goes_on=goes_on)
+        self._reactions_known = self._branch is not None  # those of the initial state
+        self.cell_forces = parts.cell_forces
+        if not self._reactions_known:
+            together(self.equation.forces_at_rest, scheme, q_here)
+        goes_on = goes_on or not self._reactions_known
         forces, before = last_forces(grid, share, scheme, start) if goes_on else (None, None)
-        if forces is not None or not self.reactions_known:
+        if forces is not None or not self._reactions_known:
             self.cell_forces.begin(forces)
             self._begun_at = before
-        self.begun = self.between < 1 or self.cell_forces.asks_for_before
 
         self.solution, self._end = kind(scene, grid), np.zeros(1)
-        self._watches: list[Watch] = []
         self._describe(self.solution)
+        self._watches: list[Watch] = []
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
         extras = Extras(
             self.ask if self.controllers.asks else None, self.controllers.stops,
@@ -152,10 +161,13 @@ class Simulation(StateView):
         self._applies = fresh and begins_loaded(scene, scheme, t0)
         self._stepper = Stepper(
             scheme, self.equation, newton, self.ledger, parts.inertia, self._branch,
-            self.support_dofs, self.cell_forces, self.begun, together, extras,
+            self.cell_forces, together, extras,
         )  # fmt: skip
         self.solver = self._stepper.solver
-        self._stepper.begin_at(self)
+        self._stepper.begin_at(self, t0, q_here)
+        self.moved(t0)
+        if has_inertia(scheme) and (scene.links or scene.supports):
+            together(warn_of_jumps, grid, t0, q, self.connections()[:, 0])
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -216,7 +228,8 @@ class Simulation(StateView):
         """Begin to take in extremes after each step in C, or return None if that cannot be."""
         if not self.share.alone:
             return None
-        self._watches.append(one := Watch(self.fields, self.cell_forces, self._along, parts))
+        along = ForcesAlongCells(self.grid), self.solution.between
+        self._watches.append(one := Watch(self.fields, self.cell_forces, *along, parts))
         self._stepper.watch(self._watches)
         return one
 
@@ -258,7 +271,7 @@ class Simulation(StateView):
                     warn(said)
 
     @property
-    def q_before(self) -> Array:  # type: ignore[override]
+    def q_before(self) -> Array:
         """Configuration at the beginning of the last step."""
         return self.prediction.q_before if self._begun_at is None else self._begun_at
 
@@ -299,10 +312,116 @@ class Simulation(StateView):
         if self._copies is not None:
             self._copies.leave()
 
+    # -- the state -----------------------------------------------------------------------------
+
+    def moved(self, t: float) -> None:
+        """Take note that the state is another one, at the time ``t``."""
+        self.t = t
+        self._q: Array | None = None  # copied when Python asks for it
+        self._now: States | None = None
+
+    @property
+    def q(self) -> Array:
+        """Configuration at the local degrees of freedom."""
+        if self._q is None:
+            self._q = self._stepper.q
+        return self._q
+
+    @property
+    def now(self) -> States:
+        """The present state, read as a solution; all processes call it together.
+
+        Before the first step of a dynamic run, reactions are those of the scene at rest.
+
+        Example:
+            >>> simulation = ub.Simulation(scene, ub.Midpoint())
+            >>> simulation.step_to(0.05)
+            >>> print(simulation.now.diagram(beam, points=2).M[:2].round(-3))
+            [-5000. -4000.]
+            >>> simulation.close()
+        """
+        if self._now is None:
+            columns = self._writer.columns
+            size = columns.width
+            row: Array = np.empty(size + self.solution.begun * self.grid.size)
+            self._writer.write(row[:size])
+            if self.solution.begun:
+                row[size:] = self.share.gather(self.q_before)
+                columns = columns.plus(BEFORE, (self.grid.size,))
+            self._now = States(self.grid, self.solution, Block(columns, row[None], 1))
+            if self._gathers:
+                self._now.of_record = partial(self._gathered_forces, self.parts)
+        return self._now
+
+    @cached_property
+    def _writer(self) -> StateWriter:
+        return StateWriter(
+            self._stepper.c, self.share, self.ledger, self.supports, self.inelastic,
+            self.couplings, self.cell_forces, self.q,
+        )  # fmt: skip
+
+    @property
+    def _gathers(self) -> bool:
+        """True if rows have no record that forces of cells follow from."""
+        return not self.share.alone or bool(self.cell_forces.c.given)
+
+    def _gathered_forces(self, parts: int, *_: Array) -> Array:
+        """``cell_number`` of loops.h of all cells after so many steps, which are the present."""
+        if parts != self.parts:
+            raise SceneError("section forces of an earlier state: ask for simulation.now again")
+        numbers = self.cell_forces(self.q, self.q_before).T
+        return np.ascontiguousarray(self.share.gather_cells(numbers).T)
+
+    def keep(self) -> None:
+        """Append the state to the solution; all processes call it together."""
+        solution, parts = self.solution, self.parts
+        follows = not solution.begun or solution.parts_of_last == parts - 1
+        if not parts or not follows or self._gathers:
+            return self._keep_in(solution)
+        self._writer.write(solution.room(self._writer.columns))
+        solution.grow()
+        solution.count(parts, self.iterations)
+
+    def _keep_in(self, solution: Solution) -> None:
+        columns, (_, row) = self._writer.columns, self.now.row(0)
+        row, before = row[: columns.width].copy(), row[columns.width :]
+        if self.parts == 0 and not self._reactions_known:
+            columns.of_rows("reactions", row).fill(math.nan)
+        if self._gathers:
+            forces = self.now.numbers(0)
+            row = np.append(row[: columns.at[RECORD].start], forces)
+            columns = columns.plus(FORCES, forces.shape, without=RECORD)
+        at_rest = not len(solution) and np.array_equal(before, self.now.q[0])
+        if solution.begun and solution.parts_of_last != self.parts - 1 and not at_rest:
+            columns, row = columns.plus(BEFORE, before.shape), np.append(row, before)
+        solution.append(columns, row)
+        solution.count(self.parts, self.iterations)
+
+    def room(self, steps: int) -> Array:
+        """Rows of the solution for the states after so many steps; none for what C cannot keep."""
+        solution, columns = self.solution, self._writer.columns
+        if not self.share.alone or (solution.begun and solution.parts_of_last != self.parts):
+            return np.empty((0, columns.width))
+        return solution.room(columns, min(steps, 1 + ROOM // columns.width))
+
+    def grow(self, written: int, parts_of_last: int) -> None:
+        """Take note of steps whose states C wrote to the :meth:`room`; it had none for the last.
+
+        One that was taken in parts is written anew: it does not begin at the state before it.
+        """
+        in_parts = self.solution.begun and written > 0 and parts_of_last > 1
+        if whole := written - in_parts:
+            self.solution.grow(whole)
+            self.solution.count(self.parts - in_parts * parts_of_last, self.iterations)
+        if in_parts or not written:
+            self.keep()
+
     def _describe(self, solution: Solution) -> None:
         """Tell a solution how section forces follow from what it keeps."""
-        solution.between = self.between
-        solution.find_cell_forces(self.scheme, self.cell_forces if self.share.alone else None)
+        solution.between = float(self.scheme.average(0.0, 1.0))
+        solution.begun = solution.between < 1 or self.cell_forces.asks_for_before
+        solution.of_record = self.cell_forces.of_record if self.share.alone else None
+        solution.scheme = self.scheme
 
     # -- the end, and going on -----------------------------------------------------------------
 
@@ -315,14 +434,6 @@ class Simulation(StateView):
     def dolfinx(self) -> DolfinxView:
         """Mesh, functions and forms of this simulation, in the types of DOLFINx."""
         return DolfinxView(self)
-
-    def keep(self) -> None:
-        """Append the state to the solution; all processes call it together."""
-        if self.share.alone and (self.parts or self.reactions_known):
-            now: Later | Snapshots = self._stepper.now(self)
-        else:
-            now = Snapshots.of(self.gather())
-        self.solution.keep(now, self.parts, self.iterations)
 
     def end(self) -> None:
         """Let the solution have the last state, and what another run that starts there needs."""
@@ -337,7 +448,7 @@ class Simulation(StateView):
         self.settle()
         now = Solution(self.scene, self.grid)
         self._describe(now)
-        now.keep(Snapshots.of(self.gather()), self.parts, self.iterations)
+        self._keep_in(now)
         now.internal = self._assembly.internal_variables(self.q, self.t)
         return now
 
@@ -352,13 +463,14 @@ class Simulation(StateView):
         self._pass_on(Restoring(self.share, state))
         self.ledger.begin()
         self.equation.add_state(self.q)
-        self._stepper.begin_at(self)
+        self._stepper.begin_at(self, self.t, self.q)
+        self.moved(self.t)
 
     def _pass_on(self, memory: Memory) -> None:
         self.t = memory.number("t", self.t)
         self.parts = int(memory.number("parts", self.parts))
         self.solver.remember(memory)
-        self.q = memory.at_dofs("q", self.q)
+        self._q = memory.at_dofs("q", self.q)
         self.controllers.remember(memory, self.t)
         self.prediction.remember(memory)
         self._begun_at = None

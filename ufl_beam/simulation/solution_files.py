@@ -21,11 +21,12 @@ from ufl_beam.output.archive import version
 from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data
 from ufl_beam.simulation.fingerprint import Description, difference
 
-FORMAT = "solution of ufl_beam, 2"
+FORMAT = "solution of ufl_beam, 3"
 """The number grows whenever the meaning of files changes."""
 
 NAMED = {
-    "seconds": float, "time_error": float, "between": float, "open_ledger": str, "warnings": str,
+    "seconds": float, "time_error": float, "between": float, "begun": bool, "open_ledger": str,
+    "warnings": str,
 }  # fmt: skip
 """Attributes that are saved as they are, and their types."""
 

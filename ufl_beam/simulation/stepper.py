@@ -11,12 +11,11 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from functools import partial
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index, Later, Snapshots
+from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia, with_half_tangents
@@ -25,7 +24,6 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.watches import Watch
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.branch_check import StaticPath
-from ufl_beam.simulation.kept_rows import KeptRows
 from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Border, Solver
@@ -33,7 +31,6 @@ from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 
 LARGEST_TURN = 0.75 * math.pi
@@ -61,9 +58,6 @@ SHORT_PART = 512
 MOST_PARTS: int = lib.MOST_PARTS
 """Largest number of parts that a step is cut into."""
 
-ROOM = 2**20
-"""Numbers that C keeps of steps before Python takes them."""
-
 LONGEST = 0.05
 """Time after which C returns, so that a run can be interrupted and shows its progress; s."""
 
@@ -79,31 +73,24 @@ class Trial(NamedTuple):
     s: Array
 
 
-class Keeping(Protocol):
-    """Solution that states are appended to."""
-
-    def keep(self, states: Snapshots, parts: int, iterations: int) -> None:
-        """Append states of a run, up to the last of which so many were done."""
-
-
 class Stepping(Protocol):
     """The state that steps lead from and to; see :class:`Simulation`."""
 
-    t: float
-    q: Array
     prediction: Prediction
     parts: int
 
     @property
-    def solution(self) -> Keeping:
-        """States that were kept."""
+    def q(self) -> Array:
+        """Configuration at the local degrees of freedom."""
 
-    @property
-    def q_before(self) -> Array:
-        """Configuration at the beginning of the last step."""
+    def moved(self, t: float) -> None:
+        """Take note that the state is another one, at the time ``t``."""
 
-    def ask(self) -> None:
-        """Ask controllers and friction for their forces and limits in the next step."""
+    def room(self, steps: int) -> Array:
+        """Rows of the solution for the states after so many steps, or fewer."""
+
+    def grow(self, written: int, parts_of_last: int) -> None:
+        """Take note of steps whose states C wrote to the :meth:`room`; it had none for the last."""
 
 
 class Extras(NamedTuple):
@@ -125,10 +112,10 @@ class Stepper:
 
     def __init__(
         self, scheme: Scheme, equation: StepEquation, newton: Newton, ledger: Ledger,
-        inertia: Inertia | None, path: StaticPath | None, support_dofs: Index,
-        cell_forces: CellForces, begun: bool, together: Agreement, extras: Extras,
+        inertia: Inertia | None, path: StaticPath | None, cell_forces: CellForces,
+        together: Agreement, extras: Extras,
     ) -> None:  # fmt: skip
-        self._equation, self._inertia, self._path, self._begun = equation, inertia, path, begun
+        self._equation, self._inertia, self._path = equation, inertia, path
         self._together, self._extras, self._callbacks = together, extras, equation.callbacks
         share, phases = equation.share, equation.phases
         again = [one.again for one in phases if one.again is not None]
@@ -181,13 +168,7 @@ class Stepper:
             name: [x for one in phases for x in getattr(one, name)]
             for name in ("begin", "accept", "add_state")
         })  # fmt: skip
-        inelastic = [one for one in equation.terms if isinstance(one, InelasticBeams)]
-        links = [one for one in equation.terms if isinstance(one, Links)]
-        self._links, number = links, len(share.grid.scene.links)
-        parts = ledger, equation.supports, share.grid.scene.supports, support_dofs, inelastic
-        self._make_rows = partial(KeptRows, self.c, *parts, links, number, cell_forces.kept)
-        self._rows: KeptRows | None = None
-        self._last: tuple[int, Array] = -2, np.zeros(0)  # step kept last; state at its end
+        self._links = [one for one in equation.terms if isinstance(one, Links)]
 
     def _add_extras(self, loops: dict[str, list[Loop]]) -> None:
         """Let functions of Python take part in the phases of a step."""
@@ -222,32 +203,22 @@ class Stepper:
             StepFailed: Even the smallest part failed; the state is that before it.
             BaseException: What a function of a user has raised; the steps before are taken.
         """
-        c, steps = self.c, len(ends)
-        rows: Array = np.zeros((1, 0))
+        c, steps, room, rows = self.c, len(ends), 0, ffi.NULL
         if keep:
-            kept = self._rows or self._kept(state.q)
-            steps = min(steps, 1 + ROOM // kept.width)
-            rows = np.zeros((steps + 1, kept.width))  # the first one is of the state before
-            rows[0, kept.q] = state.q
+            of_states = state.room(steps)
+            room, rows = len(of_states), doubles(of_states)
+            steps = max(room, 1)
         with self._in_c(state):
-            taken = int(lib.take_steps(c, steps, doubles(ends), LONGEST, keep, doubles(rows[1:])))
+            taken: int = lib.take_steps(c, steps, doubles(ends), LONGEST, room > 0, rows)
         if keep and taken:
-            if taken < steps:
-                rows = rows[: taken + 1].copy()  # so that the rest does not stay
-            before = None
-            if self._begun:
-                before = rows[:-1, kept.q]
-                if c.parts_of_last > 1:
-                    before = np.vstack([before[:-1], state.prediction.q_before])
-            states = kept.states(ends[:taken].copy(), rows[1:], before)
-            state.solution.keep(states, state.parts, self.solver.iterations)
+            state.grow(taken if room else 0, c.parts_of_last)
         if c.failure:
             self._fail()
         return taken
 
     def apply_loads(self, state: Stepping, end: float) -> None:
         """Apply the loads that act at the present time, in parts, up to the time ``end``."""
-        fill(self.c, applies=1, begin_of_run=state.t, applied_by=end)
+        fill(self.c, applies=1, begin_of_run=self.c.t, applied_by=end)
         with self._in_c(state):
             reached = lib.go_to_time(self.c, end)
         self.c.applies = 0
@@ -332,8 +303,7 @@ class Stepper:
     def _ask(self, *_: Any) -> None:
         """Let controllers and friction ask the scene, which has the state of C."""
         if self._state is not None and self._extras.ask is not None:
-            self._state.t = self.c.t
-            self._state.q = partial(self._copy, self.c.q)  # type: ignore[assignment]
+            self._state.moved(self.c.t)
             self._together(self._extras.ask)
 
     def _require(self, step: Any, q1: Any, s: Any) -> None:
@@ -369,19 +339,11 @@ class Stepper:
             # Python's preconditioner under PETSc: its exception is still set when C returns.
             raise error.__cause__ or error from None
         finally:
-            self._state, state.t = None, self.c.t
+            self._state = None
+            state.moved(self.c.t)
             state.parts += self.c.parts
             for one in self._watches:
                 one.seen = state.parts
-            # Copied when Python asks for it; C leaves it alone until the next step.
-            state.q = partial(self._copy, self.c.q)  # type: ignore[assignment]
-
-    def _kept(self, q: Array) -> KeptRows:
-        """Rows of numbers, one for each step that C keeps."""
-        if self._rows is None:
-            self._rows = rows = self._make_rows(q)
-            fill(self.c, kinds=len(rows.kinds), width=rows.width, kept=rows.kinds)
-        return self._rows
 
     def watch(self, watches: Sequence[Watch]) -> None:
         """Let these take in the state after each step."""
@@ -389,29 +351,20 @@ class Stepper:
         of_c = ffi.new("watch *[]", [one.c for one in watches])
         fill(self.c, watches=len(watches), watch=of_c)
 
-    def now(self, state: Stepping) -> Later:
-        """The state that C has."""
-        kept = self._rows or self._kept(state.q)
-        # NumPy asks for large pages from 4 MiB on, and the first touch of these takes longer here.
-        row, before = np.frombuffer(bytearray(8 * kept.width))[None], None
-        lib.keep_state(self.c, doubles(row))
-        if self._begun:
-            number, before = self._last
-            if number != state.parts - 1:
-                before = state.q_before[None]
-            self._last = state.parts, row[:, kept.q]
-        t = np.array([self.c.t])
-        return Later(t, partial(kept.states, t, row, before))
+    @property
+    def q(self) -> Array:
+        """Accepted local configuration; a copy."""
+        return self._copy(self.c.q)
 
     def _copy(self, values: Any) -> Array:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
 
-    def begin_at(self, state: Stepping) -> None:
+    def begin_at(self, state: Stepping, t: float, q: Array) -> None:
         """Go on from a state that no step has led to."""
-        ffi.memmove(self.c.q, doubles(state.q), self._bytes)
+        ffi.memmove(self.c.q, doubles(q), self._bytes)
         fill(self.c, prediction=state.prediction.c)
-        self.c.t, self._last = state.t, (-2, np.zeros(0))
-        give_back_memory(len(state.q))
+        self.c.t = t
+        give_back_memory(len(q))
 
 
 def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:

@@ -31,10 +31,11 @@ from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
 from ufl_beam.model.ledger_entries import ENTRIES
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.scene import Scene
+from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
+from ufl_beam.output.states import States
 from ufl_beam.simulation.controllers import Controllers
-from ufl_beam.simulation.kept_states import KeptStates
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.links import DISSIPATED, WORK, Links
+from ufl_beam.terms.links import Links
 
 STATES = 100
 """Number of successive steps in which numerical losses are added."""
@@ -102,7 +103,7 @@ class LedgerWatch:
         """Go on where states, which were all judged, have been forgotten."""
         self._judged = len(solution) - 1
 
-    def _judge(self, states: KeptStates, every: int) -> Iterator[str]:
+    def _judge(self, states: States, every: int) -> Iterator[str]:
         times, (state, supplied, lost) = states.times, states.ledger()
         works = sum(float(np.abs(np.diff(work)).sum()) for work in supplied.values())
         sizes = [e if name in ENTRIES else np.abs(e - e[0]) for name, e in state.items()]
@@ -145,7 +146,7 @@ class LedgerWatch:
                 "sample time, inertia at its place, or a ForceLaw instead"
             )
 
-    def _falls(self, name: str, fall: float, states: KeptStates, n: int) -> str:
+    def _falls(self, name: str, fall: float, states: States, n: int) -> str:
         before, after = states.times[n : n + 2]
         return (
             f"{self._where(name, states, n)}the dissipated energy, the entry {name!r} of the "
@@ -155,20 +156,23 @@ class LedgerWatch:
             "one that is to give energy have active = True"
         )
 
-    def _where(self, name: str, states: KeptStates, n: int) -> str:
+    def _where(self, name: str, states: States, n: int) -> str:
         """Cell or connector whose dissipated energy falls most in a step."""
         kind = {"friction": Coulomb, "damping": Damper}.get(name)
         falls: dict[str, float] = {}
         for i, link in enumerate(self._grid.scene.links):
             entry = link.law.entry if isinstance(link.law, ConnectorLaw) else ""
             if entry == name if entry else kind is None or isinstance(link.law, kind):
-                taken = states.connections[:, i, WORK if kind and not entry else DISSIPATED]
+                column = WORK if kind and not entry else DISSIPATED
+                taken = states.column("connectors")[:, i, column]
                 falls[f"{link}: "] = taken[n] - taken[n + 1]
         if name in ("hinges", "plastic"):
-            cells = states.materials[:, :, [0, 5 if name == "plastic" else 6]]
-            for (cell, before), (_, after) in zip(cells[n], cells[n + 1], strict=True):
-                place = self._grid.middle(int(cell))
-                falls[f"{place.beam.name}, cell at s = {place.s:.3g}: "] = before - after
+            column = PLASTIC if name == "plastic" else HINGE
+            before, after = (states.cells_of(k)[:, column] for k in (n, n + 1))
+            cell = int(np.argmax(before - after))
+            place = self._grid.middle(cell)
+            fall = before[cell] - after[cell]
+            falls[f"{place.beam.name}, cell at s = {place.s:.3g}: "] = float(fall)
         worst = max(falls, key=lambda one: falls[one], default="")
         return worst if worst and falls[worst] > 0.0 else ""
 

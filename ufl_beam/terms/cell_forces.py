@@ -127,19 +127,8 @@ class CellForces:
 
     # -- what solutions keep -------------------------------------------------------------------
 
-    def record(self) -> Array | None:
-        """Copy what the forces follow from besides configurations; None if they are given."""
-        if self.c.given:
-            return None
-        record, at = np.empty(sum(n for _, n in self.kept)), 0
-        to = doubles(record)
-        for place, n in self.kept:
-            ffi.memmove(to + at, place[0], n * record.itemsize)
-            at += n
-        return record
-
     def of_record(self, record: Array, q: Array, before: Array) -> Array:
-        """The numbers of a :meth:`record`, as a call returns them."""
+        """The numbers that follow from those of :attr:`kept`, as a call returns them."""
         given, now, at = self.c.given, [place[0] for place, _ in self.kept], 0
         record = np.array(record)
         try:

@@ -57,11 +57,6 @@ class Account(Mapping[str, float]):
     def __len__(self) -> int:
         return len(self._at)
 
-    def by_name(self) -> dict[str, float]:
-        """Return the entries as they are now."""
-        numbers: Any = self.numbers.tolist()
-        return dict(zip(self._at, numbers, strict=False))
-
     def pointer(self, name: str) -> Any:
         """An entry as C has it; there is no room for many names after it."""
         self[name] += 0.0

@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -14,7 +14,6 @@ from ufl_beam.compiled.c_library import Loop, doubles, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
-from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
@@ -179,9 +178,9 @@ class InelasticBeams(Cells):
         return np.ones(6) if self._hinges else KEPT_WITHOUT_JUMP
 
 
-def inelastic_cells(share: Share) -> list[tuple[Layout, Index]]:
+def inelastic_cells(grid: Any) -> list[tuple[Layout, Index]]:
     """Layouts of material points, and the cells (numbers of the grid) that have them."""
-    grid, groups = share.grid, dict[Layout, list[int]]()
+    groups = dict[Layout, list[int]]()
     sections, of_beam = grid.sections
     for number, section in enumerate(sections):
         layout = section.layout(section.hinge)

@@ -17,12 +17,6 @@ from ufl_beam.terms.base import InternalForces
 from ufl_beam.terms.connector_responses import Setting, respond
 from ufl_beam.terms.phases import Callbacks
 
-CONNECTION = 5
-"""Numbers of a connector in a state, the columns of :class:`Connection`."""
-
-MOTION, FORCE, WORK, RATE, DISSIPATED = range(CONNECTION)
-"""These columns."""
-
 
 class Links(InternalForces):
     """Connectors that are alike; each has a force among the unknowns.
@@ -56,16 +50,16 @@ class Links(InternalForces):
         """Local degrees of freedom that are the forces; (num_links,)."""
         return self._forces_at
 
-    def kept(self, q: Array) -> Iterator[tuple[int, Array]]:
-        """Numbers of the accepted state ``q`` that are added to columns of ``Connection``.
+    def kept(self, q: Array) -> Iterator[tuple[str, Array]]:
+        """Numbers of the accepted state ``q`` that are added to fields of ``Connection``.
 
-        They are all of these columns but the forces; (num_links,) each.  Later steps change them.
+        They are all of these but the forces; (num_links,) each.  Later steps change them.
         """
-        yield MOTION, self._kept_motion(q)
-        yield WORK, self.work
-        yield RATE, self.rate
+        yield "motion", self._kept_motion(q)
+        yield "work", self.work
+        yield "rate", self.rate
         for energy in self.response.dissipated():
-            yield DISSIPATED, energy
+            yield "dissipated", energy
 
     def _kept_motion(self, q: Array) -> Array:
         """Motions of the accepted state as solutions show them."""

@@ -141,12 +141,6 @@ class Supports:
         pivots[self._held] = self.pivots
         self.pivots[:] = memory.at_dofs("pivots", pivots)[self._held]
 
-    def all_reactions(self, size: int) -> Array:
-        """The reactions at all local degrees of freedom, in the axes of the supports."""
-        r = np.zeros(size)
-        r[self._held] = self.reactions
-        return r
-
 
 def _turned_axes(dofs: Index, angle: float, A: Csr) -> tuple[Any, ...]:
     """Fields of ``turned_axes`` of loops.h for the displacement of a place."""

@@ -922,8 +922,8 @@ enum failure {
   SUCCEEDS, RAISED, NO_EQUILIBRIUM, APPLIED_TOO_FAST, TURNS_TOO_FAR, GIVES_ENERGY, LEAVES_MECHANISM, LEAPS
 };
 
-/* Numbers that are kept of each step: how many, from where and to where in a row of zeros.  They are
- * one after the other, or have places in both, where they are added. */
+/* Numbers of a state: how many, from where and to where in its row.  They are one after the other, or
+ * have places in both, where they are added. */
 typedef struct {
   double *const *from;
   int number, first;     /* first: of the row, if they are one after the other */
@@ -956,7 +956,7 @@ typedef struct {
   int states;
   double *state;      /* entries of the ledger that a state has, one after the other */
   time_step step;
-  int kinds, width; /* of numbers that are kept; of a row */
+  int kinds, width; /* of numbers of a state; of a row */
   const kept_numbers *kept;
   cell_forces *cell_forces;
   int watches;

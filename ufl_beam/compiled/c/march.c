@@ -939,9 +939,10 @@ static double seconds_now(void)
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* What is kept of the state, into a row of zeros. */
+/* The state, or the part of it that this process has, as a row; see state_writer.py. */
 void keep_state(const march *m, double *row)
 {
+  memset(row, 0, m->width * sizeof *row);
   for (int k = 0; k < m->kinds; ++k) {
     const kept_numbers *n = m->kept + k;
     const double *from = *n->from;
@@ -953,7 +954,7 @@ void keep_state(const march *m, double *row)
 }
 
 /* Steps to the times `ends`, up to the first that fails, or that ends so many seconds later; how many
- * were taken. Each is kept in one of `rows`, which are zero, if `keeps`; one that was cut is the last, as
+ * were taken. Each is kept in one of `rows`, if `keeps`; one that was cut is the last, as
  * its last part does not begin where the one before has ended. */
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
 {

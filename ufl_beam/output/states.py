@@ -1,0 +1,538 @@
+# SPDX-License-Identifier: MIT
+"""States at successive times, and what follows from them: motions, forces, material, momenta."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+from typing import NamedTuple
+
+from mpi4py import MPI
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index, State
+from ufl_beam.compiled.csr import Product
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
+from ufl_beam.discretization.partition import Share
+from ufl_beam.display import one_line
+from ufl_beam.errors import SceneError, require_number
+from ufl_beam.model.bodies import Anchor, Member, Place
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import Support
+from ufl_beam.output.archive import require_arrays
+from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
+from ufl_beam.output.joint_histories import (
+    JointHistory,
+    links_of,
+    motion_of,
+    of_joint,
+    position_of,
+    turned,
+    velocity_of,
+)
+from ufl_beam.output.state_rows import (
+    BEFORE,
+    FORCE,
+    FORCES,
+    HINGE,
+    LEDGER,
+    PLASTIC,
+    RECORD,
+    Block,
+    Column,
+    Columns,
+    Connection,
+    connection,
+)
+from ufl_beam.terms.energy_ledger import Energy
+from ufl_beam.terms.inelastic_beams import inelastic_cells
+
+
+class Diagram(NamedTuple):
+    """Section forces along a beam; at a vertex the values before and after it.
+
+    Attributes:
+        s: Parameter of the beam, from 0 at its start to 1; (num_cells points,).
+        N: Axial force, positive in tension; N.
+        V: Shear force, along the normal to the left of the direction of the beam; N.
+        M: Bending moment, positive with tension to the right of that direction; N m.
+
+    Example:
+        >>> diagram = solution.diagram(beam, points=2)  # at both ends of the four cells
+        >>> print(diagram.s[:4], diagram.M[:4].round(-3))
+        [0.   0.25 0.25 0.5 ] [-195000. -146000. -146000.  -98000.]
+    """
+
+    s: Array
+    N: Array
+    V: Array
+    M: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
+
+
+class Material(NamedTuple):
+    """State of the material of all cells at one time.
+
+    Attributes:
+        forces: (N, V, M); (num_cells, 3); N, N, N m.
+        jump: Rotation of the hinges; (num_cells,); rad.
+        plastic: Energy dissipated by plastic strains; (num_cells,); J.
+        hinge: Energy dissipated by hinges, or by the cracks of fibres; (num_cells,); J.
+    """
+
+    forces: Array
+    jump: Array
+    plastic: Array
+    hinge: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
+
+
+LEAST_ROOM = 8
+"""Least number of rows that are made at once."""
+
+
+class Cells:
+    """What computes results of the cells of a whole scene, made when it is asked for first.
+
+    No process communicates with others.
+    """
+
+    def __init__(self, grid: Grid) -> None:
+        self.grid = grid
+
+    @cached_property
+    def fields(self) -> Fields:
+        """Fields on all cells."""
+        return Fields(Share(self.grid, MPI.COMM_SELF))
+
+    @cached_property
+    def strains(self) -> Strains:
+        """Strains of all cells."""
+        return Strains(self.fields)
+
+    @cached_property
+    def along(self) -> ForcesAlongCells:
+        """Section forces of all cells."""
+        return ForcesAlongCells(self.grid)
+
+    @cached_property
+    def inelastic(self) -> Index:
+        """Cells that can yield or break; (m,)."""
+        groups = [cells for _, cells in inelastic_cells(self.grid)]
+        return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups]))
+
+
+class States:
+    """States of a scene at n+1 times, read alike in the solution of a run and while it runs.
+
+    Attributes:
+        scene: Model.
+        grid: Its vertices, cells and numbering.
+        between: Part of a step at whose configuration its forces are in equilibrium.
+        begun: Whether forces depend on the configuration at the beginning of the step.
+        cells: Section forces, strains and masses of its cells.
+        of_record: Forces of cells that follow from a record, q, and q at the beginning of the step;
+            ``cell_number`` of loops.h; (9, num_cells).
+    """
+
+    def __init__(self, grid: Grid, like: States | None = None, *blocks: Block) -> None:
+        self.scene: Scene = grid.scene
+        self.grid = grid
+        self.between, self.begun = 1.0, False
+        self.of_record: Callable[[Array, Array, Array], Array] | None = None
+        self._blocks = [*blocks]
+        self.cells = Cells(grid)
+        self._computed: tuple[tuple[int, bytes], Array] | None = None  # forces asked for last
+        if like is not None:
+            self.between, self.begun, self.of_record = like.between, like.begun, like.of_record
+            self.cells = like.cells
+
+    # -- rows ----------------------------------------------------------------------------------
+
+    def room(self, columns: Columns, number: int = 1) -> Array:
+        """So many rows behind the last state, or fewer, which count after :meth:`grow`.
+
+        Memory that was freed may stay with the process, so rows are not copied to make room.
+        """
+        block = self._blocks[-1] if self._blocks else None
+        if (
+            block is None
+            or (block.columns is not columns and block.columns.at != columns.at)
+            or block.number == len(block.space)
+        ):
+            space = np.empty((max(number, len(self), LEAST_ROOM), columns.width))
+            self._blocks.append(block := Block(columns, space, 0))
+        return block.space[block.number : block.number + number]
+
+    def grow(self, number: int = 1) -> None:
+        """Append so many states, which were written in :meth:`room`."""
+        self._blocks[-1].number += number
+
+    def append(self, columns: Columns, row: Array) -> None:
+        """Append a state, a row with these columns."""
+        self.room(columns)[0] = row
+        self.grow()
+
+    def part(self, first: int, last: int) -> States:
+        """Views of the states from the first number to before the last one."""
+        blocks, end = [], 0
+        for block in self._blocks:
+            begin, end = end, end + block.number
+            rows = block.rows[max(first - begin, 0) : max(last - begin, 0)]
+            blocks.append(Block(block.columns, rows, len(rows)))
+        return States(self.grid, self, *blocks)
+
+    def thin(self) -> None:
+        """Forget every other state; the first one stays."""
+        states, self._blocks, self._computed = self.part(0, len(self)), [], None
+        for n in range(0, len(states), 2):
+            columns, row = states.row(n)
+            if states.begun and BEFORE not in columns.at:
+                columns = columns.plus(BEFORE, (self.grid.size,))
+                row = np.append(row, states.before(n))
+            self.append(columns, row)
+
+    def __len__(self) -> int:
+        """Number of states."""
+        return sum(block.number for block in self._blocks)
+
+    def row(self, n: int) -> tuple[Columns, Array]:
+        """The n-th state: its columns, and a view of its row."""
+        n = range(len(self))[n]
+        for block in self._blocks:
+            if n < block.number:
+                break
+            n -= block.number
+        return block.columns, block.rows[n]
+
+    def column(self, name: str) -> Column:
+        """Column of this name in all states that have it; (n+1, ...)."""
+        return Column(self._blocks, name)
+
+    def _one(self, name: str, n: int) -> Array:
+        """Column of the n-th state; a view."""
+        columns, row = self.row(n)
+        return columns.of_rows(name, row)
+
+    def before(self, n: int) -> Array:
+        """Configuration at the beginning of the step to the n-th state, where it matters."""
+        n = range(len(self))[n]
+        columns, row = self.row(n)
+        if BEFORE in columns.at:
+            return columns.of_rows(BEFORE, row)
+        return self._one("q", n - 1 if n and self.begun else n)
+
+    def numbers(self, n: int) -> Array:
+        """``cell_number`` of loops.h in the n-th state; (9, num_cells); N, N m."""
+        columns, row = self.row(n)
+        if FORCES in columns.at:
+            return columns.of_rows(FORCES, row)
+        if self.of_record is None:
+            raise SceneError("section forces: these states were kept without them")
+        record, q = (columns.of_rows(name, row) for name in (RECORD, "q"))
+        return self.of_record(record, q, self.before(n))
+
+    def history(self) -> State:
+        """Return all states, as arrays by name, with the forces of cells; (n+1, ...)."""
+        number = range(len(self))
+        names = dict.fromkeys(name for block in self._blocks for name in block.columns.at)
+        arrays = {name: self.column(name)[:,] for name in names if ": " not in name}
+        arrays.pop(RECORD, None)
+        arrays[FORCES] = np.array([self.numbers(n) for n in number])
+        if BEFORE in arrays:
+            arrays[BEFORE] = np.array([self.before(n) for n in number])
+            if np.array_equal(arrays[BEFORE], arrays["q"][[0, *number[:-1]]]):
+                del arrays[BEFORE]  # each step begins where the one before ends
+        for part, entries in zip(LEDGER, self.ledger(), strict=True):
+            arrays |= {f"{part}: {name}": values for name, values in entries.items()}
+        return arrays
+
+    def resume(self, history: State) -> None:
+        """Go on after :meth:`history`; arrays of a scene that it lacks are zero.
+
+        Raises:
+            SceneError: They have other shapes than those that the scene implies.
+        """
+        require_arrays(history, {"t": (-1,)})
+        n, begins = len(history["t"]), BEFORE in history
+        self._blocks, self._computed = [], None
+        ledger = [name for name in history if name.startswith(tuple(f"{x}: " for x in LEDGER))]
+        columns = Columns.of(
+            self.grid, moving="v" in history, cells=len(self.cells.inelastic), ledger=ledger,
+            record=None,
+        )  # fmt: skip
+        if begins:
+            columns = columns.plus(BEFORE, (self.grid.size,))
+        rows: Array = np.zeros((n, columns.width))
+        for name, shape in columns.shapes.items():
+            if name in history or name in ("q", FORCES):
+                require_arrays(history, {name: (n, *shape)})
+                columns.of_rows(name, rows)[:] = history[name]
+        self._blocks = [Block(columns, rows, n)]
+
+    # -- motion --------------------------------------------------------------------------------
+
+    @property
+    def times(self) -> Array:
+        """Times that were kept, n after the initial one; (n+1,); s."""
+        return self.column("t")[:,]
+
+    @property
+    def q(self) -> Array:
+        """Configurations, all degrees of freedom in the order of the grid; (n+1, size)."""
+        return self.column("q")[:,]
+
+    @property
+    def v(self) -> Array:
+        """Velocities, as :attr:`q`; empty in statics."""
+        return self.column("v")[:,]
+
+    def displacement(self, place: Anchor) -> Array:
+        """Displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
+
+        Interpolated in cells with their degree; of points of bodies exact.
+
+        Raises:
+            SceneError: The beam of the place is not in the scene.
+        """
+        return motion_of(self.grid, place, self.column("q"))
+
+    def velocity(self, place: Anchor) -> Array:
+        """Velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
+
+        Raises:
+            SceneError: The run was static, or the beam of the place is not in the scene.
+        """
+        if not len(v := self.column("v")):
+            raise SceneError("velocity: the run was static; there is none")
+        return velocity_of(self.grid, place, self.column("q"), v)
+
+    def position(self, place: Anchor) -> Array:
+        """Coordinates of a place; (n+1, 2); m."""
+        return position_of(self.grid, place, self.column("q"))
+
+    def shape(self, beam: Member, n: int = -1) -> Array:
+        """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
+        vertices, grid = self.grid.vertices_of(beam), self.grid
+        return np.asarray(grid.points[vertices] + self._one("q", n)[grid.dofs[vertices, :2]])
+
+    # -- joints --------------------------------------------------------------------------------
+
+    def connector(self, connector: Connector) -> Connection:
+        """Relative motion, force and work of a connector.
+
+        Raises:
+            SceneError: It is not in the scene.
+        """
+        return connection(self.column("connectors")[:, links_of(self.scene, connector)])
+
+    def joint(self, joint: Joint) -> JointHistory:
+        """Return the relative motion and the forces of the first two places of a joint.
+
+        Raises:
+            SceneError: It is not in the scene.
+        """
+        forces = self.column("connectors")[:, :, FORCE]
+        return of_joint(self.grid, joint, self.column("q"), forces)
+
+    def reaction(self, support: Support) -> Array:
+        """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
+
+        It is that of the components of motion that the support holds.
+
+        In statics the first row is what the initial state bears: nothing in the undeformed scene,
+        for loads act from the first step on; with ``start=`` the reactions of its equilibrium.  In
+        dynamics they act during the step that ends at each time; the first row is NaN.
+
+        Raises:
+            SceneError: The support is not in the scene.
+        """
+        if support not in self.scene.supports:
+            raise SceneError(f"reaction: {support} is not in the scene")
+        forces = self.column("reactions")[:, self.scene.supports.index(support)]
+        if support.angle:
+            forces[:, :2] = turned(forces[:, :2], np.full(len(forces), support.angle))
+        return forces
+
+    # -- forces of cells -----------------------------------------------------------------------
+
+    def cell_forces(self, n: int, parts: Array = MIDDLE) -> Array:
+        """(N, V, M) of :meth:`diagram` at parts of all cells, from 0 to 1, in the n-th state.
+
+        Returns:
+            (num_cells, len(parts), 3); N, N, N m.
+        """
+        asked = range(len(self))[n], parts.tobytes()
+        if self._computed is None or self._computed[0] != asked:
+            q = self._one("q", n)
+            if self.between < 1:
+                q = (1 - self.between) * self.before(n) + self.between * q
+            along = self.cells.along
+            forces = along(slice(None), parts, self.numbers(n), q[along.dofs])
+            forces.flags.writeable = False
+            self._computed = asked, forces
+        return self._computed[1]
+
+    def section_forces(self, beam: Member, n: int = -1) -> Array:
+        """(N, V, M) of :meth:`diagram` in the middle of the cells; (num_cells, 3); N, N, N m."""
+        return np.asarray(self.cell_forces(n)[self.grid.cells_of(beam), 0])
+
+    def section_forces_at(self, place: Place) -> Array:
+        """(N, V, M) at a place, as :meth:`diagram` has it; (n+1, 3); N, N, N m.
+
+        At a vertex they are those at the end of the cell before it.
+
+        Raises:
+            SceneError: The beam of the place is not in the scene.
+        """
+        cell, part = self.grid.cell_and_part(place)
+        n, dofs = range(len(self)), self.cells.along.dofs[cell]
+        q = self.column("q")[:, dofs]
+        if self.between < 1:
+            before = np.array([self.before(k)[dofs] for k in n])
+            q = (1 - self.between) * before + self.between * q
+        numbers = np.array([self.numbers(k)[:, cell] for k in n]).T
+        forces = self.cells.along(np.full(len(n), cell), np.array([part]), numbers, q)
+        return np.asarray(forces[:, 0])
+
+    def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
+        """Section forces along a beam, by equilibrium of its cells, at the n-th kept time.
+
+        They belong to the equation of the step that ends at that time, with inertia, damping, loads
+        and works: at a support they are its :meth:`reaction`, in the axes of the section, which
+        turns with the beam.  ``points`` are those of each cell,
+        equally spaced, both ends included; V is linear between them under a uniform load.
+
+        The initial state of a static run bears nothing unless it has a ``start=``.  That of a
+        dynamic one has the forces of the last step of ``start=``, or those of its strains.
+
+        Raises:
+            SceneError: The beam is not in the scene, or ``points`` is less than 2.
+        """
+        require_number(points, "diagram: points", at_least=2)
+        s, cells, parts = self.grid.parameters(beam), self.grid.cells_of(beam), int(points)
+        at = s[:-1, None] + np.linspace(0.0, 1.0, parts) * np.diff(s)[:, None]
+        forces = self.cell_forces(n, np.arange(parts) / (parts - 1))[cells]
+        return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
+
+    def strains(self, beam: Member, n: int = -1) -> Array:
+        """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
+
+        The curvature includes the jump of a hinge over the length of its cell.
+        """
+        return self._strains(n)[self.grid.cells_of(beam)]
+
+    def strains_at(self, place: Place) -> Array:
+        """(Σ, Γ, K) in the cell at a place, as :meth:`section_forces_at`; (n+1, 3); 1, 1, 1/m."""
+        cell = self.grid.cell(place)
+        return np.array([self._strains(n)[cell] for n in range(len(self))])
+
+    def _strains(self, n: int) -> Array:
+        strains = np.empty((len(self.grid.cells), 3))
+        strains[self.cells.fields.order] = self.cells.strains.mean(self._one("q", n))
+        return strains
+
+    def material(self, beam: Member, n: int = -1) -> Material:
+        """Forces, jumps and dissipated energies in the cells of a beam at the n-th kept time.
+
+        Raises:
+            SceneError: The scene is elastic.
+        """
+        return self._material(n, self.grid.cells_of(beam))
+
+    def _material(self, n: int, cells: Index | int) -> Material:
+        if not len(self.cells.inelastic) and not self.scene.hinges:
+            raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
+        chosen = self.cells_of(n, self.cell_forces(n)[:, 0])[cells].T
+        return Material(chosen[:3].T, *chosen[3:])
+
+    def cells_of(self, n: int, forces: Array | float = 0.0) -> Array:
+        """Column "material" of all cells; elastic ones have these forces; (num_cells, 6)."""
+        everything = np.zeros((len(self.grid.cells), self.row(n)[0].shapes["material"][1]))
+        everything[:, :3] = forces
+        everything[self.cells.inelastic] = self._one("material", n)
+        return everything
+
+    def material_at(self, place: Place) -> Material:
+        """Material states in the cell at a place at all kept times; arrays begin with (n+1,).
+
+        Where a plastic hinge is at the place, ``forces[:, 2]``, ``jump`` and ``hinge`` are its
+        moment during the step that ends at each time, its rotation and the energy that it has
+        dissipated.  The other forces are those in the middle of the cell.
+
+        Raises:
+            SceneError: The scene is elastic, or the beam of the place is not in it.
+        """
+        cell, hinge = self.grid.cell(place), self.grid.hinge_at(place)
+        states = zip(*(self._material(n, cell) for n in range(len(self))), strict=True)
+        forces, jump, plastic, energy = map(np.array, states)
+        if hinge is not None:
+            of_hinge = self.connector(hinge)
+            forces[:, 2], jump, energy = of_hinge.force, of_hinge.motion, of_hinge.dissipated
+        return Material(forces, jump, plastic, energy)
+
+    def damage(self, n: int = -1) -> tuple[Array, Array]:
+        """Jump of rotation (rad) and dissipated energy (J) of each cell; both (num_cells,).
+
+        Plastic hinges at its ends are included; of several jumps it is the largest.
+        """
+        of_cells = self.cells_of(n)
+        jump, dissipated = of_cells[:, 3].copy(), of_cells[:, PLASTIC] + of_cells[:, HINGE]
+        if self.scene.hinges:
+            hinges = Connection(*self._one("connectors", n)[-len(self.scene.hinges) :].T)
+            np.add.at(dissipated, self.grid.cells_at_hinges, hinges.dissipated)
+            for cell, motion in zip(self.grid.cells_at_hinges, hinges.motion, strict=True):
+                jump[cell] = max(jump[cell], motion, key=abs)
+        return jump, dissipated
+
+    # -- balances ------------------------------------------------------------------------------
+
+    def ledger(self) -> list[dict[str, Array]]:
+        """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
+        parts = []
+        for k in range(len(LEDGER)):
+            found = [(block.rows, block.columns.ledger[k]) for block in self._blocks]
+            names = dict.fromkeys(name for _, at in found for name in at)
+            parts.append({
+                name: np.concatenate([
+                    rows[:, at[name]] if name in at else np.zeros(len(rows)) for rows, at in found
+                ])
+                for name in names
+            })  # fmt: skip
+        return parts
+
+    @property
+    def energy(self) -> Energy:
+        """Energy ledger of the run."""
+        return Energy(*self.ledger())
+
+    def momentum(self) -> Array:
+        """(p_x, p_y, L), L about the origin; (n+1, 3); N s, N s, N m s.
+
+        Raises:
+            SceneError: The run was static.
+        """
+        if not len(self.column("v")):
+            raise SceneError("momentum: the run was static; there is none")
+        times, grid = Product(mass_matrix(self.cells.fields)), self.grid
+        dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])
+        centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
+        _, first = np.unique(dofs[:, 0], return_index=True)
+        u, v, ψ = dofs[first, 0], dofs[first, 1], np.unique(dofs[:, 2])
+        X, Y = np.vstack([grid.points, centers])[first].T
+
+        def of(q: Array, velocity: Array) -> tuple[float, float, float]:
+            p = times(velocity)
+            turning = (X + q[u]) * p[v] - (Y + q[v]) * p[u]
+            return p[u].sum(), p[v].sum(), turning.sum() + p[ψ].sum()
+
+        states = range(len(self))
+        return np.array([of(self._one("q", n), self._one("v", n)) for n in states])
