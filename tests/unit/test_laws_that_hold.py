@@ -121,17 +121,19 @@ def test_held_exactly_and_never_gives_energy(name, scheme):
         assert np.abs(history.force).max() <= largest * (1 + 1e-9)
 
 
+@dataclass(frozen=True)
+class Drop(Breakaway):
+    """More to break loose than to slide."""
+
+    def sliding(self, motion, rate, state, dt):
+        return self.slow
+
+
 def test_a_slow_pull_slips_by_twice_the_drop():
     """A mass on a slow spring breaks loose at Fs, and rests after 2 (Fs - Fk)/k [closed].
 
     The spring moves by v T in the half period T of a slip, a part 2.5e-3 of it.
     """
-
-    @dataclass(frozen=True)
-    class Drop(Breakaway):
-        def sliding(self, motion, rate, state, dt):
-            return self.slow
-
     k, mass, v = 50.0, 2.0, 4e-5
     body = ub.Body((1, 0), mass=mass, inertia=1.0)
     hand = ub.Body((2, 0), mass=1.0, inertia=1.0)
@@ -147,6 +149,38 @@ def test_a_slow_pull_slips_by_twice_the_drop():
     assert moved[-1] == pytest.approx(2 * (3.0 - 2.0) / k, rel=5e-3)
     after = pull[np.argmax(pull) + 400]  # at rest again
     assert after == pytest.approx(2 * 2.0 - 3.0, rel=5e-3)
+
+
+@pytest.mark.parametrize("dt", [5e-3, 1.875e-3, 4.7e-4])
+def test_iterations_do_not_decide_what_breaks_loose(dt):
+    """To stick and to slide can both solve a step.
+
+    A run that goes on, which has other guesses, and the reference solver find the same solution.
+    """
+
+    def scene():
+        beam = ub.Beam((0, 0), (1, 0.2), ub.Section(1e4, 4e3, 100, rhoA=1, rhoI=0.01), cells=4)
+        load = ub.PointLoad(beam.end, force=(13.0, 1.5), time=ub.ramp(0.06))
+        brake = ub.Turn(ub.ground(0, 0), beam.end, Drop(0.5, 0.285, 1.0, 0.0))
+        swing = ub.Velocity([beam], linear=(0.3, 1.0), angular=0.22, about=(0, 0))
+        return brake, ub.Scene(beams=[beam], loads=[load], connectors=[brake], initial=[swing])
+
+    def go(until, since=0.0, scene=None, **more):
+        newton = ub.Newton(rtol=1e-12, reference=more.pop("reference", False))
+        mesh = ub.Mesh(degree=3, lumped=True)
+        return run(scene, ub.Midpoint(), (since, until), dt, mesh=mesh, newton=newton, **more)
+
+    brake, made = scene()
+    whole = go(0.15, scene=made)
+    held = np.abs(np.diff(whole.connector(brake).motion)) < 1e-8
+    assert np.count_nonzero(np.diff(held)) > 2
+    for n in range(1, 8):
+        until = whole.times[n * len(whole.times) // 8]
+        _, made = scene()
+        rest = go(0.15, until, made, start=go(until, scene=made))
+        np.testing.assert_allclose(rest.q[-1], whole.q[-1], rtol=0, atol=1e-9)
+    reference = go(0.15, scene=scene()[1], reference=True)
+    np.testing.assert_allclose(reference.q, whole.q, rtol=0, atol=1e-9)
 
 
 def test_what_wears_is_lost():

@@ -93,7 +93,7 @@ class LawInStep(ABC):
         self.length = 1.0 if link.turns else setting.size  # of a motion that is large
         self.z: dict[str, float] = {}
         self.stored: dict[str, float] = {}
-        self.opening: MaterialPoints | _Slipping | None = None
+        self.opening: MaterialPoints | _Slipping | _Holding | None = None
         if self.entry:
             getattr(setting.ledger, self.part)[self.entry] += 0.0
 
@@ -380,20 +380,26 @@ class _Rubbing(LawInStep):
         """Stick while the force is below the limit; slip until the sliding velocity reverses."""
         moved = e1 - self.e0
         stuck = self._slip == 0
-        # Coming to rest must not give energy; if it did, the place is held at once in this step.
-        # The force of the guess does not decide this: it belongs to another motion.
-        if not self._guessed and stuck and λ * self._way < 0:
-            self._against = True
-        self._guessed = False
         if not self._against and self._slip * self._way > 0:
             moved -= self._way  # rest at the end, rather than a reversed velocity
-        if not stuck and self._slip * moved < -1e-14 * self.length:
-            self._slip = 0.0
-        elif stuck and abs(λ) > self._limit * (1 + 1e-12):
-            self._slip = math.copysign(1.0, λ)
+        back = not stuck and self._slip * moved < -1e-14 * self.length
+        # Coming to rest must not give energy; if it did, the place is held at once in this step.
+        # The force of the guess does not decide this: it belongs to another motion.
+        gives = not self._guessed and not self._against and stuck and λ * self._way < 0
+        over = stuck and abs(λ) > self._limit * (1 + 1e-12)
+        self._guessed = False
+        if self._may_change(back or gives, over, λ):
+            self._against |= gives
+            if back:
+                self._slip = 0.0
+            elif over:
+                self._slip = math.copysign(1.0, λ)
         if self._slip == 0 and self._limit > 0:
             return 1.0, -self._creep, self.e0 + (0.0 if self._against else self._way)
         return self._sliding(e1)
+
+    def _may_change(self, turns: bool, over: bool, λ: float) -> bool:
+        return True
 
     def _sliding(self, e1: float) -> Row:
         return 0.0, 1.0, self._slip * self._limit
@@ -404,16 +410,42 @@ class _Rubbing(LawInStep):
 
 
 class _Holding(_Rubbing):
-    """Law of a user that holds the motion up to a limit, and slides beyond it."""
+    """Law of a user that holds the motion up to a limit, and slides beyond it.
+
+    Its sliding force may be below the limit, so that to stick and to slide can both be solutions.
+    It goes on as in the last step until an equilibrium is found that does not admit this.
+
+    Attributes:
+        excess: Infinite if it slides back or its coming to rest gives energy; ``|force| / limit -
+            1`` if it is held and bears too much; else 0.
+    """
 
     def __init__(self, link: Connector, setting: Setting) -> None:
         self.entry = link.law.entry  # type: ignore[union-attr]
         super().__init__(link, setting)
-        law = self.law
+        law, self.opening = self.law, self
+        self._free, self.excess = False, 0.0
         self.saved_as, self._θ = f"{type(law).__qualname__}{[*law.variables]}", setting.scheme.theta
         self.z |= {name: float(x) for name, x in law.variables.items()}
         self.z |= {"held": 0.0, "dissipated": 0.0}
         self.stored = {"stored": 0.0}
+
+    def _may_change(self, turns: bool, over: bool, λ: float) -> bool:
+        self.excess = 0.0
+        if self._free or not self.setting.search.hold:
+            return True
+        if turns or over:
+            self.excess = math.inf if turns or not self._limit else abs(λ) / self._limit - 1
+            self.setting.search.over = True
+        return False
+
+    def release(self, least: float) -> None:
+        """Let it change in the iterates from now on if its excess is so large."""
+        self._free |= self.excess > 0 and self.excess >= least
+
+    def close(self) -> None:
+        """Take the release back."""
+        self._free = False
 
     def _state(self) -> State:
         return State({name: np.array([self.z[name]]) for name in self.law.variables})

@@ -196,6 +196,8 @@ class CompiledLaws(Response):
 class RubbingLaws(Rubbing, CompiledLaws):
     """Laws that hold the motion below a limit."""
 
+    opens = True
+
     def _prepare(self, law: Any) -> None:
         super()._prepare(law)
         self._limits = np.zeros(len(self._links))

@@ -114,6 +114,9 @@ class Rubbing(Response):
             tiny=1e-14 * self._lengths(), sticks=self._sticks, against=against,
             switched=setting.search.switched, force=np.zeros(n), rows=np.zeros((n, 3)), **of_laws,
         )  # fmt: skip
+        if self.opens:
+            search, free = setting.search.flags, np.zeros(n, dtype=np.int32)
+            fill(self._friction, search=search, free=free, excess=np.zeros(n))
         if setting.rates is not None:
             fill(self._friction, rates=setting.rates.c)
         self.in_c = {**self.in_c, "friction": self._friction}

@@ -134,8 +134,8 @@ class Couplings(Links):
         if response.asks_at_ends:
             accept.insert(0, callbacks.phase(self._ask_at_end))
         if response.opens:
-            names = ("points", "slips", "way_before")
-            found = {**response.in_c, "slips": response.in_c.get("rigid_plastic"), **of_law}
+            names, of = ("points", "slips", "rubs", "way_before"), response.in_c
+            found = {**of, "slips": of.get("rigid_plastic"), "rubs": of.get("friction"), **of_law}
             opens = {name: found[name] for name in names if found.get(name) is not None}
             if "way_before" in opens:
                 opens["way_before"] = integers(opens["way_before"])

@@ -6,6 +6,9 @@ it has opened.  The rule that chooses: a hinge, a crack of a fibre or a softenin
 not flow at the beginning of a step stays closed in it if there is an equilibrium in which it bears
 at most its limit.  Of several that bear too much, the one with the largest excess opens first, and
 the others only if they still do then.
+
+Laws of connectors that hold a motion follow the same rule, where the sliding force may be below the
+limit: what sticks goes on to stick, and what slides to slide, if there is such an equilibrium.
 """
 
 from __future__ import annotations

@@ -48,7 +48,11 @@ void ask_law(kernel *law, const double *w, int answers, double *s)
 
 /* Rows of dry friction at the motions e1: a connector sticks while the force is below the limit, and slips
  * until the sliding velocity reverses, be it in the middle of the step or at its end. Both slipping to a
- * reversed velocity and rest can be solutions of a long step; rest is taken if it gives no energy. */
+ * reversed velocity and rest can be solutions of a long step; rest is taken if it gives no energy.
+ *
+ * Where the sliding force may be below the limit, to stick and to slide can both be solutions, too. While HOLD
+ * is set, each connector of such a law goes on as in the last step until an equilibrium is found; what it does
+ * not admit is the excess, by which the march lets them change. */
 static void find_rows_of_friction(friction *f, const double *e0, const double *e1, const double *force)
 {
   for (int i = 0; i < f->number; ++i) {
@@ -59,9 +63,17 @@ static void find_rows_of_friction(friction *f, const double *e0, const double *e
     const int back = !stuck && *slip * (slows ? step - f->way[i] : step) < -f->tiny[i];
     /* To come to rest must not give energy; if it did, the place is held at once in this step. The force
      * of the guess does not decide this: it belongs to another motion. */
-    if (!f->guessed) f->against[i] |= stuck && λ * f->way[i] < 0;
-    if (back) *slip = 0;
-    else if (stuck && fabs(λ) > limit * (1 + 1e-12)) *slip = λ < 0 ? -1 : 1;
+    const int gives = !f->guessed && !f->against[i] && stuck && λ * f->way[i] < 0;
+    const int over = stuck && fabs(λ) > limit * (1 + 1e-12);
+    if (f->search) f->excess[i] = 0;
+    if (f->search && f->search[HOLD] && !f->free[i]) {
+      if (back || gives || over) f->search[OVER] = 1;
+      f->excess[i] = back || gives ? INFINITY : over ? fabs(λ) / limit - 1 : 0;
+    } else {
+      f->against[i] |= gives;
+      if (back) *slip = 0;
+      else if (over) *slip = λ < 0 ? -1 : 1;
+    }
     const int sticks = *slip == 0 && limit > 0;
     if (sticks != f->sticks[i]) f->sticks[i] = sticks, *f->switched = 1;
     if (sticks) {

@@ -812,6 +812,8 @@ struct friction {
   double *softness, *tiny;     /* creep at the limit; step that is nothing but round-off */
   int32_t *sticks, *against;   /* in the latest iterate; whether to come to rest would give energy */
   int32_t *switched;           /* see equation */
+  int32_t *search, *free;      /* of laws: as that of points; whether one may change in the iterates */
+  double *excess;              /* of laws: of those that an equilibrium does not admit as they are */
   int guessed;                 /* whether the next iterate is the guess */
   double *force, *rows;        /* in the iterate; of each, three */
 };
@@ -907,10 +909,12 @@ typedef struct {
   double moves, work, stored; /* largest motion, as a part of `far`; J */
 } static_path;
 
-/* Places that open beyond a limit: points of cells or of springs, or rigid-plastic connectors. */
+/* Places that open beyond a limit: points of cells or of springs, rigid-plastic connectors, or laws that
+ * hold a motion. */
 typedef struct {
   inelastic *cells;
   points *points;
+  friction *rubs;
   rigid_plastic *slips;
   const int32_t *way_before; /* of these, after the last step */
 } openable;

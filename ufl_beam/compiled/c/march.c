@@ -682,6 +682,7 @@ static double largest_excess(const march *m)
     if (o->cells) most = fmax(most, *o->cells->points->over);
     else if (o->points) most = fmax(most, *o->points->over);
     for (int i = 0; o->slips && i < o->slips->number; ++i) most = fmax(most, o->slips->excess[i]);
+    for (int i = 0; o->rubs && i < o->rubs->number; ++i) most = fmax(most, o->rubs->excess[i]);
   }
   return most;
 }
@@ -699,6 +700,8 @@ static void open_places(march *m, double least)
       release(o->points, least);
     for (int i = 0; p && i < p->number; ++i)
       if (p->excess[i] > 0 && p->excess[i] >= least) p->slipped[i] = RELEASED;
+    for (int i = 0; o->rubs && i < o->rubs->number; ++i)
+      o->rubs->free[i] |= o->rubs->excess[i] > 0 && o->rubs->excess[i] >= least;
   }
 }
 
@@ -712,6 +715,7 @@ static void end_search(march *m, int opened)
     for (int i = 0; p && i < p->cells * p->of_cell; ++i)
       if (p->w[i * p->width + FLOWS] == RELEASED) p->w[i * p->width + FLOWS] = CLOSED;
     for (int i = 0; o->slips && i < o->slips->number; ++i) o->slips->slipped[i] = abs(o->way_before[i]);
+    if (o->rubs) memset(o->rubs->free, 0, o->rubs->number * sizeof *o->rubs->free);
   }
 }
 
