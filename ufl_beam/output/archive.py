@@ -37,6 +37,9 @@ ADVICE = {
 }
 """What to do about a file that cannot be used."""
 
+READ_TOO = {"solution of ufl_beam, 3": "solution of ufl_beam, 2"}
+"""Formats of earlier versions that are read beside those of this one."""
+
 NPY: Any = np.lib.format
 """NumPy's reader and writer of arrays; it has no types."""
 
@@ -162,7 +165,7 @@ def read(path: Path, format: str) -> Content:
             "so that damage cannot be seen; save it again"
         )
         return content
-    if found != format:
+    if found not in (format, READ_TOO.get(format)):
         raise SceneError(
             f"the file is a {found}, written by {by} of ufl_beam; this version, {version()}, reads "
             f"a {format}"
@@ -186,7 +189,8 @@ def _without_checksum(data: bytes) -> tuple[str, Content]:
     with h5py.File(io.BytesIO(data), "r") as file:
         found = str(file.attrs.get("format", ""))
         if found.startswith("solution"):
-            return found, {}
+            text: Content = json.loads(file["text"][()])
+            return found, {**text, **{name: file[name][()] for name in text.pop("arrays")}}
         if found.startswith("study"):
             text = {name: [*file[name].asstr()[()]] for name in ("cases", "errors")}
             results = {name: values[()] for name, values in file["results"].items()}

@@ -22,7 +22,14 @@ from ufl_beam.output.saved_scene import require_no_code
 from ufl_beam.output.states import States
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.opened_hinges import Opened
-from ufl_beam.simulation.solution_files import FORMAT, NAMED, grid_of, require_same, text_of
+from ufl_beam.simulation.solution_files import (
+    FORMAT,
+    NAMED,
+    grid_of,
+    of_earlier_version,
+    require_same,
+    text_of,
+)
 
 UNKNOWN = -2
 """Number of parts up to a state that no step goes on from."""
@@ -115,6 +122,8 @@ class Solution(States, Rich):
 
     def _take(self, content: Content) -> None:
         require_arrays(content, {"counts": (2,), "history/every": (1,)})
+        if "history/times" in content:
+            content = of_earlier_version(content, self.grid)
         self.resume(below("history/", content))
         self.internal = below("internal/", content)
         self.parts, self.iterations = map(int, content["counts"])

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Anchor, Member
@@ -17,8 +18,10 @@ from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import version
+from ufl_beam.output.archive import Content, above, below, version
+from ufl_beam.output.joint_histories import turned
 from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data
+from ufl_beam.output.state_rows import BEFORE, FORCES
 from ufl_beam.simulation.fingerprint import Description, difference
 
 FORMAT = "solution of ufl_beam, 3"
@@ -73,6 +76,26 @@ def require_same(saved: Any, given: Any) -> None:
     now, then = (Description({"scene": json.loads(json.dumps(d))}).texts for d in (given, saved))
     if differs := difference(now, then):
         raise SceneError(f"it is a solution of another scene: {differs}")
+
+
+def of_earlier_version(content: Content, grid: Grid) -> Content:
+    """Content of the formats 1 and 2 in that of this one: names, axes, rows of material."""
+    old = below("history/", content)
+    q, kept = old["q"], {name: values for name, values in old.items() if len(values)}
+    names = {"times": "t", "connections": "connectors", "cells": FORCES}
+    new = {names.get(name, name): values for name, values in kept.items()}
+    new.setdefault(FORCES, np.full((len(q), lib.CELL_NUMBERS, len(grid.cells)), np.nan))
+    for k, support in enumerate(grid.scene.supports):  # reactions were in the axes of the plane
+        at = new["reactions"][:, k, :2]
+        at[:] = turned(at, np.full(len(at), -support.angle))
+    if "material" in new:  # rows began with the number of the cell
+        rows = new["material"]
+        order = np.argsort(rows[:, :, 0], axis=1)[:, :, None]
+        new["material"] = np.take_along_axis(rows, order, 1)[:, :, 1:]
+    if len(new.get(BEFORE, ())) == 1:  # each step began where the one before ended
+        new[BEFORE] = np.concatenate([new[BEFORE], q[:-1]])
+    others = {name: of for name, of in content.items() if not name.startswith("history/")}
+    return {**others, "begun": BEFORE in new, **above("history/", new)}
 
 
 def _used_curve(scene: Scene, position: Callable[[Anchor], Array], curve: Curve) -> SavedCurve:
