@@ -128,10 +128,9 @@ from ufl_beam.plotting.plots import (
 from ufl_beam.plotting.render import Camera, animate, render
 from ufl_beam.plotting.style import picture
 from ufl_beam.simulation.checkpoint import Checkpoint
-from ufl_beam.simulation.loading import load
 from ufl_beam.simulation.run import simulate
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.solution import Solution, load
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.energy_ledger import Energy

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.simulation.opened_hinges import _fall
+from ufl_beam.simulation.solution import _fall
 
 LENGTH, EI, LIMIT = 2.0, 1000.0, 10.0  # m, N m², N m
 LONGER = 0.75 * LENGTH

@@ -12,7 +12,7 @@ import pytest
 
 import ufl_beam as ub
 from tests.unit.laws_of_ones_own import Dashpot, PowerLaw
-from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
+from ufl_beam.model.material_law import has_quadratic_energies, judges_dissipation
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms import connector_laws

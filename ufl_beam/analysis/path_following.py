@@ -27,8 +27,7 @@ from ufl_beam.errors import (
     require_switch,
 )
 from ufl_beam.mechanics.classical import Static
-from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.connector_law_checks import require_limit
+from ufl_beam.model.connector_law import ConnectorLaw, require_limit
 from ufl_beam.model.connector_laws import Controller, rubs
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene

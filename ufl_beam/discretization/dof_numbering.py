@@ -23,6 +23,7 @@ from ufl_beam.errors import SceneError, require_kind, shorten
 from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import points_along
+from ufl_beam.model.fibres import Layout
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.plastic_hinges import place_of
 from ufl_beam.model.scene import Scene
@@ -209,6 +210,28 @@ class Grid:
         of_beam = np.array(of_beams, dtype=np.int32)
         firsts = np.unique(of_beam, return_index=True)[1]
         return [self.scene.beams[i].section for i in firsts], of_beam
+
+    @cached_property
+    def inelastic(self) -> list[tuple[Layout, Index]]:
+        """Layouts of material points, and the cells that have them.
+
+        Raises:
+            SceneError: Their degree is more than one.
+        """
+        groups = dict[Layout, list[int]]()
+        sections, of_beam = self.sections
+        for number, section in enumerate(sections):
+            layout = section.layout(section.hinge)
+            if layout is not None and not layout.elastic:
+                if self.mesh.degree > 1:
+                    beam = self.scene.beams[int(np.argmax(of_beam == number))]
+                    raise SceneError(
+                        f"Mesh: degree = {self.mesh.degree} is for elastic beams, and {beam.name} "
+                        "may yield or break; use degree=1 with more cells, or an elastic section"
+                    )
+                groups.setdefault(layout, []).append(number)
+        of_cell = of_beam[self.beam_of_cell]
+        return [(layout, np.flatnonzero(np.isin(of_cell, one))) for layout, one in groups.items()]
 
     def lengths(self, cells: Index) -> Array:
         """Lengths of some cells; (len(cells),); m."""

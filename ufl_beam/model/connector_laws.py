@@ -23,9 +23,8 @@ from ufl_beam.errors import (
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.curves import Curve
 from ufl_beam.model.force_laws import ForceLaw as ForceLaw
-from ufl_beam.model.law_checks import require_bulk_law
 from ufl_beam.model.law_functions import Values, larger, positive, smaller, sqrt
-from ufl_beam.model.material_law import MaterialLaw, State
+from ufl_beam.model.material_law import MaterialLaw, State, require_bulk_law
 from ufl_beam.model.material_laws import DuvautLions, Hardening
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.softening_laws import (

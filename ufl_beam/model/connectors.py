@@ -9,8 +9,7 @@ from dataclasses import dataclass, field
 from ufl_beam.display import bracketed
 from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, arm, require_anchors
-from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.connector_law_checks import require_connector_law
+from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
 from ufl_beam.model.connector_laws import Guide, Law, Motor, RigidPlastic, rubs
 from ufl_beam.model.curves import Point
 from ufl_beam.model.records import Record

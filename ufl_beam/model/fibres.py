@@ -13,9 +13,8 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, require_array, require_count, require_kind
-from ufl_beam.model.law_checks import require_bulk_law
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_law import MaterialLaw, require_bulk_law
 from ufl_beam.model.records import Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 

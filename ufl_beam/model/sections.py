@@ -17,8 +17,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
-from ufl_beam.model.law_checks import require_bulk_law, require_interaction
-from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, require_interaction
 from ufl_beam.model.material_laws import Hardening
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening

@@ -19,7 +19,7 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.model.bodies import Member
-from ufl_beam.model.ledger_entries import ENTRIES
+from ufl_beam.model.connector_law import ENTRIES
 from ufl_beam.model.signatures import parameters_by_name
 from ufl_beam.model.time_functions import TimeFunction, require_time_function
 

@@ -49,7 +49,6 @@ from ufl_beam.output.state_rows import (
     connection,
 )
 from ufl_beam.terms.energy_ledger import Energy
-from ufl_beam.terms.inelastic_beams import inelastic_cells
 
 
 class Diagram(NamedTuple):
@@ -126,7 +125,7 @@ class Cells:
     @cached_property
     def inelastic(self) -> Index:
         """Cells that can yield or break; (m,)."""
-        groups = [cells for _, cells in inelastic_cells(self.grid)]
+        groups = [cells for _, cells in self.grid.inelastic]
         return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups]))
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
 from ufl_beam.plotting import drawing, style
-from ufl_beam.plotting.inelastic import draw_damage
+from ufl_beam.plotting.drawing import draw_damage
 from ufl_beam.plotting.labels import Label, Spot, place
 from ufl_beam.plotting.layout import Pose, directions, joined, left_of, segments, unit_vectors
 from ufl_beam.plotting.style import (

@@ -20,7 +20,7 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.output.joint_histories import motion_of
-from ufl_beam.simulation.solution import Solution
+from ufl_beam.output.states import States
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
 """Half the size of a symbol of a support where beams are not short; length of a beam below which it
@@ -88,7 +88,7 @@ class Stage:
 
     def __init__(
         self,
-        subject: Scene | Solution,
+        subject: Scene | States,
         magnify: float,
         unit: float,  # half the size of a symbol; m
         shown: Sequence[int] | None = None,
@@ -96,21 +96,21 @@ class Stage:
     ) -> None:
         require_number(magnify, "magnify", positive=True)
         self.magnify, self.unit, self.outside = magnify, unit, outside or unit
-        self._solution = subject if isinstance(subject, Solution) else None
-        self.scene = subject.scene if isinstance(subject, Solution) else subject
+        self._solution = subject if isinstance(subject, States) else None
+        self.scene = subject.scene if isinstance(subject, States) else subject
         kept = 0 if self._solution is None else len(self._solution.times)
         self._shown = range(kept) if shown is None else shown
 
     @classmethod
     def at_scale(
         cls,
-        subject: Scene | Solution,
+        subject: Scene | States,
         magnify: float,
         scale: float,
         shown: Sequence[int] | None = None,
     ) -> Stage:
         """Make a stage for a picture in the plane at a scale, the length of a point (m)."""
-        scene = subject.scene if isinstance(subject, Solution) else subject
+        scene = subject.scene if isinstance(subject, States) else subject
         lengths = [math.dist(beam.start.point, beam.end.point) for beam in scene.beams]
         typical = float(np.median(lengths)) / scale if lengths else math.inf
         unit = SYMBOL * scale * min(max(typical / SHORT_BEAM, SMALLEST), 1.0)

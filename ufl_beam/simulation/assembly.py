@@ -32,7 +32,7 @@ from ufl_beam.terms.connectors import couplings
 from ufl_beam.terms.damping import SecondDifferences, damping_forces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.guide_curves import guides
-from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
+from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces, LoadTerm
 from ufl_beam.terms.material_points import expect_entries
@@ -148,9 +148,8 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
 
     # Each kind makes its entries of the ledger: their order is that of the columns of tables.  It
     # follows from the scene alone, also where a process lacks cells or connectors of a kind.
-    groups = inelastic_cells(share.grid)
     inelastic, elastic = [], np.ones(len(share.cells), dtype=bool)
-    for layout, cells in groups:
+    for layout, cells in share.grid.inelastic:
         expect_entries(layout, scheme, ledger)
         part = np.flatnonzero(np.isin(share.cells, cells))
         if len(part):
@@ -158,7 +157,7 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
             inelastic.append(InelasticBeams(fields.part(part), layout, *setting, search))
     beams: list[Cells] = [*inelastic]
     loses = scheme.alpha or isinstance(scheme, DecayingMidpoint)
-    if loses and sum(len(cells) for _, cells in groups) < len(share.grid.cells):
+    if loses and sum(len(cells) for _, cells in share.grid.inelastic) < len(share.grid.cells):
         ledger.lost["numerical"] += 0.0
     numerical: list[Term] = []
     if elastic.any():

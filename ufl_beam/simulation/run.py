@@ -143,7 +143,7 @@ def simulate(
             if pace.steps % solution.every == 0 or pace.finished:
                 simulation.keep()
                 thins = len(solution) > most + 1 and not pace.finished
-                simulation.warn(watch.judge(solution, last=thins or pace.finished))
+                simulation.warn(watch.judge(solution, solution.every, last=thins or pace.finished))
                 if thins:
                     solution.thin()
                     solution.every *= 2
@@ -166,14 +166,14 @@ def simulate(
                 if quiet and solution.every == 1 and most == sys.maxsize:
                     pace.advance(sys.maxsize, keep=True)
                     solution.time_error = pace.error
-                    simulation.together(simulation.warn, watch.judge(solution))
+                    simulation.together(simulation.warn, watch.judge(solution, solution.every))
                 else:
                     left = solution.every - pace.steps % solution.every
                     pace.advance(left if quiet else 1)
                     simulation.together(after_step)
                 bar.update(pace.progress - bar.n)
         simulation.end()
-        simulation.together(simulation.warn, watch.judge(solution, last=True))
+        simulation.together(simulation.warn, watch.judge(solution, solution.every, last=True))
         check_ledger(simulation)
     if comm.rank == 0:
         solution.opened.warn(scheme, solution.times)

@@ -19,7 +19,6 @@ from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.archive import Content, above, below, version
-from ufl_beam.output.joint_histories import turned
 from ufl_beam.output.saved_scene import SavedCurve, SavedFunction, from_data, lost, to_data
 from ufl_beam.output.state_rows import BEFORE, FORCES
 from ufl_beam.simulation.fingerprint import Description, difference
@@ -86,8 +85,8 @@ def of_earlier_version(content: Content, grid: Grid) -> Content:
     new = {names.get(name, name): values for name, values in kept.items()}
     new.setdefault(FORCES, np.full((len(q), lib.CELL_NUMBERS, len(grid.cells)), np.nan))
     for k, support in enumerate(grid.scene.supports):  # reactions were in the axes of the plane
-        at = new["reactions"][:, k, :2]
-        at[:] = turned(at, np.full(len(at), -support.angle))
+        cos, sin = np.cos(support.angle), np.sin(support.angle)
+        new["reactions"][:, k, :2] @= [[cos, -sin], [sin, cos]]
     if "material" in new:  # rows began with the number of the cell
         rows = new["material"]
         order = np.argsort(rows[:, :, 0], axis=1)[:, :, None]

@@ -16,7 +16,7 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.output.state_rows import FORCE, LEDGER, RECORD, Columns, Connection
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.inelastic_beams import InelasticBeams, inelastic_cells
+from ufl_beam.terms.inelastic_beams import InelasticBeams
 from ufl_beam.terms.links import Links
 from ufl_beam.terms.rates_in_c import V
 from ufl_beam.terms.supports import Supports
@@ -44,7 +44,7 @@ class StateWriter:
         self._alive, self._kinds = list[Any](), list[Any]()
         grid, moving = share.grid, march.rates != ffi.NULL
         accounts = ledger.state, ledger.supplied, ledger.lost
-        cells = [of for _, of in inelastic_cells(grid)]
+        cells = [of for _, of in grid.inelastic]
         all_cells = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *cells]))
         record = cell_forces.kept if share.alone else []
         self.columns = columns = Columns.of(

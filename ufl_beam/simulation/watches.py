@@ -16,8 +16,7 @@ import numpy as np
 from ufl_beam.compiled.c_library import doubles, ffi, struct
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.connector_law_checks import judges_loss
+from ufl_beam.model.connector_law import ENTRIES, ConnectorLaw, judges_loss
 from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
@@ -27,14 +26,11 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.law_checks import has_quadratic_energies, judges_dissipation
-from ufl_beam.model.ledger_entries import ENTRIES
-from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_law import MaterialLaw, has_quadratic_energies, judges_dissipation
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
 from ufl_beam.output.states import States
 from ufl_beam.simulation.controllers import Controllers
-from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.links import Links
 
 STATES = 100
@@ -88,20 +84,21 @@ class LedgerWatch:
         self._judged = 0  # number of the last state that was judged
         self._told: set[str] = set()
 
-    def judge(self, solution: Solution, *, last: bool = False) -> Iterator[str]:
+    def judge(self, states: States, every: int, *, last: bool = False) -> Iterator[str]:
         """Judge what was kept since the last call, if it is enough or the ``last``.
 
-        Yields warnings, of each kind the first.
+        ``every`` is the number of steps from one state to the next.  Yields warnings, of each kind
+        the first.
         """
-        number = len(solution) - 1 - self._judged
+        number = len(states) - 1 - self._judged
         number -= 0 if last else number % STATES
         if number > 0:
             first, self._judged = self._judged, self._judged + number
-            yield from self._judge(solution.part(first, self._judged + 1), solution.every)
+            yield from self._judge(states.part(first, self._judged + 1), every)
 
-    def thinned(self, solution: Solution) -> None:
+    def thinned(self, states: States) -> None:
         """Go on where states, which were all judged, have been forgotten."""
-        self._judged = len(solution) - 1
+        self._judged = len(states) - 1
 
     def _judge(self, states: States, every: int) -> Iterator[str]:
         times, (state, supplied, lost) = states.times, states.ledger()

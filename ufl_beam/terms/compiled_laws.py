@@ -19,8 +19,7 @@ from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.connector_steps import law_step
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.connector_law_checks import place_of
+from ufl_beam.model.connector_law import ConnectorLaw, place_of
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_law import State
 from ufl_beam.terms.connector_laws import Rubbing

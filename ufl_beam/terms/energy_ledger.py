@@ -14,7 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.display import Rich
-from ufl_beam.model.ledger_entries import ENTRIES
+from ufl_beam.model.connector_law import ENTRIES
 
 EXPLAINED = 0.1
 """Part of an imbalance from which on an estimate of round-off explains it."""

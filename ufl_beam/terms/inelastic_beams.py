@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import ufl
@@ -16,7 +16,6 @@ from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.errors import SceneError
 from ufl_beam.mechanics.functional import virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
@@ -176,21 +175,3 @@ class InelasticBeams(Cells):
     def kept_factors(self) -> Array:
         """Factors of :attr:`Points.kept` in what :meth:`kept` returns; (6,)."""
         return np.ones(6) if self._hinges else KEPT_WITHOUT_JUMP
-
-
-def inelastic_cells(grid: Any) -> list[tuple[Layout, Index]]:
-    """Layouts of material points, and the cells (numbers of the grid) that have them."""
-    groups = dict[Layout, list[int]]()
-    sections, of_beam = grid.sections
-    for number, section in enumerate(sections):
-        layout = section.layout(section.hinge)
-        if layout is not None and not layout.elastic:
-            if grid.mesh.degree > 1:
-                beam = grid.scene.beams[int(np.argmax(of_beam == number))]
-                raise SceneError(
-                    f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
-                    "may yield or break; use degree=1 with more cells, or an elastic section"
-                )
-            groups.setdefault(layout, []).append(number)
-    of_cell = of_beam[grid.beam_of_cell]
-    return [(layout, np.flatnonzero(np.isin(of_cell, one))) for layout, one in groups.items()]

@@ -32,8 +32,7 @@ from ufl_beam.mechanics.point_equations import (
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, Layout
-from ufl_beam.model.law_checks import traced
-from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_law import MaterialLaw, traced
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.openings import NOTHING, SPENT, SearchFlags

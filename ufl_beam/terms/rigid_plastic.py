@@ -23,7 +23,7 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import RigidPlastic
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.law_checks import traced
+from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import Hardening
 from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.model.softening_laws import SofteningLaw
