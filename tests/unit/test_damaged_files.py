@@ -407,7 +407,7 @@ def test_what_cannot_be_written_is_said(tmp_path):
 # -- earlier versions ------------------------------------------------------------------------------
 
 
-EARLIER = Path(__file__).parents[1] / "data" / "solution_2"
+EARLIER = Path(__file__).parents[1] / "data" / "solution_2.zip"
 """A file of the format 2, which :func:`yielding` gave then."""
 
 

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Anchor, Member, Place, Spot
+from ufl_beam.model.fibres import Layout
 
 
 class _Numbering(Protocol):
@@ -36,6 +37,8 @@ class _Numbering(Protocol):
     def rotations(self) -> Index: ...
     @property
     def sections(self) -> tuple[list[Any], Index]: ...
+    @property
+    def inelastic(self) -> list[tuple[Layout, Index]]: ...
     @property
     def dofs_of_links(self) -> Index: ...
     def node(self, anchor: Anchor) -> Index: ...

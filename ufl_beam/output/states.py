@@ -246,10 +246,10 @@ class States:
         arrays = {name: self.column(name)[:,] for name in names if ": " not in name}
         arrays.pop(RECORD, None)
         arrays[FORCES] = np.array([self.numbers(n) for n in number])
-        if BEFORE in arrays:
-            arrays[BEFORE] = np.array([self.before(n) for n in number])
-            if np.array_equal(arrays[BEFORE], arrays["q"][[0, *number[:-1]]]):
-                del arrays[BEFORE]  # each step begins where the one before ends
+        if arrays.pop(BEFORE, None) is not None:
+            before = np.array([self.before(n) for n in number])
+            if not np.array_equal(before, arrays["q"][[0, *number[:-1]]]):
+                arrays[BEFORE] = before  # a step does not begin where the one before ends
         for part, entries in zip(LEDGER, self.ledger(), strict=True):
             arrays |= {f"{part}: {name}": values for name, values in entries.items()}
         return arrays
