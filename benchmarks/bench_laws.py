@@ -14,6 +14,7 @@ docs/steps.md.
 import argparse
 import statistics
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -47,10 +48,53 @@ def scene(add):
     )
 
 
+@dataclass(frozen=True)
+class Cubic(ub.ConnectorLaw):
+    """A spring that stiffens."""
+
+    stiffness: float
+
+    def energy(self, motion, state):
+        return self.stiffness * (motion**2 / 2 + 25 * motion**4)
+
+
+@dataclass(frozen=True)
+class Mount(ub.ConnectorLaw):
+    """A mount that stiffens in all directions together."""
+
+    stiffness: float
+    components = 2
+
+    def energy(self, motion, state):
+        x, y = motion
+        return self.stiffness * (x**2 + 2 * y**2) / 2 * (1 + 50 * (x**2 + y**2))
+
+
+@dataclass(frozen=True)
+class Brake(ub.ConnectorLaw):
+    """More to break loose than to slide."""
+
+    rest: float
+    moving: float
+
+    def limit(self, state):
+        return self.rest
+
+    def sliding(self, motion, rate, state, dt):
+        return self.moving
+
+
 def slide(law):
     """A connector between the ground and the end of the beam, across it."""
     return lambda beam, body: {
         "connectors": [ub.Slide(ub.ground(2, 0), beam.end, law, axis=ACROSS)]
+    }
+
+
+def bushing(law):
+    """The same with all components of the displacement."""
+    return lambda beam, body: {
+        "connectors": [ub.Bushing(ub.ground(2, 0), beam.end, law, axis=ACROSS)]
     }
 
 
@@ -81,6 +125,13 @@ CASES = {
     "`Actuator`": (slide(ub.Actuator(lambda t: 5.0 * np.sin(30 * t))), None),
     "`Stop`": (slide(ub.Stop(1e5, low=-0.005)), None),
     "`Coulomb`": (slide(ub.Coulomb(2.0)), None),
+    "`ConnectorLaw`": (slide(Cubic(1e4)), None),
+    "`ConnectorLaw` that holds": (slide(Brake(2.5, 2.0)), None),
+    "`Bushing` of two components": (bushing(Mount(1e4)), None),
+    "`Clearance`": (bushing(ub.Clearance(1e5, gap=0.005, damping=0.1)), None),
+    "`Clearance` with friction": (
+        bushing(ub.Clearance(1e5, gap=0.005, damping=0.1, friction=0.2, radius=0.02)), None,
+    ),
     "`RigidPlastic`": (turn(ub.RigidPlastic(ub.Hardening(15.0, modulus=10.0))), pinned),
     "`Motor`": (turn(ub.Motor(lambda t: 0.2 * np.sin(5 * t))), pinned),
     "`ForceLaw`": (slide(ub.ForceLaw(lambda e, de: 1e4 * e + 1e6 * e**3)), None),
