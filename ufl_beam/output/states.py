@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
@@ -94,8 +95,9 @@ class Material(NamedTuple):
         return one_line(self)
 
 
-LEAST_ROOM = 8
-"""Least number of rows that are made at once."""
+LEAST_ROOM, MOST_NUMBERS = 8, 2**21
+"""Least number of rows that are made at once, if they have no more numbers.  The C library gives
+more than 32 MiB back to the system, and to touch new pages takes a good part of a step."""
 
 
 class Cells:
@@ -167,7 +169,10 @@ class States:
             or (block.columns is not columns and block.columns.at != columns.at)
             or block.number == len(block.space)
         ):
-            space = np.empty((max(number, len(self), LEAST_ROOM), columns.width))
+            most = MOST_NUMBERS // columns.width
+            shape = max(number, min(max(len(self), LEAST_ROOM), most)), columns.width
+            # NumPy asks for large pages from 4 MiB on, and the first touch of these takes longer.
+            space = np.frombuffer(bytearray(8 * math.prod(shape))).reshape(shape)
             self._blocks.append(block := Block(columns, space, 0))
         return block.space[block.number : block.number + number]
 

@@ -93,8 +93,11 @@ class StateWriter:
         for place, number in record:
             self._copy(place, first, number)
             first += number
-        fill(march, kinds=len(self._kinds), width=columns.width,
-             kept=ffi.new("kept_numbers[]", self._kinds))  # fmt: skip
+        # Large vectors are written once; what is added to begins at zero.
+        width = columns.width
+        sums, after = (at["reactions"].start, at["material"].stop) if share.alone else (0, width)
+        kept = ffi.new("kept_numbers[]", self._kinds)
+        fill(march, kinds=len(kept), kept=kept, width=width, sums=sums, after_sums=after)
 
     def _place(self, numbers: Array) -> Any:
         """A place that has the address of an array, or of the first number of a view."""

@@ -960,7 +960,8 @@ typedef struct {
   int states;
   double *state;      /* entries of the ledger that a state has, one after the other */
   time_step step;
-  int kinds, width; /* of numbers of a state; of a row */
+  int kinds, width;     /* of numbers of a state; of a row */
+  int sums, after_sums; /* part of a row where numbers are added */
   const kept_numbers *kept;
   cell_forces *cell_forces;
   int watches;

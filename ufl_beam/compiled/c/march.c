@@ -946,7 +946,7 @@ static double seconds_now(void)
 /* The state, or the part of it that this process has, as a row; see state_writer.py. */
 void keep_state(const march *m, double *row)
 {
-  memset(row, 0, m->width * sizeof *row);
+  memset(row + m->sums, 0, (m->after_sums - m->sums) * sizeof *row);
   for (int k = 0; k < m->kinds; ++k) {
     const kept_numbers *n = m->kept + k;
     const double *from = *n->from;
