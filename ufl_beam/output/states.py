@@ -95,9 +95,9 @@ class Material(NamedTuple):
         return one_line(self)
 
 
-LEAST_ROOM, MOST_NUMBERS = 8, 2**21
-"""Least number of rows that are made at once, if they have no more numbers.  The C library gives
-more than 32 MiB back to the system, and to touch new pages takes a good part of a step."""
+LEAST_ROOM, MOST_NUMBERS = 8, 2**17
+"""Least number of rows that are made at once, if they have no more numbers.  Small blocks fit into
+memory that has been used before; to touch new pages takes a good part of a step."""
 
 
 class Cells:
