@@ -130,6 +130,11 @@ class Columns:
         return self._others[key]
 
 
+def new_rows(number: int, width: int) -> Array:
+    """Rows of zeros.  NumPy asks for large pages from 4 MiB on, whose first touch takes longer."""
+    return np.frombuffer(bytearray(8 * number * width)).reshape(number, width)
+
+
 class Block:
     """Rows with the same columns, one below the other, with room for more that is never moved.
 

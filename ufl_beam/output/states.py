@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from functools import cached_property
 from typing import NamedTuple
@@ -48,6 +47,7 @@ from ufl_beam.output.state_rows import (
     Columns,
     Connection,
     connection,
+    new_rows,
 )
 from ufl_beam.terms.energy_ledger import Energy
 
@@ -170,9 +170,8 @@ class States:
             or block.number == len(block.space)
         ):
             most = MOST_NUMBERS // columns.width
-            shape = max(number, min(max(len(self), LEAST_ROOM), most)), columns.width
-            # NumPy asks for large pages from 4 MiB on, and the first touch of these takes longer.
-            space = np.frombuffer(bytearray(8 * math.prod(shape))).reshape(shape)
+            number_of_rows = max(number, min(max(len(self), LEAST_ROOM), most))
+            space = new_rows(number_of_rows, columns.width)
             self._blocks.append(block := Block(columns, space, 0))
         return block.space[block.number : block.number + number]
 
@@ -180,9 +179,9 @@ class States:
         """Append so many states, which were written in :meth:`room`."""
         self._blocks[-1].number += number
 
-    def append(self, columns: Columns, row: Array) -> None:
-        """Append a state, a row with these columns."""
-        self.room(columns)[0] = row
+    def append(self, columns: Columns, *parts: Array) -> None:
+        """Append a state, a row with these columns in one or several parts."""
+        np.concatenate(parts, out=self.room(columns)[0])
         self.grow()
 
     def part(self, first: int, last: int) -> States:
@@ -198,11 +197,11 @@ class States:
         """Forget every other state; the first one stays."""
         states, self._blocks, self._computed = self.part(0, len(self)), [], None
         for n in range(0, len(states), 2):
-            columns, row = states.row(n)
+            columns, *parts = states.row(n)
             if states.begun and BEFORE not in columns.at:
                 columns = columns.plus(BEFORE, (self.grid.size,))
-                row = np.append(row, states.before(n))
-            self.append(columns, row)
+                parts.append(states.before(n))
+            self.append(columns, *parts)
 
     def __len__(self) -> int:
         """Number of states."""

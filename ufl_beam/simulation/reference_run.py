@@ -55,7 +55,7 @@ def simulate_by_reference(
         for k, support in enumerate(scene.supports):
             forces[k] = turned(forces[k], np.full(1, -support.angle))[0]  # in its axes
         columns = Columns({name: np.shape(values) for name, values in state.items()})
-        solution.append(columns, np.concatenate([*map(np.ravel, state.values())]))
+        solution.append(columns, *map(np.ravel, state.values()))
         solution.count(solver.parts, solver.iterations)
 
     keep()

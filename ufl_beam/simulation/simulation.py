@@ -24,7 +24,7 @@ from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.forces_along_cells import ForcesAlongCells
-from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block
+from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, new_rows
 from ufl_beam.output.state_view import StateView
 from ufl_beam.output.states import States
 from ufl_beam.output.watches import Watch
@@ -343,7 +343,7 @@ class Simulation(StateView):
         if self._now is None:
             columns = self._writer.columns
             size = columns.width
-            row: Array = np.empty(size + self.solution.begun * self.grid.size)
+            (row,) = new_rows(1, size + self.solution.begun * self.grid.size)
             self._writer.write(row[:size])
             if self.solution.begun:
                 row[size:] = self.share.gather(self.q_before)
@@ -384,17 +384,20 @@ class Simulation(StateView):
 
     def _keep_in(self, solution: Solution) -> None:
         columns, (_, row) = self._writer.columns, self.now.row(0)
-        row, before = row[: columns.width].copy(), row[columns.width :]
-        if self.parts == 0 and not self._reactions_known:
-            columns.of_rows("reactions", row).fill(math.nan)
+        parts, before = [row[: columns.width]], row[columns.width :]
+        unknown = self.parts == 0 and not self._reactions_known
         if self._gathers:
             forces = self.now.numbers(0)
-            row = np.append(row[: columns.at[RECORD].start], forces)
+            parts = [row[: columns.at[RECORD].start], forces.ravel()]
             columns = columns.plus(FORCES, forces.shape, without=RECORD)
         at_rest = not len(solution) and np.array_equal(before, self.now.q[0])
         if solution.begun and solution.parts_of_last != self.parts - 1 and not at_rest:
-            columns, row = columns.plus(BEFORE, before.shape), np.append(row, before)
-        solution.append(columns, row)
+            columns = columns.plus(BEFORE, before.shape)
+            parts.append(before)
+        solution.append(columns, *parts)
+        if unknown:
+            columns, row = solution.row(-1)
+            columns.of_rows("reactions", row).fill(math.nan)
         solution.count(self.parts, self.iterations)
 
     def room(self, steps: int) -> Array:
