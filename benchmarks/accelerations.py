@@ -61,7 +61,7 @@ ACCELERATIONS = {
         "but what is at their borders.",
         by.SHIPPED, by.WHOLE,
         (
-            "compiled/c/elimination.c", "solvers/static_condensation.py:Chains",
+            "compiled/c/elimination.c", "solvers/static_condensation.py:_chains",
             "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:_plan",
             "solvers/static_condensation.py:_what_is_left",
             "solvers/static_condensation.py:Elimination",

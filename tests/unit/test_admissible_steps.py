@@ -7,6 +7,7 @@ from bars import Bars
 from laws_of_ones_own import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, TwoRoots
 
 import ufl_beam as ub
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.material_points import Points
 
@@ -98,7 +99,7 @@ def test_iterates_far_apart(law, scheme, size):
         assert np.abs(r - asked_once.r).max() < 1e-11 * largest  # of strains that cancel
         for one, _ in both:
             before = one.kept[:, 4].copy()
-            assert one.gives_energy() == -1
+            assert lib.gives_energy(one.c) == -1
             one.accept()
             # J, of round-off in the energies of the strains
             assert (one.kept[:, 4] - before).min() >= -1e-14 * largest * np.abs(new).max()

@@ -209,7 +209,7 @@ def no_points(monkeypatch):
     forget_forms()
     monkeypatch.setattr("ufl_beam.terms.material_points.Points.__init__", refuse)
     monkeypatch.setattr("ufl_beam.terms.material_points.PointForms.__init__", refuse)
-    monkeypatch.setattr("ufl_beam.terms.inelastic_beams.InelasticBeams.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.terms.beams.InelasticBeams.__init__", refuse)
     monkeypatch.setattr("ufl_beam.model.softening_laws.Softening.traction", refuse)
     monkeypatch.setattr("ufl_beam.mechanics.point_equations.PointEquations.__init__", refuse)
 

@@ -10,7 +10,7 @@ from scipy.sparse import csr_array
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.terms.damping import SecondDifferences
+from ufl_beam.terms.inertia_and_damping import SecondDifferences
 
 # Numbers of one magnitude, so that an error in any term shows in the largest entry.
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)

@@ -123,7 +123,7 @@ def metric(share: Share) -> Array:
     weights[share.rotations()] = 1.0
     weights[share.multipliers()] = 0.0
     weights[share.num_owned :] = 0.0
-    return weights / (grid.size - len(grid.multipliers))
+    return np.asarray(weights / (grid.size - len(grid.multipliers)))
 
 
 class Stiffness:

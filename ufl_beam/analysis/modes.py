@@ -16,8 +16,9 @@ import numpy as np
 from ufl_beam.analysis.linearization import SmallMotions, reference_state
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
+from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.function_spaces import Fields, SectionForces
+from ufl_beam.discretization.function_spaces import Fields, section_forces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
 from ufl_beam.display import Rich
@@ -139,7 +140,7 @@ class Shapes(Rich, ABC):
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
         share = Share(self.grid, MPI.COMM_SELF)
-        forces = SectionForces(Fields(share))
+        forces = section_forces(Fields(share))
         frames: list[Any] = [
             _Frame(self, share, forces, float(k), self._scaled(k, amplitude).real)
             for k in range(len(self))
@@ -170,7 +171,7 @@ class _Frame:
     may_break = False
 
     def __init__(
-        self, shapes: Shapes, share: Share, forces: SectionForces, t: float, change: Array
+        self, shapes: Shapes, share: Share, forces: Kernel, t: float, change: Array
     ) -> None:
         self.scene, self.grid, self.comm, self.share = shapes.scene, shapes.grid, share.comm, share
         self.q, self.t = shapes.q + change, t
@@ -184,9 +185,9 @@ class _Frame:
 
     def section_forces(self) -> Array:
         """Section forces of the shape alone: a derivative, by a small difference."""
-        ends, ε = np.empty((2, len(self.grid.cells), 3)), 1e-5
+        ends, ε = np.zeros((2, len(self.grid.cells), 3)), 1e-5
         for sign, end in zip((1.0, -1.0), ends, strict=True):
-            self._forces.write(self._state + sign * ε * self._change, end)
+            self._forces.add(self._state + sign * ε * self._change, end)
         return np.asarray((ends[0] - ends[1]) / (2 * ε))
 
 

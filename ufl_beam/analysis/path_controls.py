@@ -186,7 +186,8 @@ class PathCorrector:
     def dissipation_side(self, q: Array, way: Direction) -> float:
         """Positive where more dissipates in a direction from ``q``, negative where against it."""
         now, size = self.dissipation(q), self.size(way)
-        flows = self.share.total(float(any(c.response.flows() for c in self.simulation.couplings)))
+        here = any(one.response.way.any() for one in self.simulation.couplings)
+        flows = self.share.total(float(here))
         for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)

@@ -74,7 +74,10 @@ class Grid:
         inside = np.arange(len(vertices), len(self.points))
         self.nodes_of_cells[:, 2:] = inside.reshape(between.shape[:2])
         self.cells = self.nodes_of_cells[:, :2]
-        self._require_length()
+        for cell in np.flatnonzero(self.lengths(np.arange(len(begin))) <= 1e-12 * scene.size)[:1]:
+            x, y = self.points[self.cells[cell, 0]]
+            name = beams[self.beam_of_cell[cell]].name
+            raise SceneError(f"{name}: zero length of a cell at ({x:g}, {y:g})")
         self._add_hinges([place_of(hinge) for hinge in scene.hinges])
         self._number()
         scene.release()
@@ -100,13 +103,6 @@ class Grid:
 
     def __repr__(self) -> str:
         return f"<Grid: {self}>"
-
-    def _require_length(self) -> None:
-        lengths = self.lengths(np.arange(len(self.cells)))
-        for cell in np.flatnonzero(lengths <= 1e-12 * self.scene.size)[:1]:
-            beam = self.scene.beams[self.beam_of_cell[cell]]
-            x, y = self.points[self.cells[cell, 0]]
-            raise SceneError(f"{beam.name}: zero length of a cell at ({x:g}, {y:g})")
 
     def _add_hinges(self, places: Sequence[Place]) -> None:
         """Give each plastic hinge a second vertex, which the cell beyond it begins or ends with."""

@@ -187,7 +187,7 @@ class Fields:
         """Vertices of the cells; (num_cells, 2, 2); m."""
         grid = self.share.grid
         vertices = grid.cells.take(self.share.cells[self.order], axis=0)
-        return grid.points.take(vertices, axis=0)
+        return np.asarray(grid.points.take(vertices, axis=0))
 
     @cached_property
     def _coordinates_in_lanes(self) -> Array:
@@ -222,7 +222,7 @@ class Fields:
         sections, of_beam = grid.sections
         numbers = [[getattr(section, name) for name in names] for section in sections]
         beams = grid.beam_of_cell[self.share.cells[self.order]]
-        return np.array(numbers).reshape(-1, len(names))[of_beam[beams]]
+        return np.asarray(np.array(numbers).reshape(-1, len(names))[of_beam[beams]])
 
 
 @stated
@@ -294,18 +294,9 @@ def _section_forces(of: Element) -> ufl.Form:
     return ufl.dot(r, ufl.TestFunction(of.stiffness.function_space)) / of.axis.h * of.dx(1)
 
 
-class SectionForces:
+def section_forces(fields: Fields) -> Kernel:
     """(N, V, M) in the cells were they elastic, from the strains of a configuration, P(7)."""
-
-    def __init__(self, fields: Fields) -> None:
-        self._kernel = fields.kernel(_section_forces(fields.element), fields.element.q1)
-        self._order = fields.order
-
-    def write(self, q: Array, resultants: Array) -> None:
-        """Resultants at ``q`` into the rows of the cells, in the order of the share; N, N, N m."""
-        values = np.zeros(3 * len(self._order))
-        self._kernel.add(np.ascontiguousarray(q), values)
-        resultants[self._order] = values.reshape(-1, 3)
+    return fields.kernel(_section_forces(fields.element), fields.element.q1)
 
 
 # -- the cells as a mesh of DOLFINx ----------------------------------------------------------------

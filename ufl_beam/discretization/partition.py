@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
 from mpi4py import MPI
 
@@ -13,43 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.model.bodies import Anchor, Member, Place, Spot
-from ufl_beam.model.fibres import Layout
-
-
-class _Numbering(Protocol):
-    """Members of :class:`Grid` that a share and its users need; documented there."""
-
-    scene: Any
-    mesh: Any
-    points: Array
-    cells: Index
-    nodes_of_cells: Index
-    beam_of_cell: Index
-    dofs: Index
-    dofs_of_bodies: Index
-    vertices_at_hinges: Index
-    cells_at_hinges: Index
-    multipliers: Index
-    size: int
-
-    @property
-    def rotations(self) -> Index: ...
-    @property
-    def sections(self) -> tuple[list[Any], Index]: ...
-    @property
-    def inelastic(self) -> list[tuple[Layout, Index]]: ...
-    @property
-    def dofs_of_links(self) -> Index: ...
-    def node(self, anchor: Anchor) -> Index: ...
-    def cell(self, place: Place) -> int: ...
-    def lengths(self, cells: Index) -> Array: ...
-    def cells_of(self, beam: Member) -> Index: ...
-    def hinges(self, beam: Member) -> list[Any]: ...
-    def keys(self, cells: Index) -> list[tuple[int, int]]: ...
-    def weights(self, place: Place) -> tuple[Index, Array]: ...
-    def describe_cell(self, number: int) -> str: ...
-    def worst(self, sizes: Array) -> dict[str, float]: ...
+from ufl_beam.model.bodies import Anchor, Spot
 
 
 def bisected(points: Array, number: int) -> Index:
@@ -80,6 +44,7 @@ class Share:
     order of the grid.  Global numbers, those of PETSc, are contiguous on each process.
 
     Attributes:
+        grid: The :class:`Grid`.
         alone: True if there is only one process; asking MPI takes longer.
         cells: Numbers of the cells of this process, ascending.
         dofs: Degrees of freedom, in numbers of the grid, by local number.
@@ -93,7 +58,7 @@ class Share:
             shape (len(links), 7).
     """
 
-    def __init__(self, grid: _Numbering, comm: MPI.Intracomm) -> None:
+    def __init__(self, grid: Any, comm: MPI.Intracomm) -> None:
         self.grid = grid
         self.comm, self.alone = comm, comm.size == 1
         rank_of_cell = bisected(grid.points[grid.cells].mean(axis=1), comm.size)
@@ -151,7 +116,7 @@ class Share:
 
     def at(self, anchor: Anchor) -> Index:
         """Degrees of freedom (numbers of the grid) of what an anchor moves with; shape (3,)."""
-        return self.grid.node(anchor)
+        return np.asarray(self.grid.node(anchor))
 
     def computes(self, anchor: Anchor) -> bool:
         """Return whether this process has the (first) cell at a place, or owns a body.
@@ -181,7 +146,7 @@ class Share:
 
     def cell_lengths(self) -> Array:
         """Lengths of the cells; m."""
-        return self.grid.lengths(self.cells)
+        return np.asarray(self.grid.lengths(self.cells))
 
     def lengths(self) -> Array:
         """Change of each local dof by a strain of one: a cell's length, or a radian.
@@ -196,7 +161,7 @@ class Share:
         return lengths
 
     def weights(self) -> Array:
-        """Factors that make forces and moments comparable, see ``Equation``; a new array."""
+        """Factors that make forces and moments comparable, see ``StepEquation``; a new array."""
         weights = np.ones(self.size)
         weights[self.rotations()] = 1 / self.grid.scene.size
         weights[self.multipliers()] = 0.0

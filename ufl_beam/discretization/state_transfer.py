@@ -38,7 +38,14 @@ class Transfer:
             np.vstack([grid.dofs, *(grid.node(body.middle) for body in bodies)]).ravel()
             for grid in (new, old)
         )
-        links = self._links()
+        # Numbers of connectors that both scenes have: new -> old
+        known: dict[object, list[int]] = {}
+        for i, link in enumerate(old.scene.links):
+            known.setdefault(_geometry(link), []).append(i)
+        links: dict[int, int] = {}
+        for i, link in enumerate(new.scene.links):
+            if candidates := known.get(_geometry(link)):
+                links[i] = candidates.pop(0)
         self._numbers = {a: b for b, a in links.items()}
         self._to = np.concatenate([news, new.multipliers[list(links)]])
         self._from = np.concatenate([olds, old.multipliers[list(links.values())]])
@@ -65,18 +72,6 @@ class Transfer:
                     f"start: {body.name} is not in the scene of the solution, so that nobody knows "
                     "where it is; let it be in both, held by supports before"
                 )
-
-    def _links(self) -> dict[int, int]:
-        """Numbers of connectors that both scenes have: new -> old."""
-        known: dict[object, list[int]] = {}
-        for i, link in enumerate(self._old.scene.links):
-            known.setdefault(_geometry(link), []).append(i)
-        found: dict[int, int] = {}
-        for i, link in enumerate(self._new.scene.links):
-            candidates = known.get(_geometry(link), [])
-            if candidates:
-                found[i] = candidates.pop(0)
-        return found
 
     def state(self, q: Array) -> Array:
         """Configuration in the new numbering; places that a new joint joins must be together."""

@@ -24,20 +24,20 @@ from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.terms.base import Term
-from ufl_beam.terms.beams import BEFORE, ElasticBeams, Inertia
+from ufl_beam.terms.beams import Cells, ElasticBeams, InelasticBeams
 from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.cells import Cells
-from ufl_beam.terms.connector_responses import Setting
-from ufl_beam.terms.connectors import couplings
-from ufl_beam.terms.damping import SecondDifferences, damping_forces
+from ufl_beam.terms.connector_laws import Setting
+from ufl_beam.terms.connectors import Links, couplings
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.guide_curves import guides
-from ufl_beam.terms.inelastic_beams import InelasticBeams
-from ufl_beam.terms.links import Links
+from ufl_beam.terms.inertia_and_damping import (
+    BEFORE,
+    Inertia,
+    RatesInC,
+    SecondDifferences,
+    damping_forces,
+)
 from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces, LoadTerm
-from ufl_beam.terms.material_points import expect_entries
-from ufl_beam.terms.openings import SearchFlags
-from ufl_beam.terms.rates_in_c import RatesInC
+from ufl_beam.terms.material_points import SearchFlags, expect_entries
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.works import Works
 
@@ -170,10 +170,16 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     controllers = Controllers(share)
     rates = RatesInC(scheme, v) if has_inertia(scheme) else None
     connectors = Setting(
-        controllers.place, rates, scene.size, scheme, ledger, friction_repeats(scene), search
+        controllers.place,
+        None if rates is None else rates.c,
+        scene.size,
+        scheme,
+        ledger,
+        friction_repeats(scene),
+        search,
     )
     of_links = share, connectors, A
-    coupled = together(lambda: [*couplings(*of_links), *guides(*of_links)])
+    coupled = together(couplings, *of_links)
 
     loads = _loads(scene, fields, scheme, ledger, A)
     if scene.works:
@@ -197,7 +203,7 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
 
 
 def _cell_forces(share: Share, terms: list[Term]) -> CellForces:
-    parts = [part for term in terms for part in term.in_cells()]
+    parts = [part for term in terms for part in term.in_cells]
     dead = [term.loads_in_cells() for term in terms if isinstance(term, DeadLoads)]
     return CellForces(share, parts, *dead)
 

@@ -23,8 +23,8 @@ from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
 from ufl_beam.terms.base import KINDS
-from ufl_beam.terms.inelastic_beams import InelasticBeams
-from ufl_beam.terms.links import Links
+from ufl_beam.terms.beams import InelasticBeams
+from ufl_beam.terms.connectors import Links
 
 SHARE = 0.1
 """Least motion or deformation that is named, as a part of the largest motion."""

@@ -21,7 +21,7 @@ class Prediction:
     change their sign from step to step, or where steps do not resolve the motion.
 
     Args:
-        weights: Of residuals, see :class:`Equation`.
+        weights: Of residuals, see :class:`StepEquation`.
 
     Attributes:
         c: ``prediction`` of loops.h; C writes to it when a step is accepted.

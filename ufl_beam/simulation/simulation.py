@@ -357,7 +357,7 @@ class Simulation(StateView):
     def _writer(self) -> StateWriter:
         return StateWriter(
             self._stepper.c, self.share, self.ledger, self.supports, self.inelastic,
-            self.couplings, self.cell_forces, self.q,
+            self.couplings, self.cell_forces,
         )  # fmt: skip
 
     @property

@@ -14,11 +14,11 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
 from ufl_beam.discretization.partition import Share
 from ufl_beam.output.state_rows import FORCE, LEDGER, RECORD, Columns, Connection
+from ufl_beam.terms.beams import InelasticBeams
 from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.connectors import Links
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.inelastic_beams import InelasticBeams
-from ufl_beam.terms.links import Links
-from ufl_beam.terms.rates_in_c import V
+from ufl_beam.terms.inertia_and_damping import V
 from ufl_beam.terms.supports import Supports
 
 
@@ -28,9 +28,6 @@ class StateWriter:
     Each process states which of its numbers are added to which places of the row; then the rows of
     all processes are added.
 
-    Args:
-        q: The accepted configuration at the local degrees of freedom.
-
     Attributes:
         columns: Of a row; with the record of the forces of cells if one process has all of them.
     """
@@ -38,7 +35,6 @@ class StateWriter:
     def __init__(
         self, march: Any, share: Share, ledger: Ledger, supports: Supports,
         inelastic: Sequence[InelasticBeams], couplings: Sequence[Links], cell_forces: CellForces,
-        q: Array,
     ) -> None:  # fmt: skip
         self._march, self._share = march, share
         self._alive, self._kinds = list[Any](), list[Any]()
@@ -86,7 +82,7 @@ class StateWriter:
         for link in couplings:
             rows = at["connectors"].start + columns.shapes["connectors"][1] * link.numbers
             self._add(now, link.forces_at, rows + FORCE)
-            for field, numbers in link.kept(q):
+            for field, numbers in link.kept:
                 apart = numbers.strides[0] // numbers.itemsize * np.arange(len(rows))
                 self._add(self._place(numbers), apart, rows + Connection._fields.index(field))
         first = at[RECORD].start

@@ -15,13 +15,12 @@ from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step
-from ufl_beam.terms.base import InternalForces, Term
-from ufl_beam.terms.cells import Cells
-from ufl_beam.terms.links import Links
+from ufl_beam.terms.base import Callbacks, Term
+from ufl_beam.terms.beams import Cells
+from ufl_beam.terms.connectors import Links
+from ufl_beam.terms.inertia_and_damping import RatesInC
 from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.openings import SearchFlags
-from ufl_beam.terms.phases import Callbacks
-from ufl_beam.terms.rates_in_c import RatesInC
+from ufl_beam.terms.material_points import SearchFlags
 from ufl_beam.terms.supports import Supports
 
 MOVING = "inertia", "damping"
@@ -60,12 +59,12 @@ class StepEquation:
         # Where nothing has inertia, the work of the internal forces is compared with energies.
         self.force = np.zeros(0 if in_motion else share.size)
         self.beams, self.couplings, self.loads = beams, couplings, loads
-        self.inner: list[InternalForces] = [*beams, *couplings]
+        self.inner: list[Term] = [*beams, *couplings]
         self.others: list[Term] = [*loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]
         self.c = struct("equation", size=A.size, owned=share.num_owned, weight=self.weights)
         self.callbacks = callbacks = Callbacks(self.c)
-        loops = [term.loops() for term in self.terms]
+        loops = [term.loops for term in self.terms]
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
 
         def take(name: str) -> Any:
@@ -77,8 +76,8 @@ class StepEquation:
             return one[1]
 
         product, cells = take("add_step_tangent"), take("add_cells")
-        demands = [one.demand() for one in couplings]
-        demands += filter(None, (one.demand() for one in beams))
+        both = (*couplings, *beams)
+        demands = [one.demand for one in both if one.demand is not None]
         demanding = share.largest(float(bool(demands)))
         predicted = [one.predicted.c for one in beams if one.predicted is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)

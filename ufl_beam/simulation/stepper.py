@@ -28,10 +28,10 @@ from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Border, Solver
 from ufl_beam.solvers.newton_options import Newton
-from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.connectors import Links
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.links import Links
+from ufl_beam.terms.inertia_and_damping import Inertia
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""

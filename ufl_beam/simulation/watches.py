@@ -31,7 +31,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
 from ufl_beam.output.states import States
 from ufl_beam.simulation.controllers import Controllers
-from ufl_beam.terms.links import Links
+from ufl_beam.terms.connectors import Links
 
 STATES = 100
 """Number of successive steps in which numerical losses are added."""

@@ -164,7 +164,8 @@ def _require_known(newton: Newton) -> None:
         snes.setKSP(ksp)
         unused = take_options(snes, chosen)
     except PETSc.Error as error:
-        raise SceneError(f"PETSc refuses the options {_spelt(chosen)}: {error}") from None
+        spelt = (f"-{PREFIX}{k}" + ("" if v is None else f" {v}") for k, v in chosen.items())
+        raise SceneError(f"PETSc refuses the options {' '.join(spelt)}: {error}") from None
     finally:
         snes.destroy()
         ksp.destroy()
@@ -180,7 +181,3 @@ def _require_known(newton: Newton) -> None:
         if name in WHILE_SOLVING:
             hint = "; such options must stand in PETSC_OPTIONS"
         raise SceneError(f"{where}: PETSc has no use for the option {PREFIX}{name}{hint}")
-
-
-def _spelt(chosen: Mapping[str, Any]) -> str:
-    return " ".join(f"-{PREFIX}{k}" + ("" if v is None else f" {v}") for k, v in chosen.items())

@@ -31,80 +31,78 @@ from ufl_beam.solvers.substructuring import (
 )
 
 
-class Chains:
+def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any, ...]:
     """Vertices of the cells of one process that couple to their two neighbours and to nothing else.
 
     They are found in the structure of the matrix, so they remain right whatever comes to couple.
     ``alone`` marks local degrees of freedom that no other process has.
 
-    Attributes:
-        dofs: Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
-        first: First vertex of each chain, and the number of vertices.
-        ends: Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
-        spikes: Which chains have a left end, so that all their vertices come to couple to it; the
-            others begin at a vertex with one neighbour, and have their right end twice in ``ends``.
-        at: Where in the rows of a vertex the columns of the vertex before, of itself and of the
-            vertex after begin; (num_vertices, 3).
+    Returns:
+        Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
+        First vertex of each chain, and the number of vertices.
+        Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
+        Which chains have a left end, so that all their vertices come to couple to it; the others
+        begin at a vertex with one neighbour, and have their right end twice.
+        Where in the rows of a vertex the columns of the vertex before, of itself and of the vertex
+        after begin; (num_vertices, 3).
     """
+    nodes = cell_dofs.shape[1] // 3
+    start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
+    # Vertex number k is the one between the cells k and k + 1.
+    around = np.hstack([start[:-1], end[:-1], end[1:]])
+    inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)
+    # With nine entries in rows and columns, these nine are all.
+    plain = alone & (np.diff(A.indptr) == 9)
+    plain &= np.bincount(A.indices, minlength=A.size) == 9
+    inside &= plain[end[:-1]].all(axis=1) & _in_turn(end[:-1])
+    first_of_vertex = np.zeros(len(inside), dtype=bool)
+    first_of_vertex[np.unique(end[:-1, 0], return_index=True)[1]] = True
+    inside &= first_of_vertex
+    # Beams side by side may make an end of a chain the middle of another.
+    middle = np.zeros(A.size, dtype=bool)
+    middle[end[:-1][inside]] = True
+    chain, first, last = _runs(inside)
+    ends = np.hstack([start[:-1][first], end[1:][last]])
+    inside[inside] = ~middle[ends].any(axis=1)[chain]
 
-    def __init__(self, cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> None:
-        nodes = cell_dofs.shape[1] // 3
-        start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
-        # Vertex number k is the one between the cells k and k + 1.
-        around = np.hstack([start[:-1], end[:-1], end[1:]])
-        inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)
-        # With nine entries in rows and columns, these nine are all.
-        plain = alone & (np.diff(A.indptr) == 9)
-        plain &= np.bincount(A.indices, minlength=A.size) == 9
-        inside &= plain[end[:-1]].all(axis=1) & _in_turn(end[:-1])
-        first_of_vertex = np.zeros(len(inside), dtype=bool)
-        first_of_vertex[np.unique(end[:-1, 0], return_index=True)[1]] = True
-        inside &= first_of_vertex
-        # Beams side by side may make an end of a chain the middle of another.
-        middle = np.zeros(A.size, dtype=bool)
-        middle[end[:-1][inside]] = True
-        chain, first, last = _runs(inside)
-        ends = np.hstack([start[:-1][first], end[1:][last]])
-        inside[inside] = ~middle[ends].any(axis=1)[chain]
+    # A chain with one neighbour at both ends is eliminated from both, up to its middle.
+    narrow = alone & (np.diff(A.indptr) == 6)
+    narrow &= np.bincount(A.indices, minlength=A.size) == 6
 
-        # A chain with one neighbour at both ends is eliminated from both, up to its middle.
-        narrow = alone & (np.diff(A.indptr) == 6)
-        narrow &= np.bincount(A.indices, minlength=A.size) == 6
+    def has_one_neighbour(of: Index) -> npt.NDArray[np.bool_]:
+        return np.asarray(narrow[of].all(axis=1) & _in_turn(of))
 
-        def has_one_neighbour(of: Index) -> npt.NDArray[np.bool_]:
-            return np.asarray(narrow[of].all(axis=1) & _in_turn(of))
+    _, first, last = _runs(inside)
+    free = has_one_neighbour(start[:-1][first]) & has_one_neighbour(end[1:][last])
+    free &= last - first > 1
+    inside[(first + last)[free] // 2] = False
 
-        _, first, last = _runs(inside)
-        free = has_one_neighbour(start[:-1][first]) & has_one_neighbour(end[1:][last])
-        free &= last - first > 1
-        inside[(first + last)[free] // 2] = False
-
-        chain, first, last = _runs(inside)
-        left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
-        before, after = start[:-1][inside], end[1:][inside]
-        # A vertex with six entries has no neighbour but the first or last of its chain.
-        dead_left, dead_right = map(has_one_neighbour, (left, right))
-        backward = dead_right & ~dead_left
-        dead = dead_left | dead_right
-        long = last - first + 1
-        self.first = np.append(0, np.cumsum(long + dead))
-        begin = self.first[:-1]
-        here = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
-        here = np.where(backward[chain], long[chain] - 1 - here, here)
-        place = begin[chain] + dead[chain] + here
-        around = np.empty((self.first[-1], 3, 3), dtype=np.int32)
-        around[place, 1] = middle_
-        around[place, 0] = np.where(backward[chain, None], after, before)
-        around[place, 2] = np.where(backward[chain, None], before, after)
-        around[begin[dead], 0] = A.size + np.arange(3)
-        around[begin[dead], 1] = np.where(backward[:, None], right, left)[dead]
-        around[begin[dead], 2] = around[begin[dead] + 1, 1]
-        right = np.where(backward[:, None], left, right)
-        self.ends = np.hstack([np.where(dead[:, None], right, left), right])
-        self.dofs, self.spikes = around[:, 1], ~dead
-        self.at = np.zeros(around.shape[:2], dtype=np.uint8)
-        for column in around.reshape(-1, 9).T:
-            self.at += around[:, :, 0] > column[:, None]
+    chain, first, last = _runs(inside)
+    left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
+    before, after = start[:-1][inside], end[1:][inside]
+    # A vertex with six entries has no neighbour but the first or last of its chain.
+    dead_left, dead_right = map(has_one_neighbour, (left, right))
+    backward = dead_right & ~dead_left
+    dead = dead_left | dead_right
+    long = last - first + 1
+    first_of_chain = np.append(0, np.cumsum(long + dead))
+    begin = first_of_chain[:-1]
+    here = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
+    here = np.where(backward[chain], long[chain] - 1 - here, here)
+    place = begin[chain] + dead[chain] + here
+    around = np.empty((first_of_chain[-1], 3, 3), dtype=np.int32)
+    around[place, 1] = middle_
+    around[place, 0] = np.where(backward[chain, None], after, before)
+    around[place, 2] = np.where(backward[chain, None], before, after)
+    around[begin[dead], 0] = A.size + np.arange(3)
+    around[begin[dead], 1] = np.where(backward[:, None], right, left)[dead]
+    around[begin[dead], 2] = around[begin[dead] + 1, 1]
+    right = np.where(backward[:, None], left, right)
+    ends = np.hstack([np.where(dead[:, None], right, left), right])
+    at = np.zeros(around.shape[:2], dtype=np.uint8)
+    for column in around.reshape(-1, 9).T:
+        at += around[:, :, 0] > column[:, None]
+    return around[:, 1], first_of_chain, ends, ~dead, at
 
 
 def _in_turn(dofs: Index) -> npt.NDArray[np.bool_]:
@@ -133,30 +131,30 @@ def _plan(
     """Find what can be eliminated, and where entries go.
 
     Returns:
-        Degrees of freedom that are left, in the order of the grid; :attr:`Chains.at`;
+        Degrees of freedom that are left, in the order of the grid; the last of :func:`_chains`;
         ``indptr`` and ``indices`` of the matrix of what is left; :data:`INDICES`.
     """
     A = Csr(np.empty(0), indices, indptr)
-    chains = Chains(cell_dofs, A, alone)
+    vertices, first_of_chain, ends_of, spikes, at = _chains(cell_dofs, A, alone)
     stays = np.ones(A.size, dtype=bool)
-    stays[chains.dofs] = False
+    stays[vertices] = False
     here = np.flatnonzero(stays)
     here = here[np.argsort(dofs[here])]
     number = np.full(A.size, -1, dtype=np.int32)
     number[here] = np.arange(len(here))
-    ends, owned = number[chains.ends], here[here < num_owned]
-    first, last = (chains.dofs[k] for k in (chains.first[:-1], chains.first[1:] - 1))
-    next_to = np.stack([np.where(chains.spikes[:, None], first, last), last], axis=1)
-    of_ends = chains.ends.reshape(-1, 2, 3)
+    ends, owned = number[ends_of], here[here < num_owned]
+    first, last = (vertices[k] for k in (first_of_chain[:-1], first_of_chain[1:] - 1))
+    next_to = np.stack([np.where(spikes[:, None], first, last), last], axis=1)
+    of_ends = ends_of.reshape(-1, 2, 3)
     rows = np.stack([of_ends, next_to], axis=1)[..., None]
     columns = np.stack([next_to, of_ends], axis=1)[..., None, :]
     with_ends = A.positions(*map(np.ravel, np.broadcast_arrays(rows, columns)))
     *structure, entry, place, places = _what_is_left(A, number, ends, len(here))
     found = (
-        chains.first, chains.spikes, chains.dofs[:, 0], A.indptr[chains.dofs[:, 0]], with_ends,
+        first_of_chain, spikes, vertices[:, 0], A.indptr[vertices[:, 0]], with_ends,
         entry, place, places, owned, number[owned], ends,
     )  # fmt: skip
-    return here, chains.at, *structure, *(np.ascontiguousarray(x, np.int32) for x in found)
+    return here, at, *structure, *(np.ascontiguousarray(x, np.int32) for x in found)
 
 
 def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index, ...]:

@@ -1,22 +1,31 @@
 # SPDX-License-Identifier: MIT
-"""Virtual works that a scene may contribute to the equation of a step.
+"""Terms: virtual works that a scene may contribute to the equation of a step, and their phases.
 
 A term adds its part of the residual and of the tangent at the end of the step, and says what the
 step did to the energy.  Vectors hold the local degrees of freedom of a process, ghosts included;
 what several processes add to one degree of freedom is summed by the solver.
+
+The beginning of a step and its acceptance are loops in C, with callbacks for functions of a user.
 """
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.terms.phases import Callbacks, Phases
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import StepFailed
+from ufl_beam.model.time_functions import Constant, Table, TimeFunction, steady, value_at
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""
@@ -43,42 +52,64 @@ class InCells(NamedTuple):
     q0: Any = None
 
 
+class Phases(NamedTuple):
+    """Loops of the type ``phase`` of loops.h, each with its data.
+
+    ``change`` says what a step stores and dissipates, of the type ``change_of_energy``; ``opens``
+    are fields of ``openable``, if something may open; ``admits`` is the check of a step before it
+    is accepted, of the type ``admission``; ``again`` begins a step again, which iterates tried.
+    """
+
+    begin: Sequence[Loop] = ()
+    accept: Sequence[Loop] = ()
+    add_state: Sequence[Loop] = ()
+    change: Loop | None = None
+    opens: dict[str, Any] | None = None
+    admits: Loop | None = None
+    again: Loop | None = None
+
+
 class Term(ABC):
-    """Virtual work of one physical effect; a method that a term does not define does nothing."""
+    """Virtual work of one physical effect; a method that a term does not define does nothing.
+
+    Attributes:
+        kind: Kind of its forces, one of :data:`KINDS`.
+        loops: C functions of residual and tangent, with their data.
+        in_cells: Forces on the nodes of cells; none if all act between nodes that joints may share.
+        demand: C function of how far a law is missed, with its data; None if that is always zero.
+        must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
+            accepted.
+    """
 
     kind: str
-    """Kind of its forces, one of :data:`KINDS`."""
+    loops: tuple[Loop, Loop | None]
+    in_cells: Sequence[InCells] = ()
+    demand: Loop | None = None
+    must_dissipate = False
 
     _A: Csr
     """Matrix that takes the tangent."""
-
-    _loops: tuple[Loop, Loop | None]
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """Return C functions of residual and tangent, with their data."""
-        return self._loops
 
     @abstractmethod
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return C functions of the beginning and the acceptance of a step; called once."""
 
-    def in_cells(self) -> Sequence[InCells]:
-        """Forces on the nodes of cells; none if all act between nodes that joints may share."""
-        return ()
-
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the virtual work at ``q1`` to ``r``."""
-        (force, data), _ = self.loops()
+        (force, data), _ = self.loops
         force(data, doubles(q1), doubles(r))
 
     def add_tangent(self, q1: Array) -> None:
         """Add the derivative at ``q1`` to the matrix that the term was made with."""
-        _, tangent = self.loops()
+        _, tangent = self.loops
         if tangent is not None:
             tangent[0](tangent[1], doubles(q1), doubles(self._A.data))
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
+
+    def require_dissipation(self, q1: Array) -> None:
+        """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
 
     def start(self, q: Array) -> None:
         """Take ``q`` for the accepted configuration, which no step has led to."""
@@ -87,11 +118,130 @@ class Term(ABC):
         """State what later steps depend on; ``q`` is the configuration of the state."""
 
 
-class InternalForces(Term):
-    """Forces inside a scene: those of its cells and connectors."""
+class Callbacks:
+    """Python functions that C calls while it takes steps.
 
-    must_dissipate = False
-    """True if :meth:`require_dissipation` has to be called before a step is accepted."""
+    What they raise must not pass through C: the first exception is kept, and the step fails.
 
-    def require_dissipation(self, q1: Array) -> None:
-        """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
+    Attributes:
+        error: What was raised in the latest step; a failure of a step gives way to anything else.
+        c: ``equation`` of loops.h.
+    """
+
+    error: BaseException | None = None
+
+    def __init__(self, c: Any) -> None:
+        self.c, self._alive = c, list[Any]()
+
+    # -- functions, with their data ---------------------------------------------------------------
+
+    def of_time(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
+        """``time_function`` of loops.h for functions of time with their owners, see value_at."""
+        of_time = ffi.new("time_function[]", len(functions))
+        for place, (function, owner) in zip(of_time, functions, strict=True):
+            if function is steady:
+                function = Constant(1.0)
+            if isinstance(function, Constant):
+                function = Table((0.0,), (function.value,))
+            if isinstance(function, Table):
+                points = [np.array(x, dtype=np.float64) for x in (function.times, function.values)]
+                place.points, (place.t, place.y) = len(points[0]), map(doubles, points)
+                self._alive += points
+            else:
+                place.ask = lib.time_in_python
+                place.handle = self.handle(partial(value_at, function, owner=owner))
+        return of_time
+
+    def phase(self, function: Callable[[Any, Any, Any], None]) -> Loop:
+        """Phase of C that calls ``function(step, q1, s)`` with pointers."""
+        return lib.phase_in_python, self.handle(function)
+
+    # -- what they raise --------------------------------------------------------------------------
+
+    def settle(self) -> None:
+        """Raise what a function that C has called has raised."""
+        error, self.error = self.error, None
+        if error is not None:
+            raise error
+
+    @contextmanager
+    def raising(self) -> Iterator[None]:
+        """Raise at the end of a block, outside of steps, what functions have raised in it."""
+        before, self.error = (self.error, self.c.raised), None
+        try:
+            yield
+            self.settle()
+        finally:
+            self.error, self.c.raised = before
+
+    def handle(self, function: Any, size: int = 0) -> Any:
+        """Handle of what C calls; ``size`` of numbers that it adds to, if it does."""
+        self._alive.append(ffi.new_handle((self, function, size)))
+        return self._alive[-1]
+
+
+def _note(kind: type, error: BaseException, traceback: Any) -> None:
+    """Keep an exception of a callback, and let C end the step on all processes.
+
+    An interrupt may come before the first line of the callback has run.
+    """
+    arguments = traceback.tb_frame.f_locals
+    callbacks, _, size = ffi.from_handle(arguments["handle"])
+    failed = isinstance(error, StepFailed)
+    if callbacks.error is None or isinstance(callbacks.error, StepFailed):
+        callbacks.error = error.with_traceback(traceback)
+    callbacks.c.raised = max(callbacks.c.raised, 1 if failed else 2)
+    if "out" in arguments:
+        np.frombuffer(ffi.buffer(arguments["out"], 8 * size)).fill(math.nan)
+
+
+def from_c(
+    error: float | None = None, name: str | None = None
+) -> Callable[[Callable[..., Any]], Any]:
+    """Decorate a callback of C, declared in c_library.py; its value if it raises is ``error``."""
+    more = {} if error is None else {"error": error}
+    declared: Any = ffi.def_extern(name=name, onerror=_note, **more)
+    return declared  # type: ignore[no-any-return]
+
+
+@from_c()
+def curve_in_python(handle: Any, s: float, step: float, out: Any) -> None:
+    """Callback of C, declared in c_library.py."""
+    curve, far = ffi.from_handle(handle)[1], 2 * step
+    out[0 : 2 * lib.CURVE_POINTS] = (
+        *curve(s - far), *curve(s - step), *curve(s), *curve(s + step), *curve(s + far),
+    )  # fmt: skip
+
+
+@from_c(math.nan)
+def time_in_python(handle: Any, t: float) -> float:
+    """Callback of C, declared in c_library.py."""
+    return float(ffi.from_handle(handle)[1](t))
+
+
+def call_in_python(handle: Any, *arguments: Any) -> None:
+    """Callbacks of C, declared in c_library.py."""
+    ffi.from_handle(handle)[1](*arguments)
+
+
+for _name in ("run", "begin", "phase"):
+    from_c(name=f"{_name}_in_python")(call_in_python)
+
+
+def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
+    """Loops that give kernels the configuration at the beginning of a step, those that have it."""
+    return [
+        loop("begin_forms", struct("form_of_step", form=one.cells, at=one.position(q0)))
+        for one in kernels if one.uses(q0)
+    ]  # fmt: skip
+
+
+def knowing(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
+    """Fields of a struct for forms that know values of a function, which a phase gives them."""
+    forms = [(one.cells, one.position(function)) for one in kernels]
+    return {"forms": len(forms), "form": ffi.new("form_of_step[]", forms)}
+
+
+def entering(kernel: Any, entry: Any) -> Loop:
+    """Loop that adds the value of a kernel to an entry of the ledger."""
+    return loop("add_values", struct("form_value", form=kernel.cells, entry=entry))

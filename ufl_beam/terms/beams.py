@@ -1,33 +1,182 @@
 # SPDX-License-Identifier: MIT
-"""Elastic beams and inertia."""
+"""Forces inside beams: elastic cells, and cells whose material yields, flows or breaks.
+
+The latter answer strains by the return map of their material points.  Common parts: forms of a
+step; strains that an iteration of a static step predicts; and works of the tangent and of its
+derivative, which buckling needs.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
 import ufl
 
-from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import ffi, lib, loop, struct
-from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, Fields, mass_kernel, mass_matrix
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import doubles, fill, lib, loop, struct
+from ufl_beam.compiled.csr import Csr
+from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.function_spaces import Element, Fields, Strains
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia, with_half_tangents
-from ufl_beam.terms.base import InCells, Term
-from ufl_beam.terms.cells import Cells, OfForms, PredictedStrains
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.model.fibres import Layout
+from ufl_beam.terms.base import Callbacks, InCells, Phases, Term, beginning, entering
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.phases import Callbacks, Phases, entering
-from ufl_beam.terms.rates_in_c import RatesInC
+from ufl_beam.terms.material_points import Points, SearchFlags
 
-BEFORE = "velocity before"
-"""Name of the velocities at the beginning of the last step, in what is saved."""
+
+class OfForms(Term):
+    """Forces of a virtual work on cells, and forms of the energy that they lose in a step."""
+
+    _entry: str  # of the losses in the ledger
+
+    def __init__(
+        self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger,
+        tangent: Kernel | None = None,
+    ) -> None:  # fmt: skip
+        self._q0, self._q1 = fields.element.q0, fields.element.q1
+        self._fields, self._A, self._ledger = fields, A, ledger
+        if tangent is None:
+            self._force, tangent = fields.force_and_tangent(work, self._q1, A)
+        else:
+            self._force = fields.hot_kernel(work, self._q1)
+        force = self._force
+        self.loops = loop("add_cells", force.cells), loop("add_cells", tangent.cells)
+        self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
+        self._losses = [fields.hot_kernel(form, self._q1) for form in losses]
+        self._of_step = [force, *(loss for loss in self._losses if not loss.share(force))]
+        if losses:
+            ledger.lost[self._entry] += 0.0
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops over the cells at the beginning of a step and at its acceptance."""
+        lost = self._ledger.lost
+        accept = [entering(loss, lost.pointer(self._entry)) for loss in self._losses]
+        return Phases(beginning(self._of_step, self._q0), accept)
+
+
+# -- static steps ----------------------------------------------------------------------------------
+
+
+@stated
+def _linear_strains(of: Element) -> tuple[ufl.Form, fem.Function]:
+    """Strains at the points, linear in a displacement about a configuration; that one."""
+    about = of.configuration()
+    e_about = strain(about, of.axis)
+    return of.sampled(e_about + ufl.derivative(e_about, about, of.q1)), about
+
+
+class PredictedStrains:
+    """Strains that an iteration of a static step predicts, by linear kinematics.
+
+    Displacements that solve a linear equation strain slender beams along their axes by nothing but
+    the error of the linearisation, and forces from that send the next iteration astray.  The
+    equation was about forces as well, which strains that are linear in the displacements predict
+    without that error: they belong into the tangent, while the residual remains that of the
+    displacements.  That is Newton's method for displacements and forces as independent unknowns, as
+    the functional has them, with the forces eliminated; it converges in few iterations, whatever
+    the slenderness.  The first guess of a step strains beams in the same way, so cells that yield
+    extrapolate strains of states.
+
+    Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
+
+    Attributes:
+        c: ``predicted_strains`` of loops.h, with the state of the iteration.
+        beginning: The phase that begins a step.
+    """
+
+    def __init__(self, fields: Fields) -> None:
+        form, about = _linear_strains(fields.element)
+        self._form = fields.hot_kernel(form, fields.element.q1)
+        weights = fields.share.grid.mesh.point_weights.repeat(3)
+        last, change = np.zeros((2, fields.share.size))
+        self.c = struct(
+            "predicted_strains", size=len(change), of_cell=len(weights), weight=weights,
+            about=last, change=change, e=np.zeros((len(fields.order), len(weights))),
+            strains=self._form.cells, at_about=self._form.position(about),
+        )  # fmt: skip
+        self.beginning = loop("begin_predicted_strains", self.c)
+
+
+# -- works of tangents -----------------------------------------------------------------------------
+
+
+class _Works(NamedTuple):
+    """Works of a tangent and of its derivative along u for the motion x on y; that derivative."""
+
+    tangent: ufl.Form
+    change: ufl.Form
+    matrix: ufl.Form
+    x: fem.Function
+    y: fem.Function
+    u: fem.Function
+
+
+@stated
+def _works(work: ufl.Form, q1: fem.Function) -> _Works:
+    x, y, u = (fem.Function(q1.function_space) for _ in range(3))
+    tangent = ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
+    action = ufl.action(ufl.derivative(work, q1, x), y)
+    change = ufl.derivative(action, q1, u)
+    return _Works(action, change, ufl.derivative(tangent, q1, u), x, y, u)
+
+
+class Cells(Term):
+    """Forces in cells whose tangent is known by its works on two motions, too.
+
+    Works are summed over cells from the strains of the motions.  The entries of a matrix have the
+    round-off of axial and shear stiffness, in which the bending of slender cells would be lost.
+    """
+
+    _work_form: ufl.Form
+    _q1: fem.Function
+    _fields: Fields
+    predicted: PredictedStrains | None = None
+    """In statics, the strains whose forces tangents have."""
+
+    def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
+        """Values in the cells, at ``q1``, of what the virtual work depends on besides."""
+        return {}
+
+    @cached_property
+    def _derivatives(self) -> tuple[_Works, dict[str, Kernel]]:
+        return _works(self._work_form, self._q1), {}
+
+    def _at(self, q1: Array, name: str, **motions: Array) -> Kernel:
+        """The kernel of one of the :class:`_Works`, compiled when it is first asked for."""
+        forms, kernels = self._derivatives
+        if name not in kernels:
+            kernels[name] = self._fields.kernel(getattr(forms, name), self._q1)
+            if name == "matrix":
+                kernels[name].place(self._A)
+        kernel = kernels[name]
+        for function, values in self._coefficients(q1).items():
+            if kernel.uses(function):
+                kernel.put(function, values)
+        for motion, values in motions.items():
+            kernel.set(getattr(forms, motion), values)
+        return kernel
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``."""
+        self._at(q1, "matrix", u=u).add(q1, self._A.data)
+
+    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
+        """Return the work of the tangent for the motion x on y; J."""
+        return self._at(q1, "tangent", x=x, y=y).value(q1)
+
+    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
+        """Return the work of the derivative of the tangent along u, for x on y; J."""
+        return self._at(q1, "change", u=u, x=x, y=y).value(q1)
+
+
+# -- elastic beams ---------------------------------------------------------------------------------
 
 
 class ElasticForms(NamedTuple):
@@ -86,11 +235,9 @@ class ElasticBeams(OfForms, Cells):
         self._stored.share(self._force)
         if tangent is not None:
             self._of_step.append(tangent)
-            self._loops = self._loops[0], loop("add_static_tangent", self._static)
-
-    def in_cells(self) -> Sequence[InCells]:
-        """The forces of the resultants, which both configurations of a step determine."""
-        return [InCells(lambda: self._force, lib.STRESS, self._fields.order, q0=self._q0)]
+            self.loops = self.loops[0], loop("add_static_tangent", self._static)
+        # Both configurations of a step determine the forces.
+        self.in_cells = [one._replace(q0=self._q0) for one in self.in_cells]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells."""
@@ -101,75 +248,142 @@ class ElasticBeams(OfForms, Cells):
         return Phases(begin, accept, [state], loop("change_of_form", state[1]))
 
 
-class Inertia(Term):
-    """Inertia of beams and point masses: a constant matrix, P(18).
+# -- beams with material points --------------------------------------------------------------------
+
+KEPT_WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
+"""Factors of :attr:`Points.kept` where its jump is a crack of one fibre, and no hinge."""
+
+
+class InelasticForms(NamedTuple):
+    """Virtual work of resultants r; the same of b + D e around an iterate, and its derivative."""
+
+    work: ufl.Form
+    around: ufl.Form
+    tangent: ufl.Form
+    r: fem.Function
+    b: fem.Function
+    D: fem.Function
+
+
+@stated
+def inelastic_forms(of: Element, scheme: Scheme) -> InelasticForms:
+    """Forms of a step of a time scheme."""
+    r, b, D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
+    w_e, dx = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis), of.dx(1)
+    around = virtual_work(b + ufl.dot(D, strain(of.q1, of.axis)), w_e) * dx
+    tangent = ufl.derivative(around, of.q1, ufl.TrialFunction(of.space))
+    return InelasticForms(virtual_work(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
+
+
+class InelasticBeams(Cells):
+    """Resultants of cells with material points, working on the virtual strains, P(34).
+
+    The points answer the strains of an iterate with resultants r and their derivatives D; around
+    it resultants are b + D e, linear in the strains e, from which UFL derives the tangent,
+    material and geometric.  One loop in C evaluates points and forms.
 
     Attributes:
-        rates: Velocities, and what else the scheme keeps.
+        kept_factors: Factors of :attr:`Points.kept` in what :meth:`kept` returns; (6,).
     """
 
-    kind = "inertia"
+    kind = "beams"
 
     def __init__(
-        self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, rates: RatesInC
-    ) -> None:
-        rotations = with_half_tangents(scheme, fields.share.rotations())
-        self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
-        self._loops = self._times.loops
-        self._fields, self._ledger, self._A, self.scheme = fields, ledger, A, scheme
-        self.rates = rates
-        if rates.slips:
-            ledger.lost["numerical"] += 0.0
+        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger,
+        search: SearchFlags,
+    ) -> None:  # fmt: skip
+        self._A, self._ledger = A, ledger
+        self.kept_factors = np.ones(6) if layout.hinges else KEPT_WITHOUT_JUMP
+        self.predicted = None if has_inertia(scheme) else PredictedStrains(fields)
+        self._cells = fields.share.cells[fields.order]
+        self._strains = Strains(fields)
+        share, lengths = fields.share, fields.share.cell_lengths()[fields.order]
+        keys = share.grid.keys(self._cells)
+        self.points = Points(layout, keys, lengths, scheme, search, predicts=True)
 
-    def in_cells(self) -> Sequence[InCells]:
-        """The mass of the beams times the accelerations of the step."""
-        form = partial(mass_kernel, self._fields)
-        return [InCells(form, lib.DENSITY, self._fields.order, self._times.rate)]
+        forms = inelastic_forms(fields.element, scheme)
+        self._q0, self._q1 = fields.element.q0, fields.element.q1
+        self._b, self._D, self._fields, self._work_form = forms.b, forms.D, fields, forms.around
+        self._force, self._tangent = (
+            fields.hot_kernel(form, self._q1) for form in (forms.work, forms.tangent)
+        )
+        self._tangent.place(A)
+        self.must_dissipate = layout.kind.law.must_dissipate
 
-    @property
-    def M(self) -> Csr:
-        """The mass matrix; a new one."""
-        return self._times.matrix()
+        self._latest: Array = np.full(share.size, np.nan)
+        self._in_c = struct(
+            "inelastic", size=share.size, latest=self._latest, points=self.points.c,
+            scene=share.grid.scene.size,
+            strains=self._strains.kernel.cells, force=self._force.cells,
+            tangent=self._tangent.cells, at_r=self._force.position(forms.r),
+            at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
+        )  # fmt: skip
+        if self.predicted is not None:
+            forces, last_b, last_D = np.zeros((3, len(lengths), 9))
+            of_tangent = {"forces": forces, "last_b": last_b, "last_D": last_D}
+            fill(self._in_c, predicted=self.predicted.c, **of_tangent)
+        names, force = ("add_inelastic_force", "add_inelastic_tangent"), self._force
+        self.loops = loop(names[0], self._in_c), loop(names[1], self._in_c)
+        self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
+        if self.points.c.line:
+            self.demand = loop("missed_by_points", self._in_c)
 
-    @property
-    def v(self) -> Array:
-        """Velocities in the accepted state; a copy."""
-        return self.rates.v
+    # -- in C ----------------------------------------------------------------------------------
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the matrix and the velocities."""
-        lost = self._ledger.lost.pointer("numerical") if self.rates.slips else ffi.NULL
-        kinetic = self._ledger.state.pointer("kinetic")
-        of = self.rates.times(self._times, kept=kinetic, lost=lost)
-        begin, accept = loop("begin_inertia", of), loop("accept_inertia", of)
-        return Phases([begin], [accept], [loop("add_kinetic_energy", of)])
+        """Loops over the points."""
+        c = struct("inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger))
+        begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
+        if self.predicted is not None:
+            begin.append(self.predicted.beginning)
+        ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
+        opens = {"cells": self._in_c} if self.points.softens else None
+        change = loop("change_of_points", c)
+        admits = loop("points_dissipate", c) if self.must_dissipate else None
+        return Phases(begin, *ends, change, opens, admits)
 
-    def carry_on(self, memory: Memory, known: int) -> None:
-        """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""
-        rates = self.rates
-        more = rates.more or (rates.v,) * known
-        rates.keep(*map(memory.at_dofs, self.scheme.kept[:known], more))
+    # -- the step ------------------------------------------------------------------------------
 
-    def pass_on_step(self, memory: Memory) -> None:
-        """State the velocities before the last step, and its length, at each degree of freedom."""
-        rates = self.rates
-        v_before = memory.at_dofs(BEFORE, rates.v_before)
-        lengths = memory.at_dofs("last step", np.full(rates.c.size, rates.last_dt))
-        rates.take(rates.v, v_before, float(lengths[0]) if len(lengths) else rates.last_dt)
+    def start(self, q: Array) -> None:
+        """Let the points begin at the strains of a configuration."""
+        strains = self._strains(q)
+        self.points.start(strains)
+        self.points.refresh(strains)
 
-    def velocities(self, s: Array, dt: float) -> Array:
-        """Velocities at the end of a step ``s`` of the nodes, of the length ``dt`` (s)."""
-        return self.rates.after(s, dt)[0]
+    def require_dissipation(self, q1: Array) -> None:
+        """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
+        lib.respond_at(self._in_c, doubles(q1))
+        grid = self._fields.share.grid
+        self.points.require_dissipation(lambda cell: grid.describe_cell(self._cells[cell]))
 
-    def prepare(self, s: Array, dt: float) -> None:
-        """Take from a trial step ``s`` what the scheme keeps besides the velocities."""
-        _, *more = self.rates.after(s, dt)
-        self.rates.keep(*more)
+    def dissipation(self, q1: Array) -> float:
+        """Energy that cells of this process dissipate in the step to ``q1``; J."""
+        lib.respond_at(self._in_c, doubles(q1))
+        return self.points.dissipation()
+
+    def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
+        """Resultants around ``q1`` and their derivatives; points go on as they answer."""
+        strains = self._strains(q1)
+        r, D = self.points.respond(strains)
+        self._latest.fill(np.nan)  # the points would answer otherwise now
+        around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
+        return {self._b: around, self._D: D}
+
+    def about_state(self) -> tuple[Index, Array, Array]:
+        """Cells (numbers of the grid), and b, D of resultants b + D e about the accepted state.
+
+        Shapes (num_cells, 3) and (num_cells, 9).  D is that of a step like the last one.
+        """
+        strains, D = self.points.tangent()
+        elastic = np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
+        return self._cells, self.points.kept[:, :3] - elastic, D
+
+    # -- the state -----------------------------------------------------------------------------
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """Save or restore velocities and the last step."""
-        rates = self.rates
-        v = memory.at_dofs("velocity", rates.v)
-        v_before = memory.at_dofs(BEFORE, rates.v_before)
-        rates.take(v, v_before, memory.number("step of velocity", rates.last_dt))
-        self.carry_on(memory, int(memory.number("further rates", len(rates.more))))
+        """Save or restore the internal variables."""
+        self.points.restore(memory.rows("cells", self._cells, self.points.state()))
+
+    def kept(self) -> tuple[Index, Array]:
+        """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
+        return self._cells, self.points.kept * self.kept_factors

@@ -1,19 +1,50 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors that hold, drive, push, damp and rub."""
+"""Laws of connectors over a step: one row ``α e + β λ = γ`` for each component of each of them.
+
+e is the relative motion at the end of the step and λ the force that resists its growth.  What is
+held has a row about e, all other laws have one about λ, linear in e around the latest iterate.
+
+Here are laws that give a motion or a force, dry friction, springs, and rigid-plastic laws, such as
+those of plastic hinges of zero length; laws of force_laws.py are stated by functions.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
+import ufl
 
-from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import doubles, ffi, fill, struct
-from ufl_beam.model.connector_laws import HELD, Actuator, Controller, Coulomb, Damper, Guide, Motor
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, names, struct
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.mechanics.slips import numbers, slip
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.bodies import Place
+from ufl_beam.model.connector_laws import (
+    HELD,
+    Actuator,
+    Controller,
+    Coulomb,
+    Damper,
+    Guide,
+    Motor,
+    RigidPlastic,
+    Spring,
+)
 from ufl_beam.model.connectors import Connector
-from ufl_beam.terms.connector_responses import Response, Setting, respond
-from ufl_beam.terms.phases import Callbacks
+from ufl_beam.model.fibres import Layout
+from ufl_beam.model.material_law import traced
+from ufl_beam.model.material_laws import Hardening
+from ufl_beam.model.plastic_hinges import law_of
+from ufl_beam.model.softening_laws import SofteningLaw
+from ufl_beam.model.time_functions import TimeFunction
+from ufl_beam.terms.base import Callbacks
+from ufl_beam.terms.energy_ledger import Account, Ledger
+from ufl_beam.terms.material_points import NOTHING, SPENT, Points, SearchFlags, expect_entries
 
 CREEP = 1e-12
 """Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
@@ -22,129 +53,383 @@ Only where several places that stick hold the same motion: so they share the for
 """
 
 
-class _Held(Response):
-    """Constraints of joints and guides: the motion is zero, and there is no work."""
+class Setting(NamedTuple):
+    """Arguments that all responses are made with."""
+
+    asked: Callable[[Connector], Any]  # places of forces of controllers and limits of friction
+    rates: Any  # ``rates`` of loops.h, with the velocities; None in statics
+    size: float  # of the scene; m
+    scheme: Scheme
+    ledger: Ledger
+    friction_repeats: bool  # True if places that stick may hold what is held already
+    search: SearchFlags  # of all points of the scene
 
 
-class _Driven(Response):
-    """Motors: the motion is given."""
+class Response:
+    """Connectors whose laws are of one kind; motions and forces are arrays.
 
-    _part, _entry, _sign = "supplied", "motors", -1.0
+    A method that a law does not define does nothing.  Arrays are views, which later steps change.
 
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
-        motors = zip(self._laws, self._links, strict=True)
-        wanted = callbacks.of_time([(law.motion, link) for law, link in motors])
-        return {"wanted_motion": wanted, **super().in_steps(callbacks)}
+    Attributes:
+        name: Of the internal variables in files.
+        in_c: Data of laws evaluated in C, by names in ``couplings`` of loops.h.
+        must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
+            accepted.
+        opens: True if connectors open beyond a limit.
+        asks_at_ends: True if :meth:`take` is to be called when a step is accepted.
+        motion: Motions of the accepted state as solutions show them, (num_links,); None if those
+            are the motions of the nodes.
+        way: Way in which each slips plastically in the latest iterate, 1 or -1; 0 if it does not.
+        sticks: Whether friction holds each connector in the latest iterate; None without friction.
+        dissipated: Energies whose sum each connector has dissipated plastically; (num_links,); J.
+    """
 
+    must_dissipate = opens = asks_at_ends = False
+    motion: Array | None = None
+    sticks: Index | None = None
+    dissipated: Sequence[Array] = ()
 
-@respond.register(Motor)
-@respond.register(Guide)
-def _(law: Motor | Guide, links: Sequence[Connector], setting: Setting) -> Response:
-    return (_Held if law is HELD or isinstance(law, Guide) else _Driven)(law, links, setting)
+    def __init__(self, links: Sequence[Connector], setting: Setting, name: str) -> None:
+        self._links, self._setting, self.name = links, setting, name
+        self._laws: list[Any] = [link.law for link in links]
+        # Motions that are large: the size of the scene, or a radian
+        self._lengths = np.where([link.turns for link in links], 1.0, setting.size)
+        self.way: Index = np.zeros(len(links), dtype=np.int32)
+        self.in_c: dict[str, Any] = {}
+        self._in_steps: dict[str, Any] = {}
+        self._of_time: dict[str, list[tuple[TimeFunction, object]]] = {}
+        self._entries: dict[str, tuple[Account, str]] = {}
+        # Internal variables, one for each connector, or for all components of one together
+        self._variables: list[npt.NDArray[Any]] = []
+        self._components = 1
 
-
-class _Given(Response):
-    """Base of laws that give the force."""
-
-    _part, _sign = "supplied", -1.0
-
-    def _prepare(self, law: Any) -> None:
-        self._end, self._reached = np.zeros((2, len(self._links)))  # of this step, of the last one
-
-    def _wanted(self, callbacks: Callbacks) -> Any:
-        """Return ``time_function`` of loops.h of the forces."""
-        actuators = zip(self._laws, self._links, strict=True)
-        return callbacks.of_time([(law.force, link) for law, link in actuators])
-
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
-        ends = {"end": self._end, "reached": self._reached}
-        return {"wanted_force": self._wanted(callbacks), **ends, **super().in_steps(callbacks)}
-
-    def state(self) -> Array:
-        """The forces at the end of the last step."""
-        return self._reached[:, None]
-
-    def restore(self, rows: Array) -> None:
-        self._reached[:] = rows[:, 0]
-
-
-@respond.register(Actuator)
-class _Pushed(_Given):
-    """Actuators: the force is a function of time."""
-
-    _entry = "loads"
-
-
-@respond.register(Controller)
-class _Controlled(_Given):
-    """Controllers: the force is the one that they returned when the step began."""
-
-    _entry = "controllers"
-
-    def _wanted(self, callbacks: Callbacks) -> Any:
-        self._always = np.zeros(1)
-        wanted = ffi.new("time_function[]", len(self._links))
-        for place, link in zip(wanted, self._links, strict=True):
-            place.points, place.t, place.y = 1, doubles(self._always), self._setting.asked(link)
-        return wanted
-
-
-@respond.register(Damper)
-class _Damped(Response):
-    """Dampers: the force is viscosity times the mean rate."""
-
-    _entry = "damping"
-
-    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
-        return {"viscosity": self._numbers("viscosity"), **super().in_steps(callbacks)}
-
-
-class Rubbing(Response):
-    """Connectors that stick (0), or slip one way or the other (-1, 1)."""
+    def _enter(self, **entries: tuple[Account, str]) -> None:
+        """Make entries of the ledger; C knows their places by these names."""
+        self._entries.update(entries)
+        for account, name in entries.values():
+            account[name] += 0.0
 
     def _rub(self, limits: list[Any], **of_laws: Any) -> None:
-        """Make the struct of C; ``limits`` are addresses of the limits of the forces."""
+        """Let connectors stick or slip; ``limits`` are addresses of the limits of the forces."""
         n, setting = len(self._links), self._setting
+        # The way that each slips, or 0, in the step and in the accepted state
         self._slip, self._accepted, way, creep = np.zeros((4, n))
-        self._sticks, against = np.zeros((2, n), dtype=np.int32)
+        self.sticks, against = np.zeros((2, n), dtype=np.int32)
         softness = CREEP if setting.friction_repeats else 0.0
-        self._friction = struct(
+        friction = self.in_c["friction"] = struct(
             "friction", number=n, limit=ffi.new("double *[]", limits), slip=self._slip,
-            accepted=self._accepted, way=way, creep=creep, softness=softness * self._lengths(),
-            tiny=1e-14 * self._lengths(), sticks=self._sticks, against=against,
+            accepted=self._accepted, way=way, creep=creep, softness=softness * self._lengths,
+            tiny=1e-14 * self._lengths, sticks=self.sticks, against=against,
             switched=setting.search.switched, force=np.zeros(n), rows=np.zeros((n, 3)), **of_laws,
         )  # fmt: skip
         if self.opens:
             search, free = setting.search.flags, np.zeros(n, dtype=np.int32)
-            fill(self._friction, search=search, free=free, excess=np.zeros(n))
+            fill(friction, search=search, free=free, excess=np.zeros(n))
         if setting.rates is not None:
-            fill(self._friction, rates=setting.rates.c)
-        self.in_c = {**self.in_c, "friction": self._friction}
+            fill(friction, rates=setting.rates)
+        self._variables.insert(0, self._accepted)
+
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
+        """Return fields of ``coupling_term`` and of its ``inelastic_term``, see loops.h."""
+        places = {field: account.pointer(name) for field, (account, name) in self._entries.items()}
+        of_time = {field: callbacks.of_time(some) for field, some in self._of_time.items()}
+        return {**self._in_steps, **of_time, **places}
 
     def know(self, couplings: Any) -> None:
-        """Take the rates of the motions."""
-        rate, v = couplings.rate_of_motion, couplings.velocities
-        fill(self._friction, rate=rate.cells, at_v=rate.position(v))
+        """Take arrays of the connectors, and forms on them, that the laws need."""
+        if self.sticks is not None:
+            rate, v = couplings.rate_of_motion, couplings.forms.u
+            fill(self.in_c["friction"], rate=rate.cells, at_v=rate.position(v))
 
-    def about_force(self, rows: Array) -> Array:
-        """Zero for what sticks."""
-        return np.where(self._sticks != 0, 0.0, 1.0)
+    def take(self, e1: Array) -> None:
+        """Take the end of a step at the motions ``e1``, before C does; this may raise."""
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Energy dissipated plastically in a step to the motions ``e1``; J."""
+        return 0.0
+
+    def require_dissipation(self, e1: Array) -> None:
+        """Raise :class:`StepFailed` if a law gives energy in a step to the motions ``e1``."""
+
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        return np.where(self.way == 0, 1.0, 0.0)
+
+    def bends(self, e1: Array) -> Array:
+        """Derivatives of α by the motions, internal variables kept; (num_connectors, n)."""
+        return np.zeros((len(self._links), 1))
 
     def state(self) -> Array:
-        """Which way each slips, and what else the law remembers."""
-        return np.column_stack([self._accepted, super().state()])
+        """Return the internal variables; (num_links, k)."""
+        rows = np.zeros((len(self._links) // self._components, len(self._variables)))
+        for column, values in zip(rows.T, self._variables, strict=True):
+            column[:] = values
+        return np.repeat(rows, self._components, axis=0)
 
     def restore(self, rows: Array) -> None:
-        """Take over a :meth:`state`."""
-        self._slip[:] = self._accepted[:] = rows[:, 0]
-        super().restore(rows[:, 1:])
+        """Take over the internal variables of :meth:`state`."""
+        for mine, values in zip(self._variables, rows[:: self._components].T, strict=True):
+            mine[:] = values
+        if self.sticks is not None:
+            self._slip[:] = self._accepted
+
+    def start(self, e: Array) -> None:
+        """Begin at motions that no step has led to."""
+
+    def borne(self) -> Array | None:
+        """Forces of springs in the state that :meth:`start` has begun at; (num_links,)."""
+        return None
+
+    def freeze(self) -> None:
+        """Keep everything elastic from now on: nothing yields or breaks further."""
 
 
-@respond.register(Coulomb)
-class _DryFriction(Rubbing):
-    """Dry friction, whose limits controllers may set."""
+# -- laws that give a motion or a force ------------------------------------------------------------
 
-    _entry, name_in_files = "friction", "_Rubbing"
+GIVEN = {
+    Motor: ("_Driven", "supplied", "motors", -1.0),
+    Actuator: ("_Pushed", "supplied", "loads", -1.0),
+    Controller: ("_Controlled", "supplied", "controllers", -1.0),
+    Damper: ("_Damped", "lost", "damping", 1.0),
+    Coulomb: ("_Rubbing", "lost", "friction", 1.0),
+}
+"""Name in files, part and entry of the ledger where the work of the forces is, and its sign."""
 
-    def _prepare(self, law: Any) -> None:
-        self._rub([self._setting.asked(link) for link in self._links])
+
+class GivenLaws(Response):
+    """Laws that give the motion or the force, or its limit: motors, dampers, dry friction, ...
+
+    Joints and guides hold a motion, without work.
+    """
+
+    def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
+        held = law is HELD or isinstance(law, Guide)
+        name, part, entry, sign = ("_Held", "", "", 0.0) if held else GIVEN[type(law)]
+        super().__init__(links, setting, name)
+        if not held:
+            self._enter(entry=(getattr(setting.ledger, part), entry))
+            self._in_steps["sign"] = sign
+        both = list(zip(self._laws, links, strict=True))
+        if isinstance(law, Motor) and not held:
+            self._of_time["wanted_motion"] = [(one.motion, link) for one, link in both]
+        elif isinstance(law, Damper):
+            self._in_steps["viscosity"] = np.array([one.viscosity for one in self._laws])
+        elif isinstance(law, Coulomb):
+            self._rub([setting.asked(link) for link in links])
+        elif isinstance(law, Actuator | Controller):
+            # The forces at the end of this step, and at that of the last one
+            end, reached = np.zeros((2, len(links)))
+            self._in_steps.update(end=end, reached=reached)
+            self._variables = [reached]
+            if isinstance(law, Actuator):
+                self._of_time["wanted_force"] = [(one.force, link) for one, link in both]
+            else:  # what controllers returned when the step began
+                self._always = np.zeros(1)
+                wanted = ffi.new("time_function[]", len(links))
+                for place, link in zip(wanted, links, strict=True):
+                    place.points, place.t, place.y = 1, doubles(self._always), setting.asked(link)
+                self._in_steps["wanted_force"] = wanted
+
+
+# -- springs ---------------------------------------------------------------------------------------
+
+
+class Springs(Response):
+    """Springs of one law, which may yield and break: points whose strain is the motion."""
+
+    def __init__(self, law: Spring, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links, setting, "_Sprung")
+        softening, number = law.softening, len(links)
+        layout = Layout(
+            strains=np.array([[1.0, 0.0, 0.0]]),
+            weights=np.ones(1),
+            stiffness=np.array([law.stiffness]),
+            laws=((law.law or Hardening(limit=np.inf), 1),),
+            rest=np.zeros(3),
+            softening=softening if softening is not None and softening.opens else None,
+            breaking=slice(0, None),
+        )
+        keys = [(0, i) for i in range(number)]
+        self.points = Points(layout, keys, np.ones(number), setting.scheme, setting.search)
+        expect_entries(layout, setting.scheme, setting.ledger)
+        self._strains = np.zeros((number, 3))
+        self.must_dissipate = layout.kind.law.must_dissipate
+        self.in_c, self.opens = {"points": self.points.c}, self.points.softens
+        self.dissipated = self.points.kept[:, 4], self.points.kept[:, 5]
+
+    def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
+        """Fields of ``inelastic_term``."""
+        return self.points.in_steps(self._setting.ledger)
+
+    def _at(self, e: Array) -> Array:
+        self._strains[:, 0] = e
+        return self._strains
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Energy that yields or breaks springs in a step to the motions ``e1``; J."""
+        self.points.respond(self._at(e1))
+        return self.points.dissipation()
+
+    def require_dissipation(self, e1: Array) -> None:
+        """Raise :class:`StepFailed` if a law gives energy in a step to the motions ``e1``."""
+        self.points.respond(self._at(e1))
+        self.points.require_dissipation(lambda number: str(self._links[number]))
+
+    def remaining(self) -> Array:
+        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
+
+    def state(self) -> Array:
+        """Internal variables of the points."""
+        return self.points.state()
+
+    def restore(self, rows: Array) -> None:
+        """Take over the variables of :meth:`state`."""
+        self.points.restore(rows)
+
+    def start(self, e: Array) -> None:
+        """Begin at motions that no step has led to."""
+        self.points.start(self._at(e))
+        self.points.refresh(self._at(e))
+
+    def borne(self) -> Array | None:
+        """Forces of the springs."""
+        return self.points.kept[:, 0]
+
+    def freeze(self) -> None:
+        """Keep springs elastic from now on."""
+        self.points.freeze()
+
+
+# -- rigid-plastic laws ---------------------------------------------------------------------------
+
+INPUTS = (*names("slip_input", "slip_"), "θ", "dt")
+"""First inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated
+slip and motion at t_n, which loops.h names as well; numbers of the scheme.  Then come those of the
+law."""
+
+
+class SlipForms:
+    """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
+
+    def __init__(self, law: SofteningLaw | Hardening, scheme: Scheme) -> None:
+        self._pointwise = pointwise = Pointwise((*INPUTS, *numbers(law)))
+        at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
+        with traced(law):
+            end = slip(law, at, scheme)._asdict()
+            force = end.pop("force")
+            slope = ufl.diff(force, at["slip"])
+        self._response = force, slope
+        self.force = pointwise.compile(*self._response)
+        self.end = pointwise.compile(*in_order("slip_output", end, "slip_"))
+
+    @cached_property
+    def spent(self) -> Any:
+        """Force and its derivative next to nothing."""
+        return self._pointwise.compile(*(NOTHING * x for x in self._response))
+
+
+_slip_forms = stated(SlipForms)
+
+
+EARLY = 0.01
+"""Motion, in rad or as a part of the scene, that counts as much as the limit in deciding whether a
+connector slips in an iterate; solutions do not depend on it."""
+
+
+WEAK = 1e-9
+"""Factor of motions at least, as a part of EI of the member over the size of the scene."""
+
+
+def _slope(link: Connector, size: float) -> float:
+    """Factor of motions beside forces in the equation of a connector, see rigid_plastic.c.
+
+    It is above the steepest softening, so that an open branch is found open; and so large that
+    motions, not the round-off of forces, say in which direction a weak hinge slips.
+    """
+    law = law_of(link)
+    if not 0.0 < law.limit < np.inf:
+        return 1.0
+    steepest, _ = law.steepest
+    early = law.limit / (EARLY * (1.0 if link.turns else size))
+    least = WEAK * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
+    return float(max(early, least)) + (2 * steepest if steepest < np.inf else 0.0)
+
+
+class RigidPlasticLaws(Response):
+    """Rigid-plastic connectors whose laws are of one kind; see rigid_plastic.c.
+
+    A connector is held exactly until its force reaches the limit of its law.  Then the force is
+    that of the law, a function of the slip that grows in the step.
+    """
+
+    opens = True
+
+    def __init__(self, law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links, setting, "CompiledSlips")
+        n, ledger, scheme = len(links), setting.ledger, setting.scheme
+        self._enter(hinges=(ledger.lost, "hinges"))
+        self._hardens = isinstance(law.law, Hardening)
+        loss = 2 * scheme.alpha if self._hardens else 0.0
+        if self._hardens:
+            self._enter(hardening=(ledger.state, "hardening"))
+        if loss:
+            self._enter(numerical=(ledger.lost, "numerical"))
+        inputs = (*INPUTS, *numbers(law.law))
+        self._storage = np.zeros((n, len(inputs)))
+        self._at = {name: self._storage[:, i] for i, name in enumerate(inputs)}
+        for i, link in enumerate(links):
+            for name, value in numbers(law_of(link)).items():
+                self._at[name][i] = value
+        self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
+        self._limit = self._at["number limit"].copy()
+        back_force, dissipated, excess = np.zeros((3, n))
+        self._slipped, self.way, self._way_before = np.zeros((3, n), dtype=np.int32)
+        self._stored = np.zeros(1)  # of all together; to whom it belongs does not matter
+        at = self._at["slipped"], self._at["start"]
+        self._variables = [*at, self._limit, back_force, dissipated, self._way_before]
+        # Motions without the round-off of those that are held
+        self.motion, self.dissipated = self._at["start"], (dissipated,)
+
+        kind = Hardening(1.0) if isinstance(law.law, Hardening) else law.law.kind()
+        self._forms = _slip_forms(kind, scheme)
+        self._c = struct(
+            "rigid_plastic", number=n, width=len(inputs), w=self._storage,
+            force=self._forms.force, end=self._forms.end, search=setting.search.flags,
+            limit=self._limit, back_force=back_force, dissipated=dissipated,
+            slope=np.array([_slope(link, setting.size) for link in links]), excess=excess,
+            slipped=self._slipped, way=self.way, rows=np.zeros((n, 3)),
+        )  # fmt: skip
+        self.in_c = {"rigid_plastic": self._c}
+        self._in_steps = {
+            "dt_of_law": INPUTS.index("dt"), "way_before": self._way_before,
+            "hardened": self._stored, "loss": loss,
+        }  # fmt: skip
+
+    def dissipation(self, e1: Array, λ: Array) -> float:
+        """Energy dissipated in a step to the motions ``e1``, positive where one would slip; J."""
+        arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
+        return float(lib.dissipation_of_rigid_plastic(self._c, *arrays))
+
+    def state(self) -> Array:
+        """Internal variables; (num_links, 7)."""
+        stored = np.zeros(len(self._links))
+        stored[:1] = self._stored
+        return np.column_stack([super().state(), stored])
+
+    def restore(self, rows: Array) -> None:
+        """Take over the variables of :meth:`state`."""
+        super().restore(rows[:, :-1])
+        self._slipped[:] = np.abs(self._way_before)
+        self._stored[0] = rows[:, -1].sum()
+
+    def start(self, e: Array) -> None:
+        """Begin at motions that no step has led to."""
+        self._at["start"][:] = e
+
+    def freeze(self) -> None:
+        """Hold from now on, but for connectors that bear nothing any more: these are free."""
+        spent = self._limit <= SPENT * self._at["number limit"]
+        self._limit[:] = np.where(spent, 0.0, np.inf)
+        if not self._hardens:
+            self._c.force = self._forms.spent

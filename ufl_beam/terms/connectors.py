@@ -1,8 +1,13 @@
 # SPDX-License-Identifier: MIT
-"""The virtual work of connectors: the force of a law on the variation of a relative motion."""
+"""The virtual work of connectors: the force of a law on the variation of a relative motion.
+
+Guides hold a point on a curve of the plane, free along it.
+"""
 
 from __future__ import annotations
 
+from abc import abstractmethod
+from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -10,25 +15,96 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, integers, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.dolfinx_compat import fem, line_mesh
+from ufl_beam.dolfinx_compat import line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
+from ufl_beam.errors import NoNumber
 from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
 from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.connector_laws import HELD, ForceLaw, Law, RigidPlastic, Spring
+from ufl_beam.model.connector_laws import HELD, ForceLaw, Guide, Law, RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector
-from ufl_beam.terms import compiled_laws, connector_laws, force_laws, rigid_plastic, springs
-from ufl_beam.terms.connector_responses import Setting, respond
-from ufl_beam.terms.links import Links
-from ufl_beam.terms.phases import Callbacks, Phases, beginning
+from ufl_beam.model.curves import REACH, parameter_step
+from ufl_beam.terms.base import Callbacks, Phases, Term, beginning
+from ufl_beam.terms.connector_laws import GivenLaws, Response, RigidPlasticLaws, Setting, Springs
+from ufl_beam.terms.force_laws import AskedLaws, CompiledLaws
 
-LAWS = (compiled_laws, connector_laws, force_laws, rigid_plastic, springs)
-"""Modules with the responses of laws, which register them with :func:`respond`."""
+
+def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
+    """Make the response of connectors whose laws are of the kind of ``law``."""
+    if isinstance(law, ConnectorLaw):
+        return CompiledLaws(law, links, setting)
+    kinds: dict[type, Any] = {Spring: Springs, RigidPlastic: RigidPlasticLaws, ForceLaw: AskedLaws}
+    made: Response = kinds.get(type(law), GivenLaws)(law, links, setting)
+    return made
+
+
+class Links(Term):
+    """Connectors that are alike; each has a force among the unknowns.
+
+    Attributes:
+        numbers: Of the connectors in the scene's links.
+        forces_at: Local degrees of freedom that are the forces; (num_links,).
+        response: What their law makes of motions and forces.
+        rate: Mean rate of the motions in the last step; (num_links,); m/s or rad/s.
+        kept: Numbers of the accepted state that are added to fields of ``Connection``, all but the
+            forces; (num_links,) each.  Later steps change them.
+    """
+
+    kind = "connectors"
+
+    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
+        self.numbers: Index = share.links[here]
+        self.links: list[Connector] = [share.grid.scene.links[i] for i in self.numbers]
+        self._dofs = share.link_dofs[here].astype(np.int32)
+        self.forces_at: Index = self._dofs[:, 6]
+        self._A = A
+        self._callbacks: Callbacks  # from when the phases are made
+        self.response = response = respond(self.links[0].law, self.links, setting)
+        self.must_dissipate = response.must_dissipate
+        # Motions and forces of the accepted state, and works since the beginning (J)
+        self._e, self._before, self._work, self.rate = np.zeros((4, len(self.links)))
+        motion = self._e if response.motion is None else response.motion
+        self.kept = [("motion", motion), ("work", self._work), ("rate", self.rate)]
+        self.kept += [("dissipated", energy) for energy in response.dissipated]
+
+    @abstractmethod
+    def motion(self, q: Array) -> Array:
+        """Relative motions at ``q``; (num_links,); m or rad."""
+
+    def add_residual(self, q1: Array, r: Array) -> None:
+        """Add forces and rows of laws, and raise what functions of a user raise."""
+        with self._callbacks.raising():
+            super().add_residual(q1, r)
+
+    def add_tangent(self, q1: Array) -> None:
+        """Add their derivatives, and raise what functions of a user raise."""
+        with self._callbacks.raising():
+            super().add_tangent(q1)
+
+    def put_motions(self, q: Array, v: Array, works: Array) -> None:
+        """Put what laws of forces work on in the step ``v`` from ``q`` in the place of forces."""
+
+    def take(self, q: Array) -> None:
+        """Take the forces in ``q`` as those before the next step."""
+        self._before[:] = q[self.forces_at]
+
+    def put_forces(self, q: Array) -> None:
+        """Put the forces that springs bear in the undeformed scene into its configuration."""
+        if (borne := self.response.borne()) is not None:
+            q[self.forces_at] = self._before[:] = borne
+
+    def require_dissipation(self, q1: Array) -> None:
+        """Raise :class:`StepFailed` if a law gives energy in the step to ``q1``."""
+        self.response.require_dissipation(self.motion(q1))
+
+    def dissipation(self, q1: Array) -> float:
+        """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
+        return self.response.dissipation(self.motion(q1), q1[self.forces_at])
 
 
 def _motions_with(link: Connector) -> tuple[str, ...]:
@@ -60,6 +136,10 @@ class Couplings(Links):
     Each is a cell of unit length from one node to the other, with its forces as unknowns after
     those of the nodes.  Components of a :func:`Bushing` are links that stand one after the other.
     Forms, and laws of many kinds, are evaluated in C.
+
+    Attributes:
+        forms: Forms of a connector, and the functions in them.
+        motions: Motions in the accepted state and in the latest iterate, as C has them.
     """
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
@@ -68,54 +148,41 @@ class Couplings(Links):
         motions = _motions_with(links[0])
         k, n = len(motions), len(links)
         self._cells = n // k
-        self._dofs = np.column_stack([self._dofs[::k, :6], self._forces_at.reshape(-1, k)])
-        self._forms = forms = connector_forms(motions, scheme, _one_cell())
+        self._dofs = np.column_stack([self._dofs[::k, :6], self.forces_at.reshape(-1, k)])
+        self.forms = forms = connector_forms(motions, scheme, _one_cell())
         numbers = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links]
         self._numbers = np.reshape(numbers, (self._cells, 8 * k))
-        self._work, self._tangent, self._value = map(
-            self._form, (forms.work, forms.tangent, forms.motion)
-        )
-        self._tangent.place(A)
-        self._e, self._now, self._rows = np.zeros(n), np.zeros(n), np.zeros((n, k + 2))
+        of_step = forms.work, forms.tangent, forms.motion
+        work, tangent, value = (self._form(one) for one in of_step)
+        tangent.place(A)
+        self._of_step = work, tangent
+        self._now, self._rows = np.zeros(n), np.zeros((n, k + 2))
+        self.motions = self._e, self._now
         self._rows[:, 0] = 1.0  # held, until a law says something else
-        for kernel in (self._work, self._tangent):
+        for kernel in self._of_step:
             kernel.put(forms.row, self._rows.reshape(self._cells, -1))
         self._in_c = struct(
             "couplings", number=self._cells, components=k,
             link=np.arange(self._cells, dtype=np.int32), dofs=self._dofs,
-            force=self._forces_at.copy(), size=setting.size,
+            force=self.forces_at.copy(), size=setting.size,
             length=np.where([c.turns for c in links], 1.0, setting.size),
-            work=self._work.cells, tangent=self._tangent.cells, motion=self._value.cells,
-            row=self._work.position(forms.row), row_of_tangent=self._tangent.position(forms.row),
+            work=work.cells, tangent=tangent.cells, motion=value.cells,
+            row=work.position(forms.row), row_of_tangent=tangent.position(forms.row),
             by_cell=np.zeros(n), e0=self._e, e1=self._now, before=self._before,
-            taken=self.work, rate=self.rate, weight_of_before=scheme.weight_of_before,
+            taken=self._work, rate=self.rate, weight_of_before=scheme.weight_of_before,
             **self.response.in_c,
         )  # fmt: skip
+        self.loops = loop("add_couplings_force", self._in_c), loop("add_cells", tangent.cells)
+        self.demand = loop("missed_by_couplings", self._in_c)
         self.response.know(self)
 
     def _form(self, form: ufl.Form) -> Kernel:
         """A form on the connectors, with their numbers."""
         unit = np.tile([[0.0, 0.0], [1.0, 0.0]], (self._cells, 1, 1))
-        kernel = Kernel(form, self._forms.q1, self._dofs, unit)
-        if kernel.uses(self._forms.numbers):
-            kernel.put(self._forms.numbers, self._numbers)
+        kernel = Kernel(form, self.forms.q1, self._dofs, unit)
+        if kernel.uses(self.forms.numbers):
+            kernel.put(self.forms.numbers, self._numbers)
         return kernel
-
-    @property
-    def velocities(self) -> fem.Function:
-        """Function of :attr:`rate_of_motion` that has the velocities."""
-        return self._forms.u
-
-    @property
-    def motions(self) -> tuple[Array, Array]:
-        """Motions in the accepted state and in the latest iterate, as C has them."""
-        return self._e, self._now
-
-    # -- in C ----------------------------------------------------------------------------------
-
-    def loops(self) -> tuple[Loop, Loop | None]:
-        """C loops of forces and rows, and of their derivatives."""
-        return loop("add_couplings_force", self._in_c), loop("add_cells", self._tangent.cells)
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the connectors; where laws of a user have a history, they are asked, too."""
@@ -126,13 +193,19 @@ class Couplings(Links):
         points = struct("inelastic_term", **{k: x for k, x in of_law.items() if k not in fields})
         c = struct("coupling_term", links=self._in_c, points=points, **mine)
 
-        begin = beginning((self._work, self._tangent), self._forms.q0)
+        begin = beginning(self._of_step, self.forms.q0)
         phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")
         first, accept, state = ([loop(name, c)] for name in phases)
         admits = loop("springs_dissipate", c) if response.must_dissipate else None
         change, opens, again = loop("change_of_couplings", c), None, None
         if response.asks_at_ends:
-            accept.insert(0, callbacks.phase(self._ask_at_end))
+
+            def ask(step: Any, q1: Any, s: Any) -> None:
+                """Let laws of a user take the end of a step, before anything is accepted."""
+                lib.find_motions(self._in_c, q1)
+                response.take(self._now)
+
+            accept.insert(0, callbacks.phase(ask))
         if response.opens:
             names, of = ("points", "slips", "rubs", "way_before"), response.in_c
             found = {**of, "slips": of.get("rigid_plastic"), "rubs": of.get("friction"), **of_law}
@@ -142,15 +215,6 @@ class Couplings(Links):
         if response.in_c.keys() & {"rigid_plastic", "friction", "asked"}:
             again = loop("begin_couplings_again", c)
         return Phases([*begin, *first], accept, state, change, opens, admits, again)
-
-    def demand(self) -> Loop:
-        """The loop that says how much an iterate misses of the laws."""
-        return loop("missed_by_couplings", self._in_c)
-
-    def _ask_at_end(self, step: Any, q1: Any, s: Any) -> None:
-        """Let laws of a user take the end of a step, before anything is accepted."""
-        lib.find_motions(self._in_c, q1)
-        self.response.take(self._now)
 
     # -- the step ------------------------------------------------------------------------------
 
@@ -162,46 +226,42 @@ class Couplings(Links):
     @cached_property
     def rate_of_motion(self) -> Kernel:
         """The rates of the motions; friction asks for them."""
-        return self._form(self._forms.rate)
-
-    def rates(self, q: Array, v: Array) -> Array:
-        """Rates of the motions at ``q`` if the velocities are ``v``; (num_links,); m/s or rad/s."""
-        rates = np.zeros(len(self.links))
-        self.rate_of_motion.set(self._forms.u, v)
-        self.rate_of_motion.add(q, rates)
-        return rates
+        return self._form(self.forms.rate)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Put minus the change of the motions where the row is about the force."""
-        about_force = self.response.about_force(self.rows(q))
+        of_force = self.rows(q)[:, -2]
+        about_force = of_force != 0.0
+        factors = np.divide(-1.0, of_force, out=np.zeros(len(of_force)), where=about_force)
+        if self.response.sticks is not None:
+            about_force = self.response.sticks == 0
+            factors = np.where(about_force, -1.0, 0.0)
         if about_force.any():
-            works[self._forces_at] = np.where(
-                about_force != 0.0, -about_force * self.rates(q, v), works[self._forces_at]
-            )
+            rates = np.zeros(len(self.links))
+            self.rate_of_motion.set(self.forms.u, v)
+            self.rate_of_motion.add(q, rates)
+            at = self.forces_at
+            works[at] = np.where(about_force, factors * rates, works[at])
 
     def rows(self, q: Array) -> Array:
         """Rows of the laws around ``q``; (num_links, k + 2) with k components."""
         lib.find_rows(self._in_c, doubles(q), doubles(self._rows))
         return self._rows
 
-    def _kept_motion(self, q: Array) -> Array:
-        """Motions of the accepted state as solutions show them."""
-        return self.response.motion(self._e)
-
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         change, e = self._tangent_change, self.motion(q1)
         both = self.rows(q1), self.response.bends(e)
         rows, bends = (np.reshape(x, (self._cells, -1)) for x in both)
-        for function, values in ((self._forms.row, rows), (self._forms.bend, bends)):
+        for function, values in ((self.forms.row, rows), (self.forms.bend, bends)):
             if change.uses(function):
                 change.put(function, values)
-        change.set(self._forms.u, u)
+        change.set(self.forms.u, u)
         change.add(q1, self._A.data)
 
     @cached_property
     def _tangent_change(self) -> Kernel:
-        change = self._form(self._forms.change)
+        change = self._form(self.forms.change)
         change.place(self._A)
         return change
 
@@ -215,15 +275,93 @@ class Couplings(Links):
     def remember(self, memory: Memory, q: Array) -> None:
         """Motions, forces and works, and what the laws remember."""
         response = self.response
-        rows = np.column_stack([self.work, self.rate, self._before, self._e, response.state()])
-        name = response.name_in_files or type(response).__name__
-        rows = memory.rows(name, self.numbers, rows)
-        self.work[:], self.rate[:], self._before[:], self._e[:] = rows[:, :4].T
+        rows = np.column_stack([self._work, self.rate, self._before, self._e, response.state()])
+        rows = memory.rows(response.name, self.numbers, rows)
+        self._work[:], self.rate[:], self._before[:], self._e[:] = rows[:, :4].T
         response.restore(rows[:, 4:])
 
 
+class Guides(Links):
+    """Forces across curves; those over a step are across the chord, so that they do no work.
+
+    The last digits of the curve spoil the direction of a short chord.  Where it is so short that
+    they spoil more than the curvature does, the direction in its middle takes its place: either
+    errs by the last digits to the power of two thirds at most.
+
+    The motion of a guide is the distance from its curve, zero when a step is accepted.  All is
+    computed in guide_curves.c, which asks Python for points of the curves.
+    """
+
+    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
+        super().__init__(share, here, setting, A)
+        n, size = len(self.links), setting.size
+        self._curves = [link.law.curve for link in self.links if isinstance(link.law, Guide)]
+        x, y, λ = self._x, self._y, _ = [self._dofs[:, k] for k in (1, 3, 6)]
+        pairs = (x, x), (x, y), (y, x), (y, y), (x, λ), (y, λ), (λ, x), (λ, y)
+        points = np.array([link.b.point for link in self.links], dtype=np.float64)
+        last_digit = np.spacing(size + np.abs(points).max(axis=1))
+        self._s, self._s0 = np.zeros((2, n))
+        self._steps = np.array([parameter_step(curve, 0.0, size) for curve in self._curves])
+        self._on0, self._size = points.copy(), size
+        self._c = struct(
+            "guides", number=n, over_step=setting.scheme.average(0.0, 1.0) != 1.0,
+            dofs=self._dofs, entries=np.column_stack([A.positions(*pair) for pair in pairs]),
+            point=points, size=size, reach=REACH,
+            shortest=size * (24 * last_digit / size) ** (1 / 3),
+            distance=self._e, s0=self._s0, s=self._s, step=self._steps, on0=self._on0,
+            frame=ffi.new("guide_frame[]", n), around=ffi.new("curve_around[]", n),
+        )  # fmt: skip
+        lib.begin_guides_again(self._c)
+        self.loops = loop("add_guides_force", self._c), loop("add_guides_tangent", self._c)
+        self.demand = loop("missed_by_guides", self._c)
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops that begin at the points of the last step, and remember those at its end."""
+        self._callbacks = callbacks
+        curves = [callbacks.handle(curve, 2 * lib.CURVE_POINTS) for curve in self._curves]
+        fill(self._c, ask=lib.curve_in_python, curve=ffi.new("void *[]", curves))
+        self._c.report, self._c.handle = lib.run_in_python, callbacks.handle(self._report)
+        begin, accept = (loop(name, self._c) for name in ("begin_guides", "accept_guides"))
+        return Phases([begin], [accept], again=loop("begin_guides_again", self._c))
+
+    def _report(self) -> None:
+        place = self.links[self._c.lost].b
+        raise NoNumber(f"{place} is where no nearest point of its guide curve was found")
+
+    def motion(self, q: Array) -> Array:
+        """Distances from the curves; m."""
+        lib.begin_guides_again(self._c)
+        with self._callbacks.raising():
+            lib.find_frames(self._c, doubles(q))
+        return np.array([self._c.frame[k].distance for k in range(len(self.links))])
+
+    def add_tangent_change(self, q1: Array, u: Array) -> None:
+        """Add the derivative of the tangent at ``q1`` along ``u``.
+
+        Only Python knows the curves, so it is a difference of fourth order, over a hundredth of
+        the scene: curvatures are known to 1e-8, which leaves 1e-6.
+        """
+        way = np.abs(u[np.r_[self._x, self._y]]).max(initial=0.0)
+        ε = 1e-2 * self._size / way if way > 0 else 1.0
+        data = self._A.data
+        before, change = data.copy(), np.zeros_like(data)
+        for k, weight in ((-2, 1), (-1, -8), (1, 8), (2, -1)):
+            data.fill(0.0)
+            self.add_tangent(q1 + k * ε * u)
+            change += weight / (12 * ε) * data
+        data[:] = before + change
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The points on the curves, their parameters, and the steps of these for tangents."""
+        numbers = (self._e, self._s, self._s0, self._steps)
+        rows = memory.rows("guides", self.numbers, np.column_stack([*numbers, self._on0]))
+        for mine, column in zip(numbers, rows.T, strict=False):
+            mine[:] = column
+        self._on0[:] = rows[:, 4:]
+
+
 def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
-    """Make the connectors of a process but for guides, those that are alike together.
+    """Make the connectors of a process, those that are alike together, and its guides.
 
     Each process makes the entries of the ledger in the order of the scene, also those that only
     others write.
@@ -239,4 +377,6 @@ def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
             made.append(Couplings(share, np.array(groups[key]), setting, A))
         elif link.motion in MOTIONS:
             respond(link.law, (), setting)
+    if here := [i for i, number in enumerate(share.links) if isinstance(links[number].law, Guide)]:
+        made.append(Guides(share, np.array(here), setting, A))
     return made

@@ -1,21 +1,178 @@
 # SPDX-License-Identifier: MIT
-"""Force laws by functions of a user, with a history, and with any slope."""
+"""Laws of connectors that are stated: as energy and resistance, compiled to C, or as functions.
+
+Functions of a user give a force, with a history and with any slope; C asks Python for them.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 import scipy  # its parts are loaded when they are used
+import ufl
+from ufl.algorithms import expand_derivatives
+from ufl.constantvalue import Zero
+from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import fill, lib, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
+from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import NoNumber, SceneError, require_returned, shorten
+from ufl_beam.mechanics.connector_steps import law_step
+from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.connector_law import ConnectorLaw, place_of
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.force_laws import ForceLaw
-from ufl_beam.terms.connector_responses import Response, respond
-from ufl_beam.terms.phases import Callbacks
+from ufl_beam.model.material_law import State
+from ufl_beam.terms.base import Callbacks
+from ufl_beam.terms.connector_laws import Response, Setting
+
+# -- energy and resistance -------------------------------------------------------------------------
+
+
+def inputs(law: ConnectorLaw) -> tuple[str, ...]:
+    """Names of the inputs of a compiled law; loops.h explains their order."""
+    motions = (f"{when} {i}" for when in ("motion", "before") for i in range(law.components))
+    of_law = (*(f"state {name}" for name in law.variables), *(f"number {n}" for n in law.numbers()))
+    return (*motions, "dt", "theta", *of_law)
+
+
+class LawForms:
+    """Compiled law of a connector, for all numbers.
+
+    Attributes:
+        force: Forces and their derivatives by the motions at the end of the step.
+        end: ``law_output`` of loops.h, then the variables at the end.
+        limit: Force up to which the motion is held.
+    """
+
+    def __init__(self, law: ConnectorLaw, scheme: Scheme) -> None:
+        self._law, self._scheme, self._pointwise = law, scheme, Pointwise(inputs(law))
+        at, motions = self._pointwise.at, [f"motion {i}" for i in range(law.components)]
+        self._at = at | {name: ufl.variable(at[name]) for name in motions}
+        self._motions = [self._at[name] for name in motions]
+        try:
+            forces, *numbers, variables = law_step(law, self._at, scheme)
+            self.force = self._compile(*forces, *self._slopes(forces))
+            by_name = dict(zip(("stored", "numerical"), numbers, strict=True))
+            end = in_order("law_output", by_name, "law_")
+            self.end = self._compile(*end, *variables)
+            old = State({name: at[f"state {name}"] for name in law.variables})
+            numbers_of_law = {name: at[f"number {name}"] for name in law.numbers()}
+            self.limit = self._compile(ufl.as_ufl(law.of(numbers_of_law).limit(old)))
+        except Exception as error:
+            raise SceneError(
+                f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
+                f"written with + - * / ** and the functions of ub.law_functions{place_of(law)}"
+            ) from error
+
+    @cached_property
+    def frozen(self) -> tuple[Any, Any]:
+        """The same forces, and second derivatives, while the variables stay as they are."""
+        forces = law_step(self._law, self._at, self._scheme, frozen=True).forces
+        slopes = self._slopes(forces)
+        return self._compile(*forces, *slopes), self._compile(*self._slopes(slopes))
+
+    def _slopes(self, values: Sequence[Expr]) -> list[Expr]:
+        """Derivatives of each value by all motions."""
+        return [ufl.diff(value, motion) for value in values for motion in self._motions]
+
+    def _compile(self, *outputs: Expr) -> Any:
+        """Compile a function; none if all that it returns is zero."""
+        outputs = tuple(map(expand_derivatives, outputs))
+        zero = all(isinstance(one, Zero) for one in outputs)
+        return ffi.NULL if zero else self._pointwise.compile(*outputs)
+
+
+_law_forms = stated(LawForms)
+
+
+class CompiledLaws(Response):
+    """Connectors whose laws are of one class, with numbers of their own."""
+
+    def __init__(self, law: ConnectorLaw, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links, setting, f"{type(law).__qualname__}{[*law.variables]}")
+        scheme, ledger, k = setting.scheme, setting.ledger, law.components
+        n = len(links) // k
+        self._law, self._components, self.opens = law, k, law.holds
+        self._enter(stored=(ledger.state, "stored"))
+        if not law.elastic:
+            self._enter(lost=(ledger.lost, law.entry))
+        if scheme.weight_of_before == 0.0 and scheme.load_weight > 0.5:
+            self._enter(numerical=(ledger.lost, "numerical"))
+        columns = inputs(law)
+        w = self._w = np.zeros((n, len(columns)))
+        self._at = at = {name: w[:, k] for k, name in enumerate(columns)}
+        at["theta"][:], at["dt"][:] = scheme.theta, 1.0
+        for name, value in law.variables.items():
+            at[f"state {name}"][:] = value
+        for name in law.numbers():
+            at[f"number {name}"][:] = [getattr(one, name) for one in self._laws[::k]]
+        self._held, lost = np.zeros(n), np.zeros(n * k)  # what is lost, in the first component
+        self.dissipated = (lost,)
+        variables = [at[f"state {name}"] for name in law.variables]
+        self._variables = [*variables, self._held, lost[::k]]
+        self._forms = _law_forms(law.of(dict.fromkeys(law.numbers(), 1.0)), scheme)
+        outputs = int(lib.LAW_OUTPUTS) + len(law.variables)
+        self._c = struct(
+            "connector_laws", number=n, width=len(columns), variables=len(law.variables),
+            components=k, force=self._forms.force, end=self._forms.end, loses=not law.elastic, w=w,
+            stored=self._held, lost=lost, rows=np.zeros((n, k * (k + 2))),
+            answer=np.zeros(outputs), sum=np.zeros(2),
+        )  # fmt: skip
+        self.in_c = {"laws": self._c}
+        if law.holds:
+            self._limits = np.zeros(n)
+            places = [doubles(self._limits) + i for i in range(n)]
+            self._rub(places, laws=self._c, limit_of_law=self._forms.limit)
+
+    def bends(self, e1: Array) -> Array:
+        """Minus the second derivatives of the forces; variables stay.
+
+        Zero of laws that hold: what sticks has none, and what slides is followed in no analysis.
+        """
+        if self._law.holds:
+            return super().bends(e1)
+        k = self._components
+        self._w[:, :k] = e1.reshape(-1, k)
+        bends = np.zeros((len(self._w), k**3))
+        for w, of in zip(self._w, bends, strict=True):
+            lib.ask_law(self._forms.frozen[1], doubles(w), k**3, doubles(of))
+        return -bends
+
+    def _accepted_state(self) -> tuple[ConnectorLaw, list[Array], State]:
+        """The law with the numbers of all connectors, their motions, and their variables."""
+        law, at = self._law, self._at
+        numbers = law.of({name: at[f"number {name}"] for name in law.numbers()})
+        motions = [at[f"before {i}"] for i in range(law.components)]
+        return numbers, motions, State({name: at[f"state {name}"] for name in law.variables})
+
+    def start(self, e: Array) -> None:
+        """Begin at motions that no step has led to."""
+        k = self._components
+        self._w[:, k : 2 * k] = e.reshape(-1, k)
+        with np.errstate(all="ignore"):
+            law, motions, variables = self._accepted_state()
+            self._held[:] = law.energy(law.given(motions), variables)
+
+    def borne(self) -> Array | None:
+        """Forces of the energies where :meth:`start` has begun; nobody knows them if laws hold."""
+        if self._law.holds:
+            return None
+        law, motions, variables = self._accepted_state()
+        return np.column_stack(law.elastic_forces(motions, variables)).ravel()
+
+    def freeze(self) -> None:
+        """Keep the variables from now on, and let what sticks stick."""
+        if not self._law.holds:
+            fill(self._c, force=self._forms.frozen[0])
+
+
+# -- functions of a user ---------------------------------------------------------------------------
 
 MISSED = 0.5
 """Part of what the iterate before has missed of a law, from which on a step went too far."""
@@ -37,15 +194,24 @@ class Iterate(NamedTuple):
 
 
 class Asked:
-    """The functions of a law, of one connector in one step."""
+    """The functions of a law, of one connector in one step.
 
-    def __init__(self, link: Connector, law: ForceLaw, size: float, load_weight: float) -> None:
+    Attributes:
+        state: Internal variables of the accepted state; written to when a step is accepted.
+        last: The iterate before in this step; None in the first.
+        energy: The energy that can be had back, a function; None if the law states none.
+    """
+
+    def __init__(
+        self, link: Connector, law: ForceLaw, size: float, load_weight: float, state: Array
+    ) -> None:
         self._link, self._law, self._asked = link, law.force, law.asked
         self._small, self._weight = 1e-3 * size, load_weight
-        self._stored, self._asked_by_stored = law.stored, law.asked_by_stored
+        self.energy, self._asked_by_stored = law.stored, law.asked_by_stored
         self._e0, self._dt, self._known = 0.0, 1.0, dict[str, Any]()
-        self._last: Iterate | None = None
-        self.state: Array = np.array(law.state)
+        self.last: Iterate | None = None
+        self.state = state
+        state[:] = law.state
 
     def begin(self, e0: float, t: float, dt: float) -> None:
         """Begin a step at the motion ``e0``; the law acts at the time ``t``."""
@@ -53,23 +219,16 @@ class Asked:
         state = self.state.copy()
         state.flags.writeable = False  # iterates begin with the same one
         self._known = {"t": t, "dt": dt, "state": state}
-        self._last = None
-
-    def again(self) -> None:
-        """Forget the iterates of the step."""
-        self._last = None
+        self.last = None
 
     # -- the functions -------------------------------------------------------------------------
 
     def force(self, e1: float) -> float:
         """The force if the step ends at the motion ``e1``."""
-        return self._respond(e1)[0]
+        return self.end(e1)[0]
 
-    def after(self, e1: float) -> Array:
-        """The internal variables if the step ends at the motion ``e1``."""
-        return self._respond(e1)[1]
-
-    def _respond(self, e1: float) -> tuple[float, Array]:
+    def end(self, e1: float) -> tuple[float, Array]:
+        """The force and the internal variables if the step ends at the motion ``e1``."""
         motion = (1.0 - self._weight) * self._e0 + self._weight * e1
         rate, state = (e1 - self._e0) / self._dt, self.state
         if not self._asked:
@@ -98,16 +257,11 @@ class Asked:
             ) from None
         return force, state
 
-    @property
-    def stores(self) -> bool:
-        """True if the law states an energy."""
-        return self._stored is not None
-
     def stored(self, motion: float) -> float:
         """The energy that can be had back; J."""
-        if self._stored is None:
+        if self.energy is None:
             return 0.0
-        value = self._stored(motion, **dict.fromkeys(self._asked_by_stored, self.state.copy()))
+        value = self.energy(motion, **dict.fromkeys(self._asked_by_stored, self.state.copy()))
         t = f", t = {self._known['t']:.9g} s" if self._known else ""
         at = f"motion = {motion:.6g}{t}"
         return require_returned(value, f"{self._link}: the energy", at, finite=True)
@@ -116,13 +270,13 @@ class Asked:
 
     def line(self, e: float, λ: float) -> tuple[float, float]:
         """Slope and intercept of the law around an iterate."""
-        force, last = self.force(e), self._last
+        force, last = self.force(e), self.last
         missed, at = force - λ, e
         if last is not None and abs(missed) > MISSED * abs(last.missed) and e != last.e:
             at = self._meeting(e, λ, last)
             force = force if at == e else self.force(at)
         slope = self._slope(at, force)
-        self._last = Iterate(e, λ, missed, at)
+        self.last = Iterate(e, λ, missed, at)
         return slope, force - slope * at
 
     def _meeting(self, e: float, λ: float, last: Iterate) -> float:
@@ -149,7 +303,7 @@ class Asked:
         a part of the motion, or of that in the iterate before, if that leaves digits.
         """
         ε = DIFFERENCE * max(abs(e - self._e0), 1e-3 * max(abs(e), self._small))
-        near = DIFFERENCE * max(abs(e), 0.0 if self._last is None else abs(self._last.at))
+        near = DIFFERENCE * max(abs(e), 0.0 if self.last is None else abs(self.last.at))
         if 0.0 < near < ε:
             change = self.force(e + near) - self.force(e - near)
             if abs(change) > DIGITS * abs(force):
@@ -167,34 +321,32 @@ class Asked:
         return -sum(forces) / (12 * ε**2)
 
 
-@respond.register(ForceLaw)
 class AskedLaws(Response):
     """Forces that functions give; all laws have as many internal variables."""
 
-    _entry = "functions"
-
-    def _prepare(self, law: Any) -> None:
-        numbers = zip(self._links, self._laws, self._lengths(), strict=True)
-        self._each = [Asked(*each, self._setting.scheme.load_weight) for each in numbers]
-        n = len(self._links)
+    def __init__(self, law: ForceLaw, links: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(links, setting, "AskedLaws")
+        n, ledger = len(links), setting.ledger
+        self._work = ledger.lost, "functions"
+        self._enter(entry=self._work, stored=(ledger.state, "stored"))
+        self._in_steps["sign"] = 1.0
+        states, weight = np.zeros((n, len(law.state))), setting.scheme.load_weight
+        self._variables = list(states.T)
+        numbers = zip(links, self._laws, self._lengths, states, strict=True)
+        self._each = [Asked(link, one, size, weight, x) for link, one, size, x in numbers]
+        self.asks_at_ends = any(one.state.size or one.energy for one in self._each)
         self._held, self._force, self._rows = np.zeros(1), np.zeros(n), np.zeros((n, 3))
         self._rows[:, 1] = 1.0
         self._c = struct("asked_laws", force=self._force, rows=self._rows, held=self._held)
         self.in_c = {"asked": self._c}
-        self._setting.ledger.state["stored"] += 0.0
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
         """The functions, which C calls."""
-        handle = callbacks.handle
-        fill(
-            self._c, begin=lib.begin_in_python, find_rows=lib.run_in_python, again=lib.run_in_python
-        )
-        self._c.begin_self, self._c.rows_self = handle(self._begin), handle(self._find_rows)
-        self._c.again_self = handle(self._again)
-        return {
-            **super().in_steps(callbacks),
-            "stored": self._setting.ledger.state.pointer("stored"),
-        }
+        c, handle = self._c, callbacks.handle
+        fill(c, begin=lib.begin_in_python, find_rows=lib.run_in_python, again=lib.run_in_python)
+        c.begin_self, c.rows_self = handle(self._begin), handle(self._find_rows)
+        c.again_self = handle(self._again)
+        return super().in_steps(callbacks)
 
     def know(self, couplings: Any) -> None:
         """Take the arrays of motions in the accepted state and in the iterate."""
@@ -206,7 +358,7 @@ class AskedLaws(Response):
 
     def _again(self) -> None:
         for one in self._each:
-            one.again()
+            one.last = None
 
     def _find_rows(self) -> None:
         """Put the laws around the iterate into the rows of C."""
@@ -220,30 +372,21 @@ class AskedLaws(Response):
         """Derivatives of the slopes."""
         return np.array([one.bend(e1[i]) for i, one in enumerate(self._each)])
 
-    @property
-    def asks_at_ends(self) -> bool:
-        """True if something is to do when a step is accepted."""
-        return any(one.state.size or one.stores for one in self._each)
-
     def take(self, e1: Array) -> None:
         """Take the internal variables after a step to the motions, and enter what is stored."""
-        states = [one.after(float(x)) for one, x in zip(self._each, e1, strict=True)]
+        states = [one.end(float(x))[1] for one, x in zip(self._each, e1, strict=True)]
         before = float(self._held[0])
         for one, state in zip(self._each, states, strict=True):
-            one.state = state
+            one.state[:] = state
         self.start(e1)
-        self._entries[self._entry] -= float(self._held[0]) - before
+        account, entry = self._work
+        account[entry] -= float(self._held[0]) - before
 
     def start(self, e: Array) -> None:
         """Find the energy that is stored at these motions."""
         self._held[0] = sum([one.stored(float(x)) for one, x in zip(self._each, e, strict=True)])
 
-    def state(self) -> Array:
-        """Internal variables of the accepted state."""
-        return np.array([one.state for one in self._each])
-
     def restore(self, rows: Array) -> None:
         """Take over the internal variables of a :meth:`state`, at the accepted motions."""
-        for i, one in enumerate(self._each):
-            one.state = rows[i].copy()
+        super().restore(rows)
         self.start(self._e0)

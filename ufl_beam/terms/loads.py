@@ -29,10 +29,9 @@ from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
-from ufl_beam.model.time_functions import TimeFunction, value_at
-from ufl_beam.terms.base import InCells, Term
+from ufl_beam.model.time_functions import value_at
+from ufl_beam.terms.base import Callbacks, InCells, Phases, Term
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.phases import Callbacks, Phases
 
 
 class LoadTerm(Term):
@@ -44,9 +43,8 @@ class LoadTerm(Term):
 
     kind = "loads"
     vector: Any
-
-    def __init__(self, scheme: Scheme, ledger: Ledger) -> None:
-        self._scheme, self._ledger = scheme, ledger
+    _scheme: Scheme
+    _ledger: Ledger
 
     @abstractmethod
     def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
@@ -72,15 +70,12 @@ class _AtDofs(LoadTerm):
         """Make ``dofs`` of those that are not zero in ``loaded``, on any process, and forces."""
         # A process may own degrees of freedom that others load.
         self.dofs: Index = np.flatnonzero(share.added(loaded)).astype(np.int32)
-        self._size, self._owners = share.size, owners
+        self._size, self._in_time = share.size, [(load.time, load) for load in owners]
         self._forces = np.zeros((rows, len(self.dofs)))
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
 
-    def _in_time(self) -> list[tuple[TimeFunction, object]]:
-        return [(load.time, load) for load in self._owners]
-
     def _factors_at(self, t: float) -> Array:
-        return np.array([value_at(load.time, t, load) for load in self._owners])
+        return np.array([value_at(function, t, load) for function, load in self._in_time])
 
     def _whole(self, forces: Array) -> Array:
         """Forces at all local degrees of freedom, from those that are loaded."""
@@ -93,7 +88,7 @@ class DeadLoads(_AtDofs):
     """Forces and moments that keep their direction: vectors times functions of time."""
 
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
-        super().__init__(scheme, ledger)
+        self._scheme, self._ledger = scheme, ledger
         # Loads of one time function are one vector, which belongs to the first of them for
         # messages; functions need not be hashable.
         vectors: dict[int, tuple[Load, Array]] = {}
@@ -113,7 +108,7 @@ class DeadLoads(_AtDofs):
         # in its equation.
         self._parts: Array = np.zeros((4, len(vectors)))
         self._along = [in_cells.get(key) for key in vectors]
-        self._loops = loop("subtract_vector", self.vector), None
+        self.loops = loop("subtract_vector", self.vector), None
 
     def loads_in_cells(self) -> Any:
         """``loads_in_cells`` of loops.h; null if nothing acts along beams."""
@@ -133,7 +128,7 @@ class DeadLoads(_AtDofs):
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=number,
             force=self._forces[0], end=self._forces[1], before=self._forces[2],
             parts=[doubles(part) for part in self._parts[:3]],
-            factors=np.full(number, math.nan), factor=callbacks.of_time(self._in_time()),
+            factors=np.full(number, math.nan), factor=callbacks.of_time(self._in_time),
             vector=ffi.new("double *[]", [doubles(vector) for vector in self._vectors]),
             work=self._ledger.supplied.pointer("loads"),
             weight_of_before=self._scheme.weight_of_before,
@@ -190,7 +185,7 @@ class FollowerLoads(_AtDofs):
     def __init__(
         self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
-        super().__init__(scheme, ledger)
+        self._ledger = ledger
         here = [i for i, load in enumerate(loads) if share.computes(load.place)]
         owners = [loads[i] for i in here]
         self._numbers: Index = np.array(here, dtype=np.int64)
@@ -216,11 +211,11 @@ class FollowerLoads(_AtDofs):
             weight_of_before=scheme.weight_of_before,
         )  # fmt: skip
         tangent = loop("add_tangent_of_follower_loads", self._c)
-        self._loops = loop("subtract_follower_loads", self._c), tangent
+        self.loops = loop("subtract_follower_loads", self._c), tangent
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the loads."""
-        c = fill(self._c, factor=callbacks.of_time(self._in_time()))
+        c = fill(self._c, factor=callbacks.of_time(self._in_time))
         c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
 
@@ -244,17 +239,6 @@ def _turned_mass(of: Element) -> ufl.Form:
     return of.inertia[0] * ufl.dot(turn(u), w_u) * of.dx_of_mass()
 
 
-def _turned_mass_matrix(fields: Fields) -> Csr:
-    """Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force."""
-    share, G = fields.share, fields.assembled(_turned_mass(fields.element))
-    for place, mass, _ in lumps(share.grid.scene):
-        dofs = share.at(place)[:2]
-        if share.owns(dofs).all():
-            u, v = share.local(dofs)
-            G.data[G.positions(np.array([u, v]), np.array([v, u]))] += (-mass, mass)
-    return G
-
-
 class FrameForces(LoadTerm):
     """Centrifugal and Coriolis forces; the first have a potential, the second do no work.
 
@@ -265,36 +249,46 @@ class FrameForces(LoadTerm):
         self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
         share = fields.share
-        super().__init__(scheme, ledger)
-        S, G = mass_matrix(fields), _turned_mass_matrix(fields)
+        self._ledger = ledger
+        # Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force
+        S, G = mass_matrix(fields), fields.assembled(_turned_mass(fields.element))
+        for at, mass, _ in lumps(share.grid.scene):
+            dofs = share.at(at)[:2]
+            if share.owns(dofs).all():
+                u, v = share.local(dofs)
+                G.data[G.positions(np.array([u, v]), np.array([v, u]))] += (-mass, mass)
         coriolis = 2 * frame.rate if has_inertia(scheme) else 0.0
         S.data[np.isin(S.rows(), share.rotations())] = 0.0
         S.data *= frame.rate**2
         G.data *= coriolis
-        self._matrices, self._A, self._fields = (Product(S), Product(G)), A, fields
+        self._matrices, self._A = (Product(S), Product(G)), A
         x, y = (np.ascontiguousarray(of, dtype=np.int32) for of in share.translations())
+        # Vectors from the axis to the places of all displacements.  Beams last: those joined to the
+        # ground share its displacement, not the place of its centre.
+        grid, from_axis = share.grid, np.zeros(share.grid.size)
+        centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
+        points = np.concatenate([centers, grid.points]) - frame.about
+        from_axis[np.concatenate([grid.dofs_of_bodies, grid.dofs])[:, :2]] = points
         change, place, space, self._force, self._before, rest = np.zeros((6, share.size))
-        self._accelerations = rest, ffi.new("double *[1]", [doubles(rest)])
+        accelerations = ffi.new("double *[1]", [doubles(rest)])
+        self._rest = rest, accelerations
         self.vector = struct("vector", size=share.size, values=self._force)
         c = self._c = struct(
             "rotating_frame", size=share.size, entries=len(A.data), places=len(x), x=x, y=y,
             pull=self._matrices[0].c, turn=self._matrices[1].c, pulls=S.data, turns=G.data,
-            from_centre=_positions(fields, frame.about), rate=frame.rate, coriolis=coriolis,
+            from_centre=from_axis[share.dofs], rate=frame.rate, coriolis=coriolis,
             part=scheme.load_weight, weight_of_before=scheme.weight_of_before, change=change,
             place=place, space=space, force=self._force, before=self._before,
-            accelerations=self._accelerations[1],
+            accelerations=accelerations,
         )  # fmt: skip
-        self._loops = loop("subtract_frame_forces", c), loop("add_tangent_of_frame", c)
+        self.loops = loop("subtract_frame_forces", c), loop("add_tangent_of_frame", c)
+        at_cells = fields.order, accelerations
+        self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at_cells)]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the degrees of freedom."""
         self._c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
-
-    def in_cells(self) -> Sequence[InCells]:
-        """The mass of the beams times the accelerations of the frame."""
-        form = partial(mass_kernel, self._fields)
-        return [InCells(form, lib.DENSITY, self._fields.order, self._accelerations[1])]
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
         """The forces at ``q``; take that state as one that is in equilibrium with them."""
@@ -310,14 +304,3 @@ class FrameForces(LoadTerm):
         """The forces in the equation of the last step, and how much of them acts."""
         self._force[:] = self._before[:] = memory.added("rotating frame", self._before)
         self._c.grown = memory.number("growth of the rotating frame", self._c.grown)
-
-
-def _positions(fields: Fields, about: tuple[float, float]) -> Array:
-    """Vectors from a point to the places of all displacements; (size,); m."""
-    share = fields.share
-    grid, x = share.grid, np.zeros(share.grid.size)
-    centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
-    # Beams last: those joined to the ground share its displacement, not the place of its centre.
-    points = np.concatenate([centers, grid.points]) - about
-    x[np.concatenate([grid.dofs_of_bodies, grid.dofs])[:, :2]] = points
-    return np.asarray(x[share.dofs])

@@ -4,6 +4,15 @@
 The laws are traced with UFL symbols: UFL derives the consistent tangents, by the implicit function
 theorem where a discontinuity opens, and FFCx compiles them.  The return map is a loop in C over the
 points, material_points.c, which calls the compiled laws.
+
+With strong softening a step has two solutions, one in which a hinge stays closed and one in which
+it has opened.  The rule that chooses: a hinge, a crack of a fibre or a softening spring that does
+not flow at the beginning of a step stays closed in it if there is an equilibrium in which it bears
+at most its limit.  Of several that bear too much, the one with the largest excess opens first, and
+the others only if they still do then.
+
+Laws of connectors that hold a motion follow the same rule, where the sliding force may be below the
+limit: what sticks goes on to stick, and what slides to slide, if there is such an equilibrium.
 """
 
 from __future__ import annotations
@@ -17,7 +26,7 @@ import ufl
 from ufl.conditional import Condition
 from ufl.core.expr import Expr
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import StepFailed
@@ -32,10 +41,9 @@ from ufl_beam.mechanics.point_equations import (
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, Layout
-from ufl_beam.model.material_law import MaterialLaw, traced
+from ufl_beam.model.material_law import traced
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.openings import NOTHING, SPENT, SearchFlags
 
 law_functions.where.register(Condition, ufl.conditional)
 law_functions.below.register(Expr, ufl.lt)
@@ -48,10 +56,24 @@ DIGITS = 16 * float(np.finfo(float).eps)
 """Round-off of dissipated energies, as a part of elastic ones of the strains."""
 
 
-def kept_inputs(law: MaterialLaw) -> tuple[str, ...]:
-    """The internal variables, and what else of an accepted state the next step depends on."""
-    others = ("jump", "opening", *rows(law, "before"), "traction", "flows")
-    return (*prefixed("state", law.variables), *others)
+SPENT, NOTHING = 1e-6, 1e-30
+"""Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
+
+
+class SearchFlags:
+    """Flags that all points and connectors of a scene share in a step.
+
+    Attributes:
+        flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
+            STIFF: points that do not open answer elastically.  HOLD: points that do not flow stay
+            closed.  OVER: one of them has borne more than its limit.
+        switched: Whether the row of a connector was about its motion in the latest tangent and is
+            about its force now, or the other way round; (1,), int32.
+    """
+
+    def __init__(self) -> None:
+        self.switched: Index = np.zeros(1, dtype=np.int32)
+        self.flags: Index = np.zeros(lib.SEARCH_FLAGS, dtype=np.int32)
 
 
 def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
@@ -150,6 +172,7 @@ class Points:
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
         search: Shared by all points of a scene.
+        predicts: Let tangents predict stresses where points yield, see follow_prediction in C.
 
     Attributes:
         c: ``points`` of loops.h.
@@ -174,6 +197,8 @@ class Points:
         length: Array,
         scheme: Scheme,
         search: SearchFlags | None = None,
+        *,
+        predicts: bool = False,
     ) -> None:
         self._search = search or SearchFlags()
         self._layout, self._alpha = layout, scheme.alpha
@@ -183,7 +208,9 @@ class Points:
         cells, of_cell, width = len(length), len(layout.weights), len(self.names)
         self._storage = storage = np.zeros((cells, of_cell, width))
         self._at = {name: storage[:, :, i] for i, name in enumerate(self.names)}
-        self._kept = kept_inputs(law)
+        # The internal variables, and what else of an accepted state the next step depends on
+        others = ("jump", "opening", *rows(law, "before"), "traction", "flows")
+        self._kept = (*prefixed("state", law.variables), *others)
         self._components = len(law.resultants or "x")
         softening = layout.softening and layout.softening.kind()
         self._equations = PointEquations(layout.kind, softening, scheme)
@@ -223,6 +250,9 @@ class Points:
             e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.kept, sum=self.sums,
             own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search.flags,
         )  # fmt: skip
+        if predicts and self._components == 1 and self._yields:
+            lines = np.zeros((2, cells, of_cell, int(lib.LINE)))
+            fill(self.c, line=lines[0], predicted=lines[1])
 
     def __getitem__(self, name: str) -> Array:
         """Return the values of an input at the points, by its name; a view; (cells, n)."""
@@ -258,12 +288,6 @@ class Points:
             self["dt"][:] = self.dt[0] = dt
         self.c.tried = 0  # of a law that solves for its variables
 
-    def predict(self) -> None:
-        """Let tangents predict stresses where points yield, see follow_prediction in C."""
-        if self._components == 1 and self._yields:
-            lines = np.zeros((2, *self._storage.shape[:2], int(lib.LINE)))
-            fill(self.c, line=lines[0], predicted=lines[1])
-
     def respond(self, strains: Array) -> tuple[Array, Array]:
         """(N, V, M) that act in a step to these strains, and derivatives; (cells, 3), (cells, 9).
 
@@ -297,17 +321,13 @@ class Points:
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
 
-    def gives_energy(self) -> int:
-        """Number of the point that gives most energy in the latest response, or -1.
+    def require_dissipation(self, describe: Callable[[int], str]) -> None:
+        """Raise :class:`StepFailed` if a point gives energy; ``describe`` names its cell.
 
         That is a law whose dissipation is negative: its equations have several solutions, and one
-        was found that no material comes to.  Points of all cells are counted through.
+        was found that no material comes to.
         """
-        return int(lib.gives_energy(self.c))
-
-    def require_dissipation(self, describe: Callable[[int], str]) -> None:
-        """Raise :class:`StepFailed` if a point gives energy; ``describe`` names its cell."""
-        if (worst := self.gives_energy()) >= 0:
+        if (worst := lib.gives_energy(self.c)) >= 0:
             law = type(self._layout.kind.law).__name__
             raise StepFailed(
                 f"{law} of {describe(worst // self._storage.shape[1])} has a negative dissipation "
@@ -320,31 +340,18 @@ class Points:
         """Take the strains of the latest response as the new state."""
         lib.commit(self.c)
 
-    def change(self) -> float:
-        """Energy that :meth:`accept` would add to what is stored and dissipated; J.
-
-        Where viscous stresses relax it is as the trapezoidal rule counts it: backward Euler's
-        dissipation is that of the stress at the end, and the difference is no energy.
-        """
-        changes = self._sums_to_come() - [0, 0, 0, *self.sums[3:5], 0, 0]
-        return float(np.sum(changes[[0, 1, 3, 4, 5, 6]]))
-
     def dissipation(self) -> float:
         """Energy that :meth:`accept` would add to what is dissipated; J.
 
         It is zero up to the round-off of the energies by whose difference laws may find it.
         """
-        plastic, broken = map(float, self._sums_to_come()[:2])
+        copy = self._copy()
+        lib.commit(copy)
+        plastic, broken = copy.sum[0], copy.sum[1]
         size, volume = 0.0, self._layout.weights * self["length"]
         for C, *ends in zip(*map(self._rows, ("stiffness", "strain", "before")), strict=True):
             size += sum(float(np.sum(volume * self[C] * self[e] ** 2)) for e in ends)
-        return broken + (plastic if abs(plastic) > DIGITS * size else 0.0)
-
-    def _sums_to_come(self) -> Array:
-        """Return :attr:`sums` as :meth:`accept` would leave them."""
-        copy = self._copy()
-        lib.commit(copy)
-        return np.frombuffer(ffi.buffer(copy.sum, self.sums.nbytes)).copy()
+        return float(broken + (plastic if abs(plastic) > DIGITS * size else 0.0))
 
     def _copy(self) -> Any:
         """Points with a copy of the state, which loops may change, and the same response."""

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -24,10 +23,9 @@ from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.time_functions import Constant
 from ufl_beam.model.works import Potential, Work
-from ufl_beam.terms.base import InCells
+from ufl_beam.terms.base import Callbacks, InCells, Phases, entering
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.phases import Callbacks, Phases, entering
 
 
 class Acting:
@@ -37,13 +35,16 @@ class Acting:
         order: Positions of the cells in ``share.cells``.
         residual: Form of the forces.
         tangent: Form of their derivative, if there is any.
+        passes_on: True if forces depend on the motion of the last step, and their work is counted
+            on.
     """
 
     def __init__(
         self, work: Work, stated: Statement, fields: Fields, scheme: Scheme, A: Csr
     ) -> None:
         self._work, self._stated, self._fields, self._A = work, stated, fields, A
-        self._scheme, self.order = scheme, fields.order
+        self.order = fields.order
+        self.passes_on = work.takes_rates and bool(scheme.weight_of_before)
         self._saved_as = f"work of {work.name}"
         tangent = None if stated.tangent.empty() else stated.tangent
         forms = stated.residual, tangent, stated.energy, stated.lost
@@ -95,11 +96,6 @@ class Acting:
             self.remember(past)
         return self._before
 
-    @property
-    def passes_on(self) -> bool:
-        """True if forces depend on the motion of the last step, and their work is counted on."""
-        return self._work.takes_rates and bool(self._scheme.weight_of_before)
-
     def remember(self, memory: Memory) -> None:
         """The forces of a virtual work in the equation of the last step."""
         if self._energy is None:
@@ -132,18 +128,6 @@ def _position(form: Kernel, function: fem.Function) -> int:
     return form.position(function) if form.uses(function) else -1
 
 
-def _expect(work: Work, stated: Statement, ledger: Ledger) -> None:
-    """Make the entries of a work, also on processes without such cells."""
-    if not isinstance(work, Potential):
-        ledger.supplied[work.name] += 0.0
-        return
-    ledger.state[work.name] += 0.0
-    if stated.varies(work):
-        ledger.supplied[work.in_time] += 0.0
-    if stated.lost is not None:
-        ledger.lost["numerical"] += 0.0
-
-
 # -- the term ------------------------------------------------------------------------------------
 
 
@@ -155,13 +139,19 @@ class Works(LoadTerm):
     """
 
     def __init__(self, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr, t0: float) -> None:
-        super().__init__(scheme, ledger)
+        self._ledger = ledger
         share, self._A = fields.share, A
         grid = share.grid
         self._parts: list[Acting] = []
         for work in grid.scene.works:
             stated = statement(work, element_of(grid.mesh), scheme)
-            _expect(work, stated, ledger)
+            # The entries, also on processes without such cells
+            of_energy = isinstance(work, Potential)
+            (ledger.state if of_energy else ledger.supplied)[work.name] += 0.0
+            if stated.varies(work):
+                ledger.supplied[work.in_time] += 0.0
+            if stated.lost is not None:
+                ledger.lost["numerical"] += 0.0
             cells = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
             part = np.flatnonzero(np.isin(share.cells, cells))
             if len(part):
@@ -176,7 +166,11 @@ class Works(LoadTerm):
         tangents = [part.tangent for part in self._parts if part.tangent is not None]
         self._calls = [_calls([part.residual for part in self._parts]), _calls(tangents)]
         force, tangent = (loop("add_calls", calls) for calls, _ in self._calls)
-        self._loops = force, tangent
+        self.loops = force, tangent
+        self.in_cells = [
+            InCells(lambda of=one: of.residual, lib.WORK, one.order)  # type: ignore[misc]
+            for one in self._parts
+        ]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the works."""
@@ -203,13 +197,6 @@ class Works(LoadTerm):
         for one in self._parts:
             if one.passes_on:
                 one.remember(memory)
-
-    def in_cells(self) -> Sequence[InCells]:
-        """The forces of each work."""
-        return [
-            InCells(lambda of=one: of.residual, lib.WORK, one.order)  # type: ignore[misc]
-            for one in self._parts
-        ]
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The time and growth of the works, and their forces in the equation of the last step."""

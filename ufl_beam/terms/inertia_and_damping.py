@@ -1,0 +1,393 @@
+# SPDX-License-Identifier: MIT
+"""Forces of velocities: inertia, damping, and the rates that a time scheme keeps, as C has them.
+
+A scheme states the coefficients of a step, once for each length of a step.
+"""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache, partial
+from typing import Any
+
+import numpy as np
+import ufl
+from ufl.core.expr import Expr
+
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
+from ufl_beam.compiled.csr import Csr, StepProduct
+from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.function_spaces import (
+    Element,
+    Fields,
+    Strains,
+    applied,
+    mass_kernel,
+    mass_matrix,
+)
+from ufl_beam.discretization.state_io import Memory
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.errors import SceneError
+from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
+from ufl_beam.mechanics.functional import resultants, virtual_work
+from ufl_beam.mechanics.kinematics import strain, virtual_strain
+from ufl_beam.mechanics.time_schemes import (
+    Coefficients,
+    DynamicScheme,
+    Scheme,
+    combined,
+    with_half_tangents,
+)
+from ufl_beam.model.damping import KelvinVoigt, Rayleigh
+from ufl_beam.terms.base import Callbacks, InCells, Phases, Term, knowing
+from ufl_beam.terms.beams import OfForms
+from ufl_beam.terms.energy_ledger import Ledger
+
+BEFORE = "velocity before"
+"""Name of the velocities at the beginning of the last step, in what is saved."""
+
+CHANGE, V, V_BEFORE, MORE = range(4)
+"""Places of the rates in C: the step or a change of velocities, velocities, ..."""
+
+
+class RatesInC:
+    """Velocities of a scene, those before the last step, and what else a scheme keeps; all in C.
+
+    They satisfy :class:`Rates`; arrays are copies.
+
+    Attributes:
+        c: ``rates`` of loops.h; also has the length of the last step, infinite before the first.
+        slips: True if the scheme loses energy by the rates.
+
+    Raises:
+        SceneError: The scheme states no such coefficients as :class:`Coefficients` describes.
+    """
+
+    def __init__(self, scheme: DynamicScheme, v: Array) -> None:
+        size, number = len(v), MORE + len(scheme.kept)
+        self.slips = checked_coefficients(scheme).slip is not None
+        self._scheme = scheme
+        # Changes are elsewhere; of velocities before the last ones new ones are not computed, and
+        # new velocities take their place where nothing asks for them.
+        asks = self.slips or scheme.looks_back
+        self._now = np.zeros((number - V, size))
+        self._next = np.zeros((number - V_BEFORE - (not asks), size))
+        self._slip = np.zeros(size if self.slips else 0)
+        handle = ffi.new_handle((scheme, number))
+        find = lib.numbers_in_python
+        self.c = struct("rates", size=size, number=number, find=find, handle=handle)
+        self.c.after_any = not scheme.looks_back
+        first, *more = self._next if asks else (self._now[1], *self._next)
+        for k, (rate, new) in enumerate(
+            zip(self._now, (first, self._slip, *more), strict=True), start=V
+        ):
+            self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
+        self.take(v, v, math.inf)
+        self.keep()
+
+    def _rate(self, k: int) -> Array:
+        """A rate as C has it; a view."""
+        return np.frombuffer(ffi.buffer(self.c.rate[k], 8 * self.c.size))
+
+    @property
+    def v(self) -> Array:
+        """Velocities of the accepted state."""
+        return self._rate(V).copy()
+
+    @property
+    def v_before(self) -> Array:
+        """Velocities before the last step."""
+        return self._rate(V_BEFORE).copy()
+
+    @property
+    def more(self) -> tuple[Array, ...]:
+        """Rates that the scheme keeps besides, as many as are known."""
+        return tuple(self._rate(MORE + k).copy() for k in range(self.c.more))
+
+    def keep(self, *more: Array) -> None:
+        """Set what else the scheme keeps; a step can begin if that is anything."""
+        for k, rate in enumerate(more):
+            self._rate(MORE + k)[:] = rate
+        self.c.more, self.c.ready = len(more), bool(more) or not self._scheme.kept
+
+    def take(self, v: Array, v_before: Array, last_dt: float) -> None:
+        """Set velocities, those before the last step, and its length."""
+        self._rate(V)[:], self._rate(V_BEFORE)[:], self.c.last_dt = v, v_before, last_dt
+
+    def after(self, s: Array, dt: float) -> list[Array]:
+        """Velocities after a step ``s`` of the nodes, and what the scheme keeps besides."""
+        known: Any = self._scheme
+        rows = _coefficients(known, dt, self.c.last_dt, self.c.more).rates
+        return [combined(row, s, self) for row in rows]
+
+    def times(self, product: StepProduct, **entries: Any) -> Any:
+        """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
+        v, momentum = np.zeros(self.c.size), np.zeros(len(self._slip))
+        of = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **entries)
+        return fill(of, rates=self.c)
+
+
+@lru_cache(maxsize=1024)  # steps of one size have some ten lengths, as times are rounded
+def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coefficients:
+    """Coefficients of a step, as lists of numbers."""
+    found = scheme.coefficients(dt, last_dt, known)
+    inertia, velocity, *rates = (list(map(float, row)) for row in (*found[:2], *found.rates))
+    slip = None if found.slip is None else list(map(float, found.slip))
+    return Coefficients(inertia, velocity, rates, slip)
+
+
+def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
+    """Return coefficients of steps of 1 s, and refuse rows of another length.
+
+    Raises:
+        SceneError: They are not as :class:`Coefficients` says.
+    """
+    known: Any = scheme
+    number = len(scheme.kept)
+    try:
+        found = _coefficients(known, 1.0, 1.0, number)
+        rows = found.inertia, found.velocity, *found.rates, *([found.slip] if found.slip else [])
+        right = len(found.rates) == 1 + number and {len(row) for row in rows} == {MORE + number}
+        right = right and bool(np.isfinite(rows).all()) and found.rates[0][0] != 0.0
+    except (TypeError, ValueError, AttributeError):
+        right = False
+    if not right or MORE + number > lib.MOST_RATES:
+        raise SceneError(
+            f"{scheme!r}: coefficients(dt, last_dt, known) must return Coefficients with rows of "
+            f"3 + known numbers, {1 + number} of them in rates, see docs/extending.md"
+        )
+    return found
+
+
+@ffi.def_extern(error=0)  # type: ignore[misc, untyped-decorator, unused-ignore]
+def numbers_in_python(handle: Any, numbers: Any) -> int:
+    """Callback of C: write ``scheme_numbers`` of loops.h for a step."""
+    scheme, number = ffi.from_handle(handle)
+    of = _coefficients(scheme, numbers.dt, numbers.last_dt, numbers.more)
+    rows = of.inertia, of.velocity, of.slip or [0.0] * MORE, *of.rates
+    places = numbers.inertia, numbers.velocity, numbers.slip, *numbers.rates
+    for place, row in zip(places, rows, strict=False):
+        place[0:number] = [*row, *[0.0] * (number - len(row))]
+    numbers.gives = len(of.rates) - 1
+    return 1
+
+
+class Inertia(Term):
+    """Inertia of beams and point masses: a constant matrix, P(18).
+
+    Attributes:
+        rates: Velocities, and what else the scheme keeps.
+    """
+
+    kind = "inertia"
+
+    def __init__(
+        self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, rates: RatesInC
+    ) -> None:
+        rotations = with_half_tangents(scheme, fields.share.rotations())
+        self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
+        self.loops, at = self._times.loops, (fields.order, self._times.rate)
+        self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at)]
+        self._ledger, self._A, self.scheme, self.rates = ledger, A, scheme, rates
+        if rates.slips:
+            ledger.lost["numerical"] += 0.0
+
+    @property
+    def M(self) -> Csr:
+        """The mass matrix; a new one."""
+        return self._times.matrix()
+
+    @property
+    def v(self) -> Array:
+        """Velocities in the accepted state; a copy."""
+        return self.rates.v
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops over the matrix and the velocities."""
+        lost = self._ledger.lost.pointer("numerical") if self.rates.slips else ffi.NULL
+        kinetic = self._ledger.state.pointer("kinetic")
+        of = self.rates.times(self._times, kept=kinetic, lost=lost)
+        begin, accept = loop("begin_inertia", of), loop("accept_inertia", of)
+        return Phases([begin], [accept], [loop("add_kinetic_energy", of)])
+
+    def carry_on(self, memory: Memory, known: int) -> None:
+        """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""
+        rates = self.rates
+        more = rates.more or (rates.v,) * known
+        rates.keep(*map(memory.at_dofs, self.scheme.kept[:known], more))
+
+    def pass_on_step(self, memory: Memory) -> None:
+        """State the velocities before the last step, and its length, at each degree of freedom."""
+        rates = self.rates
+        v_before = memory.at_dofs(BEFORE, rates.v_before)
+        lengths = memory.at_dofs("last step", np.full(rates.c.size, rates.c.last_dt))
+        rates.take(rates.v, v_before, float(lengths[0]) if len(lengths) else rates.c.last_dt)
+
+    def velocities(self, s: Array, dt: float) -> Array:
+        """Velocities at the end of a step ``s`` of the nodes, of the length ``dt`` (s)."""
+        return self.rates.after(s, dt)[0]
+
+    def prepare(self, s: Array, dt: float) -> None:
+        """Take from a trial step ``s`` what the scheme keeps besides the velocities."""
+        _, *more = self.rates.after(s, dt)
+        self.rates.keep(*more)
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """Save or restore velocities and the last step."""
+        rates = self.rates
+        v = memory.at_dofs("velocity", rates.v)
+        v_before = memory.at_dofs(BEFORE, rates.v_before)
+        rates.take(v, v_before, memory.number("step of velocity", rates.c.last_dt))
+        self.carry_on(memory, int(memory.number("further rates", len(rates.more))))
+
+
+# -- damping ---------------------------------------------------------------------------------------
+
+
+def _work_and_loss(
+    of: Element, scheme: Scheme | DecayingMidpoint, factor: Expr, before: Expr
+) -> tuple[ufl.Form, ufl.Form]:
+    """Forms of resultants ``factor C (Δe - before)``, Δe being the changes of the strains."""
+    change = strain(of.q1, of.axis) - strain(of.q0, of.axis)
+    r = factor * resultants(change - before, of.stiffness)
+    w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
+    return virtual_work(r, w_e) * of.dx(1), virtual_work(r, change) * of.dx(1)
+
+
+@stated
+def _viscous_forms(of: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
+    """Virtual work, the energy lost, and the time over that of the step."""
+    rate = of.at_points()
+    return *_work_and_loss(of, scheme, rate, ufl.zero(3)), rate
+
+
+class KelvinVoigtForces(OfForms):
+    """Resultants in proportion to the rates of the strains, P(89) with a weight of time over dt."""
+
+    kind = _entry = "damping"
+
+    def __init__(
+        self, damping: KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger
+    ) -> None:
+        work, lost, self._rate = _viscous_forms(fields.element, scheme)
+        super().__init__(work, [lost], fields, A, ledger)
+        self._time, self._dt = damping.time, np.zeros(1)
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops over the cells; the step is a number of the forms."""
+        begin, accept, *_ = super().phases(callbacks)
+        c = struct(
+            "viscous_forms", **knowing(self._of_step, self._rate), of_cell=len(self._rate.x.array),
+            time=self._time, dt=self._dt,
+        )  # fmt: skip
+        return Phases([*begin, loop("begin_viscous_forms", c)], accept)
+
+
+@stated
+def _reference_stiffness(of: Element) -> ufl.Form:
+    rest = of.configuration()
+    e, w_e = (virtual_strain(rest, w, of.axis) for w in (ufl.TrialFunction(of.space), of.w))
+    return virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
+
+
+class RayleighForces(Term):
+    """A constant matrix times the velocity of the step, P(92)."""
+
+    kind = "damping"
+
+    def __init__(
+        self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
+        rates: RatesInC,
+    ) -> None:  # fmt: skip
+        C, M, form = fields.matrix(), mass_matrix(fields), _reference_stiffness(fields.element)
+        K = fields.assembled(form)
+        C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
+        rotations = with_half_tangents(scheme, fields.share.rotations())
+        self._times = StepProduct(C, rotations, A, fields.share.scratch)
+        self.loops = self._times.loops
+        self._ledger, self._rates, self._A = ledger, rates, A
+        at, q1 = (fields.order, self._times.rate), fields.element.q1
+
+        def stiffness() -> Kernel:
+            return fields.hot_kernel(applied(form, q1), q1)
+
+        self.in_cells = [
+            InCells(stiffness, lib.STRESS, *at, damping.stiffness),
+            InCells(partial(mass_kernel, fields), lib.DENSITY, *at, damping.mass),
+        ]
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops over the matrix and the velocities."""
+        of = self._rates.times(self._times, lost=self._ledger.lost.pointer("damping"))
+        return Phases([loop("begin_rayleigh", of)], [loop("accept_rayleigh", of)])
+
+
+def damping_forces(
+    of: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
+    rates: RatesInC | None,
+) -> list[Term]:  # fmt: skip
+    """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
+    ledger.lost["damping"] += 0.0
+    if isinstance(of, Rayleigh):
+        if rates is None:
+            raise SceneError(
+                "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
+                "use KelvinVoigt, which acts in the time of a static run"
+            )
+        return [RayleighForces(of, fields, scheme, A, ledger, rates)]
+    grid = fields.share.grid
+    beams = grid.scene.beams if of.beams is None else of.beams
+    pairs = (zip(grid.cells_of(beam), grid.hinges(beam), strict=True) for beam in beams)
+    cells = [cell for of_beam in pairs for cell, hinge in of_beam if hinge is None]
+    part = np.flatnonzero(np.isin(fields.share.cells, cells))
+    if not len(part):
+        return []
+    return [KelvinVoigtForces(of, fields.part(part), scheme, A, ledger)]
+
+
+# -- of schemes ----------------------------------------------------------------------------------
+
+
+@stated
+def _change_forms(of: Element, scheme: DecayingMidpoint) -> tuple[ufl.Form, ufl.Form, fem.Function]:
+    """Virtual work, the energy lost, and the changes of the strains in the step before."""
+    before = of.at_points(3)
+    return *_work_and_loss(of, scheme, of.constant(scheme.part), before), before
+
+
+class SecondDifferences(OfForms):
+    """Resultants c C (Δe - r Δe'), see :class:`DecayingMidpoint`."""
+
+    kind, _entry = "beams", "numerical"
+
+    def __init__(self, scheme: DecayingMidpoint, fields: Fields, A: Csr, ledger: Ledger) -> None:
+        work, lost, self._before = _change_forms(fields.element, scheme)
+        super().__init__(work, [lost], fields, A, ledger)
+        self._strains = Strains(fields)
+        self._cells = fields.share.cells[fields.order]
+        self._e, self._change = np.zeros((2, *self._strains.shape))
+        self._last_dt = np.full(1, math.inf)
+
+    def phases(self, callbacks: Callbacks) -> Phases:
+        """Loops over the cells and their strains."""
+        begin, accept, *_ = super().phases(callbacks)
+        c = struct(
+            "second_differences", strains=self._strains.kernel.cells, weight=self._strains.weights,
+            of_cell=len(self._strains.weights), **knowing(self._of_step, self._before), e=self._e,
+            change=self._change, space=np.zeros(self._e.shape), last_dt=self._last_dt,
+        )  # fmt: skip
+        before, after = (loop(f"{name}_second_differences", c) for name in ("begin", "accept"))
+        return Phases([*begin, before], [*accept, after])
+
+    def start(self, q: Array) -> None:
+        """Take the strains at ``q``."""
+        self._e[:] = self._strains(q)
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The changes of the strains in the last step, and its length."""
+        # The length is in the rows: the process that says numbers for all may have no such cells.
+        rows = np.column_stack([self._change, np.full(len(self._change), self._last_dt)])
+        rows = memory.rows("changes of strains", self._cells, rows)
+        self._change[:], self._last_dt[0] = rows[:, :-1], rows[0, -1]
+        self.start(q)
