@@ -18,7 +18,7 @@ from ufl_beam.display import bracketed, one_line
 from ufl_beam.errors import SceneError, StepFailed
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.stepper import Trial
-from ufl_beam.solvers.factorization import Factorisation, SingularMatrix
+from ufl_beam.solvers.factorization import Factorisation
 
 INVERSE_ITERATIONS = 50  # inverse iterations in which a mode is sought
 MODE_TOLERANCE = 1e-8  # its change in the last one; the square is the error of the eigenvalue
@@ -181,7 +181,7 @@ class Stiffness:
         blocks = [[K, G @ diags_array(self._unit)], [of_forces, diags_array(diagonal)]]
         try:
             self._factors = Factorisation(csr_array(block_array(blocks)))
-        except SingularMatrix:
+        except np.linalg.LinAlgError:
             raise StepFailed("the tangent stiffness is singular") from None
         self.symmetric = self._factors.symmetric
         self.negative = self._factors.negative - int(negative.sum())

@@ -27,10 +27,6 @@ MANTISSA = 12
 """Number of MUMPS's answer that has the sign of the determinant."""
 
 
-class SingularMatrix(Exception):
-    """The matrix has no inverse."""
-
-
 class Factorisation:
     """L D Lᵀ factors of a symmetric matrix, or L U factors of another one, by MUMPS.
 
@@ -41,11 +37,14 @@ class Factorisation:
         symmetric: Whether the matrix is, up to round-off.
         negative: Number of its negative eigenvalues if it is symmetric; else 1 where its
             determinant is negative, and 0 where it is positive.
+
+    Raises:
+        LinAlgError: The matrix has no inverse.
     """
 
     def __init__(self, A: csr_array) -> None:
         if not np.isfinite(A.data).all():
-            raise SingularMatrix
+            raise np.linalg.LinAlgError("the matrix has no inverse")
         rows = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr))
         self._scale = _scale(A, rows)
         scaled = A.data * (self._scale[rows] * self._scale[A.indices])
@@ -63,7 +62,7 @@ class Factorisation:
         factors.setMumpsIcntl(DETERMINANT, 0 if self.symmetric else 1)
         pc.setUp()
         if pc.getFailedReason():
-            raise SingularMatrix
+            raise np.linalg.LinAlgError("the matrix has no inverse")
         self.negative = (
             int(factors.getMumpsInfog(NEGATIVE_PIVOTS))
             if self.symmetric

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import ufl
@@ -107,24 +107,15 @@ class PredictedStrains:
 # -- works of tangents -----------------------------------------------------------------------------
 
 
-class _Works(NamedTuple):
-    """Works of a tangent and of its derivative along u for the motion x on y; that derivative."""
-
-    tangent: ufl.Form
-    change: ufl.Form
-    matrix: ufl.Form
-    x: fem.Function
-    y: fem.Function
-    u: fem.Function
-
-
 @stated
-def _works(work: ufl.Form, q1: fem.Function) -> _Works:
+def _works(work: ufl.Form, q1: fem.Function) -> dict[str, Any]:
+    """Works of a tangent and of its change along u for the motion x on y; that change; x, y, u."""
     x, y, u = (fem.Function(q1.function_space) for _ in range(3))
     tangent = ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
     action = ufl.action(ufl.derivative(work, q1, x), y)
     change = ufl.derivative(action, q1, u)
-    return _Works(action, change, ufl.derivative(tangent, q1, u), x, y, u)
+    matrix = ufl.derivative(tangent, q1, u)
+    return {"tangent": action, "change": change, "matrix": matrix, "x": x, "y": y, "u": u}
 
 
 class Cells(Term):
@@ -145,14 +136,14 @@ class Cells(Term):
         return {}
 
     @cached_property
-    def _derivatives(self) -> tuple[_Works, dict[str, Kernel]]:
+    def _derivatives(self) -> tuple[dict[str, Any], dict[str, Kernel]]:
         return _works(self._work_form, self._q1), {}
 
     def _at(self, q1: Array, name: str, **motions: Array) -> Kernel:
-        """The kernel of one of the :class:`_Works`, compiled when it is first asked for."""
+        """The kernel of one of :func:`_works`, compiled when it is first asked for."""
         forms, kernels = self._derivatives
         if name not in kernels:
-            kernels[name] = self._fields.kernel(getattr(forms, name), self._q1)
+            kernels[name] = self._fields.kernel(forms[name], self._q1)
             if name == "matrix":
                 kernels[name].place(self._A)
         kernel = kernels[name]
@@ -160,7 +151,7 @@ class Cells(Term):
             if kernel.uses(function):
                 kernel.put(function, values)
         for motion, values in motions.items():
-            kernel.set(getattr(forms, motion), values)
+            kernel.set(forms[motion], values)
         return kernel
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:

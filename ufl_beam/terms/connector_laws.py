@@ -258,7 +258,7 @@ class Springs(Response):
         self.dissipated = self.points.kept[:, 4], self.points.kept[:, 5]
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
-        """Fields of ``inelastic_term``."""
+        """Return fields of ``inelastic_term`` of loops.h, with entries of the ledger."""
         return self.points.in_steps(self._setting.ledger)
 
     def _at(self, e: Array) -> Array:
