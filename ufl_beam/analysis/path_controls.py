@@ -262,8 +262,8 @@ class PathCorrector:
     ) -> Trial:
         """Solve for an equilibrium under a constraint, beginning with a predicted step.
 
-        Closed openings that do not flow are held closed if they can be, see openings.py, unless
-        ``hold`` is false, as in a direction in which they open.
+        Closed openings that do not flow are held closed if they can be, see material_points.py,
+        unless ``hold`` is false, as in a direction in which they open.
         """
         if self.crossing is not None:
             predicted = self.crossing.predicted

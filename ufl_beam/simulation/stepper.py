@@ -236,8 +236,8 @@ class Stepper:
     ) -> Trial:
         """Solve a step, whose times are those of the guess, together with the load factor.
 
-        With ``hold`` what does not flow stays closed if it can, see openings.py.  The guess is in
-        the axes of supports.
+        With ``hold`` what does not flow stays closed if it can, see material_points.py.  The guess
+        is in the axes of supports.
         """
         c = self.c
         self.solver.follow(border)
