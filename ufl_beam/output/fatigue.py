@@ -26,8 +26,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
-from ufl_beam.output.recorders import Recorder
-from ufl_beam.output.state_view import StateView
+from ufl_beam.output.recorders import Recorder, StateView
 
 BLOCK = 1000  # steps that are collected before their cycles are counted
 

@@ -23,9 +23,10 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.output.archive import require_arrays
-from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
-from ufl_beam.output.joint_histories import (
+from ufl_beam.output.output_files import require_arrays
+from ufl_beam.output.postprocessing import (
+    MIDDLE,
+    ForcesAlongCells,
     JointHistory,
     links_of,
     motion_of,

@@ -15,7 +15,6 @@ from ufl_beam.errors import SceneError, require_count
 from ufl_beam.model.bodies import Anchor, arm
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene, spots_of
-from ufl_beam.output.joint_histories import turned
 from ufl_beam.output.output_files import changed, part_of, require_path
 from ufl_beam.output.paraview_files import (
     LineFields,
@@ -24,8 +23,8 @@ from ufl_beam.output.paraview_files import (
     XdmfWriter,
     data_path,
 )
-from ufl_beam.output.recorders import Recorder
-from ufl_beam.output.state_view import StateView
+from ufl_beam.output.postprocessing import turned
+from ufl_beam.output.recorders import Recorder, StateView
 from ufl_beam.parallel import on_first
 
 BODY, LINK = 1, 2

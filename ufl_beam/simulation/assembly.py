@@ -20,9 +20,9 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import Agreement
-from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.simulation.stepper import StaticPath
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import BEFORE, ElasticBeams, Inertia
 from ufl_beam.terms.cell_forces import CellForces

@@ -1,19 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Evaluation of controllers and friction limits as a step begins, at steps or at sample times."""
+"""Forces of controllers and limits of friction: evaluated as steps begin, and watched."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
-from ufl_beam.compiled.c_library import doubles, integers
+from ufl_beam.compiled.c_library import doubles, ffi, integers, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.model.connector_laws import Controller, Coulomb, Running
+from ufl_beam.model.connector_laws import (
+    Controller,
+    Coulomb,
+    ForceLaw,
+    Running,
+)
 from ufl_beam.model.connectors import Connector
+from ufl_beam.terms.links import Links
 
 SAME = 1e-9
 """Part of a sample time by which the end of a step may miss it."""
@@ -121,3 +127,81 @@ def _sample(link: Connector) -> float:
 def _rounding(sample: float, *times: float) -> float:
     """Difference of times that is due to their last digits; s."""
     return SAME * sample + 4 * math.ulp(max(map(abs, times)))
+
+
+# -- forces that alternate -------------------------------------------------------------------------
+
+ALTERNATIONS = 20
+"""Number of successive changes of direction of a force that is a fault."""
+
+LARGE = 0.5
+"""Least change of such a force, as a part of the largest force so far."""
+
+MOVED = 1e-9
+"""Least motion of such a step, as a part of the size of the scene, or rad."""
+
+
+class ForceWatch:
+    """Watches forces of controllers and force laws for a change of direction at every step.
+
+    Attributes:
+        c: ``force_watch`` of loops.h; None if there are no such laws.
+    """
+
+    c: Any = None
+
+    def __init__(self, couplings: Sequence[Links], controllers: Controllers, size: float) -> None:
+        kinds = Controller, ForceLaw
+        found = [
+            (link, one, k) for one in couplings for k, link in enumerate(one.links)
+            if isinstance(link.law, kinds)
+        ]  # fmt: skip
+        self._links, n = [link for link, *_ in found], len(found)
+        if not n:
+            return
+        controlled = [isinstance(link.law, Controller) for link in self._links]
+        values, fresh = (
+            [place(x) if of else ffi.NULL for x, of in zip(self._links, controlled, strict=True)]
+            for place in (controllers.place, controllers.fresh_place)
+        )
+        self._told, none = np.full(n, math.nan), np.zeros((3, n))
+        self.c = struct(
+            "force_watch", number=n, most=ALTERNATIONS, large=LARGE, moved=MOVED,
+            dof=np.array([one.forces_at[k] for _, one, k in found], dtype=np.int32),
+            value=ffi.new("double *[]", values), fresh=ffi.new("int32_t *[]", fresh),
+            rate=ffi.new("double *[]", [doubles(one.rate) + k for _, one, k in found]),
+            length=np.array([1.0 if link.turns else size for link in self._links]),
+            force=none[0], change=none[1], largest=none[2], told=self._told,
+            count=np.zeros(n, dtype=np.int32),
+        )  # fmt: skip
+        self._alive = couplings, controllers
+
+    def told(self) -> Iterator[str]:
+        """Yield warnings that have not been told, one a connector."""
+        if self.c is not None and self.c.tells:
+            self.c.tells = 0
+            for link, t in zip(self._links, map(float, self._told), strict=True):
+                if not math.isnan(t):
+                    yield _alternates(link, t)
+
+
+def _alternates(link: Connector, t: float) -> str:
+    """Describe a force that changes its direction at every step until ``t``."""
+    sampled = isinstance(link.law, Controller) and link.law.sample
+    said = (
+        f"{link}: the force changed its direction at each of the {ALTERNATIONS} "
+        f"{'samples' if sampled else 'steps'} before t = {t:.6g} s"
+    )
+    if not isinstance(link.law, Controller):
+        return (
+            f"{said}: it drives a motion that is too fast for the steps. Use smaller ones, or a "
+            "scheme that damps such motions, as Midpoint(alpha=0.05, beta=0.05) does"
+        )
+    return (
+        f"{said}: the controller answers the motion that it has caused by the time it is asked "
+        "again. A force of kd times a rate that is held for a time dt needs kd dt < 2 J; J is the "
+        "inertia (along a line the mass) that it moves within dt, and a beam without a body has "
+        "hardly any there, whatever the step. Give the place the inertia of its drive, as "
+        "PointMass or Body, take smaller gains, or state the force as a ForceLaw, which has no "
+        "delay; see docs/howto_machine.md"
+    )

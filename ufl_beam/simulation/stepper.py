@@ -16,15 +16,14 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib, struct
+from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia, with_half_tangents
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.watches import Watch
 from ufl_beam.parallel import Agreement
-from ufl_beam.simulation.branch_check import StaticPath
-from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Border, Solver
 from ufl_beam.solvers.newton_options import Newton
@@ -32,6 +31,118 @@ from ufl_beam.terms.beams import Inertia
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.links import Links
+
+# -- prediction ------------------------------------------------------------------------------------
+
+
+class Prediction:
+    """Goes on as the last steps did: at their velocity and, ``in_motion``, with their acceleration.
+
+    After steps of equal length, a part of the last second difference of the configuration is added:
+    that which the one before was like.  It is 1 in smooth motion, and 0 where second differences
+    change their sign from step to step, or where steps do not resolve the motion.
+
+    Args:
+        weights: Of residuals, see :class:`Equation`.
+
+    Attributes:
+        c: ``prediction`` of loops.h; C writes to it when a step is accepted.
+    """
+
+    def __init__(self, share: Share, q: Array, weights: Array, *, in_motion: bool) -> None:
+        self._share, self._in_motion = share, in_motion
+        self.c = struct("prediction", size=share.size, dt=math.inf)
+        self._q_before = q.copy()
+        fill(self.c, q_before=self._q_before)
+        if in_motion:
+            self._second = np.zeros(share.size)
+            size = {"scene": share.grid.scene.size, "unknowns": share.grid.size}
+            fill(self.c, second=self._second, weight=weights, **size)
+
+    @property
+    def q_before(self) -> Array:
+        """Configuration at the beginning of the last step; a copy."""
+        return np.frombuffer(ffi.buffer(self.c.q_before, 8 * self._share.size)).copy()
+
+    @property
+    def last_dt(self) -> float:
+        """Length of the last step, infinite before the first; s."""
+        return float(self.c.dt)
+
+    def forget(self) -> None:
+        """Let the next step start from where it begins: it does not go on as the last one did."""
+        self.c.dt = math.inf
+
+    def remember(self, memory: Memory) -> None:
+        """State it in numbers of the grid; see state_io.py."""
+        self.c.dt = memory.number("last dt", self.c.dt)
+        q_before = memory.at_dofs("q before", self.q_before)
+        ffi.memmove(self.c.q_before, doubles(q_before), q_before.nbytes)
+        if self._in_motion:
+            self.c.equal = int(memory.number("equal steps", self.c.equal))
+            self.c.repeated = memory.number("part that repeats itself", self.c.repeated)
+            self.c.now = memory.number("square of the second difference", self.c.now)
+            self._second[:] = memory.at_dofs("second difference", self._second)
+
+
+# -- check of static steps -------------------------------------------------------------------------
+
+FAR = 1e3
+"""Largest motion of a node in a static step that is no mechanism; sizes of the scene or radians."""
+
+KINK = 1e-6
+"""Work that a kink of a law may leave unexplained, as a part of the energy that went through."""
+
+
+class StaticPath:
+    """Checks of a static step before it is accepted, from the state in which the path begins.
+
+    The internal forces must account for what a step stores and dissipates.  Otherwise Newton's
+    method may have found another branch of equilibria: beyond a limit load, or where softening lets
+    go more than it dissipates.  The ``slack`` of the scheme says how much work may stay
+    unexplained; ``force`` are the internal forces at the end of the last step.
+    """
+
+    _c: Any
+
+    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, force: Array) -> None:
+        self._share, self._scheme, self._ledger, self.force = share, scheme, ledger, force
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The internal forces at the end of the last step."""
+        self.force[:] = memory.added("internal forces", self.force)
+
+    def failure(self, mechanism: bool) -> StepFailed:
+        """Describe why the latest step was not followed: it leaves a mechanism, or leaps."""
+        c = self._c
+        if mechanism:
+            return StepFailed(
+                f"a node moves by {c.moves:.1e} times the size of the scene, or turns by so many "
+                "radians, in the step: what yields and what has opened leave a mechanism"
+            )
+        return StepFailed(
+            f"the step stores and dissipates {c.stored:.3e} J, but the forces along it do "
+            f"{c.work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
+            "to tell"
+        )
+
+    def in_c(self, changes: Sequence[Loop]) -> Any:
+        """``static_path`` of loops.h; ``changes`` are those of the terms."""
+        parts = self._ledger.state, self._ledger.supplied, self._ledger.lost
+        per_far = np.full(self._share.size, 1 / self._share.grid.scene.size)
+        per_far[self._share.rotations()] = 1.0
+        self._c = struct(
+            "static_path", slack=self._scheme.slack, far=FAR, kink=KINK, per_far=per_far,
+            force=self.force, terms=len(changes),
+            weight_of_before=self._scheme.weight_of_before,
+            change=ffi.new("change_call[]", list(changes)), accounts=len(parts),
+            account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),
+            entries=np.array([len(part) for part in parts], dtype=np.int32),
+        )  # fmt: skip
+        return self._c
+
+
+# -- steps -----------------------------------------------------------------------------------------
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
@@ -162,7 +273,7 @@ class Stepper:
             changes = [one.change for one in phases if one.change is not None]
             fill(self.c, path=path.in_c(changes))
         self._alive: list[Any] = [opens]
-        self._watches: Sequence[Watch] = ()
+        self._watches: Sequence[Any] = ()
         self._state: Stepping | None = None  # while C takes steps
         self._add_extras({
             name: [x for one in phases for x in getattr(one, name)]
@@ -345,7 +456,7 @@ class Stepper:
             for one in self._watches:
                 one.seen = state.parts
 
-    def watch(self, watches: Sequence[Watch]) -> None:
+    def watch(self, watches: Sequence[Any]) -> None:
         """Let these take in the state after each step."""
         self._watches = watches
         of_c = ffi.new("watch *[]", [one.c for one in watches])

@@ -1,13 +1,23 @@
 # SPDX-License-Identifier: MIT
-"""Histories of joints and connectors: relative motions, forces, works."""
+"""What follows from states: motions of places, forces of joints, section forces along cells.
+
+At both ends of a cell section forces are its forces on the nodes there: of stresses, inertia,
+damping, loads and works, see :mod:`ufl_beam.terms.cell_forces`.  So they are in equilibrium with
+supports, joints and what else acts at nodes, to the residual of the step.  Between the ends they
+change by what acts along the cell: its resultant, its couple, and how it is distributed, as far as
+that is known.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import cache
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError
@@ -17,6 +27,8 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
+
+# -- places and joints -----------------------------------------------------------------------------
 
 Vectors: TypeAlias = Any
 """Configurations or velocities at some times, an array or a ``Column``; (n, size)."""
@@ -145,3 +157,123 @@ def _direction(grid: Grid, holder: Connector, states: Vectors, turn: Array) -> A
             normals.append((-y, x))
         return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
     return turned(holder.axis, turn if holder.follows_a else np.zeros_like(turn))
+
+
+# -- section forces along cells --------------------------------------------------------------------
+
+MIDDLE: Array = np.full(1, 0.5)
+"""The middle of a cell, as a part of it."""
+
+Way = Callable[[Any], tuple[Any, Any]]
+"""Derivative of the place by the part of the cell, at a part."""
+
+
+def section_force(numbers: Any, way: Way, *, works: bool) -> Callable[[Any], tuple[Any, Any, Any]]:
+    """State the force in the plane and the moment at a part of a cell, from 0 to 1 at its end.
+
+    Args:
+        numbers: Forces of the cell, ``cell_number`` of loops.h: arrays, or expressions of UFL.
+        way: In the configuration in which they are in equilibrium.
+        works: Whether forces across the cell may be distributed in any way, by works of a user.
+    """
+    start, end, skew = ((numbers[k], numbers[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X))
+    at_start, at_end, couple = (numbers[k] for k in (lib.START_M, lib.END_M, lib.COUPLE))
+    points = gauss_rule()
+
+    def force(part: Any) -> list[Any]:
+        bend = -6 * part * (1 - part)
+        return [part * (a + b) - a + bend * c for a, b, c in zip(start, end, skew, strict=True)]
+
+    def lever(part: Any) -> Any:
+        """Moment of the section forces up to a part about the place there, over the part."""
+        pairs = ((weight, way(at * part), force(at * part)) for at, weight in points)
+        return sum(weight * (x[0] * f[1] - x[1] * f[0]) for weight, x, f in pairs)
+
+    # What moments at both ends say besides: couples, or how works are distributed across.
+    missed = at_start + at_end - couple + lever(1.0)
+    if works:
+        ways = [[6 * w * at * (1 - at) * x for x in way(at)] for at, w in points]
+        x, y = (sum(one) for one in zip(*ways, strict=True))
+        turned = missed / (x * x + y * y)
+        skew = skew[0] - turned * y, skew[1] + turned * x
+    else:
+        couple = couple + missed
+    return lambda part: (*force(part), part * (couple - lever(part)) - at_start)
+
+
+def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, Any]:
+    """(N, V, M) of a force in the plane and a moment; (c, s) is the axis of the section."""
+    x, y, M = plane
+    return c * x + s * y, c * y - s * x, M
+
+
+class ForcesAlongCells:
+    """(N, V, M) in points of the cells of a grid.
+
+    Args:
+        grid: Cells and numbering.
+
+    Attributes:
+        angles: Of the undeformed axis at both ends of the cells; (num_cells, 2); rad.
+        dofs: Degrees of freedom (u, v, ψ) of the nodes of cells; (num_cells, 3, degree + 1).
+    """
+
+    def __init__(self, grid: Any) -> None:
+        nodes = grid.nodes_of_cells
+        start, end, *inner = range(nodes.shape[1])
+        self._mesh, self._along = grid.mesh, [start, *inner, end]
+        self.dofs: Index = grid.dofs[nodes].transpose(0, 2, 1)
+        self._works = bool(grid.scene.works)
+        self._places: Array = grid.points[nodes[:, self._along]].transpose(2, 0, 1)
+        x, y = self._places[:, :, -1] - self._places[:, :, 0]
+        angles = np.asarray(np.arctan2(y, x))
+        self.angles = angles[:, None] + _turns(grid, angles)
+
+    def __call__(self, cells: Index | slice, parts: Array, numbers: Array, q: Array) -> Array:
+        """Compute them at parts of cells, from 0 at the start to 1 at the end; N, N, N m.
+
+        Args:
+            cells: Numbers of the cells, or of one cell at many times.
+            parts: Parts; (points,).
+            numbers: Forces of the cells, ``cell_number`` of loops.h; (9, num_cells).
+            q: Configurations (u, v, ψ) of their nodes, those between the ends of the step at which
+                its forces are in equilibrium; (num_cells, 3, degree + 1).
+
+        Returns:
+            (N, V, M); (num_cells, points, 3).
+        """
+        u, v, ψ = q[:, :, self._along].transpose(1, 0, 2)
+        x, y = self._places[:, cells] + (u, v)
+        mesh, (start, end) = self._mesh, self.angles[cells].T
+
+        def way(part: Array | float) -> tuple[Array, Array]:
+            slopes = mesh.slopes(np.ravel(part)).T
+            return x @ slopes, y @ slopes
+
+        angle = np.outer(start, 1 - parts) + np.outer(end, parts) + ψ @ mesh.weights(parts).T
+        at = section_force(numbers[:, :, None], way, works=self._works)
+        return np.stack(in_section(at(parts), np.cos(angle), np.sin(angle)), axis=2)
+
+
+@cache
+def gauss_rule() -> tuple[tuple[float, float], ...]:
+    """Points of Gauss's rule on a cell, and their weights; exact for all here."""
+    points, weights = np.polynomial.legendre.leggauss(3)
+    return tuple((float(1 + x) / 2, float(w) / 2) for x, w in zip(points, weights, strict=True))
+
+
+def _turns(grid: Any, angles: Array) -> Array:
+    """Angles to the smooth axis of a curved beam from both ends of its cells; (num_cells, 2); rad.
+
+    Vertices halve the angle between two cells, but at corners of the beam; it is linear in a cell.
+    """
+    half = np.angle(np.exp(1j * np.diff(angles))) / 2
+    half[np.diff(grid.beam_of_cell) != 0] = np.nan
+    for beam in grid.scene.beams:
+        if beam.corners:
+            at_corners = np.isin(grid.parameters(beam)[1:-1], beam.corners)
+            half[grid.cells_of(beam)[:-1][at_corners]] = np.nan
+    start, end = np.append(np.nan, -half), np.append(half, np.nan)
+    # As a circle where there is no neighbour
+    both = np.where(np.isnan(start), -end, start), np.where(np.isnan(end), -start, end)
+    return np.nan_to_num(np.column_stack(both))
