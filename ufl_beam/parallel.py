@@ -353,7 +353,16 @@ class Copies:
         if self._pending is None:
             return
         (request, ends), self._pending = self._pending, None
-        self._wait(request)
+        end = time.monotonic() + PATIENCE
+        while not request.Test():
+            time.sleep(0.0)  # the others may need this core
+            if time.monotonic() > end:
+                end = math.inf
+                warn(
+                    f"process {self._comm.rank} of {self._comm.size} waits for the others to "
+                    "compute the same scene. Let all processes run it, or pass comm=MPI.COMM_SELF "
+                    "where one alone does"
+                )
         apart, (size, failed) = ends[:3] + ends[3:6], ends[6:]
         allowed = TOLERANCE * np.array([size, abs(ends[1]) + abs(ends[4]), 0.0])
         if failed or (apart > allowed).any():
@@ -369,15 +378,3 @@ class Copies:
                 "the others (MPI.COMM_WORLD.bcast), or pass comm=MPI.COMM_SELF if each is to "
                 "compute its own scene"
             )
-
-    def _wait(self, request: MPI.Request) -> None:
-        end = time.monotonic() + PATIENCE
-        while not request.Test():
-            time.sleep(0.0)  # the others may need this core
-            if time.monotonic() > end:
-                end = math.inf
-                warn(
-                    f"process {self._comm.rank} of {self._comm.size} waits for the others to "
-                    "compute the same scene. Let all processes run it, or pass comm=MPI.COMM_SELF "
-                    "where one alone does"
-                )

@@ -229,7 +229,7 @@ def test_of_a_simulation():
         simulation.step_to(0.01 * (n + 1))
         simulation.keep()
         forces, k = simulation.section_forces(), 0
-        ends = simulation.forces_along(np.array([0.0, 1.0]))
+        ends = simulation.now.cell_forces(0, np.array([0.0, 1.0]))
         for beam in scene.beams:
             of_beam = simulation.solution.section_forces(beam)
             diagram = simulation.solution.diagram(beam, points=2)

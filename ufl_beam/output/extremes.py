@@ -254,7 +254,7 @@ class Extremes(Recorder):
 
     def _state(self, simulation: StateView) -> tuple[Array, Array]:
         """Section forces of all cells, and the configuration, the same on every process."""
-        return simulation.forces_along(self._parts), simulation.share.gather(simulation.q)
+        return simulation.now.cell_forces(0, self._parts), simulation.share.gather(simulation.q)
 
     @property
     def _extents(self) -> list[Extent]:

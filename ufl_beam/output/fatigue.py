@@ -373,7 +373,8 @@ class Fatigue(Recorder):
 
     def write(self, simulation: StateView) -> None:
         """Note the section forces, and count now and then."""
-        self._block.append(simulation.forces_along(self._parts)[self._cells, self._part])
+        forces = simulation.now.cell_forces(0, self._parts)
+        self._block.append(forces[self._cells, self._part])
         self._end = simulation.t
         if len(self._block) == BLOCK:
             self._count()

@@ -11,7 +11,6 @@ that is known.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
 from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
@@ -164,6 +163,10 @@ def _direction(grid: Grid, holder: Connector, states: Vectors, turn: Array) -> A
 MIDDLE: Array = np.full(1, 0.5)
 """The middle of a cell, as a part of it."""
 
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
+GAUSS = [(float(1 + x) / 2, float(w) / 2) for x, w in zip(POINTS, WEIGHTS, strict=True)]
+"""Points of Gauss's rule on a cell, and their weights; exact for all here."""
+
 Way = Callable[[Any], tuple[Any, Any]]
 """Derivative of the place by the part of the cell, at a part."""
 
@@ -178,7 +181,6 @@ def section_force(numbers: Any, way: Way, *, works: bool) -> Callable[[Any], tup
     """
     start, end, skew = ((numbers[k], numbers[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X))
     at_start, at_end, couple = (numbers[k] for k in (lib.START_M, lib.END_M, lib.COUPLE))
-    points = gauss_rule()
 
     def force(part: Any) -> list[Any]:
         bend = -6 * part * (1 - part)
@@ -186,13 +188,13 @@ def section_force(numbers: Any, way: Way, *, works: bool) -> Callable[[Any], tup
 
     def lever(part: Any) -> Any:
         """Moment of the section forces up to a part about the place there, over the part."""
-        pairs = ((weight, way(at * part), force(at * part)) for at, weight in points)
+        pairs = ((weight, way(at * part), force(at * part)) for at, weight in GAUSS)
         return sum(weight * (x[0] * f[1] - x[1] * f[0]) for weight, x, f in pairs)
 
     # What moments at both ends say besides: couples, or how works are distributed across.
     missed = at_start + at_end - couple + lever(1.0)
     if works:
-        ways = [[6 * w * at * (1 - at) * x for x in way(at)] for at, w in points]
+        ways = [[6 * w * at * (1 - at) * x for x in way(at)] for at, w in GAUSS]
         x, y = (sum(one) for one in zip(*ways, strict=True))
         turned = missed / (x * x + y * y)
         skew = skew[0] - turned * y, skew[1] + turned * x
@@ -253,13 +255,6 @@ class ForcesAlongCells:
         angle = np.outer(start, 1 - parts) + np.outer(end, parts) + ψ @ mesh.weights(parts).T
         at = section_force(numbers[:, :, None], way, works=self._works)
         return np.stack(in_section(at(parts), np.cos(angle), np.sin(angle)), axis=2)
-
-
-@cache
-def gauss_rule() -> tuple[tuple[float, float], ...]:
-    """Points of Gauss's rule on a cell, and their weights; exact for all here."""
-    points, weights = np.polynomial.legendre.leggauss(3)
-    return tuple((float(1 + x) / 2, float(w) / 2) for x, w in zip(points, weights, strict=True))
 
 
 def _turns(grid: Any, angles: Array) -> Array:

@@ -159,10 +159,6 @@ class StateView(ABC):
         """
         return np.asarray(self.now.cell_forces(0)[:, 0])
 
-    def forces_along(self, parts: Array) -> Array:
-        """(N, V, M) at parts of all cells, from 0 to 1; (num_cells, len(parts), 3); N, N, N m."""
-        return self.now.cell_forces(0, parts)
-
     def damage(self) -> tuple[Array, Array]:
         """Jump of rotation (rad) and dissipated energy (J) of each cell; see :class:`States`."""
         return self.now.damage()
@@ -170,11 +166,6 @@ class StateView(ABC):
     def watch(self, parts: Array) -> Any:
         """Begin to take in extremes after each step in C, or return None if that cannot be."""
         return None
-
-    @property
-    def may_break(self) -> bool:
-        """True if something in the scene yields, softens or has plastic hinges."""
-        return bool(self.now.column("material")[0,].size or self.scene.hinges)
 
 
 class Recorder(ABC):

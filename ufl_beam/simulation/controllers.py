@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -30,6 +30,7 @@ class Controllers:
 
     Attributes:
         numbers: The forces and limits, where C finds them; N or N m.
+        sampled: Connectors whose controllers have a sample time.
         fresh: Whether controllers were evaluated since these flags were cleared; as ``numbers``.
     """
 
@@ -41,11 +42,11 @@ class Controllers:
         self.numbers, self.fresh = np.zeros(len(asked)), np.zeros(len(asked), dtype=np.int32)
         for link in constant:
             self.numbers[self._at[link]] = link.law.force
-        self._sampled = [link for link in asked if _sample(link)]
+        self.sampled = [link for link in asked if _sample(link)]
         self._each_step = [x for x in asked if not _sample(x) and x not in constant]
         self._numbers = np.array([i for i, x in enumerate(links) if x in self._at], dtype=int)
         # Of each that has a sample time: time of the first sample (s), number of the last one.
-        self._samples = np.full((len(self._sampled), 2), math.nan)
+        self._samples = np.full((len(self.sampled), 2), math.nan)
 
     @property
     def values(self) -> dict[Connector, float]:
@@ -55,7 +56,7 @@ class Controllers:
     @property
     def asks(self) -> bool:
         """True if anything is to be evaluated when steps begin."""
-        return bool(self._each_step or self._sampled)
+        return bool(self._each_step or self.sampled)
 
     def place(self, link: Connector) -> Any:
         """Address of the number of a connector."""
@@ -69,7 +70,7 @@ class Controllers:
         """Evaluate what is due at the time ``now.t``; all processes call it together."""
         for link in self._each_step:
             self._ask(link, now)
-        for i, link in enumerate(self._sampled):
+        for i, link in enumerate(self.sampled):
             first, number = self._due(i, now.t)
             if number != self._samples[i, 1]:
                 self._ask(link, now)
@@ -83,18 +84,13 @@ class Controllers:
     def _due(self, i: int, t: float) -> tuple[float, int]:
         """Time of the first sample, and the number of the one that holds from ``t`` on."""
         first = t if math.isnan(self._samples[i, 0]) else float(self._samples[i, 0])
-        sample = _sample(self._sampled[i])
+        sample = _sample(self.sampled[i])
         return first, math.floor((t - first + _rounding(sample, t, first)) / sample)
-
-    @property
-    def stops(self) -> Callable[[float, float], float] | None:
-        """:meth:`next_sample`; None if no controller has a sample time."""
-        return self.next_sample if self._sampled else None
 
     def next_sample(self, t: float, end: float) -> float:
         """Return the next sample time after ``t``, or ``end`` if that comes first; s."""
         stop = end
-        for i, link in enumerate(self._sampled):
+        for i, link in enumerate(self.sampled):
             first, number = self._due(i, t)
             sample = _sample(link)
             at = first + (number + 1) * sample
@@ -111,7 +107,7 @@ class Controllers:
             return
         held = np.full((len(self.numbers), 4), math.nan)
         held[:, 0], held[:, 3] = self.numbers, t
-        sampled = [self._at[link] for link in self._sampled]
+        sampled = [self._at[link] for link in self.sampled]
         held[sampled, 1:3] = self._samples
         rows = memory.known_rows("asked", self._numbers, held)
         self.numbers[:] = rows[:, 0]

@@ -287,7 +287,11 @@ def _deformations(
 def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> str:
     """Words for a motion that meets no force; ``motions`` are the sizes of its parts."""
     alike = np.round(motions, 6)  # the order of equal ones must not be that of their round-off
-    parts = [_component(words) for words in grid.worst(np.where(alike >= 1 / 2, alike, 0.0))]
+    parts = []
+    for words in grid.worst(np.where(alike >= 1 / 2, alike, 0.0)):
+        component, _, place = words.partition(" of ")
+        what = "rotation" if component == "psi" else f"displacement {component}"
+        parts.append(f"the {what} of {place}")
     if cells.stiff:
         return (
             f"the forces no longer resist a motion that is largest in {_list(parts)}, as at a "
@@ -299,19 +303,15 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
     if ways:
         give = "gives way" if len(ways) == 1 else "give way together"
         said += f"; {_list(ways)} {give} at no further force"
-    if len(cells.soft) > 1 and any(_perfectly_plastic(grid, i) for i in cells.soft):
+    layouts = (grid.scene.beams[grid.beam_of_cell[i]].section.layout(None) for i in cells.soft)
+    laws = (law for layout in layouts if layout is not None for law, _ in layout.laws)
+    perfect = any(isinstance(law, Hardening) and law.bounded and law.opens for law in laws)
+    if len(cells.soft) > 1 and perfect:
         said += (
             "; if they are in a row, nothing tells which of them flows: let the law harden a "
             "little, as Hardening(limit, modulus) with a millionth of the stiffness"
         )
     return said
-
-
-def _perfectly_plastic(grid: Grid, cell: int) -> bool:
-    """Return whether a law of a cell is Hardening that does not harden."""
-    layout = grid.scene.beams[grid.beam_of_cell[cell]].section.layout(None)
-    laws = () if layout is None else layout.laws
-    return any(isinstance(law, Hardening) and law.bounded and law.opens for law, _ in laws)
 
 
 def _strains(grid: Grid, q: Array, x: Array) -> Array:
@@ -332,12 +332,6 @@ def _named(sizes: Array) -> Index:
     """The largest of those that are large enough to be named."""
     order = np.argsort(-sizes, kind="stable")
     return order[sizes[order] >= SHARE]
-
-
-def _component(words: str) -> str:
-    """A degree of freedom as :meth:`Grid.describe` says it, with a noun."""
-    component, _, place = words.partition(" of ")
-    return f"the {'rotation' if component == 'psi' else f'displacement {component}'} of {place}"
 
 
 def _list(names: list[str]) -> str:

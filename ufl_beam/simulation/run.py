@@ -40,7 +40,7 @@ from ufl_beam.simulation.diagnosis import ROOM, LedgerWatch, open_ledger
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_control import Adaptive, number_of_steps, steps_of
+from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, number_of_steps
 from ufl_beam.simulation.stepper import MOST_PARTS
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
@@ -139,7 +139,11 @@ def simulate(
         solution = simulation.solution
         solution.every, solution.building = every, time.perf_counter() - begin
         stack.enter_context(running(simulation, recorders, outputs, begin))
-        pace = steps_of(simulation, t1, dt)
+        pace: EqualSteps | AdaptiveSteps  # `error` sums estimated errors, NaN if there are none
+        if isinstance(dt, Adaptive):
+            pace = AdaptiveSteps(simulation, t1, dt)
+        else:
+            pace = EqualSteps(simulation, t1, dt)
         watch = LedgerWatch(simulation.grid, scheme, ROOM * simulation.solver.convergence.c.rtol)
 
         def after_step() -> None:

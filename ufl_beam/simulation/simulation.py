@@ -152,7 +152,8 @@ class Simulation(StateView):
         self._watches: list[Watch] = []
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
         extras = Extras(
-            self.ask if self.controllers.asks else None, self.controllers.stops,
+            self.ask if self.controllers.asks else None,
+            self.controllers.next_sample if self.controllers.sampled else None,
             self._require_held if self._loose else None,
             None if self._copies is None else self._copies.note, self._watch.c,
         )  # fmt: skip
@@ -214,7 +215,7 @@ class Simulation(StateView):
             if self._applies and self.parts == 0:
                 self._applies = False
                 self._stepper.apply_loads(self, self.t + APPLYING * (float(ends[0]) - self.t))
-                self.prediction.forget()
+                self.prediction.c.dt = math.inf  # the next step does not go on as this one did
             taken = self._stepper.take(self, ends, keep=keep)
             self._begun_at = None
             self.warn(self._watch.told(), here=not self.share.alone)

@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -68,10 +68,6 @@ class Prediction:
     def last_dt(self) -> float:
         """Length of the last step, infinite before the first; s."""
         return float(self.c.dt)
-
-    def forget(self) -> None:
-        """Let the next step start from where it begins: it does not go on as the last one did."""
-        self.c.dt = math.inf
 
     def remember(self, memory: Memory) -> None:
         """State it in numbers of the grid; see state_io.py."""
@@ -184,26 +180,6 @@ class Trial(NamedTuple):
     s: Array
 
 
-class Stepping(Protocol):
-    """The state that steps lead from and to; see :class:`Simulation`."""
-
-    prediction: Prediction
-    parts: int
-
-    @property
-    def q(self) -> Array:
-        """Configuration at the local degrees of freedom."""
-
-    def moved(self, t: float) -> None:
-        """Take note that the state is another one, at the time ``t``."""
-
-    def room(self, steps: int) -> Array:
-        """Rows of the solution for the states after so many steps, or fewer."""
-
-    def grow(self, written: int, parts_of_last: int) -> None:
-        """Take note of steps whose states C wrote to the :meth:`room`; it had none for the last."""
-
-
 class Extras(NamedTuple):
     """Functions of Python that take part in the steps of some scenes, or None."""
 
@@ -218,7 +194,8 @@ class Stepper:
     """Steps of a scene in C; see march.c.
 
     The state is that of C.  What there is to see of it is in Python after each call: time,
-    configuration, velocities, reactions and ledger.
+    configuration, velocities, reactions and ledger.  The ``state`` of methods is the
+    :class:`Simulation`, which is above this module.
     """
 
     def __init__(
@@ -274,7 +251,7 @@ class Stepper:
             fill(self.c, path=path.in_c(changes))
         self._alive: list[Any] = [opens]
         self._watches: Sequence[Any] = ()
-        self._state: Stepping | None = None  # while C takes steps
+        self._state: Any = None  # while C takes steps
         self._add_extras({
             name: [x for one in phases for x in getattr(one, name)]
             for name in ("begin", "accept", "add_state")
@@ -291,12 +268,15 @@ class Stepper:
         asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
         mine = [one for one in loops["accept"] if one[0] in asking]
         if extras.require is not None:
-            mine.insert(0, callbacks.phase(self._require))
+            require = extras.require
+            mine.insert(0, callbacks.phase(lambda step, q1, s: require(self._copy(q1))))
         loops["accept"] = mine + [one for one in loops["accept"] if one[0] not in asking]
         if extras.ask is not None:
             loops["begin"].insert(0, callbacks.phase(self._ask))
         if extras.note is not None:
-            loops["add_state"].append(callbacks.phase(self._note))
+            note = extras.note
+            took = callbacks.phase(lambda step, q1, s: note(step.t1, self._copy(q1)))
+            loops["add_state"].append(took)
         for name, calls in loops.items():
             place, in_c = getattr(self.c, name), ffi.new("phase_call[]", calls)
             self._alive += [in_c, calls]
@@ -304,7 +284,7 @@ class Stepper:
 
     # -- steps -----------------------------------------------------------------------------------
 
-    def take(self, state: Stepping, ends: Array, *, keep: bool = False) -> int:
+    def take(self, state: Any, ends: Array, *, keep: bool = False) -> int:
         """Take steps to these times, for :data:`LONGEST` at most; those that fail in parts.
 
         Returns:
@@ -327,7 +307,7 @@ class Stepper:
             self._fail()
         return taken
 
-    def apply_loads(self, state: Stepping, end: float) -> None:
+    def apply_loads(self, state: Any, end: float) -> None:
         """Apply the loads that act at the present time, in parts, up to the time ``end``."""
         fill(self.c, applies=1, begin_of_run=self.c.t, applied_by=end)
         with self._in_c(state):
@@ -336,14 +316,14 @@ class Stepper:
         if not reached:
             self._fail()
 
-    def attempt(self, state: Stepping, t1: float, end: float) -> Trial:
+    def attempt(self, state: Any, t1: float, end: float) -> Trial:
         """Solve the step to ``t1``, which is a part of one to ``end``."""
         with self._in_c(state):
             solved = lib.attempt_step(self.c, t1, end)
         return self._trial(solved)
 
     def attempt_along(
-        self, state: Stepping, step: Step, guess: Array, border: Border, *, hold: bool
+        self, state: Any, step: Step, guess: Array, border: Border, *, hold: bool
     ) -> Trial:
         """Solve a step, whose times are those of the guess, together with the load factor.
 
@@ -363,7 +343,7 @@ class Stepper:
         self.solver.follow(None)
         return self._trial(solved)
 
-    def accept(self, state: Stepping, trial: Trial) -> None:
+    def accept(self, state: Any, trial: Trial) -> None:
         """Go where the latest attempt went."""
         self.c.step.t1 = trial.step.t1
         with self._in_c(state):
@@ -417,16 +397,6 @@ class Stepper:
             self._state.moved(self.c.t)
             self._together(self._extras.ask)
 
-    def _require(self, step: Any, q1: Any, s: Any) -> None:
-        """Require that a state is held before it is accepted."""
-        if self._extras.require is not None:
-            self._extras.require(self._copy(q1))
-
-    def _note(self, step: Any, q1: Any, s: Any) -> None:
-        """Note an accepted step."""
-        if self._extras.note is not None:
-            self._extras.note(step.t1, self._copy(q1))
-
     def _prepare(self) -> None:
         """Take from a trial step what the scheme keeps besides the velocities."""
         if self._inertia is not None:
@@ -440,7 +410,7 @@ class Stepper:
     # -- the state -------------------------------------------------------------------------------
 
     @contextmanager
-    def _in_c(self, state: Stepping) -> Iterator[None]:
+    def _in_c(self, state: Any) -> Iterator[None]:
         """Context in which C takes steps from a state; then Python sees the one that follows."""
         self._state = state
         self.c.parts, self.c.failure, self._callbacks.error = 0, lib.SUCCEEDS, None
@@ -470,7 +440,7 @@ class Stepper:
     def _copy(self, values: Any) -> Array:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
 
-    def begin_at(self, state: Stepping, t: float, q: Array) -> None:
+    def begin_at(self, state: Any, t: float, q: Array) -> None:
         """Go on from a state that no step has led to."""
         ffi.memmove(self.c.q, doubles(q), self._bytes)
         fill(self.c, prediction=state.prediction.c)
