@@ -160,6 +160,50 @@ def _direction(grid: Grid, holder: Connector, states: Vectors, turn: Array) -> A
 
 # -- section forces along cells --------------------------------------------------------------------
 
+
+class Diagram(NamedTuple):
+    """Section forces along a beam; at a vertex the values before and after it.
+
+    Attributes:
+        s: Parameter of the beam, from 0 at its start to 1; (num_cells points,).
+        N: Axial force, positive in tension; N.
+        V: Shear force, along the normal to the left of the direction of the beam; N.
+        M: Bending moment, positive with tension to the right of that direction; N m.
+
+    Example:
+        >>> diagram = solution.diagram(beam, points=2)  # at both ends of the four cells
+        >>> print(diagram.s[:4], diagram.M[:4].round(-3))
+        [0.   0.25 0.25 0.5 ] [-195000. -146000. -146000.  -98000.]
+    """
+
+    s: Array
+    N: Array
+    V: Array
+    M: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
+
+
+class Material(NamedTuple):
+    """State of the material of all cells at one time.
+
+    Attributes:
+        forces: (N, V, M); (num_cells, 3); N, N, N m.
+        jump: Rotation of the hinges; (num_cells,); rad.
+        plastic: Energy dissipated by plastic strains; (num_cells,); J.
+        hinge: Energy dissipated by hinges, or by the cracks of fibres; (num_cells,); J.
+    """
+
+    forces: Array
+    jump: Array
+    plastic: Array
+    hinge: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
+
+
 MIDDLE: Array = np.full(1, 0.5)
 """The middle of a cell, as a part of it."""
 
