@@ -29,7 +29,7 @@ from scaling_model import count_traffic, work
 from scaling_page import write_page
 
 import ufl_beam as ub
-from ufl_beam.simulation import replicas as one_process_below
+from ufl_beam import parallel as one_process_below
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m^3
 BAY, MEMBER_CELLS = 3.0, 10  # m

@@ -17,7 +17,7 @@ from ufl_beam.compiled import c_library
 from ufl_beam.compiled.jit import compiled
 from ufl_beam.discretization import compiled_forms
 from ufl_beam.simulation import simulation as stepping
-from ufl_beam.simulation.prediction import Prediction
+from ufl_beam.simulation.stepper import Prediction
 from ufl_beam.solvers import newton, static_condensation
 from ufl_beam.solvers.substructuring import Klu
 

@@ -9,13 +9,13 @@ from mpi4py import MPI
 
 import pytest
 
+from ufl_beam import parallel
 from ufl_beam.errors import SceneError
-from ufl_beam.simulation import replicas
 
 sys.path.insert(0, str(Path(__file__).parent))
 
 # Under mpirun the tests' small scenes, too, are shared among all processes.
-replicas.SMALLEST_SHARE = 1
+parallel.SMALLEST_SHARE = 1
 
 COMM = MPI.COMM_WORLD
 

@@ -97,14 +97,13 @@ from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningL
 from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
 from ufl_beam.model.time_functions import Table, ramp
 from ufl_beam.model.works import Potential, VirtualWork
-from ufl_beam.output.archive import version
 from ufl_beam.output.dolfinx_view import DolfinxView
-from ufl_beam.output.events import Event, Events
 from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Cycles, Fatigue, Gerber, Goodman, HotSpot, SNCurve, rainflow
-from ufl_beam.output.history import History
+from ufl_beam.output.history import Event, Events, History
+from ufl_beam.output.output_files import version
+from ufl_beam.output.postprocessing import Diagram
 from ufl_beam.output.recorders import Recorder
-from ufl_beam.output.states import Diagram
 from ufl_beam.output.time_series import VTKHDF, XDMF
 from ufl_beam.parallel import say
 from ufl_beam.plotting import notebook  # noqa: F401 - says how notebooks show models and results

@@ -23,8 +23,8 @@ from combination_case import (
 from own_parts import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
 
 import ufl_beam as ub
+from ufl_beam import parallel
 from ufl_beam.reference.solver import Solver
-from ufl_beam.simulation import replicas
 
 
 @check
@@ -346,8 +346,8 @@ def newton_options(case):
 def processes(case):
     """Shared by all processes of MPI the run is the one of a single process."""
     only(MPI.COMM_WORLD.size > 1, "one process")
-    smallest, replicas.SMALLEST_SHARE = replicas.SMALLEST_SHARE, 1
+    smallest, parallel.SMALLEST_SHARE = parallel.SMALLEST_SHARE, 1
     try:
         assert_agree(case, comm=MPI.COMM_WORLD)
     finally:
-        replicas.SMALLEST_SHARE = smallest
+        parallel.SMALLEST_SHARE = smallest

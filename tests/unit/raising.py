@@ -14,11 +14,10 @@ from mpi4py import MPI
 
 import ufl_beam as ub
 from ufl_beam import parallel
-from ufl_beam.simulation import replicas
 
 WORLD = MPI.COMM_WORLD
 ALL = -1
-replicas.SMALLEST_SHARE = 1
+parallel.SMALLEST_SHARE = 1
 
 SECTION = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=8)
@@ -237,7 +236,7 @@ def asked(fail):
 
 def own(fail):
     """A small scene, which each process computes for itself."""
-    replicas.SMALLEST_SHARE = 10**6
+    parallel.SMALLEST_SHARE = 10**6
     load(fail)
 
 

@@ -21,7 +21,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.model.connector_laws import HELD
-from ufl_beam.output.saved_scene import RECORDS, from_data, to_data
+from ufl_beam.output.serialization import RECORDS, from_data, to_data
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "properties"))
 from restarted import bend, machine

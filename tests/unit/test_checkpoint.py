@@ -15,13 +15,13 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.discretization.state_io import Restoring, Saving
-from ufl_beam.output import archive
+from ufl_beam.output import output_files
+from ufl_beam.output.serialization import Description, difference
 from ufl_beam.simulation.checkpoint import FORMAT
-from ufl_beam.simulation.fingerprint import Description, difference
 
 
 def read(path):
-    return archive.read(path, FORMAT)
+    return output_files.read(path, FORMAT)
 
 
 STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}

@@ -349,8 +349,8 @@ MPIRUN = {
 SHARED = """
 import sys
 sys.path[:0] = [{here!r}, {tests!r}]
-from ufl_beam.simulation import replicas
-replicas.SMALLEST_SHARE = 1
+from ufl_beam import parallel
+parallel.SMALLEST_SHARE = 1
 import test_connector_laws as t
 at, links, scene = t.all_laws()
 solution = t.run(scene, t.ub.Midpoint())

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.output import archive
-from ufl_beam.output.archive import above, version
+from ufl_beam.output import output_files
+from ufl_beam.output.output_files import above, version
 from ufl_beam.output.paraview_files import data_path
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1, bending=ub.Hardening(0.5, 10.0))
@@ -194,9 +194,9 @@ def test_files_of_other_kinds_and_versions(kind, other, path, monkeypatch):
         other.write(path)
         refused(kind, path, f"is a {other.format}, written by version {version()}")
         return
-    monkeypatch.setattr(archive, "version", lambda: "9.8.7")
+    monkeypatch.setattr(output_files, "version", lambda: "9.8.7")
     later = f"{kind.format[:-1]}9"
-    archive.write(path, later, {})
+    output_files.write(path, later, {})
     monkeypatch.undo()
     refused(
         kind, path, f"is a {later}, written by version 9.8.7 of ufl_beam; this version, "
@@ -210,9 +210,9 @@ def test_files_of_other_kinds_and_versions(kind, other, path, monkeypatch):
 def forge(kind, path, change):
     """Write the file with another content and the checksum of that."""
     kind.write(path)
-    content = archive.read(path, kind.format)
+    content = output_files.read(path, kind.format)
     change(content)
-    archive.write(path, kind.format, content)
+    output_files.write(path, kind.format, content)
 
 
 def forge_members(kind, path, change):
@@ -320,9 +320,9 @@ def test_recorders_whose_state_is_missing(name, make, path, tmp_path):
     checkpoint = ub.Checkpoint(path, every=100)
     run(checkpoint=checkpoint, record=make(tmp_path / name))
     format = KINDS["checkpoint"].format
-    content = archive.read(path, format)
+    content = output_files.read(path, format)
     without = {n: x for n, x in content.items() if not n.startswith("recorder 0/")}
-    archive.write(path, format, without)
+    output_files.write(path, format, without)
     with pytest.raises(ub.SceneError, match=r"checkpoint .* cannot go on from it: KeyError\('"):
         run(checkpoint=checkpoint, record=make(tmp_path / name))
 
@@ -332,9 +332,9 @@ def test_extremes_of_another_shape(path):
     checkpoint = ub.Checkpoint(path, every=100)
     run(checkpoint=checkpoint, record=ub.Extremes())
     format = KINDS["checkpoint"].format
-    content = archive.read(path, format)
+    content = output_files.read(path, format)
     content["recorder 0/forces low"] = content["recorder 0/forces low"].T
-    archive.write(path, format, content)
+    output_files.write(path, format, content)
     with pytest.raises(ub.SceneError, match=r"checkpoint .*the array 'forces low' is float64 of"):
         run(checkpoint=checkpoint, record=ub.Extremes())
 
@@ -399,8 +399,9 @@ def test_text_that_is_none(kind, text, path):
 
 def test_what_cannot_be_written_is_said(tmp_path):
     for name, value in (("a", {1j}), ("a", np.array([None])), ("\ud800", np.zeros(2))):
+        path, content = tmp_path / "file", {name: value}
         with pytest.raises(ub.SceneError, match="file of t = 1 s cannot be written: "):
-            archive.write(tmp_path / "file", "study of ufl_beam, 2", {name: value}, " of t = 1 s")
+            output_files.write(path, "study of ufl_beam, 2", content, " of t = 1 s")
     assert not [*tmp_path.iterdir()]
 
 
@@ -446,7 +447,7 @@ def test_a_solution_of_an_earlier_version(path):
         )  # fmt: skip
 
     check(ub.load(EARLIER))
-    content = archive.read(EARLIER, Solutions.format)
+    content = output_files.read(EARLIER, Solutions.format)
     arrays = {name: x for name, x in content.items() if isinstance(x, np.ndarray)}
     text = {name: x for name, x in content.items() if name not in arrays}
     for number in (1, 0):
@@ -588,4 +589,4 @@ def test_a_history_is_checked_on_all_processes(shared_path, on_first_rank):
 
 def test_names_have_prefixes():
     assert above("a/", {"b": 1}) == {"a/b": 1}
-    assert archive.below("a/", {"a/b": 1, "c": 2}) == {"b": 1}
+    assert output_files.below("a/", {"a/b": 1, "c": 2}) == {"b": 1}

@@ -9,9 +9,9 @@ import ufl
 from dolfinx import fem, has_adios2
 
 import ufl_beam as ub
+from ufl_beam import parallel
 from ufl_beam.discretization.function_spaces import DolfinxFields
 from ufl_beam.output import dolfinx_view
-from ufl_beam.simulation import replicas
 
 STEEL = {"EA": 1e6, "GA": 4e5, "EI": 800.0, "rhoA": 10.0, "rhoI": 0.01}
 
@@ -19,7 +19,7 @@ STEEL = {"EA": 1e6, "GA": 4e5, "EI": 800.0, "rhoA": 10.0, "rhoI": 0.01}
 @pytest.mark.parametrize("least", [1, 6000], ids=["shared", "copies"])
 def test_total_is_that_of_the_scene_on_any_processes(monkeypatch, least):
     """Length, ∫ x² and stored energy; [round-off] of 12 cells and of Newton's method."""
-    monkeypatch.setattr(replicas, "SMALLEST_SHARE", least)
+    monkeypatch.setattr(parallel, "SMALLEST_SHARE", least)
     beam = ub.Beam((0, 0), (3, 0), ub.Section(**STEEL), cells=12)
     load = ub.PointLoad(beam.end, force=(10.0, 30.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])

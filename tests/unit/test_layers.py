@@ -148,7 +148,7 @@ def test_the_reference_solver_is_apart(module):
 
 def test_nothing_but_a_run_knows_the_reference_solver():
     users = {m for m in FILES if any(room(one) == "reference" for one in siblings(m))}
-    assert {m for m in users if room(m) != "reference"} == {"simulation.reference_run"}
+    assert {m for m in users if room(m) != "reference"} == {"simulation.run"}
 
 
 def test_kinematics_imports_ufl_alone():

@@ -19,8 +19,7 @@ from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
 from ufl_beam.output import output_files
-from ufl_beam.output.archive import read
-from ufl_beam.output.output_files import OutputFile
+from ufl_beam.output.output_files import OutputFile, read
 from ufl_beam.output.paraview_files import PAGE, Lines, VtkhdfWriter, XdmfWriter
 from ufl_beam.simulation.checkpoint import FORMAT
 

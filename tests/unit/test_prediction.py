@@ -8,7 +8,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import doubles, ffi, lib
-from ufl_beam.simulation.prediction import Prediction
+from ufl_beam.simulation.stepper import Prediction
 
 
 def prediction_of(scheme):

@@ -206,7 +206,7 @@ def test_paths():
 @pytest.mark.parametrize("actions", ["virtual work", "frame", "Rayleigh"])
 @pytest.mark.parametrize("kind", ["elastic", "yielding"])
 def test_processes_that_share_a_scene(actions, kind, monkeypatch):
-    monkeypatch.setattr("ufl_beam.simulation.replicas.SMALLEST_SHARE", 1)
+    monkeypatch.setattr("ufl_beam.parallel.SMALLEST_SHARE", 1)
     scene, joint = two_beams(actions, kind)
     options = {"t": (0, 0.1), "dt": 0.02, "progress": False}
     extremes, others = ub.Extremes(3), ub.Extremes(3)
@@ -229,7 +229,7 @@ def test_of_a_simulation():
         simulation.step_to(0.01 * (n + 1))
         simulation.keep()
         forces, k = simulation.section_forces(), 0
-        ends = simulation.forces_along(np.array([0.0, 1.0]))
+        ends = simulation.now.cell_forces(0, np.array([0.0, 1.0]))
         for beam in scene.beams:
             of_beam = simulation.solution.section_forces(beam)
             diagram = simulation.solution.diagram(beam, points=2)

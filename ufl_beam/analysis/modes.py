@@ -30,7 +30,7 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
-from ufl_beam.output.joint_histories import velocity_of
+from ufl_beam.output.postprocessing import velocity_of
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import active_comm, on_first

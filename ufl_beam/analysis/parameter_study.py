@@ -25,8 +25,19 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich
 from ufl_beam.errors import SceneError, require_kind, require_sequence, require_switch, shorten
-from ufl_beam.output.archive import above, below, decoding, plain, read, require_arrays, write
-from ufl_beam.output.output_files import part_of, require_apart, require_path, take
+from ufl_beam.output.output_files import (
+    above,
+    below,
+    decoding,
+    part_of,
+    plain,
+    read,
+    require_apart,
+    require_arrays,
+    require_path,
+    take,
+    write,
+)
 from ufl_beam.parallel import alone, communicator, on_first, progress_bar, say
 
 Case = dict[str, Any]

@@ -31,13 +31,12 @@ from ufl_beam.model.connector_law import ConnectorLaw, require_limit
 from ufl_beam.model.connector_laws import Controller, rubs
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.archive import Content, above, below, require_arrays
+from ufl_beam.output.output_files import Content, above, below, require_arrays
 from ufl_beam.output.recorders import Recorder, recorders_of
 from ufl_beam.parallel import communicator, progress_bar
 from ufl_beam.simulation.run import running
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.solution_files import NAMED
+from ufl_beam.simulation.solution import NAMED, Solution
 from ufl_beam.simulation.stepper import Trial
 from ufl_beam.solvers.newton_options import Newton
 

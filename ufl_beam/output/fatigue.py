@@ -26,8 +26,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
-from ufl_beam.output.recorders import Recorder
-from ufl_beam.output.state_view import StateView
+from ufl_beam.output.recorders import Recorder, StateView
 
 BLOCK = 1000  # steps that are collected before their cycles are counted
 
@@ -374,7 +373,8 @@ class Fatigue(Recorder):
 
     def write(self, simulation: StateView) -> None:
         """Note the section forces, and count now and then."""
-        self._block.append(simulation.forces_along(self._parts)[self._cells, self._part])
+        forces = simulation.now.cell_forces(0, self._parts)
+        self._block.append(forces[self._cells, self._part])
         self._end = simulation.t
         if len(self._block) == BLOCK:
             self._count()

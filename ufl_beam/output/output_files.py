@@ -1,19 +1,34 @@
 # SPDX-License-Identifier: MIT
-"""Output files: checks of their paths before a run, errors that name the file."""
+"""Output files: checks of their paths, errors that name them, and the container of what is saved.
+
+The container of solutions, studies and checkpoints has named arrays and JSON, with a checksum.
+It is a zip archive as ``numpy.savez`` writes it, which ``numpy.load`` reads; its member
+``text.json`` has what is no array.  The comment at its end names the content, the number of the
+format, the version of ufl_beam, and the SHA-256 of all bytes before.
+"""
 
 from __future__ import annotations
 
 import errno
 import hashlib
+import io
+import json
 import os
+import re
 import shutil
 import stat
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import zipfile
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from functools import cache
+from importlib import metadata
 from pathlib import Path
+from typing import Any
 
-from ufl_beam.errors import SceneError, shorten
+import numpy as np
+
+from ufl_beam.errors import SceneError, shorten, warn
 from ufl_beam.file_system import is_at, sync
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
@@ -221,3 +236,192 @@ def changed(what: str) -> SceneError:
         f"{what}: it is not what was written up to the checkpoint: it is missing, or was changed "
         "while the run was down; bring it back, or delete the checkpoint to begin anew"
     )
+
+
+# -- the container ---------------------------------------------------------------------------------
+
+Content = dict[str, Any]
+"""Arrays by name; what is not an array is JSON."""
+
+ADVICE = {
+    "solution": "Take another copy of the file, or save the solution again",
+    "study": "Delete the file to compute all members, or name another",
+    "checkpoint": "Delete the file to begin anew, or name another",
+}
+"""What to do about a file that cannot be used."""
+
+READ_TOO = {"solution of ufl_beam, 3": "solution of ufl_beam, 2"}
+"""Formats of earlier versions that are read beside those of this one."""
+
+NPY: Any = np.lib.format
+"""NumPy's reader and writer of arrays; it has no types."""
+
+DIGEST = 64
+"""Bytes of the checksum at the end of a file."""
+
+END = re.compile(rb"(?s).*?(\w+ of ufl_beam, \d+); written by ufl_beam ([!-~]+); sha256 \w{64}")
+"""The end of a file: format, and version of the package."""
+
+
+@cache
+def version() -> str:
+    """The version of the source tree that is imported, else that of the installed package."""
+    project = Path(__file__).resolve().parents[2] / "pyproject.toml"
+    if project.is_file():
+        text = project.read_text(encoding="utf-8")
+        stated = re.search(r'^name = "ufl_beam"\nversion = "([^"]+)"', text, re.MULTILINE)
+        if stated:
+            return stated[1]
+    return metadata.version("ufl_beam")
+
+
+def above(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return content with a prefix before its names."""
+    return {prefix + name: value for name, value in content.items()}
+
+
+def below(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the content whose names begin with a prefix, without it."""
+    inside = ((n, v) for n, v in content.items() if n.startswith(prefix))
+    return {name.removeprefix(prefix): value for name, value in inside}
+
+
+def write(path: Path, format: str, content: Content, at: str = "") -> None:
+    """Write a file; there is always a whole one, the new or the one before.
+
+    The ``format`` names the content and its number, "solution of ufl_beam, 2"; the number grows
+    whenever the meaning of files changes.  ``at`` is a part of messages, such as the time.
+
+    Raises:
+        SceneError: The file cannot be written, or the content is something else than numbers,
+            texts, lists and dicts.
+        OSError: There is no space for it.
+    """
+    require_writable(path)
+    what, file = format.partition(" ")[0], io.BytesIO()
+    try:
+        with zipfile.ZipFile(file, "w") as archive:
+            archive.comment = f"{format}; written by ufl_beam {version()}; sha256 ".encode()
+            archive.comment += bytes(DIGEST)
+            arrays = {n: v for n, v in content.items() if isinstance(v, np.ndarray)}
+            text = {n: v for n, v in content.items() if n not in arrays}
+            with archive.open("text.json", "w") as member:
+                member.write(json.dumps(text, default=plain).encode())
+            for name, values in arrays.items():
+                with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
+                    NPY.write_array(member, values, allow_pickle=False)
+    except (TypeError, ValueError) as error:
+        raise SceneError(
+            f"{what} {path}{at} cannot be written: a state() has something else than numbers, "
+            f"texts, lists and dicts: {error}"
+        ) from None
+    try:
+        with file.getbuffer() as data:
+            data[-DIGEST:] = hashlib.sha256(data[:-DIGEST]).hexdigest().encode()
+            put_in_place(path, data)
+    except OSError as error:
+        free = shutil.disk_usage(path.parent).free
+        before = "the one before is still there" if path.exists() else "there is none yet"
+        raise OSError(
+            error.errno or errno.EIO,
+            f"{what} {path}{at} cannot be written: {error.strerror}; it needs "
+            f"{file.tell() / 1e6:.3g} MB, and {path.parent} has {free / 1e6:.3g} MB; {before}",
+        ) from None
+
+
+def plain(value: Any) -> Any:
+    """Return arrays and numbers of NumPy as JSON has them; TypeError for other objects."""
+    if isinstance(value, np.generic | np.ndarray):
+        return value.tolist()
+    raise TypeError(repr(value))
+
+
+@contextmanager
+def decoding(path: Path, format: str) -> Iterator[None]:
+    """Make every error of reading a file a :class:`SceneError` with its name and what to do."""
+    what = format.partition(" ")[0]
+    try:
+        yield
+    except SceneError as error:
+        raise SceneError(f"{what} {path}: {error}. {ADVICE[what]}") from None
+    except Exception as error:  # of any library, as a file may have anything
+        raise SceneError(
+            f"{what} {path}: the file is damaged: {error!r}. {ADVICE[what]}"
+        ) from error
+
+
+def read(path: Path, format: str) -> Content:
+    """Read a file of :func:`write`, within :func:`decoding`."""
+    try:
+        data = path.read_bytes()
+    except FileNotFoundError:
+        raise SceneError("there is no such file") from None
+    except OSError as error:
+        raise SceneError(f"the file cannot be read: {error.strerror}") from None
+    content: Content = {}
+    found, by = "", "an earlier version"
+    if data.startswith(b"\x89HDF\r\n\x1a\n"):
+        found, content = _without_checksum(data)
+    elif data.startswith(b"checkpoint of ufl_beam, 2;"):
+        found = "checkpoint of ufl_beam, 2"
+    elif end := END.fullmatch(data[-256:]):
+        if hashlib.sha256(data[:-DIGEST]).hexdigest().encode() != data[-DIGEST:]:
+            raise SceneError("the file is damaged: its checksum is not that of its content")
+        found, by = end[1].decode(), f"version {end[2].decode()}"
+    kind = format.rpartition(", ")[0]
+    if not found:
+        why = "its end is not that of such a file" if data else "it is empty"
+        raise SceneError(f"the file holds no {kind}, or is damaged: {why}")
+    if content and found == f"{kind}, 1":
+        warn(
+            f"{path} is a {found}, written by an earlier version of ufl_beam without a checksum, "
+            "so that damage cannot be seen; save it again"
+        )
+        return content
+    if found not in (format, READ_TOO.get(format)):
+        raise SceneError(
+            f"the file is a {found}, written by {by} of ufl_beam; this version, {version()}, reads "
+            f"a {format}"
+        )
+    with zipfile.ZipFile(io.BytesIO(data)) as archive:
+        if sum(member.file_size for member in archive.infolist()) > len(data):
+            raise SceneError("the file is damaged: what it contains is larger than itself")
+        content = json.loads(archive.read("text.json"))
+        for member in archive.namelist():
+            name, _, ending = member.rpartition(".")
+            if ending == "npy":
+                stored = io.BytesIO(archive.read(member))
+                content[name] = NPY.read_array(stored, allow_pickle=False)
+    return content
+
+
+def _without_checksum(data: bytes) -> tuple[str, Content]:
+    """Format and content of a solution or a study that an earlier version wrote, in HDF5."""
+    import h5py
+
+    with h5py.File(io.BytesIO(data), "r") as file:
+        found = str(file.attrs.get("format", ""))
+        if found.startswith("solution"):
+            text: Content = json.loads(file["text"][()])
+            return found, {**text, **{name: file[name][()] for name in text.pop("arrays")}}
+        if found.startswith("study"):
+            text = {name: [*file[name].asstr()[()]] for name in ("cases", "errors")}
+            results = {name: values[()] for name, values in file["results"].items()}
+            seconds = {"member": file.attrs["member"], "seconds": file["seconds"][()]}
+            return found, {**text, **seconds, **above("results/", results)}
+    return "", {}
+
+
+def require_arrays(found: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> None:
+    """Raise :class:`SceneError` unless arrays of numbers have these shapes; -1 is any length."""
+    for name, shape in shapes.items():
+        values = np.asarray(found.get(name))
+        same = len(values.shape) == len(shape) and all(
+            expected in (length, -1) for length, expected in zip(values.shape, shape, strict=True)
+        )
+        if not same or values.dtype.kind not in "fi" or values.dtype.itemsize != 8:
+            is_ = f"{values.dtype} of shape {values.shape}" if name in found else "missing"
+            raise SceneError(
+                f"the file is damaged: the array {name!r} is {is_}, and must be numbers of 64 bits "
+                f"of shape {shape}"
+            )

@@ -1,20 +1,171 @@
 # SPDX-License-Identifier: MIT
-"""Recorders of runs: base class and checks."""
+"""Recorders of runs: their base class, the view of a run that they get, and checks."""
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 from mpi4py import MPI
 
-from ufl_beam.arrays import State
+import numpy as np
+
+from ufl_beam.arrays import Array, State
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.function_spaces import Fields
+from ufl_beam.discretization.partition import Share
+from ufl_beam.display import Parameter
 from ufl_beam.errors import SceneError, require_sequence, shorten
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.scene import Scene
 from ufl_beam.model.signatures import unlike
+from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import Output, require_apart, require_writable
-from ufl_beam.output.state_view import StateView
+from ufl_beam.output.postprocessing import links_of
+from ufl_beam.output.state_rows import FORCE, Connection, connection
+from ufl_beam.output.states import States
 from ufl_beam.parallel import on_first
+from ufl_beam.solvers.newton import Solver
+from ufl_beam.terms.beams import InelasticBeams
+from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.inertia_and_damping import Inertia
+
+
+class StateView(ABC):
+    """State at the present time, by objects of the scene; all processes call methods together."""
+
+    scene: Scene
+    comm: MPI.Intracomm  # all processes of the run
+    scheme: Scheme
+    grid: Grid
+    share: Share  # degrees of freedom of this process
+    fields: Fields
+    t: float  # s
+    parts: int  # steps so far, parts of cut steps counted each
+    cell_forces: CellForces
+    inertia: Inertia
+    inelastic: list[InelasticBeams]
+    solver: Solver  # Newton's method
+
+    @property
+    @abstractmethod
+    def now(self) -> States:
+        """The present state, read as a solution; all processes call it together."""
+
+    @property
+    @abstractmethod
+    def q(self) -> Array:
+        """Configuration at the local degrees of freedom."""
+
+    @property
+    @abstractmethod
+    def q_before(self) -> Array:
+        """That at the beginning of the last step."""
+
+    @property
+    @abstractmethod
+    def asked(self) -> dict[Connector, float]:
+        """Forces of controllers, and limits of friction; N or N m."""
+
+    @property
+    @abstractmethod
+    def parameter(self) -> Parameter:
+        """Time, or the load factor of a path."""
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations so far."""
+        return self.solver.iterations
+
+    @property
+    def snes(self) -> Any:
+        """SNES that solves the steps, of petsc4py; it takes monitors, histories and other methods.
+
+        From when it is asked for, steps are solved by PETSc's ``newtonls``, also in the compiled
+        path, where an equivalent method in C is faster for few cells.  Its norms add forces (N),
+        moments (N m) and what connectors miss; convergence is judged by :class:`Newton`'s ``rtol``.
+        Monitors are also called in line searches and along paths.
+
+        Example:
+            >>> simulation, norms = ub.Simulation(scene, ub.Midpoint()), []
+            >>> simulation.snes.setMonitor(lambda snes, iteration, norm: norms.append(norm))
+            >>> simulation.step_to(0.05)
+            >>> len(norms) == simulation.iterations + 1
+            True
+        """
+        return self.solver.snes
+
+    def velocities(self) -> list[Array]:
+        """Velocities at the local degrees of freedom; none in statics."""
+        return [self.inertia.v] if has_inertia(self.scheme) else []
+
+    def entries(self) -> tuple[dict[str, float], ...]:
+        """The ledger over all processes: state, supplied, lost; J."""
+        columns, row = self.now.row(0)
+        numbers: Any = row.tolist()
+        return tuple({name: numbers[at] for name, at in of.items()} for of in columns.ledger)
+
+    def connections(self) -> Array:
+        """Columns of :class:`Connection` for all links of the scene; (num_links, 5)."""
+        return np.asarray(self.now.column("connectors")[0,])
+
+    def connector(self, connector: Connector) -> Connection:
+        """Return motion, force, work and rate of a connector at the end of the last step.
+
+        Raises:
+            SceneError: It is not in the scene.
+        """
+        return connection(self.connections()[links_of(self.scene, connector)])
+
+    def displacement(self, place: Anchor) -> Array:
+        """Displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
+        return np.asarray(self.now.displacement(place)[0])
+
+    def velocity(self, place: Anchor) -> Array:
+        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s.
+
+        Raises:
+            SceneError: The run is static; it has no velocities.
+        """
+        if not has_inertia(self.scheme):
+            raise SceneError(
+                f"velocity of {place}: the run is static; there is none. A controller for both "
+                "kinds of runs can ask now.scheme.dynamic"
+            )
+        return np.asarray(self.now.velocity(place)[0])
+
+    def press(self, joint: Joint | Support) -> float:
+        """Size of the force of a joint or a support at the end of the last step; N.
+
+        Raises:
+            SceneError: The joint shares its displacement; make it with ``measured=True``.
+        """
+        if isinstance(joint, Support):
+            number = self.scene.supports.index(joint)
+            return float(np.linalg.norm(self.now.column("reactions")[0, number, :2]))
+        links = self.scene.links
+        numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
+        return float(np.linalg.norm(self.connections()[numbers, FORCE]))
+
+    def section_forces(self) -> Array:
+        """(N, V, M) in the middle of all cells; (num_cells, 3); N, N, N m.
+
+        They belong to the equation of the last step, see :meth:`Solution.diagram`.
+        """
+        return np.asarray(self.now.cell_forces(0)[:, 0])
+
+    def damage(self) -> tuple[Array, Array]:
+        """Jump of rotation (rad) and dissipated energy (J) of each cell; see :class:`States`."""
+        return self.now.damage()
+
+    def watch(self, parts: Array) -> Any:
+        """Begin to take in extremes after each step in C, or return None if that cannot be."""
+        return None
 
 
 class Recorder(ABC):

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cached_property
-from typing import NamedTuple
 
 from mpi4py import MPI
 
@@ -16,17 +15,19 @@ from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
 from ufl_beam.discretization.partition import Share
-from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor, Member, Place
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
-from ufl_beam.output.archive import require_arrays
-from ufl_beam.output.forces_along_cells import MIDDLE, ForcesAlongCells
-from ufl_beam.output.joint_histories import (
+from ufl_beam.output.output_files import require_arrays
+from ufl_beam.output.postprocessing import (
+    MIDDLE,
+    Diagram,
+    ForcesAlongCells,
     JointHistory,
+    Material,
     links_of,
     motion_of,
     of_joint,
@@ -50,50 +51,6 @@ from ufl_beam.output.state_rows import (
     new_rows,
 )
 from ufl_beam.terms.energy_ledger import Energy
-
-
-class Diagram(NamedTuple):
-    """Section forces along a beam; at a vertex the values before and after it.
-
-    Attributes:
-        s: Parameter of the beam, from 0 at its start to 1; (num_cells points,).
-        N: Axial force, positive in tension; N.
-        V: Shear force, along the normal to the left of the direction of the beam; N.
-        M: Bending moment, positive with tension to the right of that direction; N m.
-
-    Example:
-        >>> diagram = solution.diagram(beam, points=2)  # at both ends of the four cells
-        >>> print(diagram.s[:4], diagram.M[:4].round(-3))
-        [0.   0.25 0.25 0.5 ] [-195000. -146000. -146000.  -98000.]
-    """
-
-    s: Array
-    N: Array
-    V: Array
-    M: Array
-
-    def __repr__(self) -> str:
-        return one_line(self)
-
-
-class Material(NamedTuple):
-    """State of the material of all cells at one time.
-
-    Attributes:
-        forces: (N, V, M); (num_cells, 3); N, N, N m.
-        jump: Rotation of the hinges; (num_cells,); rad.
-        plastic: Energy dissipated by plastic strains; (num_cells,); J.
-        hinge: Energy dissipated by hinges, or by the cracks of fibres; (num_cells,); J.
-    """
-
-    forces: Array
-    jump: Array
-    plastic: Array
-    hinge: Array
-
-    def __repr__(self) -> str:
-        return one_line(self)
-
 
 LEAST_ROOM, MOST_NUMBERS = 8, 2**17
 """Least number of rows that are made at once, if they have no more numbers.  Small blocks fit into

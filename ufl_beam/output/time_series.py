@@ -15,7 +15,6 @@ from ufl_beam.errors import SceneError, require_count
 from ufl_beam.model.bodies import Anchor, arm
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene, spots_of
-from ufl_beam.output.joint_histories import turned
 from ufl_beam.output.output_files import changed, part_of, require_path
 from ufl_beam.output.paraview_files import (
     LineFields,
@@ -24,8 +23,8 @@ from ufl_beam.output.paraview_files import (
     XdmfWriter,
     data_path,
 )
-from ufl_beam.output.recorders import Recorder
-from ufl_beam.output.state_view import StateView
+from ufl_beam.output.postprocessing import turned
+from ufl_beam.output.recorders import Recorder, StateView
 from ufl_beam.parallel import on_first
 
 BODY, LINK = 1, 2
@@ -102,7 +101,7 @@ class LineData:
             at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
         forces = simulation.section_forces()
         of_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
-        if simulation.may_break:
+        if simulation.scene.hinges or simulation.now.column("material")[0,].size:
             of_cells["jump"], of_cells["dissipated energy"] = simulation.damage()
         in_cells = {
             name: np.append(np.repeat(values, self._pieces_of_cell), np.zeros(self._num_rods))

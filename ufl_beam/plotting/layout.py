@@ -19,7 +19,7 @@ from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.curves import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene, spots_of
-from ufl_beam.output.joint_histories import motion_of
+from ufl_beam.output.postprocessing import motion_of
 from ufl_beam.output.states import States
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3

@@ -30,7 +30,7 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.supports import Support
-from ufl_beam.output.joint_histories import links_of, motion_of, velocity_of
+from ufl_beam.output.postprocessing import links_of, motion_of, velocity_of
 from ufl_beam.output.state_rows import BEFORE, FORCES, LEDGER, Connection
 from ufl_beam.reference.beams import (
     ElasticBeams,

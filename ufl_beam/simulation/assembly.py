@@ -20,9 +20,9 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import Agreement
-from ufl_beam.simulation.branch_check import StaticPath
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.simulation.stepper import StaticPath
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import Cells, ElasticBeams, InelasticBeams
 from ufl_beam.terms.cell_forces import CellForces
@@ -196,16 +196,12 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
         ledger.state["stored"] += 0.0
     parts = share, A, beams, coupled, loads, others, supports, search
     equation = StepEquation(*parts, rates)
+    in_cells = [part for term in equation.terms for part in term.in_cells]
+    dead = [term.loads_in_cells() for term in equation.terms if isinstance(term, DeadLoads)]
     return Assembly(
         fields, ledger, controllers, beams, inelastic, coupled, loads, inertia,
-        supports, equation, _cell_forces(share, equation.terms),
+        supports, equation, CellForces(share, in_cells, *dead),
     )  # fmt: skip
-
-
-def _cell_forces(share: Share, terms: list[Term]) -> CellForces:
-    parts = [part for term in terms for part in term.in_cells]
-    dead = [term.loads_in_cells() for term in terms if isinstance(term, DeadLoads)]
-    return CellForces(share, parts, *dead)
 
 
 def _loads(scene: Scene, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[LoadTerm]:

@@ -18,11 +18,21 @@ import numpy as np
 
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_system import Lock
-from ufl_beam.output.archive import ADVICE, Content, above, below, decoding, read, write
-from ufl_beam.output.output_files import part_of, require_path, require_writable
+from ufl_beam.output.output_files import (
+    ADVICE,
+    Content,
+    above,
+    below,
+    decoding,
+    part_of,
+    read,
+    require_path,
+    require_writable,
+    write,
+)
 from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.serialization import CODE, Description, difference, has_state
 from ufl_beam.parallel import on_first
-from ufl_beam.simulation.fingerprint import CODE, Description, difference, has_state
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Diagnosis of failed steps and open ledgers: forces, what gives way, round-off."""
+"""Diagnosis of failed steps, open ledgers and wrong signs: forces, what gives way, round-off."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 from mpi4py import MPI
@@ -15,8 +16,21 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import ConvergenceError, NoNumber, SceneError, StepFailed
+from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.model.connector_law import ENTRIES, ConnectorLaw, judges_loss
+from ufl_beam.model.connector_laws import (
+    Coulomb,
+    Damper,
+    ForceLaw,
+    Spring,
+    Stop,
+)
 from ufl_beam.model.constraint_checks import INSTEAD
+from ufl_beam.model.material_law import MaterialLaw, has_quadratic_energies, judges_dissipation
 from ufl_beam.model.material_laws import Hardening
+from ufl_beam.model.scene import Scene
+from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
+from ufl_beam.output.states import States
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.factorization import Factorisation
@@ -273,7 +287,11 @@ def _deformations(
 def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> str:
     """Words for a motion that meets no force; ``motions`` are the sizes of its parts."""
     alike = np.round(motions, 6)  # the order of equal ones must not be that of their round-off
-    parts = [_component(words) for words in grid.worst(np.where(alike >= 1 / 2, alike, 0.0))]
+    parts = []
+    for words in grid.worst(np.where(alike >= 1 / 2, alike, 0.0)):
+        component, _, place = words.partition(" of ")
+        what = "rotation" if component == "psi" else f"displacement {component}"
+        parts.append(f"the {what} of {place}")
     if cells.stiff:
         return (
             f"the forces no longer resist a motion that is largest in {_list(parts)}, as at a "
@@ -285,19 +303,15 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
     if ways:
         give = "gives way" if len(ways) == 1 else "give way together"
         said += f"; {_list(ways)} {give} at no further force"
-    if len(cells.soft) > 1 and any(_perfectly_plastic(grid, i) for i in cells.soft):
+    layouts = (grid.scene.beams[grid.beam_of_cell[i]].section.layout(None) for i in cells.soft)
+    laws = (law for layout in layouts if layout is not None for law, _ in layout.laws)
+    perfect = any(isinstance(law, Hardening) and law.bounded and law.opens for law in laws)
+    if len(cells.soft) > 1 and perfect:
         said += (
             "; if they are in a row, nothing tells which of them flows: let the law harden a "
             "little, as Hardening(limit, modulus) with a millionth of the stiffness"
         )
     return said
-
-
-def _perfectly_plastic(grid: Grid, cell: int) -> bool:
-    """Return whether a law of a cell is Hardening that does not harden."""
-    layout = grid.scene.beams[grid.beam_of_cell[cell]].section.layout(None)
-    laws = () if layout is None else layout.laws
-    return any(isinstance(law, Hardening) and law.bounded and law.opens for law, _ in laws)
 
 
 def _strains(grid: Grid, q: Array, x: Array) -> Array:
@@ -320,15 +334,153 @@ def _named(sizes: Array) -> Index:
     return order[sizes[order] >= SHARE]
 
 
-def _component(words: str) -> str:
-    """A degree of freedom as :meth:`Grid.describe` says it, with a noun."""
-    component, _, place = words.partition(" of ")
-    return f"the {'rotation' if component == 'psi' else f'displacement {component}'} of {place}"
-
-
 def _list(names: list[str]) -> str:
     """Names in a sentence, the first ones of many."""
     names, more = names[:NAMED], len(names) - NAMED
     if more > 0:
         return f"{', '.join(names)} and {more} more"
     return " and ".join([", ".join(names[:-1]), names[-1]] if len(names) > 1 else names)
+
+
+# -- signs in the ledger of a run ------------------------------------------------------------------
+
+STATES = 100
+"""Number of successive steps in which numerical losses are added."""
+
+TURNOVER = 5.0
+"""Numerical loss in so many steps, over the largest energy in the scene meanwhile, that is wrong.
+
+A motion that steps resolve loses a small part of its energy in each.
+"""
+
+LITTLE = 1e-6
+"""Numerical loss that does not matter, as a part of the energy that went through."""
+
+
+class LedgerWatch:
+    """Judges the kept states of a run, each once.
+
+    Args:
+        grid: Its scene is watched.
+        scheme: The time scheme.
+        claimed: Part of the energy that went through by which entries may err.
+    """
+
+    def __init__(self, grid: Grid, scheme: Scheme, claimed: float) -> None:
+        self._grid, self._claimed = grid, claimed
+        laws, links = [*_laws(grid.scene)], grid.scene.links
+        grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
+        # Other schemes integrate works with the mean of the forces at both ends.
+        exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
+        at_once = scheme.theta == scheme.load_weight  # elastic forces and variables
+        stated = [link.law for link in links if isinstance(link.law, ConnectorLaw)]
+        for law in stated:
+            certain = exact and (at_once or not law.variables) and judges_loss(law)
+            grows[law.entry] = grows.get(law.entry, exact) and certain
+        self._grows = [name for name, certain in grows.items() if certain]
+        given = any(isinstance(link.law, ForceLaw) and link.law.stored for link in links)
+        given = given or not all(isinstance(law, Stop) for law in stated)
+        self._bounded = not given and all(map(has_quadratic_energies, laws))
+        self._in_motion = has_inertia(scheme)
+        self._throughput = self._most = 0.0
+        self._judged = 0  # number of the last state that was judged
+        self._told: set[str] = set()
+
+    def judge(self, states: States, every: int, *, last: bool = False) -> Iterator[str]:
+        """Judge what was kept since the last call, if it is enough or the ``last``.
+
+        ``every`` is the number of steps from one state to the next.  Yields warnings, of each kind
+        the first.
+        """
+        number = len(states) - 1 - self._judged
+        number -= 0 if last else number % STATES
+        if number > 0:
+            first, self._judged = self._judged, self._judged + number
+            yield from self._judge(states.part(first, self._judged + 1), every)
+
+    def thinned(self, states: States) -> None:
+        """Go on where states, which were all judged, have been forgotten."""
+        self._judged = len(states) - 1
+
+    def _judge(self, states: States, every: int) -> Iterator[str]:
+        times, (state, supplied, lost) = states.times, states.ledger()
+        works = sum(float(np.abs(np.diff(work)).sum()) for work in supplied.values())
+        sizes = [e if name in ENTRIES else np.abs(e - e[0]) for name, e in state.items()]
+        held = np.asarray(sum(sizes, 0.0 * times))
+        self._throughput += works + max(float(np.max(held)) - self._most, 0.0)
+        self._most = max(self._most, float(np.max(held)))
+        allowed = self._claimed * self._throughput
+        for name in self._grows:
+            if name in lost and name not in self._told:
+                falls = -np.diff(lost[name])
+                n = int(np.argmax(falls))
+                if falls[n] > allowed:
+                    self._told.add(name)
+                    yield self._falls(name, float(falls[n]), states, n)
+        least = float(np.min(state["stored"])) if "stored" in state and self._bounded else 0.0
+        if least < -allowed and "stored" not in self._told:
+            self._told.add("stored")
+            t = times[int(np.argmin(state["stored"]))]
+            yield (
+                f"the stored energy is {least:.3g} J at t = {t:.6g} s, and a sum of squares is "
+                "not negative: a law of material in the scene, or the step there, is wrong. Use "
+                "smaller steps; check elastic_energy of a law of your own"
+            )
+        starts = np.arange(0, len(times) - STATES, STATES)
+        if every > 1 or not self._in_motion or "numerical" not in lost or not len(starts):
+            return
+        losses = lost["numerical"][starts + STATES] - lost["numerical"][starts]
+        most = np.maximum.reduceat(held, starts)
+        wrong = losses > np.maximum(TURNOVER * most, LITTLE * self._throughput)
+        if wrong.any() and "numerical" not in self._told:
+            self._told.add("numerical")
+            k = int(np.argmax(wrong))
+            begin, end = times[starts[k]], times[starts[k] + STATES]
+            yield (
+                f"from t = {begin:.6g} to {end:.6g} s the time scheme took {losses[k]:.3g} J, the "
+                f"entry 'numerical', {losses[k] / most[k]:.3g} times as much as the scene held at "
+                f"most, in {STATES} steps. So most of the work that was supplied went into motions "
+                "that are too fast for the steps, and results depend on the scheme. Use smaller "
+                "steps, or smoother loads and supports; a controller that causes it needs another "
+                "sample time, inertia at its place, or a ForceLaw instead"
+            )
+
+    def _falls(self, name: str, fall: float, states: States, n: int) -> str:
+        before, after = states.times[n : n + 2]
+        return (
+            f"{self._where(name, states, n)}the dissipated energy, the entry {name!r} of the "
+            f"ledger, falls by {fall:.3g} J between t = {before:.6g} and {after:.6g} s. No law of "
+            "the scene gives dissipated energy back: a step found a wrong state there, and what "
+            "follows is wrong. Use smaller steps; check the equations of a law of your own, or let "
+            "one that is to give energy have active = True"
+        )
+
+    def _where(self, name: str, states: States, n: int) -> str:
+        """Cell or connector whose dissipated energy falls most in a step."""
+        kind = {"friction": Coulomb, "damping": Damper}.get(name)
+        falls: dict[str, float] = {}
+        for i, link in enumerate(self._grid.scene.links):
+            entry = link.law.entry if isinstance(link.law, ConnectorLaw) else ""
+            if entry == name if entry else kind is None or isinstance(link.law, kind):
+                column = WORK if kind and not entry else DISSIPATED
+                taken = states.column("connectors")[:, i, column]
+                falls[f"{link}: "] = taken[n] - taken[n + 1]
+        if name in ("hinges", "plastic"):
+            column = PLASTIC if name == "plastic" else HINGE
+            before, after = (states.cells_of(k)[:, column] for k in (n, n + 1))
+            cell = int(np.argmax(before - after))
+            place = self._grid.middle(cell)
+            fall = before[cell] - after[cell]
+            falls[f"{place.beam.name}, cell at s = {place.s:.3g}: "] = float(fall)
+        worst = max(falls, key=lambda one: falls[one], default="")
+        return worst if worst and falls[worst] > 0.0 else ""
+
+
+def _laws(scene: Scene) -> Iterator[MaterialLaw]:
+    """Laws of the material points of a scene."""
+    for beam in scene.beams:
+        layout = beam.section.layout(beam.section.hinge)
+        if layout is not None and not layout.elastic:
+            yield from (law for law, _ in layout.laws)
+    springs = [link.law for link in scene.links if isinstance(link.law, Spring)]
+    yield from (spring.law for spring in springs if spring.law is not None)

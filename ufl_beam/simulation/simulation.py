@@ -23,27 +23,25 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
-from ufl_beam.output.forces_along_cells import ForcesAlongCells
-from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, new_rows
-from ufl_beam.output.state_view import StateView
+from ufl_beam.output.extremes import Watch
+from ufl_beam.output.postprocessing import ForcesAlongCells
+from ufl_beam.output.recorders import StateView
+from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWriter, new_rows
 from ufl_beam.output.states import States
-from ufl_beam.output.watches import Watch
-from ufl_beam.parallel import Agreement, communicator
+from ufl_beam.parallel import Agreement, Copies, communicator, sharing
 from ufl_beam.simulation.assembly import assemble
+from ufl_beam.simulation.controllers import ForceWatch
 from ufl_beam.simulation.diagnosis import no_equilibrium, require_held
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of
-from ufl_beam.simulation.prediction import Prediction
-from ufl_beam.simulation.replicas import Copies, sharing
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.state_writer import StateWriter
 from ufl_beam.simulation.stepper import (
     APPLYING,
     Extras,
+    Prediction,
     Stepper,
     Trial,
     begins_loaded,
 )
-from ufl_beam.simulation.watches import ForceWatch
 from ufl_beam.solvers.newton import Border
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
@@ -154,7 +152,8 @@ class Simulation(StateView):
         self._watches: list[Watch] = []
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
         extras = Extras(
-            self.ask if self.controllers.asks else None, self.controllers.stops,
+            self.ask if self.controllers.asks else None,
+            self.controllers.next_sample if self.controllers.sampled else None,
             self._require_held if self._loose else None,
             None if self._copies is None else self._copies.note, self._watch.c,
         )  # fmt: skip
@@ -216,7 +215,7 @@ class Simulation(StateView):
             if self._applies and self.parts == 0:
                 self._applies = False
                 self._stepper.apply_loads(self, self.t + APPLYING * (float(ends[0]) - self.t))
-                self.prediction.forget()
+                self.prediction.c.dt = math.inf  # the next step does not go on as this one did
             taken = self._stepper.take(self, ends, keep=keep)
             self._begun_at = None
             self.warn(self._watch.told(), here=not self.share.alone)

@@ -236,10 +236,3 @@ class AdaptiveSteps:
         self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]
 
     _STATE = ("steps", "error", "_dt", "_fresh")
-
-
-def steps_of(simulation: Simulation, t1: float, dt: float | Adaptive) -> EqualSteps | AdaptiveSteps:
-    """Return the steps to ``t1``; ``error`` sums the estimated errors, NaN if there are none."""
-    if isinstance(dt, Adaptive):
-        return AdaptiveSteps(simulation, t1, dt)
-    return EqualSteps(simulation, t1, dt)

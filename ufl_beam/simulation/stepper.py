@@ -11,20 +11,19 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib
+from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib, struct
+from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia, with_half_tangents
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.watches import Watch
 from ufl_beam.parallel import Agreement
-from ufl_beam.simulation.branch_check import StaticPath
-from ufl_beam.simulation.prediction import Prediction
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.newton import Border, Solver
 from ufl_beam.solvers.newton_options import Newton
@@ -32,6 +31,114 @@ from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.connectors import Links
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inertia_and_damping import Inertia
+
+# -- prediction ------------------------------------------------------------------------------------
+
+
+class Prediction:
+    """Goes on as the last steps did: at their velocity and, ``in_motion``, with their acceleration.
+
+    After steps of equal length, a part of the last second difference of the configuration is added:
+    that which the one before was like.  It is 1 in smooth motion, and 0 where second differences
+    change their sign from step to step, or where steps do not resolve the motion.
+
+    Args:
+        weights: Of residuals, see :class:`StepEquation`.
+
+    Attributes:
+        c: ``prediction`` of loops.h; C writes to it when a step is accepted.
+    """
+
+    def __init__(self, share: Share, q: Array, weights: Array, *, in_motion: bool) -> None:
+        self._share, self._in_motion = share, in_motion
+        self.c = struct("prediction", size=share.size, dt=math.inf)
+        self._q_before = q.copy()
+        fill(self.c, q_before=self._q_before)
+        if in_motion:
+            self._second = np.zeros(share.size)
+            size = {"scene": share.grid.scene.size, "unknowns": share.grid.size}
+            fill(self.c, second=self._second, weight=weights, **size)
+
+    @property
+    def q_before(self) -> Array:
+        """Configuration at the beginning of the last step; a copy."""
+        return np.frombuffer(ffi.buffer(self.c.q_before, 8 * self._share.size)).copy()
+
+    @property
+    def last_dt(self) -> float:
+        """Length of the last step, infinite before the first; s."""
+        return float(self.c.dt)
+
+    def remember(self, memory: Memory) -> None:
+        """State it in numbers of the grid; see state_io.py."""
+        self.c.dt = memory.number("last dt", self.c.dt)
+        q_before = memory.at_dofs("q before", self.q_before)
+        ffi.memmove(self.c.q_before, doubles(q_before), q_before.nbytes)
+        if self._in_motion:
+            self.c.equal = int(memory.number("equal steps", self.c.equal))
+            self.c.repeated = memory.number("part that repeats itself", self.c.repeated)
+            self.c.now = memory.number("square of the second difference", self.c.now)
+            self._second[:] = memory.at_dofs("second difference", self._second)
+
+
+# -- check of static steps -------------------------------------------------------------------------
+
+FAR = 1e3
+"""Largest motion of a node in a static step that is no mechanism; sizes of the scene or radians."""
+
+KINK = 1e-6
+"""Work that a kink of a law may leave unexplained, as a part of the energy that went through."""
+
+
+class StaticPath:
+    """Checks of a static step before it is accepted, from the state in which the path begins.
+
+    The internal forces must account for what a step stores and dissipates.  Otherwise Newton's
+    method may have found another branch of equilibria: beyond a limit load, or where softening lets
+    go more than it dissipates.  The ``slack`` of the scheme says how much work may stay
+    unexplained; ``force`` are the internal forces at the end of the last step.
+    """
+
+    _c: Any
+
+    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, force: Array) -> None:
+        self._share, self._scheme, self._ledger, self.force = share, scheme, ledger, force
+
+    def remember(self, memory: Memory, q: Array) -> None:
+        """The internal forces at the end of the last step."""
+        self.force[:] = memory.added("internal forces", self.force)
+
+    def failure(self, mechanism: bool) -> StepFailed:
+        """Describe why the latest step was not followed: it leaves a mechanism, or leaps."""
+        c = self._c
+        if mechanism:
+            return StepFailed(
+                f"a node moves by {c.moves:.1e} times the size of the scene, or turns by so many "
+                "radians, in the step: what yields and what has opened leave a mechanism"
+            )
+        return StepFailed(
+            f"the step stores and dissipates {c.stored:.3e} J, but the forces along it do "
+            f"{c.work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
+            "to tell"
+        )
+
+    def in_c(self, changes: Sequence[Loop]) -> Any:
+        """``static_path`` of loops.h; ``changes`` are those of the terms."""
+        parts = self._ledger.state, self._ledger.supplied, self._ledger.lost
+        per_far = np.full(self._share.size, 1 / self._share.grid.scene.size)
+        per_far[self._share.rotations()] = 1.0
+        self._c = struct(
+            "static_path", slack=self._scheme.slack, far=FAR, kink=KINK, per_far=per_far,
+            force=self.force, terms=len(changes),
+            weight_of_before=self._scheme.weight_of_before,
+            change=ffi.new("change_call[]", list(changes)), accounts=len(parts),
+            account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),
+            entries=np.array([len(part) for part in parts], dtype=np.int32),
+        )  # fmt: skip
+        return self._c
+
+
+# -- steps -----------------------------------------------------------------------------------------
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
@@ -73,26 +180,6 @@ class Trial(NamedTuple):
     s: Array
 
 
-class Stepping(Protocol):
-    """The state that steps lead from and to; see :class:`Simulation`."""
-
-    prediction: Prediction
-    parts: int
-
-    @property
-    def q(self) -> Array:
-        """Configuration at the local degrees of freedom."""
-
-    def moved(self, t: float) -> None:
-        """Take note that the state is another one, at the time ``t``."""
-
-    def room(self, steps: int) -> Array:
-        """Rows of the solution for the states after so many steps, or fewer."""
-
-    def grow(self, written: int, parts_of_last: int) -> None:
-        """Take note of steps whose states C wrote to the :meth:`room`; it had none for the last."""
-
-
 class Extras(NamedTuple):
     """Functions of Python that take part in the steps of some scenes, or None."""
 
@@ -107,7 +194,8 @@ class Stepper:
     """Steps of a scene in C; see march.c.
 
     The state is that of C.  What there is to see of it is in Python after each call: time,
-    configuration, velocities, reactions and ledger.
+    configuration, velocities, reactions and ledger.  The ``state`` of methods is the
+    :class:`Simulation`, which is above this module.
     """
 
     def __init__(
@@ -162,8 +250,8 @@ class Stepper:
             changes = [one.change for one in phases if one.change is not None]
             fill(self.c, path=path.in_c(changes))
         self._alive: list[Any] = [opens]
-        self._watches: Sequence[Watch] = ()
-        self._state: Stepping | None = None  # while C takes steps
+        self._watches: Sequence[Any] = ()
+        self._state: Any = None  # while C takes steps
         self._add_extras({
             name: [x for one in phases for x in getattr(one, name)]
             for name in ("begin", "accept", "add_state")
@@ -180,12 +268,15 @@ class Stepper:
         asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
         mine = [one for one in loops["accept"] if one[0] in asking]
         if extras.require is not None:
-            mine.insert(0, callbacks.phase(self._require))
+            require = extras.require
+            mine.insert(0, callbacks.phase(lambda step, q1, s: require(self._copy(q1))))
         loops["accept"] = mine + [one for one in loops["accept"] if one[0] not in asking]
         if extras.ask is not None:
             loops["begin"].insert(0, callbacks.phase(self._ask))
         if extras.note is not None:
-            loops["add_state"].append(callbacks.phase(self._note))
+            note = extras.note
+            took = callbacks.phase(lambda step, q1, s: note(step.t1, self._copy(q1)))
+            loops["add_state"].append(took)
         for name, calls in loops.items():
             place, in_c = getattr(self.c, name), ffi.new("phase_call[]", calls)
             self._alive += [in_c, calls]
@@ -193,7 +284,7 @@ class Stepper:
 
     # -- steps -----------------------------------------------------------------------------------
 
-    def take(self, state: Stepping, ends: Array, *, keep: bool = False) -> int:
+    def take(self, state: Any, ends: Array, *, keep: bool = False) -> int:
         """Take steps to these times, for :data:`LONGEST` at most; those that fail in parts.
 
         Returns:
@@ -216,7 +307,7 @@ class Stepper:
             self._fail()
         return taken
 
-    def apply_loads(self, state: Stepping, end: float) -> None:
+    def apply_loads(self, state: Any, end: float) -> None:
         """Apply the loads that act at the present time, in parts, up to the time ``end``."""
         fill(self.c, applies=1, begin_of_run=self.c.t, applied_by=end)
         with self._in_c(state):
@@ -225,14 +316,14 @@ class Stepper:
         if not reached:
             self._fail()
 
-    def attempt(self, state: Stepping, t1: float, end: float) -> Trial:
+    def attempt(self, state: Any, t1: float, end: float) -> Trial:
         """Solve the step to ``t1``, which is a part of one to ``end``."""
         with self._in_c(state):
             solved = lib.attempt_step(self.c, t1, end)
         return self._trial(solved)
 
     def attempt_along(
-        self, state: Stepping, step: Step, guess: Array, border: Border, *, hold: bool
+        self, state: Any, step: Step, guess: Array, border: Border, *, hold: bool
     ) -> Trial:
         """Solve a step, whose times are those of the guess, together with the load factor.
 
@@ -252,7 +343,7 @@ class Stepper:
         self.solver.follow(None)
         return self._trial(solved)
 
-    def accept(self, state: Stepping, trial: Trial) -> None:
+    def accept(self, state: Any, trial: Trial) -> None:
         """Go where the latest attempt went."""
         self.c.step.t1 = trial.step.t1
         with self._in_c(state):
@@ -306,16 +397,6 @@ class Stepper:
             self._state.moved(self.c.t)
             self._together(self._extras.ask)
 
-    def _require(self, step: Any, q1: Any, s: Any) -> None:
-        """Require that a state is held before it is accepted."""
-        if self._extras.require is not None:
-            self._extras.require(self._copy(q1))
-
-    def _note(self, step: Any, q1: Any, s: Any) -> None:
-        """Note an accepted step."""
-        if self._extras.note is not None:
-            self._extras.note(step.t1, self._copy(q1))
-
     def _prepare(self) -> None:
         """Take from a trial step what the scheme keeps besides the velocities."""
         if self._inertia is not None:
@@ -329,7 +410,7 @@ class Stepper:
     # -- the state -------------------------------------------------------------------------------
 
     @contextmanager
-    def _in_c(self, state: Stepping) -> Iterator[None]:
+    def _in_c(self, state: Any) -> Iterator[None]:
         """Context in which C takes steps from a state; then Python sees the one that follows."""
         self._state = state
         self.c.parts, self.c.failure, self._callbacks.error = 0, lib.SUCCEEDS, None
@@ -345,7 +426,7 @@ class Stepper:
             for one in self._watches:
                 one.seen = state.parts
 
-    def watch(self, watches: Sequence[Watch]) -> None:
+    def watch(self, watches: Sequence[Any]) -> None:
         """Let these take in the state after each step."""
         self._watches = watches
         of_c = ffi.new("watch *[]", [one.c for one in watches])
@@ -359,7 +440,7 @@ class Stepper:
     def _copy(self, values: Any) -> Array:
         return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
 
-    def begin_at(self, state: Stepping, t: float, q: Array) -> None:
+    def begin_at(self, state: Any, t: float, q: Array) -> None:
         """Go on from a state that no step has led to."""
         ffi.memmove(self.c.q, doubles(q), self._bytes)
         fill(self.c, prediction=state.prediction.c)

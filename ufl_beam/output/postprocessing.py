@@ -1,0 +1,318 @@
+# SPDX-License-Identifier: MIT
+"""What follows from states: motions of places, forces of joints, section forces along cells.
+
+At both ends of a cell section forces are its forces on the nodes there: of stresses, inertia,
+damping, loads and works, see :mod:`ufl_beam.terms.cell_forces`.  So they are in equilibrium with
+supports, joints and what else acts at nodes, to the residual of the step.  Between the ends they
+change by what acts along the cell: its resultant, its couple, and how it is distributed, as far as
+that is known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeAlias
+
+import numpy as np
+
+from ufl_beam.arrays import Array, Index
+from ufl_beam.compiled.c_library import lib
+from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.display import one_line
+from ufl_beam.errors import SceneError
+from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
+from ufl_beam.model.connector_laws import Guide
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.curves import nearest, parameter_step, tangent
+from ufl_beam.model.joints import Joint
+from ufl_beam.model.scene import Scene
+
+# -- places and joints -----------------------------------------------------------------------------
+
+Vectors: TypeAlias = Any
+"""Configurations or velocities at some times, an array or a ``Column``; (n, size)."""
+
+
+class JointHistory(NamedTuple):
+    """History of a joint, b being its second place and a its first.
+
+    Attributes:
+        motion: Displacement of b relative to a, in axes that turn with a, and rotation of b
+            relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.
+        force: That the joint exerts on b, in the plane; (n+1, 2); N.
+        in_a, in_b: The same in axes that turn with a and with b; (n+1, 2); N.
+        moment: That it exerts on b, about the place b; (n+1,); N m.  Not a number where the places
+            share their rotation, so that nobody knows it.
+    """
+
+    motion: Array
+    force: Array
+    in_a: Array
+    in_b: Array
+    moment: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
+
+
+def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
+    """Numbers of the links of a connector, or of those that hold a joint of the scene."""
+    if isinstance(of, Connector):
+        links = of.components or (of,)
+        if links[0] not in scene.links:
+            raise SceneError(f"{of} is not in the scene")
+        return [scene.links.index(link) for link in links]
+    if of not in scene.joints:
+        raise SceneError(f"{of} is not in the scene")
+    if not of.holders:
+        raise SceneError(
+            f"{of} shares unknowns, so that its force is not known; make it with measured=True"
+        )
+    return [scene.links.index(holder) for holder in of.holders]
+
+
+def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
+    """A vector, or one for each angle, turned by angles; (n, 2)."""
+    a, b = np.asarray(x, dtype=np.float64).T
+    cos, sin = np.cos(angle), np.sin(angle)
+    return np.column_stack([cos * a - sin * b, sin * a + cos * b])
+
+
+def motion_of(grid: Grid, place: Anchor, states: Vectors) -> Array:
+    """Displacement and rotation of a place in configurations of the grid; (n, 3); m, m, rad."""
+    motion = _of_node(grid, place, states)
+    if isinstance(place, Spot):
+        motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
+    return motion
+
+
+def velocity_of(grid: Grid, place: Anchor, states: Vectors, velocities: Vectors) -> Array:
+    """Velocity of a place; (n, 3); m/s, m/s, rad/s."""
+    motion = _of_node(grid, place, velocities)
+    if isinstance(place, Spot):
+        x, y = turned(arm(place), _of_node(grid, place, states)[:, 2]).T
+        motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
+    return motion
+
+
+def _of_node(grid: Grid, place: Anchor, states: Vectors) -> Array:
+    """Values at what a place moves with; interpolated in cells; (n, 3)."""
+    if isinstance(place, Spot):
+        if node(place) is GROUND:
+            return np.zeros((len(states), 3))
+        dofs = grid.node(place)
+        return np.ascontiguousarray(states[:, dofs])
+    nodes, weights = grid.weights(place)
+    dofs = grid.dofs[nodes]
+    return np.asarray(weights @ np.ascontiguousarray(states[:, dofs]))
+
+
+def position_of(grid: Grid, place: Anchor, states: Vectors) -> Array:
+    """Coordinates of a place in configurations of the grid; (n, 2); m."""
+    if isinstance(place, Spot):
+        return np.asarray(place.point + motion_of(grid, place, states)[:, :2])
+    nodes, weights = grid.weights(place)
+    return np.asarray(weights @ grid.points[nodes] + motion_of(grid, place, states)[:, :2])
+
+
+def of_joint(grid: Grid, joint: Joint, states: Vectors, forces: Array) -> JointHistory:
+    """History of a joint, from configurations and the forces of all links; (n+1, num_links)."""
+    a, b, *_ = joint.places
+    turns = [motion_of(grid, place, states)[:, 2] for place in (a, b)]
+    between = position_of(grid, b, states) - position_of(grid, a, states)
+    apart = np.subtract(b.point, a.point)
+    motion = np.column_stack([turned(between, -turns[0]) - apart, turns[1] - turns[0]])
+    force, moment = np.zeros((len(states), 2)), np.zeros(len(states))
+    numbers = links_of(grid.scene, joint)
+    if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
+        raise SceneError(
+            f"{joint}: {a} and {b} share unknowns, so that the force between them is not known; "
+            "make it with measured=True"
+        )
+    if 2 in joint.shared:
+        moment[:] = np.nan
+    for number, holder in zip(numbers, joint.holders, strict=True):
+        if {holder.a, holder.b} != {a, b}:
+            continue
+        λ = forces[:, number] if holder.b == b else -forces[:, number]
+        if holder.turns:
+            moment -= λ
+        else:
+            force -= λ[:, None] * _direction(grid, holder, states, turns[0])
+    return JointHistory(motion, force, turned(force, -turns[0]), turned(force, -turns[1]), moment)
+
+
+def _direction(grid: Grid, holder: Connector, states: Vectors, turn: Array) -> Array:
+    """Unit vectors in the plane along which a motion grows; (n+1, 2)."""
+    if holder.stretches:
+        between = position_of(grid, holder.b, states) - position_of(grid, holder.a, states)
+        return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
+    if isinstance(holder.law, Guide):
+        curve, s, size, normals = holder.law.curve, 0.0, grid.scene.size, []
+        for point in position_of(grid, holder.b, states):
+            step = parameter_step(curve, s, size)
+            s = nearest(curve, point, s, step, size)
+            x, y = tangent(curve, s, step)
+            normals.append((-y, x))
+        return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
+    return turned(holder.axis, turn if holder.follows_a else np.zeros_like(turn))
+
+
+# -- section forces along cells --------------------------------------------------------------------
+
+
+class Diagram(NamedTuple):
+    """Section forces along a beam; at a vertex the values before and after it.
+
+    Attributes:
+        s: Parameter of the beam, from 0 at its start to 1; (num_cells points,).
+        N: Axial force, positive in tension; N.
+        V: Shear force, along the normal to the left of the direction of the beam; N.
+        M: Bending moment, positive with tension to the right of that direction; N m.
+
+    Example:
+        >>> diagram = solution.diagram(beam, points=2)  # at both ends of the four cells
+        >>> print(diagram.s[:4], diagram.M[:4].round(-3))
+        [0.   0.25 0.25 0.5 ] [-195000. -146000. -146000.  -98000.]
+    """
+
+    s: Array
+    N: Array
+    V: Array
+    M: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
+
+
+class Material(NamedTuple):
+    """State of the material of all cells at one time.
+
+    Attributes:
+        forces: (N, V, M); (num_cells, 3); N, N, N m.
+        jump: Rotation of the hinges; (num_cells,); rad.
+        plastic: Energy dissipated by plastic strains; (num_cells,); J.
+        hinge: Energy dissipated by hinges, or by the cracks of fibres; (num_cells,); J.
+    """
+
+    forces: Array
+    jump: Array
+    plastic: Array
+    hinge: Array
+
+    def __repr__(self) -> str:
+        return one_line(self)
+
+
+MIDDLE: Array = np.full(1, 0.5)
+"""The middle of a cell, as a part of it."""
+
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
+GAUSS = [(float(1 + x) / 2, float(w) / 2) for x, w in zip(POINTS, WEIGHTS, strict=True)]
+"""Points of Gauss's rule on a cell, and their weights; exact for all here."""
+
+Way = Callable[[Any], tuple[Any, Any]]
+"""Derivative of the place by the part of the cell, at a part."""
+
+
+def section_force(numbers: Any, way: Way, *, works: bool) -> Callable[[Any], tuple[Any, Any, Any]]:
+    """State the force in the plane and the moment at a part of a cell, from 0 to 1 at its end.
+
+    Args:
+        numbers: Forces of the cell, ``cell_number`` of loops.h: arrays, or expressions of UFL.
+        way: In the configuration in which they are in equilibrium.
+        works: Whether forces across the cell may be distributed in any way, by works of a user.
+    """
+    start, end, skew = ((numbers[k], numbers[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X))
+    at_start, at_end, couple = (numbers[k] for k in (lib.START_M, lib.END_M, lib.COUPLE))
+
+    def force(part: Any) -> list[Any]:
+        bend = -6 * part * (1 - part)
+        return [part * (a + b) - a + bend * c for a, b, c in zip(start, end, skew, strict=True)]
+
+    def lever(part: Any) -> Any:
+        """Moment of the section forces up to a part about the place there, over the part."""
+        pairs = ((weight, way(at * part), force(at * part)) for at, weight in GAUSS)
+        return sum(weight * (x[0] * f[1] - x[1] * f[0]) for weight, x, f in pairs)
+
+    # What moments at both ends say besides: couples, or how works are distributed across.
+    missed = at_start + at_end - couple + lever(1.0)
+    if works:
+        ways = [[6 * w * at * (1 - at) * x for x in way(at)] for at, w in GAUSS]
+        x, y = (sum(one) for one in zip(*ways, strict=True))
+        turned = missed / (x * x + y * y)
+        skew = skew[0] - turned * y, skew[1] + turned * x
+    else:
+        couple = couple + missed
+    return lambda part: (*force(part), part * (couple - lever(part)) - at_start)
+
+
+def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, Any]:
+    """(N, V, M) of a force in the plane and a moment; (c, s) is the axis of the section."""
+    x, y, M = plane
+    return c * x + s * y, c * y - s * x, M
+
+
+class ForcesAlongCells:
+    """(N, V, M) in points of the cells of a grid.
+
+    Args:
+        grid: Cells and numbering.
+
+    Attributes:
+        angles: Of the undeformed axis at both ends of the cells; (num_cells, 2); rad.
+        dofs: Degrees of freedom (u, v, ψ) of the nodes of cells; (num_cells, 3, degree + 1).
+    """
+
+    def __init__(self, grid: Any) -> None:
+        nodes = grid.nodes_of_cells
+        start, end, *inner = range(nodes.shape[1])
+        self._mesh, self._along = grid.mesh, [start, *inner, end]
+        self.dofs: Index = grid.dofs[nodes].transpose(0, 2, 1)
+        self._works = bool(grid.scene.works)
+        self._places: Array = grid.points[nodes[:, self._along]].transpose(2, 0, 1)
+        x, y = self._places[:, :, -1] - self._places[:, :, 0]
+        angles = np.asarray(np.arctan2(y, x))
+        self.angles = angles[:, None] + _turns(grid, angles)
+
+    def __call__(self, cells: Index | slice, parts: Array, numbers: Array, q: Array) -> Array:
+        """Compute them at parts of cells, from 0 at the start to 1 at the end; N, N, N m.
+
+        Args:
+            cells: Numbers of the cells, or of one cell at many times.
+            parts: Parts; (points,).
+            numbers: Forces of the cells, ``cell_number`` of loops.h; (9, num_cells).
+            q: Configurations (u, v, ψ) of their nodes, those between the ends of the step at which
+                its forces are in equilibrium; (num_cells, 3, degree + 1).
+
+        Returns:
+            (N, V, M); (num_cells, points, 3).
+        """
+        u, v, ψ = q[:, :, self._along].transpose(1, 0, 2)
+        x, y = self._places[:, cells] + (u, v)
+        mesh, (start, end) = self._mesh, self.angles[cells].T
+
+        def way(part: Array | float) -> tuple[Array, Array]:
+            slopes = mesh.slopes(np.ravel(part)).T
+            return x @ slopes, y @ slopes
+
+        angle = np.outer(start, 1 - parts) + np.outer(end, parts) + ψ @ mesh.weights(parts).T
+        at = section_force(numbers[:, :, None], way, works=self._works)
+        return np.stack(in_section(at(parts), np.cos(angle), np.sin(angle)), axis=2)
+
+
+def _turns(grid: Any, angles: Array) -> Array:
+    """Angles to the smooth axis of a curved beam from both ends of its cells; (num_cells, 2); rad.
+
+    Vertices halve the angle between two cells, but at corners of the beam; it is linear in a cell.
+    """
+    half = np.angle(np.exp(1j * np.diff(angles))) / 2
+    half[np.diff(grid.beam_of_cell) != 0] = np.nan
+    for beam in grid.scene.beams:
+        if beam.corners:
+            at_corners = np.isin(grid.parameters(beam)[1:-1], beam.corners)
+            half[grid.cells_of(beam)[:-1][at_corners]] = np.nan
+    start, end = np.append(np.nan, -half), np.append(half, np.nan)
+    # As a circle where there is no neighbour
+    both = np.where(np.isnan(start), -end, start), np.where(np.isnan(end), -start, end)
+    return np.nan_to_num(np.column_stack(both))
