@@ -126,6 +126,10 @@ class Rates(Protocol):
         """Rates kept besides, as many as are known of :attr:`DynamicScheme.kept`."""
 
 
+CHANGE, V, V_BEFORE, MORE = range(4)
+"""Places of the rates in C: the step or a change of velocities, velocities, ..."""
+
+
 class Coefficients(NamedTuple):
     """Numbers of a step of a scheme with inertia.
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""What follows from states: motions of places, forces of joints, section forces along cells.
+"""Results that follow from states: motions of places, forces of joints, section forces along cells.
 
 At both ends of a cell section forces are its forces on the nodes there: of stresses, inertia,
 damping, loads and works, see :mod:`ufl_beam.terms.cell_forces`.  So they are in equilibrium with

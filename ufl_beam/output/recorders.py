@@ -159,6 +159,11 @@ class StateView(ABC):
         """
         return np.asarray(self.now.cell_forces(0)[:, 0])
 
+    @property
+    def may_break(self) -> bool:
+        """True if something in the scene yields, softens or has plastic hinges."""
+        return bool(self.now.column("material")[0,].size or self.scene.hinges)
+
     def damage(self) -> tuple[Array, Array]:
         """Jump of rotation (rad) and dissipated energy (J) of each cell; see :class:`States`."""
         return self.now.damage()

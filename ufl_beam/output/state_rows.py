@@ -20,10 +20,9 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
 from ufl_beam.discretization.partition import Share
 from ufl_beam.display import one_line
+from ufl_beam.mechanics.time_schemes import V
 from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.connectors import Links
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.inertia_and_damping import V
 from ufl_beam.terms.supports import Supports
 
 LEDGER = ("state", "supplied", "lost")
@@ -192,7 +191,7 @@ class StateWriter:
 
     def __init__(
         self, march: Any, share: Share, ledger: Ledger, supports: Supports,
-        inelastic: Sequence[Any], couplings: Sequence[Links], cell_forces: CellForces,
+        inelastic: Sequence[Any], couplings: Sequence[Any], cell_forces: CellForces,
     ) -> None:  # fmt: skip
         self._march, self._share = march, share
         self._alive, self._kinds = list[Any](), list[Any]()

@@ -58,7 +58,7 @@ memory that has been used before; to touch new pages takes a good part of a step
 
 
 class Cells:
-    """What computes results of the cells of a whole scene, made when it is asked for first.
+    """Results of the cells of a whole scene, each made when it is asked for first.
 
     No process communicates with others.
     """

@@ -101,7 +101,7 @@ class LineData:
             at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
         forces = simulation.section_forces()
         of_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
-        if simulation.scene.hinges or simulation.now.column("material")[0,].size:
+        if simulation.may_break:
             of_cells["jump"], of_cells["dissipated energy"] = simulation.damage()
         in_cells = {
             name: np.append(np.repeat(values, self._pieces_of_cell), np.zeros(self._num_rods))

@@ -21,8 +21,7 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
-from ufl_beam.simulation.step_equation import StepEquation
-from ufl_beam.simulation.stepper import StaticPath
+from ufl_beam.simulation.step_equation import StaticPath, StepEquation
 from ufl_beam.terms.base import Term
 from ufl_beam.terms.beams import Cells, ElasticBeams, InelasticBeams
 from ufl_beam.terms.cell_forces import CellForces

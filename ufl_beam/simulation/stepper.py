@@ -24,7 +24,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia, with_half
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import Agreement
-from ufl_beam.simulation.step_equation import StepEquation
+from ufl_beam.simulation.step_equation import StaticPath, StepEquation
 from ufl_beam.solvers.newton import Border, Solver
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.cell_forces import CellForces
@@ -82,63 +82,6 @@ class Prediction:
 
 
 # -- check of static steps -------------------------------------------------------------------------
-
-FAR = 1e3
-"""Largest motion of a node in a static step that is no mechanism; sizes of the scene or radians."""
-
-KINK = 1e-6
-"""Work that a kink of a law may leave unexplained, as a part of the energy that went through."""
-
-
-class StaticPath:
-    """Checks of a static step before it is accepted, from the state in which the path begins.
-
-    The internal forces must account for what a step stores and dissipates.  Otherwise Newton's
-    method may have found another branch of equilibria: beyond a limit load, or where softening lets
-    go more than it dissipates.  The ``slack`` of the scheme says how much work may stay
-    unexplained; ``force`` are the internal forces at the end of the last step.
-    """
-
-    _c: Any
-
-    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, force: Array) -> None:
-        self._share, self._scheme, self._ledger, self.force = share, scheme, ledger, force
-
-    def remember(self, memory: Memory, q: Array) -> None:
-        """The internal forces at the end of the last step."""
-        self.force[:] = memory.added("internal forces", self.force)
-
-    def failure(self, mechanism: bool) -> StepFailed:
-        """Describe why the latest step was not followed: it leaves a mechanism, or leaps."""
-        c = self._c
-        if mechanism:
-            return StepFailed(
-                f"a node moves by {c.moves:.1e} times the size of the scene, or turns by so many "
-                "radians, in the step: what yields and what has opened leave a mechanism"
-            )
-        return StepFailed(
-            f"the step stores and dissipates {c.stored:.3e} J, but the forces along it do "
-            f"{c.work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
-            "to tell"
-        )
-
-    def in_c(self, changes: Sequence[Loop]) -> Any:
-        """``static_path`` of loops.h; ``changes`` are those of the terms."""
-        parts = self._ledger.state, self._ledger.supplied, self._ledger.lost
-        per_far = np.full(self._share.size, 1 / self._share.grid.scene.size)
-        per_far[self._share.rotations()] = 1.0
-        self._c = struct(
-            "static_path", slack=self._scheme.slack, far=FAR, kink=KINK, per_far=per_far,
-            force=self.force, terms=len(changes),
-            weight_of_before=self._scheme.weight_of_before,
-            change=ffi.new("change_call[]", list(changes)), accounts=len(parts),
-            account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),
-            entries=np.array([len(part) for part in parts], dtype=np.int32),
-        )  # fmt: skip
-        return self._c
-
-
-# -- steps -----------------------------------------------------------------------------------------
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""

@@ -33,9 +33,12 @@ from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import (
+    MORE,
+    V_BEFORE,
     Coefficients,
     DynamicScheme,
     Scheme,
+    V,
     combined,
     with_half_tangents,
 )
@@ -46,9 +49,6 @@ from ufl_beam.terms.energy_ledger import Ledger
 
 BEFORE = "velocity before"
 """Name of the velocities at the beginning of the last step, in what is saved."""
-
-CHANGE, V, V_BEFORE, MORE = range(4)
-"""Places of the rates in C: the step or a change of velocities, velocities, ..."""
 
 
 class RatesInC:

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Points held on curves that only Python knows, see guide_curves.py.
+/* Points held on curves that only Python knows, see connectors.py.
  *
  * Python is asked for five points of a curve at a time. The polynomial through them says where the nearest
  * point is, until that is the one in the middle but for its last digits; and gives the derivatives there. */

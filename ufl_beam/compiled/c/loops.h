@@ -56,7 +56,7 @@ struct cells {
   double *each; /* entries of all cells in the latest evaluation, in batches; or none */
 };
 
-/* Strains whose forces the tangents of a static step have, see PredictedStrains in cells.py. */
+/* Strains whose forces the tangents of a static step have, see PredictedStrains in beams.py. */
 typedef struct {
   const cells *strains;           /* linear about a configuration */
   int at_about;                   /* where they have it */
@@ -219,7 +219,7 @@ extern const double NO_ENERGY; /* dissipation that is none, as a part of its siz
 
 enum { LINE = 3 }; /* strain, stress and slope: what a tangent knows of a point */
 
-/* Flags that all points of a scene share in a step; see SearchFlags in openings.py. */
+/* Flags that all points of a scene share in a step; see SearchFlags in material_points.py. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
 /* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
@@ -263,7 +263,7 @@ enum slip_output {
   SLIP_DISSIPATED, SLIP_LOST, SLIP_STORED, SLIP_LIMIT, SLIP_BACK_FORCE, SLIP_OUTPUTS
 };
 
-/* Rigid-plastic connectors, see rigid_plastic.py. */
+/* Rigid-plastic connectors, see connector_laws.py. */
 typedef struct {
   int32_t *search;             /* as that of points */
   kernel *force, *end;         /* force of a slip and its derivative; what the end of a step brings */
@@ -292,7 +292,7 @@ typedef struct {
 /* The end of a step in a law of connectors, then come its variables there. */
 enum law_output { LAW_STORED, LAW_NUMERICAL, LAW_OUTPUTS };
 
-/* Connectors with compiled laws, see compiled_laws.py. Inputs of a law are its motions, those before the
+/* Connectors with compiled laws, see force_laws.py. Inputs of a law are its motions, those before the
  * step, dt, theta, the variables before the step, and the numbers of the law. */
 typedef struct {
   kernel *force, *end;        /* forces and their derivatives by the motions; what the end of a step brings */
@@ -519,7 +519,7 @@ enum agreement { TOTAL, HYPOT, LARGEST };
 /* What a function of a user has raised: a failure of the step, or something else, which ends the run. */
 enum raised { NOTHING, STEP_FAILED, OTHER };
 
-/* Whose forces tangents of static steps have, see PredictedStrains in cells.py: first those before the step, then
+/* Whose forces tangents of static steps have, see PredictedStrains in beams.py: first those before the step, then
  * those that the last iteration predicted, or those at the iterate; or always these. */
 enum tangents { PREDICTED, FIRST, EXACT };
 
@@ -575,7 +575,7 @@ typedef struct {
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands, demanding; /* demanding: whether there are any on any process */
   const demand *demand; /* of connectors and points */
-  int32_t *switched;    /* a row of a connector is not about what it was in the tangent; see openings.py */
+  int32_t *switched;    /* a row of a connector is not about what it was in the tangent; see material_points.py */
   double last, best;                  /* residuals of the iterate before; least so far */
   int near, slow, patience; /* near: the tangent is kept in the next iteration */
   int iterations, reason, total;      /* of the latest solution, and of all */
@@ -863,7 +863,7 @@ typedef struct {
   const inelastic_term *points; /* entries of the ledger of springs, rigid-plastic ones and laws */
 } coupling_term;
 
-/* Forces of laws of a user, which may change their direction at every step; see watches.py. */
+/* Forces of laws of a user, which may change their direction at every step; see controllers.py. */
 typedef struct {
   int number, most;            /* changes in a row that are one too many */
   double large, moved;         /* parts of the largest force, and of `length`, that count */
@@ -896,7 +896,7 @@ typedef struct {
   void *self;
 } admission_call;
 
-/* Checks of static steps, see branch_check.py; and what the latest one has found. */
+/* Checks of static steps, see step_equation.py; and what the latest one has found. */
 typedef struct {
   double slack, far, kink;
   const double *per_far; /* one over the size of the scene for displacements, one for rotations */

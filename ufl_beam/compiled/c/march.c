@@ -667,7 +667,7 @@ static double size_of_loads(const march *m)
   return size;
 }
 
-/* -- places that open: see openings.py ------------------------------------------------------------ */
+/* -- places that open: see material_points.py ------------------------------------------------------------ */
 
 /* Held places open from the largest excess over their limit on, then from this part of it on, ...; so the
  * number of solutions stays small where many open in a step. Of excesses that differ by less than TIE none
@@ -780,7 +780,7 @@ static int measure(march *m)
 }
 
 /* Whether a static step was followed: no mechanism, and the internal forces account for what it stores and
- * dissipates; see branch_check.py. */
+ * dissipates; see step_equation.py. */
 static int followed(march *m)
 {
   static_path *p = m->path;
@@ -943,7 +943,7 @@ static double seconds_now(void)
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* The state, or the part of it that this process has, as a row; see state_writer.py. */
+/* The state, or the part of it that this process has, as a row; see state_rows.py. */
 void keep_state(const march *m, double *row)
 {
   memset(row + m->sums, 0, (m->after_sums - m->sums) * sizeof *row);

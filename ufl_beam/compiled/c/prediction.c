@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Prediction of the end of a step, from which Newton's method starts; see prediction.py. */
+/* Prediction of the end of a step, from which Newton's method starts; see stepper.py. */
 
 /* Root mean square of the motions in a step, as a part of the size of the scene. */
 static const double FAR = 1. / 8;
