@@ -59,8 +59,8 @@ def bulk_law(d, limit, stiffness):
 def own_softening(d, limit, energy):
     """A softening law of one's own with about a limit and an energy."""
     return d.one([
-        f"Bilinear({limit:.4g}, {energy:.4g})",
-        f"RisesFirst({limit:.4g}, {energy / (1.5 * limit):.4g})",
+        f"Petersson({limit:.4g}, {energy:.4g})",
+        f"Rising({limit:.4g}, {energy / (1.5 * limit):.4g})",
     ])  # fmt: skip
 
 

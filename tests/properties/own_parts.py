@@ -4,13 +4,18 @@
 They are the same objects in all scenes, with other numbers each, so that each is compiled once.
 """
 
+import sys
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
 import ufl
 
 import ufl_beam as ub
+
+sys.path.append(str(Path(__file__).parents[1]))
+from laws_of_ones_own import Dashpot, Petersson, PowerLaw, Rising  # noqa: F401
 
 f = ub.law_functions
 
@@ -55,82 +60,7 @@ def warming(q, axis, M):
     return -M * axis.d(q[2])
 
 
-# -- laws --------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Dashpot(ub.MaterialLaw):
-    """Maxwell's body, in closed form."""
-
-    eta: float
-    variables: ClassVar = {"creep": 0.0}
-
-    def stress(self, strain, state):
-        return self.C * (strain - state.creep)
-
-    def increments(self, strain, state, dt):
-        return {"creep": self.stress(strain, state) / (self.eta / dt + self.C)}
-
-    def elastic_energy(self, strain, state):
-        return self.C * (strain - state.creep) ** 2 / 2
-
-
-@dataclass(frozen=True)
-class PowerLaw(ub.MaterialLaw):
-    """Ramberg and Osgood's law by residuals, as in docs/extending_laws.md."""
-
-    M0: float
-    k0: float
-    n: float
-    variables: ClassVar = {"plastic": 0.0, "largest": 0.0}
-
-    def stress(self, strain, state):
-        return self.C * (strain - state.plastic)
-
-    def residuals(self, strain, old, new, dt):
-        M = self.stress(strain, new)
-        largest = f.larger(old.largest, self.k0 * (f.absolute(M) / self.M0) ** self.n)
-        flows = f.sign(M) * (new.largest - old.largest)
-        return {"largest": new.largest - largest, "plastic": new.plastic - old.plastic - flows}
-
-    def elastic_energy(self, strain, state):
-        return self.C * (strain - state.plastic) ** 2 / 2
-
-
-@dataclass(frozen=True)
-class Bilinear(ub.SofteningLaw):
-    """Two straight lines, with the energy, as in docs/extending_laws.md."""
-
-    t: float
-    G: float
-
-    def _lines(self):
-        first, last = 0.8 * self.G / self.t, 3.6 * self.G / self.t
-        slope = self.t / 3 / (last - first)
-        return ((self.t - slope * last) / first, first), (slope, last)
-
-    def traction(self, opening):
-        return sum(slope * f.positive(end - opening) for slope, end in self._lines())
-
-    def energy_to(self, opening):
-        return sum(
-            slope * (end**2 - f.positive(end - opening) ** 2) / 2 for slope, end in self._lines()
-        )
-
-
-@dataclass(frozen=True)
-class RisesFirst(ub.SofteningLaw):
-    """Up by a third or so, then down; its energy by quadrature."""
-
-    t: float
-    width: float
-
-    def traction(self, opening):
-        x = opening / self.width
-        return self.t * (1 + 4 * x) * f.exp(-2 * x)
-
-
-LAWS, SOFTENING = ("Dashpot", "PowerLaw"), ("Bilinear", "RisesFirst")
+LAWS, SOFTENING = ("Dashpot", "PowerLaw"), ("Petersson", "Rising")
 """Names of the material laws and of the softening laws."""
 
 CONNECTOR_LAWS = "Stiffening", "Relaxing", "Cushion", "Brake"

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from law_runs import require_reference, require_restart
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import doubles, lib
@@ -162,21 +163,8 @@ def test_springs_in_one_law_are_springs(scheme):
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 @pytest.mark.parametrize("name", LAWS)
 def test_reference(name, scheme):
-    """The law by NumPy in the reference solver, and the ledger of both."""
     _, (link,), scene = cantilever(LAWS[name])
-    found, reference = (
-        run(scene, scheme, newton=ub.Newton(rtol=1e-12, reference=one)) for one in (False, True)
-    )
-    scale = np.abs(found.q).max()
-    np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * scale)
-    mine, other = found.connector(link), reference.connector(link)
-    for of in ("motion", "force", "work", "rate", "dissipated"):
-        a, b = getattr(mine, of), getattr(other, of)
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-8 * max(np.abs(a).max(), 1e-3))
-    assert list(found.energy) == list(reference.energy)
-    for entry in found.energy:
-        a, b = found.energy[entry], reference.energy[entry]
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.throughput)
+    require_reference(run, scene, link, scheme)
 
 
 @pytest.mark.parametrize("scheme", [s for s in SCHEMES if isinstance(s, ub.ExactStep)], ids=str)
@@ -199,17 +187,7 @@ def test_the_ledger_closes(name, scheme):
 @pytest.mark.parametrize("scheme", [ub.Midpoint(0.05), ub.Newmark(), ub.Static()], ids=str)
 def test_restart_and_start(scheme, shared_path):
     _, links, scene = cantilever(*LAWS.values())
-    whole = run(scene, scheme)
-    file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
-    run(scene, scheme, t=(0, 0.3), checkpoint=file)
-    resumed = run(scene, scheme, checkpoint=file)
-    assert np.array_equal(resumed.q, whole.q)
-    for link in links:
-        for mine, other in zip(resumed.connector(link), whole.connector(link), strict=True):
-            assert np.array_equal(mine, other)
-    first = run(scene, scheme, t=(0, 0.3))
-    second = run(scene, scheme, t=(0.3, 0.6), start=first)
-    np.testing.assert_allclose(second.q[-1], whole.q[-1], rtol=0, atol=1e-8 * np.abs(whole.q).max())
+    require_restart(run, scene, links, scheme, shared_path, until=0.6)
 
 
 def test_save_and_load(shared_path):

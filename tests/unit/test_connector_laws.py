@@ -11,10 +11,9 @@ import warnings
 from dataclasses import dataclass
 from typing import ClassVar
 
-from mpi4py import MPI
-
 import numpy as np
 import pytest
+from law_runs import require_reference, require_restart
 from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
@@ -192,21 +191,9 @@ def test_small_steps_keep_the_digits_of_the_force():
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 @pytest.mark.parametrize("name", LAWS)
 def test_reference(name, scheme):
-    """The law by NumPy in the reference solver, and the ledger of both."""
     _, (link,), scene = cantilever(LAWS[name])
-    found, reference = (
-        run(scene, scheme, newton=ub.Newton(rtol=1e-12, reference=one)) for one in (False, True)
-    )
-    scale = np.abs(found.q).max()
-    np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * scale)
-    mine, other = found.connector(link), reference.connector(link)
-    for of in ("motion", "force", "work", "rate", "dissipated"):
-        a, b = getattr(mine, of), getattr(other, of)
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * max(np.abs(a).max(), 1e-3))
-    assert list(found.energy) == list(reference.energy)
-    for entry in found.energy:
-        a, b = found.energy[entry], reference.energy[entry]
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.throughput)
+    found = require_reference(run, scene, link, scheme)
+    mine = found.connector(link)
     lost = found.energy.lost.get(LAWS[name].entry, 0.0)
     np.testing.assert_allclose(lost, mine.dissipated, rtol=0, atol=1e-15)
     if isinstance(scheme, ub.ExactStep):
@@ -269,22 +256,7 @@ def all_laws():
 @pytest.mark.parametrize("scheme", [ub.Midpoint(0.05), ub.Newmark(), ub.Static()], ids=str)
 def test_restart_and_start(scheme, shared_path):
     _, links, scene = all_laws()
-    whole = run(scene, scheme)
-    file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
-    run(scene, scheme, t=(0, 0.3), checkpoint=file)
-    resumed = run(scene, scheme, checkpoint=file)
-    assert np.array_equal(resumed.q, whole.q)
-    for link in links:
-        for mine, other in zip(resumed.connector(link), whole.connector(link), strict=True):
-            assert np.array_equal(mine, other)
-    for entry in whole.energy:
-        # Several processes add up what was lost before and after in another order.
-        digits = 0.0 if MPI.COMM_WORLD.size == 1 else 1e-14
-        scale = digits * whole.energy.throughput
-        np.testing.assert_allclose(resumed.energy[entry], whole.energy[entry], rtol=0, atol=scale)
-    first = run(scene, scheme, t=(0, 0.3))
-    second = run(scene, scheme, t=(0.3, 0.6), start=first)
-    np.testing.assert_allclose(second.q[-1], whole.q[-1], rtol=0, atol=1e-8 * np.abs(whole.q).max())
+    whole = require_restart(run, scene, links, scheme, shared_path, until=0.6)
     if scheme == ub.Midpoint(0.05):
         assert whole.energy.worst < 1e-9
 

@@ -8,6 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from law_runs import require_reference, require_restart
 
 import ufl_beam as ub
 
@@ -202,35 +203,14 @@ def lost_over(way):
 
 @CASES
 def test_reference(name, scheme):
-    """The law by NumPy in the reference solver, and the ledger of both."""
     _, (link,), scene = oscillator(LAWS[name])
-    found, reference = (
-        run(scene, scheme, t=(0, 1), newton=ub.Newton(rtol=1e-12, reference=one))
-        for one in (False, True)
-    )
-    np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * np.abs(found.q).max())
-    for mine, other in zip(found.connector(link), reference.connector(link), strict=True):
-        np.testing.assert_allclose(mine, other, rtol=0, atol=1e-8 * max(np.abs(mine).max(), 1e-3))
-    assert list(found.energy) == list(reference.energy)
-    for entry in found.energy:
-        a, b = found.energy[entry], reference.energy[entry]
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.throughput)
+    require_reference(run, scene, link, scheme, t=(0, 1))
 
 
 @pytest.mark.parametrize("scheme", [ub.Midpoint(0.05), ub.Static()], ids=str)
 def test_restart_and_start(scheme, shared_path):
     _, links, scene = oscillator(*LAWS.values())
-    whole = run(scene, scheme, t=(0, 1))
-    file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
-    run(scene, scheme, t=(0, 0.5), checkpoint=file)
-    resumed = run(scene, scheme, t=(0, 1), checkpoint=file)
-    assert np.array_equal(resumed.q, whole.q)
-    for link in links:
-        for mine, other in zip(resumed.connector(link), whole.connector(link), strict=True):
-            assert np.array_equal(mine, other)
-    first = run(scene, scheme, t=(0, 0.5))
-    second = run(scene, scheme, t=(0.5, 1), start=first)
-    np.testing.assert_allclose(second.q[-1], whole.q[-1], rtol=0, atol=1e-8 * np.abs(whole.q).max())
+    require_restart(run, scene, links, scheme, shared_path, until=1.0)
 
 
 def law_of(**members):

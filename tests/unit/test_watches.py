@@ -9,9 +9,9 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from laws_of_ones_own import Dashpot, PowerLaw
 
 import ufl_beam as ub
-from tests.unit.laws_of_ones_own import Dashpot, PowerLaw
 from ufl_beam.model.material_law import has_quadratic_energies, judges_dissipation
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC
 from ufl_beam.simulation.solution import Solution

@@ -166,7 +166,8 @@ class Simulation(StateView):
         self._stepper.begin_at(self, t0, q_here)
         self.moved(t0)
         if has_inertia(scheme) and (scene.links or scene.supports):
-            together(warn_of_jumps, grid, t0, q, self.connections()[:, 0])
+            motions = self.connections()[:, 0] if scene.links else np.zeros(0)
+            together(warn_of_jumps, grid, t0, q, motions)
 
     # -- stepping ------------------------------------------------------------------------------
 
