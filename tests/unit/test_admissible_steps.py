@@ -36,10 +36,10 @@ def test_dissipation_never_falls(law, scheme, dt):
     plastic = []
     for reference in (False, True):
         newton = ub.Newton(reference=reference)
-        run = ub.simulate(shaken(law), scheme, t=(0, 1), dt=dt, newton=newton, progress=False)
+        run = ub.simulate(shaken(law), scheme, t=(0, 0.6), dt=dt, newton=newton, progress=False)
         plastic.append(run.energy["plastic"])
         assert np.diff(plastic[-1]).min() >= -1e-12 * plastic[-1][-1]  # round-off of the sums
-    assert plastic[0][-1] > 1.0
+    assert plastic[0][-1] > 0.5
     assert plastic[0] == pytest.approx(plastic[1], rel=1e-6)  # tolerances of two solvers
 
 

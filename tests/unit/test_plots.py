@@ -667,7 +667,15 @@ def test_symbols_are_where_their_connector_is(connect, law):
             assert has(points, b)
             x, y = (b - a) / np.linalg.norm(b - a)
             assert np.abs(points @ (-y, x)).max() < 1.2 * 0.05
-    assert outlines(ub.plot(solution), "connectors")
+
+
+@pytest.mark.parametrize("connect", [ub.Stretch, ub.Turn])
+def test_each_connector_is_drawn(connect):
+    """One picture with all laws but the motor, which would hold the motion of a hinge."""
+    laws = CONNECTOR_LAWS[1:]
+    solution = ub.simulate(slider(connect, *laws), ub.Midpoint(), t=(0, 0.1), dt=0.1)
+    drawn = outlines(ub.plot(solution), "connectors")
+    assert len(drawn) >= len(laws)
 
 
 def test_connectors_side_by_side_do_not_cover_each_other():

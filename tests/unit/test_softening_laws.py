@@ -212,7 +212,7 @@ def test_both_solvers_agree(name, place, scheme):
     """To and fro; works and losses to 1e-9; the ledger closes."""
     runs = [
         ub.simulate(
-            scene_of(name, place), scheme, t=(0, 1), dt=1 / 20, progress=False,
+            scene_of(name, place), scheme, t=(0, 1), dt=1 / 10, progress=False,
             newton=ub.Newton(rtol=1e-12, reference=reference),
         )
         for reference in (False, True)

@@ -98,7 +98,7 @@ def kills_in_steps(tmp_path, number, steps, every):
 
 @pytest.mark.serial
 def test_two_kills(tmp_path):
-    kills_in_steps(tmp_path, 2, steps=2000, every=20)
+    kills_in_steps(tmp_path, 2, steps=1000, every=10)
 
 
 @pytest.mark.slow
