@@ -55,9 +55,9 @@ from ufl_beam.mechanics.energy_momentum import (
 )
 from ufl_beam.mechanics.time_schemes import Coefficients, DynamicScheme, Scheme, Step
 from ufl_beam.model import law_functions
-from ufl_beam.model.beams import Beam
-from ufl_beam.model.bodies import Body, Place, Spot, ground
-from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.beams import Beam, Mesh
+from ufl_beam.model.bodies import Body, Place, PointMass, Spot, Velocity, ground
+from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw
 from ufl_beam.model.connector_laws import (
     Actuator,
     Clearance,
@@ -70,12 +70,8 @@ from ufl_beam.model.connector_laws import (
     Stop,
 )
 from ufl_beam.model.connectors import Bushing, Connector, Slide, Stretch, Turn
-from ufl_beam.model.damping import KelvinVoigt, Rayleigh
-from ufl_beam.model.distributions import Lognormal, Normal, TruncatedNormal, Weibull
-from ufl_beam.model.fibres import Fibres
-from ufl_beam.model.force_laws import ForceLaw
-from ufl_beam.model.hysteresis_laws import ArmstrongFrederick, BoucWen, RambergOsgood
-from ufl_beam.model.interaction_laws import AxialBending
+from ufl_beam.model.fibres import Fibres, Lognormal, Normal, TruncatedNormal, Weibull
+from ufl_beam.model.functions import Table, ramp
 from ufl_beam.model.joints import (
     Guided,
     Joint,
@@ -86,16 +82,29 @@ from ufl_beam.model.joints import (
     Rigid,
     RigidLink,
 )
-from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, PointLoad, RotatingFrame
-from ufl_beam.model.masses import PointMass, Velocity
+from ufl_beam.model.loads import (
+    FollowerLoad,
+    Gravity,
+    KelvinVoigt,
+    LineLoad,
+    PointLoad,
+    Rayleigh,
+    RotatingFrame,
+)
 from ufl_beam.model.material_law import MaterialLaw
-from ufl_beam.model.material_laws import DuvautLions, Hardening, Perzyna
-from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.material_laws import (
+    ArmstrongFrederick,
+    AxialBending,
+    BoucWen,
+    DuvautLions,
+    Hardening,
+    Perzyna,
+    RambergOsgood,
+)
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.sections import Section
 from ufl_beam.model.softening_laws import LinearSoftening, Softening, SofteningLaw
 from ufl_beam.model.supports import Clamped, Pinned, Prescribed, Roller, Support
-from ufl_beam.model.time_functions import Table, ramp
 from ufl_beam.model.works import Potential, VirtualWork
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.extremes import Extent, Extremes

@@ -8,7 +8,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.model.curves import points_along
+from ufl_beam.model.functions import points_along
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
 

@@ -7,8 +7,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.model.connector_laws import Law
-from ufl_beam.model.damping import Damping
-from ufl_beam.model.loads import Load
+from ufl_beam.model.loads import Damping, Load
 
 CLOSED = [
     *(law for law in Law.__args__ if law is not ub.ConnectorLaw), *Load.__args__, *Damping.__args__,

@@ -8,7 +8,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme
-from ufl_beam.model.signatures import members
+from ufl_beam.model.records import members
 from ufl_beam.simulation import assembly
 
 BEAM = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0), cells=2)

@@ -435,7 +435,7 @@ def test_bad_works(make, says):
 
 def other_mesh():
     from ufl_beam.discretization.function_spaces import Element
-    from ufl_beam.model.mesh_options import Mesh
+    from ufl_beam.model.beams import Mesh
 
     return Element(Mesh()).q1
 

@@ -22,11 +22,11 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.errors import ModelWarning, SceneError
 from ufl_beam.mechanics.classical import Newmark, Static
 from ufl_beam.mechanics.time_schemes import Coefficients, Step
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.constraint_checks import require_no_mechanism
+from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.time_functions import value_at
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.solvers import eigensolvers

@@ -24,10 +24,10 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.display import Rich
 from ufl_beam.errors import SceneError, require_count, require_kind, require_number, warn
 from ufl_beam.mechanics.classical import Static
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_prestress
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
-from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.postprocessing import velocity_of

@@ -27,9 +27,9 @@ from ufl_beam.errors import (
     require_switch,
 )
 from ufl_beam.mechanics.classical import Static
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_law import ConnectorLaw, require_limit
 from ufl_beam.model.connector_laws import Controller, rubs
-from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Content, above, below, require_arrays
 from ufl_beam.output.recorders import Recorder, recorders_of

@@ -30,7 +30,7 @@ from ufl_beam.errors import (
     shorten,
 )
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import alone, communicator, progress_bar
 from ufl_beam.simulation.initial_state import require_scheme

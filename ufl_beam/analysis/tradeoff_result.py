@@ -15,7 +15,7 @@ from ufl_beam.analysis.richardson import Cross, pareto, size
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich, bracketed, one_line
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.beams import Mesh
 from ufl_beam.solvers.newton_options import Newton
 
 

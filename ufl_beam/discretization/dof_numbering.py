@@ -20,12 +20,11 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.display import counted
 from ufl_beam.errors import SceneError, require_kind, shorten
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
-from ufl_beam.model.connectors import Connector
-from ufl_beam.model.curves import points_along
+from ufl_beam.model.connectors import Connector, place_of
 from ufl_beam.model.fibres import Layout
-from ufl_beam.model.mesh_options import Mesh
-from ufl_beam.model.plastic_hinges import place_of
+from ufl_beam.model.functions import points_along
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.model.supports import COMPONENTS

@@ -25,8 +25,8 @@ from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Anchor
-from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 
 

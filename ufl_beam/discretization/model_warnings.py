@@ -18,10 +18,10 @@ from ufl_beam.errors import warn
 from ufl_beam.memory import of_structure
 from ufl_beam.model.bodies import GROUND, Place, Spot, carries
 from ufl_beam.model.connector_laws import HELD, Motor
-from ufl_beam.model.plastic_hinges import place_of
+from ufl_beam.model.connectors import place_of
+from ufl_beam.model.functions import value_at
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
-from ufl_beam.model.time_functions import value_at
 
 TOUCHING = 1e-3
 """Distance of places that touch, as a part of the length of the shorter beam."""

@@ -18,7 +18,7 @@ from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.kinematics import split
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork, Work
 

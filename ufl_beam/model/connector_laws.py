@@ -21,8 +21,8 @@ from ufl_beam.errors import (
     require_returned,
 )
 from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.curves import Curve
-from ufl_beam.model.force_laws import ForceLaw as ForceLaw
+from ufl_beam.model.connector_law import ForceLaw as ForceLaw
+from ufl_beam.model.functions import Constant, Curve, Timed
 from ufl_beam.model.law_functions import Values, larger, positive, smaller, sqrt
 from ufl_beam.model.material_law import MaterialLaw, State, require_bulk_law
 from ufl_beam.model.material_laws import DuvautLions, Hardening
@@ -33,7 +33,6 @@ from ufl_beam.model.softening_laws import (
     SofteningLaw,
     require_softening,
 )
-from ufl_beam.model.time_functions import Constant, Timed
 
 OWN_LAW = "state a ConnectorLaw of your own"
 """Message of classes that are closed."""

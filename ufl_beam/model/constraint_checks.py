@@ -28,7 +28,7 @@ from ufl_beam.model.connector_laws import (
     rubs,
 )
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.curves import Point
+from ufl_beam.model.functions import Point
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.material_law import MaterialLaw
 from ufl_beam.model.scene import Scene

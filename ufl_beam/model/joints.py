@@ -11,7 +11,7 @@ from ufl_beam.errors import SceneError, require_kind, require_switch, require_te
 from ufl_beam.model.bodies import Anchor, NodeDof, Place, carries, ground, node, require_anchors
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Connector, require_apart, unit_axis
-from ufl_beam.model.curves import Curve, Point, point_of
+from ufl_beam.model.functions import Curve, Point, point_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,12 +1,25 @@
 # SPDX-License-Identifier: MIT
-"""Records whose annotations say which values their fields accept."""
+"""Records that check their fields; signatures of functions and objects of users."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import inspect
+from abc import ABC
+from collections.abc import Callable, Sequence
 from dataclasses import fields
-from functools import cache, partial
-from typing import Annotated, Any, TypeVar, get_args, get_origin, get_type_hints
+from functools import cache, lru_cache, partial
+from typing import (
+    Annotated,
+    Any,
+    Generic,
+    NamedTuple,
+    Protocol,
+    TypeVar,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
+from weakref import WeakKeyDictionary
 
 from ufl_beam.errors import require_kind, require_number, require_vector
 
@@ -52,3 +65,75 @@ def _checks(record: type[Any]) -> list[tuple[str, object, Callable[..., object]]
                 check = partial(require_kind, kind=kinds or kind)
             found.append((field.name, field.default, check))
     return found
+
+
+# -- signatures of functions and objects of users -----------------------------------------------
+
+
+NO_MEMBERS = {object, ABC, Protocol, Generic}
+
+_alike: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
+"""Protocols that objects of a class were found to satisfy; signatures take a millisecond."""
+
+
+class Named(NamedTuple):
+    """Parameters of a function: names with a meaning; others, without which it cannot be called."""
+
+    asked: tuple[str, ...]
+    unknown: tuple[str, ...]
+
+
+def parameters_by_name(
+    function: Callable[..., Any], known: Sequence[str], after: int = 0
+) -> Named | None:
+    """Return the names by which a function asks, after so many parameters by position.
+
+    A function with ``**more`` asks for all that is known; None if the function does not tell.
+    """
+    try:
+        parameters = [*inspect.signature(function).parameters.values()]
+    except (TypeError, ValueError):
+        return None
+    if any(p.kind is p.VAR_KEYWORD for p in parameters):
+        return Named(tuple(known), ())
+    named = [p for p in parameters[after:] if p.kind is not p.VAR_POSITIONAL]
+    return Named(
+        tuple(p.name for p in named if p.name in known),
+        tuple(p.name for p in named if p.name not in known and p.default is p.empty),
+    )
+
+
+@lru_cache(maxsize=32)
+def members(of: type) -> dict[str, Callable[..., Any] | None]:
+    """Public methods, by name, of a protocol or an abstract class; attributes are None."""
+    found: dict[str, Callable[..., Any] | None] = {}
+    for base in reversed([base for base in of.__mro__ if base not in NO_MEMBERS]):
+        for name, thing in (dict.fromkeys(inspect.get_annotations(base)) | vars(base)).items():
+            if not name.startswith("_"):
+                found[name] = thing if inspect.isfunction(thing) else None
+    return found
+
+
+def unlike(value: object, of: type) -> str:
+    """Return why an object has not the members of a protocol; empty if it has them.
+
+    Methods must take the arguments that the protocol calls them with.
+    """
+    if missing := [name for name in members(of) if not hasattr(value, name)]:
+        return f"it lacks {', '.join(missing)}"
+    known = _alike.setdefault(type(value), set())
+    for name, expected in members(of).items():
+        if expected is None or of in known:
+            continue
+        _, *parameters = inspect.signature(expected).parameters.values()
+        by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+        positions = (len(parameters) - len(by_name)) * [None]
+        try:
+            inspect.signature(getattr(value, name)).bind(*positions, **dict.fromkeys(by_name))
+        except ValueError:
+            pass  # of a builtin, which has no signature
+        except TypeError:  # also of what cannot be called
+            call = ", ".join(p.name for p in parameters)
+            return f"its method {name} cannot be called as {name}({call})"
+    known.add(of)
+    return ""

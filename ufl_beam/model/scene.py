@@ -22,23 +22,30 @@ from ufl_beam.model.bodies import (
     Member,
     NodeDof,
     Place,
+    PointMass,
     Representatives,
     Spot,
+    Velocity,
     carries,
     ground,
     merged,
     node,
 )
 from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
-from ufl_beam.model.connectors import Connector
-from ufl_beam.model.curves import enclosing_diameter, points_along
-from ufl_beam.model.damping import Damping, KelvinVoigt
+from ufl_beam.model.connectors import Connector, plastic_hinges
+from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along, value_at
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.loads import FollowerLoad, LineLoad, Load, LoadAtPlace, PointLoad, RotatingFrame
-from ufl_beam.model.masses import PointMass, Velocity
-from ufl_beam.model.plastic_hinges import plastic_hinges
+from ufl_beam.model.loads import (
+    Damping,
+    FollowerLoad,
+    KelvinVoigt,
+    LineLoad,
+    Load,
+    LoadAtPlace,
+    PointLoad,
+    RotatingFrame,
+)
 from ufl_beam.model.supports import COMPONENTS, Support
-from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.model.works import Potential, VirtualWork, Work
 
 

@@ -10,8 +10,7 @@ from ufl_beam.display import bracketed
 from ufl_beam.errors import SceneError, require_number, require_vector
 from ufl_beam.model.bodies import Anchor, require_node
 from ufl_beam.model.connector_laws import Bearing
-from ufl_beam.model.curves import Point
-from ufl_beam.model.time_functions import Constant, TimeFunction, require_time_function
+from ufl_beam.model.functions import Constant, Point, TimeFunction, require_time_function
 
 COMPONENTS = ("u", "v", "psi")
 

@@ -20,8 +20,8 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.connector_law import ENTRIES
-from ufl_beam.model.signatures import parameters_by_name
-from ufl_beam.model.time_functions import TimeFunction, require_time_function
+from ufl_beam.model.functions import TimeFunction, require_time_function
+from ufl_beam.model.records import parameters_by_name
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,8 +18,8 @@ from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.display import one_line
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError, require_number
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Body, Member
-from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.output.output_files import require_arrays
 from ufl_beam.output.postprocessing import ForcesAlongCells, in_section, section_force
 from ufl_beam.output.recorders import Recorder, StateView

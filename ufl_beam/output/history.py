@@ -24,9 +24,8 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.bodies import Anchor, Place, require_anchors
 from ufl_beam.model.connector_laws import Coulomb, Stop
-from ufl_beam.model.connectors import Connector
+from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.joints import Joint
-from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import OutputFile, changed, part_of, require_path
 from ufl_beam.output.postprocessing import links_of

@@ -22,8 +22,8 @@ from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
+from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.signatures import unlike
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import Output, require_apart, require_writable
 from ufl_beam.output.postprocessing import links_of

@@ -26,9 +26,8 @@ from scipy.interpolate import KroghInterpolator
 from ufl_beam.errors import ModelWarning, SceneError
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connector_laws import HELD
-from ufl_beam.model.curves import Point
+from ufl_beam.model.functions import Point, steady
 from ufl_beam.model.supports import still
-from ufl_beam.model.time_functions import steady
 
 T = TypeVar("T")
 Data = Any  # data of JSON

@@ -13,7 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import Member
 from ufl_beam.model.connector_laws import HingeLaw
-from ufl_beam.model.plastic_hinges import law_of, place_of
+from ufl_beam.model.connectors import law_of, place_of
 from ufl_beam.plotting import symbols
 from ufl_beam.plotting.layout import Pose, Stage, joined
 from ufl_beam.plotting.style import BLUE, GREY, ORANGE, POINTS, WHITE, require_axes, shade, size_of

@@ -12,7 +12,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import Place
-from ufl_beam.model.plastic_hinges import law_of
+from ufl_beam.model.connectors import law_of
 from ufl_beam.plotting import drawing, style
 from ufl_beam.plotting.drawing import circle, dissipated_per_length, open_hinges
 from ufl_beam.plotting.style import (

@@ -17,7 +17,7 @@ from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Spot
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.curves import nearest, parameter_step, tangent
+from ufl_beam.model.functions import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.output.postprocessing import motion_of
 from ufl_beam.output.states import States

@@ -14,8 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.display import picture_of
 from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
-from ufl_beam.model.damping import Rayleigh
-from ufl_beam.model.loads import Gravity, Load, RotatingFrame
+from ufl_beam.model.loads import Gravity, Load, Rayleigh, RotatingFrame
 from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.plotting.diagrams import plot_state
 from ufl_beam.plotting.drawing import draw_strokes

@@ -10,13 +10,12 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.bodies import Anchor, Body, Member, Place
+from ufl_beam.model.bodies import Anchor, Body, Member, Place, Velocity
+from ufl_beam.model.connectors import law_of, place_of
+from ufl_beam.model.functions import TimeFunction, steady
 from ufl_beam.model.loads import FollowerLoad, LineLoad, PointLoad
-from ufl_beam.model.masses import Velocity
-from ufl_beam.model.plastic_hinges import law_of, place_of
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
-from ufl_beam.model.time_functions import TimeFunction, steady
 from ufl_beam.plotting import symbols
 from ufl_beam.plotting.labels import Label, Spot
 from ufl_beam.plotting.layout import (

@@ -28,8 +28,8 @@ from ufl_beam.mechanics.time_schemes import (
     nodal_step,
     with_half_tangents,
 )
-from ufl_beam.model.damping import KelvinVoigt, Rayleigh
 from ufl_beam.model.fibres import Layout
+from ufl_beam.model.loads import KelvinVoigt, Rayleigh
 from ufl_beam.reference.cells import CellForce, Cells, Force, Ledger, Memory, lumps, put
 from ufl_beam.reference.points import MaterialPoints, Search
 

@@ -33,12 +33,11 @@ from ufl_beam.model.connector_laws import (
     RigidPlastic,
     Spring,
 )
-from ufl_beam.model.connectors import Connector
+from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.fibres import Layout
+from ufl_beam.model.functions import value_at
 from ufl_beam.model.material_law import State
 from ufl_beam.model.material_laws import Hardening
-from ufl_beam.model.plastic_hinges import law_of
-from ufl_beam.model.time_functions import value_at
 from ufl_beam.reference.cells import Ledger
 from ufl_beam.reference.points import MaterialPoints, Search, derivative
 

@@ -21,7 +21,7 @@ from ufl_beam.mechanics.time_schemes import Step, acting
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.curves import REACH, nearest, parameter_step, tangent
+from ufl_beam.model.functions import REACH, nearest, parameter_step, tangent
 from ufl_beam.reference.cells import (
     Force,
     Form,

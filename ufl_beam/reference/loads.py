@@ -17,8 +17,8 @@ from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia
 from ufl_beam.model.bodies import GROUND, carries
+from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
-from ufl_beam.model.time_functions import value_at
 from ufl_beam.model.works import Potential, Work
 from ufl_beam.reference.beams import Mass
 from ufl_beam.reference.cells import (

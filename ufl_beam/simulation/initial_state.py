@@ -24,6 +24,7 @@ from ufl_beam.discretization.work_forms import require_works
 from ufl_beam.errors import SceneError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
 from ufl_beam.memory import no_garbage_collection
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_laws import HELD
 from ufl_beam.model.constraint_checks import (
     require_independent,
@@ -33,9 +34,8 @@ from ufl_beam.model.constraint_checks import (
     require_no_prestress,
     require_rates,
 )
-from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
-from ufl_beam.model.signatures import unlike
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.solution import Solution
 

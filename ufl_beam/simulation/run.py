@@ -27,7 +27,7 @@ from ufl_beam.errors import (
     warn,
 )
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.mesh_options import Mesh
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Output, take
 from ufl_beam.output.postprocessing import turned

@@ -19,8 +19,8 @@ from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
 from ufl_beam.display import Parameter
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten, warn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.mesh_options import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.extremes import Watch

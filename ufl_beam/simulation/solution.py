@@ -19,10 +19,10 @@ from ufl_beam.display import TIME, Rich
 from ufl_beam.errors import SceneError, require_kind, warn
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Anchor, Member, Place
+from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
-from ufl_beam.model.curves import Curve, nearest, parameter_step
 from ufl_beam.model.fibres import Layout
-from ufl_beam.model.force_laws import ForceLaw
+from ufl_beam.model.functions import Curve, nearest, parameter_step
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import (
     Content,

@@ -25,7 +25,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import StepFailed
-from ufl_beam.model.time_functions import Constant, Table, TimeFunction, steady, value_at
+from ufl_beam.model.functions import Constant, Table, TimeFunction, steady, value_at
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 """Kinds of forces."""

@@ -35,13 +35,12 @@ from ufl_beam.model.connector_laws import (
     RigidPlastic,
     Spring,
 )
-from ufl_beam.model.connectors import Connector
+from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.fibres import Layout
+from ufl_beam.model.functions import TimeFunction
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import Hardening
-from ufl_beam.model.plastic_hinges import law_of
 from ufl_beam.model.softening_laws import SofteningLaw
-from ufl_beam.model.time_functions import TimeFunction
 from ufl_beam.terms.base import Callbacks
 from ufl_beam.terms.energy_ledger import Account, Ledger
 from ufl_beam.terms.material_points import NOTHING, SPENT, Points, SearchFlags, expect_entries

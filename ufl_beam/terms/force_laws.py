@@ -24,9 +24,8 @@ from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import NoNumber, SceneError, require_returned, shorten
 from ufl_beam.mechanics.connector_steps import law_step
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.connector_law import ConnectorLaw, place_of
+from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, place_of
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.force_laws import ForceLaw
 from ufl_beam.model.material_law import State
 from ufl_beam.terms.base import Callbacks
 from ufl_beam.terms.connector_laws import Response, Setting

@@ -42,7 +42,7 @@ from ufl_beam.mechanics.time_schemes import (
     combined,
     with_half_tangents,
 )
-from ufl_beam.model.damping import KelvinVoigt, Rayleigh
+from ufl_beam.model.loads import KelvinVoigt, Rayleigh
 from ufl_beam.terms.base import Callbacks, InCells, Phases, Term, knowing
 from ufl_beam.terms.beams import OfForms
 from ufl_beam.terms.energy_ledger import Ledger

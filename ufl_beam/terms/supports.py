@@ -15,8 +15,8 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import GROUND
+from ufl_beam.model.functions import TimeFunction, value_at
 from ufl_beam.model.supports import Support
-from ufl_beam.model.time_functions import TimeFunction, value_at
 from ufl_beam.terms.base import Callbacks
 from ufl_beam.terms.energy_ledger import Ledger
 
