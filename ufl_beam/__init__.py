@@ -111,9 +111,9 @@ from ufl_beam.output.extremes import Extent, Extremes
 from ufl_beam.output.fatigue import Cycles, Fatigue, Gerber, Goodman, HotSpot, SNCurve, rainflow
 from ufl_beam.output.history import Event, Events, History
 from ufl_beam.output.output_files import version
+from ufl_beam.output.paraview_files import VTKHDF, XDMF
 from ufl_beam.output.postprocessing import Diagram
 from ufl_beam.output.recorders import Recorder
-from ufl_beam.output.time_series import VTKHDF, XDMF
 from ufl_beam.parallel import say
 from ufl_beam.plotting import notebook  # noqa: F401 - says how notebooks show models and results
 from ufl_beam.plotting.films import Film

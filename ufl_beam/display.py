@@ -12,7 +12,9 @@ from fractions import Fraction
 from functools import singledispatch
 from inspect import signature
 from types import FunctionType
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
+
+T = TypeVar("T")
 
 FEW = 4  # numbers of an array that are written
 
@@ -45,6 +47,12 @@ def one_line(record: Any) -> str:
         if value not in (_SHORT.repr(parameter.default), "{}"):
             fields.append(f"{name}={value}")
     return f"{type(record).__name__}({', '.join(fields)})"
+
+
+def in_one_line(kind: type[T]) -> type[T]:
+    """Let instances of a class, such as a named tuple, have the text of :func:`one_line`."""
+    kind.__repr__ = one_line  # type: ignore[method-assign]
+    return kind
 
 
 def bracketed(named: Any) -> str:

@@ -440,7 +440,7 @@ def test_an_interrupt_in_a_write_of_vtkhdf(n, tmp_path, monkeypatch):
     monkeypatch.setattr(VtkhdfWriter, "_put", interrupted)
     with pytest.raises(KeyboardInterrupt):
         write(writer, range(10))
-    steps = writer.steps
+    steps = writer.complete[0]
     assert 0 < steps < 10
     if n == 45:  # gone on with
         write(writer, [steps])

@@ -30,9 +30,9 @@ from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_pr
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
+from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
 from ufl_beam.output.postprocessing import velocity_of
 from ufl_beam.output.state_rows import FORCES, Connection
-from ufl_beam.output.time_series import VTKHDF, XDMF, TimeSeries
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution

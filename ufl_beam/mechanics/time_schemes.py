@@ -17,7 +17,7 @@ import numpy as np
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.display import one_line
+from ufl_beam.display import in_one_line
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.model.law_functions import Values
@@ -27,6 +27,7 @@ Constant = Callable[[float], Expr]
 """Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
 
 
+@in_one_line
 class Step(NamedTuple):
     """A step in time, as a scheme has it: its ends, and where loads and motions are taken.
 
@@ -45,9 +46,6 @@ class Step(NamedTuple):
     at: float = 1.0  # part of the way between loads at both ends, in the equation; 1: at the end
     q_before: Array | None = None  # configuration at the beginning of the last step, if ratio > 0
     ratio: float = 0.0  # of the length to that of the last step; 0 if none led to the beginning
-
-    def __repr__(self) -> str:
-        return one_line(self)
 
     @classmethod
     def of(cls, scheme: Scheme, t0: float, t1: float, end: float, q0: Array) -> Step:

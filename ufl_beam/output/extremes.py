@@ -15,14 +15,14 @@ from ufl_beam.compiled.simd_kernels import in_batches
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Element, Fields
-from ufl_beam.display import one_line
+from ufl_beam.display import in_one_line
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.output.output_files import require_arrays
 from ufl_beam.output.postprocessing import ForcesAlongCells, in_section, section_force
-from ufl_beam.output.recorders import Recorder, StateView
+from ufl_beam.output.recorders import Restartable, StateView
 from ufl_beam.terms.cell_forces import CellForces
 
 # -- extremes that C takes in after each step ------------------------------------------------------
@@ -85,7 +85,7 @@ def along_cells(of: Element, parts: tuple[float, ...], works: bool) -> AlongCell
     return AlongCells(form, motions, numbers, angles, first, moves)
 
 
-class Watch:
+class ExtremesInC:
     """Extremes of section forces at parts of cells, and of motions, of a scene on one process.
 
     Attributes:
@@ -156,6 +156,7 @@ class Watch:
 # -- the recorder ----------------------------------------------------------------------------------
 
 
+@in_one_line
 class Extent(NamedTuple):
     """Smallest and largest values of a run and their times; arrays of one shape.
 
@@ -178,9 +179,6 @@ class Extent(NamedTuple):
     time_low: Array
     time_high: Array
 
-    def __repr__(self) -> str:
-        return one_line(self)
-
     @classmethod
     def around(cls, values: Array, t: float) -> Extent:
         """Return the range of the values of one time."""
@@ -201,7 +199,7 @@ class Extent(NamedTuple):
         return Extent(*(values[rows] for values in self))
 
 
-class Extremes(Recorder):
+class Extremes(Restartable):
     """Recorder of the extremes of section forces along all cells and of motions of all nodes.
 
     Each step counts, whatever the solution keeps; memory does not grow.  Section forces are those
@@ -224,33 +222,43 @@ class Extremes(Recorder):
     def __init__(self, points: int = 2) -> None:
         require_number(points, "Extremes: points", at_least=2)
         self._parts = np.arange(int(points)) / (int(points) - 1)
-        self._watch: Watch | None = None
+        self._in_c: ExtremesInC | None = None
         self._taken: list[Extent] = []
 
-    def open(self, simulation: StateView) -> None:
-        """Begin with the initial state."""
+    def begin(self, simulation: StateView, state: State | None = None) -> None:
+        """Begin with the initial state, or go on after a :meth:`state`."""
         self._grid: Grid = simulation.grid
-        self._watch = simulation.watch(self._parts)
-        if self._watch is None:
-            self._taken = [Extent.around(x, simulation.t) for x in self._state(simulation)]
-        self.write(simulation)
+        self._in_c = simulation.watch(self._parts)
+        if state is None:
+            if self._in_c is None:
+                self._taken = [Extent.around(x, simulation.t) for x in self._state(simulation)]
+            self.write(simulation)
+            return
+        shapes = (len(self._grid.cells), len(self._parts), 3), (self._grid.size,)
+        self._taken = []
+        for what, shape in zip(("forces", "q"), shapes, strict=True):
+            names = [f"{what} {name}" for name in Extent._fields]
+            require_arrays(state, dict.fromkeys(names, shape))
+            self._taken.append(Extent(*(state[name].copy() for name in names)))
+        if self._in_c is not None:
+            self._in_c.begin(simulation.parts, self._taken)
 
     @property
     def by_itself(self) -> bool:
         """True if steps are taken in without a call of :meth:`write`."""
-        return self._watch is not None
+        return self._in_c is not None
 
     def write(self, simulation: StateView) -> None:
         """Take in the state of a step."""
-        if self._watch is not None:
-            self._watch.take(simulation.parts, simulation.t, simulation.q, simulation.q_before)
+        if self._in_c is not None:
+            self._in_c.take(simulation.parts, simulation.t, simulation.q, simulation.q_before)
             return
         for extent, values in zip(self._taken, self._state(simulation), strict=True):
             extent.widen(values, simulation.t)
 
     def close(self) -> None:
         """End the record; what was reached stays."""
-        self._taken, self._watch = self._extents, None
+        self._taken, self._in_c = self._extents, None
 
     def _state(self, simulation: StateView) -> tuple[Array, Array]:
         """Section forces of all cells, and the configuration, the same on every process."""
@@ -259,29 +267,14 @@ class Extremes(Recorder):
     @property
     def _extents(self) -> list[Extent]:
         """Those of forces and of motions."""
-        if self._watch is not None:
-            return [Extent(*of) for of in self._watch.extents()]
+        if self._in_c is not None:
+            return [Extent(*of) for of in self._in_c.extents()]
         return self._taken
 
     def state(self) -> State:
         """Return the extremes so far, by name."""
         extents = zip(("forces", "q"), self._extents, strict=True)
         return {f"{of} {name}": x for of, extent in extents for name, x in extent._asdict().items()}
-
-    def resume(self, simulation: StateView, state: State) -> None:
-        """Go on after a :meth:`state`."""
-        self._grid = simulation.grid
-        shapes = (len(self._grid.cells), len(self._parts), 3), (self._grid.size,)
-        for what, shape in zip(("forces", "q"), shapes, strict=True):
-            names = (f"{what} {name}" for name in Extent._fields)
-            require_arrays(state, dict.fromkeys(names, shape))
-        self._taken = [
-            Extent(*(state[f"{what} {name}"].copy() for name in Extent._fields))
-            for what in ("forces", "q")
-        ]
-        self._watch = simulation.watch(self._parts)
-        if self._watch is not None:
-            self._watch.begin(simulation.parts, self._taken)
 
     @property
     def grid(self) -> Grid:

@@ -26,7 +26,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
-from ufl_beam.output.recorders import Recorder, StateView
+from ufl_beam.output.recorders import Restartable, StateView
 
 BLOCK = 1000  # steps that are collected before their cycles are counted
 
@@ -319,7 +319,7 @@ class HotSpot(Record):
         return str(self.place)
 
 
-class Fatigue(Recorder):
+class Fatigue(Restartable):
     """Recorder of the rainflow cycles of the stress at named places.
 
     Its memory does not grow with the number of steps.  Section forces are those of the equation of
@@ -357,19 +357,21 @@ class Fatigue(Recorder):
         self._resolution = resolution or curve.range / 100
         self._counters: dict[HotSpot, RainflowCounter] = {}
 
-    def open(self, simulation: StateView) -> None:
-        """Begin to count, with the initial state."""
-        self._prepare(simulation)
-        self._begin = simulation.t
-        self.write(simulation)
-        self._count()  # A stress that is no number is found at once.
-
-    def _prepare(self, simulation: StateView) -> None:
+    def begin(self, simulation: StateView, state: State | None = None) -> None:
+        """Begin to count, with the initial state, or go on after a :meth:`state`."""
         at = [simulation.grid.cell_and_part(spot.place) for spot in self.spots]
         self._cells = np.array([cell for cell, _ in at], dtype=np.int64)
         self._parts, self._part = np.unique([part for _, part in at], return_inverse=True)
         self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
         self._block: list[Array] = []
+        if state is None:
+            self._begin = simulation.t
+            self.write(simulation)
+            self._count()  # A stress that is no number is found at once.
+            return
+        self._begin, self._end = map(float, state["duration"])
+        for i, counter in enumerate(self._counters.values()):
+            counter.resume(state[f"counted {i}"], state[f"waiting {i}"])
 
     def write(self, simulation: StateView) -> None:
         """Note the section forces, and count now and then."""
@@ -400,13 +402,6 @@ class Fatigue(Recorder):
         for i, counter in enumerate(self._counters.values()):
             state[f"counted {i}"], state[f"waiting {i}"] = counter.state()
         return state
-
-    def resume(self, simulation: StateView, state: State) -> None:
-        """Go on after a :meth:`state`."""
-        self._prepare(simulation)
-        self._begin, self._end = map(float, state["duration"])
-        for i, counter in enumerate(self._counters.values()):
-            counter.resume(state[f"counted {i}"], state[f"waiting {i}"])
 
     @property
     def duration(self) -> float:

@@ -29,7 +29,7 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import OutputFile, changed, part_of, require_path
 from ufl_beam.output.postprocessing import links_of
-from ufl_beam.output.recorders import Recorder, StateView
+from ufl_beam.output.recorders import Restartable, StateView
 from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC
 from ufl_beam.parallel import on_first
 
@@ -41,7 +41,7 @@ COMPONENTS = ("along", "across", "turn")  # of a bushing
 CONNECTOR = ("motion", "force", "work")  # columns of a connector
 
 
-class History(Recorder):
+class History(Restartable):
     """Table (CSV) of the motion of places and of the energy ledger, complete after a crash.
 
     Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each
@@ -94,14 +94,8 @@ class History(Recorder):
         """Path of the file, and if rows may go that of the one that takes its place."""
         return (self._path,) if self._most == sys.maxsize else (self._path, self._part)
 
-    def open(self, simulation: StateView) -> None:
-        """Write the header and the initial state."""
-        self._prepare(simulation)
-        row = self._row(simulation)
-        self._every, self._steps = self._first_every, 0
-        on_first(simulation.comm, lambda: self._begin(self._path, self._header + row))
-
-    def _prepare(self, simulation: StateView) -> None:
+    def begin(self, simulation: StateView, state: State | None = None) -> None:
+        """Write the header and the initial state, or cut off what was written after a state."""
         self._comm = simulation.comm
         self._links = {
             link: name
@@ -122,8 +116,16 @@ class History(Recorder):
         columns = [simulation.parameter.column, *names, *energies]
         # Spreadsheets take what begins so for a formula, which may run programs
         self._header = _line([f"'{c}" if c.startswith(FORMULA) else c for c in columns])
+        if state is None:
+            row = self._row(simulation)
+            self._every, self._steps = self._first_every, 0
+            on_first(self._comm, lambda: self._write_anew(self._path, self._header + row))
+        else:
+            self._every, self._steps, _, length = map(int, state["counts"])
+            content, digest = (state[name].tobytes() for name in ("content", "digest"))
+            on_first(self._comm, lambda: self._go_on(content, digest, length))
 
-    def _begin(self, path: Path, content: bytes) -> None:
+    def _write_anew(self, path: Path, content: bytes) -> None:
         self.close()
         self._files, self._length = [OutputFile(path)], 0
         self._append(content)
@@ -146,7 +148,7 @@ class History(Recorder):
     def _thin(self) -> None:
         """Leave out every other row; at no time is there less than one whole file."""
         rows = self._files[0].read(len(self._header), self._length).splitlines(keepends=True)
-        self._begin(self._part, self._header + b"".join(rows[::2]))
+        self._write_anew(self._part, self._header + b"".join(rows[::2]))
         self._files[0].rename(self._path)
 
     def _row(self, simulation: StateView) -> bytes:
@@ -177,14 +179,8 @@ class History(Recorder):
         texts = {"content": content, "digest": digest}
         return {"counts": counts, **{n: np.frombuffer(x, dtype=np.uint8) for n, x in texts.items()}}
 
-    def resume(self, simulation: StateView, state: State) -> None:
-        """Cut off what was written after the state, and append."""
-        self._prepare(simulation)
-        self._every, self._steps, _, length = map(int, state["counts"])
-        content, digest = (state[name].tobytes() for name in ("content", "digest"))
-        on_first(simulation.comm, lambda: self._take_back(content, digest, length))
-
-    def _take_back(self, content: bytes, digest: bytes, length: int) -> None:
+    def _go_on(self, content: bytes, digest: bytes, length: int) -> None:
+        """Open the file that a state knows, or write its content, and cut off what is behind."""
         if content:
             self._path.write_bytes(content)
         try:
@@ -268,7 +264,7 @@ class Event(NamedTuple):
         return f"{self.parameter.at(self.time, '.9g')}: {self.where} {self.what}"
 
 
-class Events(Recorder):
+class Events(Restartable):
     """Recorder of events, for scenes with hinges, inelastic material, stops or friction.
 
     A hinge "is free" when it has dissipated 99.9 % of its energy; a hinge that hardens "yields".
@@ -297,13 +293,13 @@ class Events(Recorder):
     def __repr__(self) -> str:
         return f"<Events: {len(self.found)}>"
 
-    def open(self, simulation: StateView) -> None:
-        """Take note of the initial state."""
+    def begin(self, simulation: StateView, state: State | None = None) -> None:
+        """Take note of the initial state, or go on after the events of a state."""
         self.found, self._rows = [], []
-        self._watch(simulation)
-
-    def _watch(self, simulation: StateView) -> None:
-        """Find the events that a scene may have, and those before the run."""
+        if state is not None:
+            rows = [(float(t), int(n), KINDS[int(kind)]) for t, n, kind in state["events"]]
+            self._add(simulation, rows)
+        # The events that the scene may have, and those before the run
         grid = simulation.grid
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
@@ -362,9 +358,3 @@ class Events(Recorder):
     def state(self) -> State:
         """Return the events so far: time, number of the cell or connector, and kind."""
         return {"events": np.array([(t, n, KINDS.index(what)) for t, n, what in self._rows])}
-
-    def resume(self, simulation: StateView, state: State) -> None:
-        """Go on after the events of a :meth:`state`."""
-        self.found, self._rows = [], []
-        self._add(simulation, [(float(t), int(n), KINDS[int(k)]) for t, n, k in state["events"]])
-        self._watch(simulation)

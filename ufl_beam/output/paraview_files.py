@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Files of time series of lines for ParaView: writers of XDMF and VTKHDF, valid after a kill."""
+"""Time series for ParaView and PyVista: a scene as lines, files valid after a kill, recorders."""
 
 from __future__ import annotations
 
@@ -8,13 +8,24 @@ import math
 import mmap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 from xml.sax.saxutils import escape
+
+from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
-from ufl_beam.output.output_files import OutputFile, part_of
+from ufl_beam.arrays import Array, Index, State
+from ufl_beam.errors import SceneError, require_count
+from ufl_beam.model.bodies import Anchor, arm
+from ufl_beam.model.connectors import Connector
+from ufl_beam.model.scene import Scene, spots_of
+from ufl_beam.output.output_files import OutputFile, changed, part_of, require_path
+from ufl_beam.output.postprocessing import turned
+from ufl_beam.output.recorders import Restartable, StateView
+from ufl_beam.parallel import on_first
+
+# -- a scene as lines ------------------------------------------------------------------------------
 
 LineFields = tuple[Mapping[str, Array], Mapping[str, Array]]
 """Fields at points, (n,) or (n, 3), and in cells, (m,), by name."""
@@ -28,7 +39,93 @@ class Lines(NamedTuple):
     parts: Array  # number of the part of the scene to which each line belongs; (m,)
 
 
-# -- XDMF ------------------------------------------------------------------------------------------
+BODY, LINK = 1, 2
+"""Numbers of bodies and links among the parts of a scene; beams are 0."""
+
+
+class Rod(NamedTuple):
+    """Straight line between two anchors, of a body or a connector."""
+
+    a: Anchor
+    b: Anchor
+    part: int  # BODY or LINK
+    along: Connector | None = None  # whose force acts along it
+
+
+def rods_of(scene: Scene) -> list[Rod]:
+    """Lines from the centre of each body to its points, and along links and springs."""
+    spots, rods = spots_of(scene), list[Rod]()
+    for body in scene.bodies:
+        x, y = body.center
+        # If something is attached to its centre alone, it is shown too, and turns.
+        beside = body.at(x + 0.02 * scene.size, y)
+        others = [s for s in spots[body] if s.point != body.center] or [beside]
+        rods += [Rod(body.middle, spot, BODY) for spot in others]
+    for joint in scene.joints:
+        if joint.look in ("RigidLink", "Link"):
+            a, b = joint.places
+            pulls = next((c for c in joint.holders if c.stretches), None)
+            rods.append(Rod(a, b, LINK, pulls))
+    rods += [
+        Rod(c.a, c.b, LINK, c if c.stretches else None)
+        for c in scene.connectors
+        if not c.turns and c.apart != (0.0, 0.0)
+    ]
+    return rods
+
+
+class LineData:
+    """Geometry of beams, bodies and connectors as lines, and the fields of a state on it.
+
+    Beams come first, node after node; behind them each line of a body or connector with two points
+    of its own.  N is the force of a connector that acts along its line; V and M are zero there.
+    """
+
+    def __init__(self, simulation: StateView) -> None:
+        grid, rods = simulation.grid, rods_of(simulation.scene)
+        ends = [anchor for rod in rods for anchor in (rod.a, rod.b)]
+        corners = np.reshape([anchor.point for anchor in ends], (-1, 2))
+        own = len(grid.points) + np.arange(len(ends)).reshape(-1, 2)
+        self.lines = Lines(
+            np.insert(np.concatenate([grid.points, corners]), 2, 0.0, axis=1),
+            np.concatenate([grid.pieces, own]),
+            np.append(np.zeros(len(grid.pieces)), [rod.part for rod in rods]),
+        )
+        self._nodes = np.concatenate([grid.dofs, *(grid.node(a)[None] for a in ends)])
+        self._ends = slice(len(grid.points), None)
+        self._arms = np.reshape([arm(anchor) for anchor in ends], (-1, 2))
+        links = simulation.scene.links
+        # Lines, and the links whose forces act along them
+        self._pulls = {k: links.index(rod.along) for k, rod in enumerate(rods) if rod.along}
+        self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
+
+    def fields(self, simulation: StateView) -> LineFields:
+        """Compute the fields of the present state, see :class:`XDMF`; all processes call it."""
+        q = simulation.share.gather(simulation.q)[self._nodes]
+        arms = turned(self._arms, q[self._ends, 2])
+        displacement = np.insert(q[:, :2], 2, 0.0, axis=1)
+        displacement[self._ends, :2] += arms - self._arms
+        at_points = {"displacement": displacement, "rotation": q[:, 2]}
+        for velocities in simulation.velocities():
+            v = simulation.share.gather(velocities)[self._nodes]
+            velocity = np.insert(v[:, :2], 2, 0.0, axis=1)
+            velocity[self._ends, :2] += v[self._ends, 2:] * arms[:, ::-1] * (-1.0, 1.0)
+            at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
+        forces = simulation.section_forces()
+        of_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
+        if simulation.may_break:
+            of_cells["jump"], of_cells["dissipated energy"] = simulation.damage()
+        in_cells = {
+            name: np.append(np.repeat(values, self._pieces_of_cell), np.zeros(self._num_rods))
+            for name, values in of_cells.items()
+        }
+        if self._pulls:
+            rods = in_cells["N"][len(self.lines.cells) - self._num_rods :]
+            rods[[*self._pulls]] = simulation.connections()[[*self._pulls.values()], 1]
+        return at_points, in_cells
+
+
+# -- XDMF -----------------------------------------------------------------------------------------
 
 HEAD = (
     b'<?xml version="1.0"?>\n<Xdmf Version="3.0"><Domain>'
@@ -68,23 +165,19 @@ class XdmfWriter:
     """
 
     def __init__(
-        self,
-        path: Path,
-        lines: Lines,
-        fields: LineFields,
-        complete: Sequence[int] | None = None,
-        digest: bytes = b"",
-    ) -> None:
+        self, path: Path, lines: Lines, fields: LineFields,
+        complete: Sequence[int] | None = None, digest: bytes = b"",
+    ) -> None:  # fmt: skip
         self._name, mesh = escape(data_path(path).name), bytearray()
         items = []
         for values in (lines.cells.astype("<i8"), lines.points, lines.parts):
-            items.append(_item(values, len(mesh), self._name))
+            items.append(self._item(values, len(mesh)))
             mesh += values.tobytes()
         self._mesh = (  # named anew in each step, written once
             f'<Topology TopologyType="Polyline" NodesPerElement="2" '
             f'NumberOfElements="{len(lines.cells)}">{items[0]}</Topology>'
             f'<Geometry GeometryType="XYZ">{items[1]}</Geometry>'
-            f"{_attribute('part', 'Cell', lines.parts, items[2])}"
+            f'<Attribute Name="part" AttributeType="Scalar" Center="Cell">{items[2]}</Attribute>'
         )
         new = complete is None
         self.complete = Complete(*(complete or (0, len(HEAD), ROOM, len(mesh))))
@@ -100,6 +193,15 @@ class XdmfWriter:
                 raise ValueError("not the files that were written up to there")
             self._cut()
 
+    def _item(self, values: Array | Index, at: int) -> str:
+        """The element that says where numbers are in the binary file."""
+        kind = "Int" if values.dtype.kind == "i" else "Float"
+        shape = " ".join(map(str, values.shape))
+        return (
+            f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="8" Format="Binary" '
+            f'Endian="Little" Seek="{at}">{self._name}</DataItem>'
+        )
+
     def write(self, t: float, fields: LineFields) -> None:
         """Append a step with its fields."""
         if self._data.size > self.complete.data:  # an interrupt has left a part of a step
@@ -109,18 +211,16 @@ class XdmfWriter:
         data = bytearray()
         for center, by_name in zip(("Node", "Cell"), fields, strict=True):
             for name, values in by_name.items():
-                item = _item(values, length + len(data), self._name)
-                text += _attribute(name, center, values, item)
+                form = "Vector" if values.ndim == 2 else "Scalar"
+                item = self._item(values, length + len(data))
+                text += f'<Attribute Name="{name}" AttributeType="{form}" Center="{center}">'
+                text += f"{item}</Attribute>"
                 data += values.tobytes()
         self._data.put(length, data)
-        tail, room = self._append((text + "</Grid>\n").encode(), tail, room)
-        self.complete = Complete(steps + 1, tail, room, length + len(data))
-
-    def _append(self, grid: bytes, tail: int, room: int) -> tuple[int, int]:
-        """Make a grid the last one of the document; where its tail and its spare room end now."""
-        start = tail + len(TAIL)
+        # The text goes into the instruction, with a tail of its own that lies within one page.
+        grid, start = (text + "</Grid>\n").encode(), tail + len(TAIL)
         new_tail = start + len(grid)
-        if new_tail % PAGE + len(TAIL) > PAGE:  # it lies within one page
+        if new_tail % PAGE + len(TAIL) > PAGE:
             new_tail += -new_tail % PAGE
         if (least := new_tail + len(TAIL)) > room:
             new_room = least + ROOM + -(least + ROOM) % PAGE  # CLOSING lies within one page, too
@@ -131,7 +231,7 @@ class XdmfWriter:
             room = new_room
         self._xml.put(start, grid.ljust(new_tail - start) + TAIL)  # still in the instruction
         self._xml.put(tail, b" " * len(TAIL))  # now in the document
-        return new_tail, room
+        self.complete = Complete(steps + 1, new_tail, room, length + len(data))
 
     def _cut(self) -> None:
         """Cut off what is behind the last complete step; the document is valid all the time.
@@ -167,21 +267,7 @@ class XdmfWriter:
             self._xml.close()
 
 
-def _item(values: Array | Index, at: int, name: str) -> str:
-    kind = "Int" if values.dtype.kind == "i" else "Float"
-    shape = " ".join(map(str, values.shape))
-    return (
-        f'<DataItem Dimensions="{shape}" NumberType="{kind}" Precision="8" Format="Binary" '
-        f'Endian="Little" Seek="{at}">{name}</DataItem>'
-    )
-
-
-def _attribute(name: str, center: str, values: Array, item: str) -> str:
-    form = "Vector" if values.ndim == 2 else "Scalar"
-    return f'<Attribute Name="{name}" AttributeType="{form}" Center="{center}">{item}</Attribute>'
-
-
-# -- VTKHDF ----------------------------------------------------------------------------------------
+# -- VTKHDF ---------------------------------------------------------------------------------------
 
 LAYOUT = (2, 0)  # of the format; VTK 9.3 warns of later ones
 LINE = 3  # VTK's number of the type of a cell
@@ -211,16 +297,12 @@ class VtkhdfWriter:
     """
 
     def __init__(
-        self,
-        path: Path,
-        lines: Lines,
-        fields: LineFields,
-        complete: Sequence[int] | None = None,
-        digest: bytes = b"",
-    ) -> None:
+        self, path: Path, lines: Lines, fields: LineFields,
+        complete: Sequence[int] | None = None, digest: bytes = b"",
+    ) -> None:  # fmt: skip
         import h5py
 
-        (self.steps,) = complete or (0,)
+        self.complete = (*(complete or (0,)),)  # number of complete steps
         rows = _rows(0.0, 0, fields)
         self._output = OutputFile(path if complete is None else part_of(path))
         self._output.put(0, _empty_file(lines, rows, fields))
@@ -248,7 +330,7 @@ class VtkhdfWriter:
                 with h5py.File(path, "r", locking=False) as file:
                     for name, (new, rows) in self._growing.items():
                         old = file["VTKHDF"][name]
-                        new.resize(self.steps * rows, axis=0)
+                        new.resize(self.complete[0] * rows, axis=0)
                         for first in range(0, len(new), BLOCK):
                             new[first : first + BLOCK] = old[first : min(first + BLOCK, len(new))]
             except Exception:  # of HDF5, which has many for what is damaged
@@ -262,30 +344,26 @@ class VtkhdfWriter:
             raise
         self._output.rename(path)
 
-    @property
-    def complete(self) -> tuple[int]:
-        """Number of complete steps, for a checkpoint."""
-        return (self.steps,)
-
     def write(self, t: float, fields: LineFields) -> None:
         """Append a step with its fields."""
         self._output.allocate(self._file.id.get_filesize() + self._room)
-        (times, time), *others = _rows(t, self.steps, fields).items()
+        (steps,) = self.complete
+        (times, time), *others = _rows(t, steps, fields).items()
         for name, values in others:
             self._put(name, values)
         self._file.flush()
         # All that the step has is in the file; that it is there comes last, and at once.
         self._put(times, time)
-        self._root["Steps"].attrs.modify("NSteps", np.int64(self.steps + 1))
+        self._root["Steps"].attrs.modify("NSteps", np.int64(steps + 1))
         self._file.flush()
-        self.steps += 1
+        self.complete = (steps + 1,)
 
     def _put(self, name: str, values: Array) -> None:
         """Write the rows of the next step by HDF5's own functions, which are the fastest."""
         from h5py import h5s
 
         dataset, (rows, *components) = self._growing[name][0].id, values.shape
-        first = self.steps * rows
+        first = self.complete[0] * rows
         dataset.set_extent((first + rows, *components))
         space = h5s.create_simple((first + rows, *components))
         space.select_hyperslab((first, *(0 for _ in components)), values.shape)
@@ -294,12 +372,12 @@ class VtkhdfWriter:
     def _cut(self) -> None:
         """Cut off what is behind the last step; times first, of too many VTK 9.3 crashes."""
         (times, _), *others = self._growing.values()
-        times.resize(self.steps, axis=0)
+        times.resize(self.complete[0], axis=0)
         self._file.flush()
-        self._root["Steps"].attrs.modify("NSteps", np.int64(self.steps))
+        self._root["Steps"].attrs.modify("NSteps", np.int64(self.complete[0]))
         self._file.flush()
         for dataset, rows in others:
-            dataset.resize(self.steps * rows, axis=0)
+            dataset.resize(self.complete[0] * rows, axis=0)
         self._file.flush()
 
     def sync(self) -> bytes:
@@ -312,11 +390,11 @@ class VtkhdfWriter:
         self._output.sync()
         whole = hashlib.sha256()
         for (dataset, rows), hashed in zip(self._growing.values(), self._hashes, strict=True):
-            end = self.steps * rows
+            end = self.complete[0] * rows
             for first in range(self._hashed * rows, end, BLOCK):
                 hashed.update(dataset[first : min(first + BLOCK, end)])
             whole.update(hashed.digest())
-        self._hashed = self.steps
+        self._hashed = self.complete[0]
         return whole.digest()
 
     def close(self) -> None:
@@ -372,3 +450,150 @@ def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> byt
                 steps[f"{kind}Offsets/{name}"] = steps[f"{kind}Offsets/{first}"]
         file.flush()
         return bytes(file.id.get_file_image())
+
+
+# -- recorders -------------------------------------------------------------------------------------
+
+
+class TimeSeries(Restartable):
+    """Base of recorders of a scene as one data set of lines, see :class:`XDMF` and :class:`VTKHDF`.
+
+    Attributes:
+        ending: End of the name of the file.
+        writer: Class of the writer, made of path, lines and fields of the first state; and to go
+            on of what ``complete`` and ``sync()`` of an earlier one gave.
+    """
+
+    ending: ClassVar[str]
+    writer: ClassVar[Any]
+
+    def __init__(self, path: str | Path, *, every: int = 1) -> None:
+        kind = type(self).__name__
+        self._path = require_path(path, kind)
+        require_count(every, f"{kind} {path}: every")
+        self._every, self._count = every, 0
+        if self._path.suffix != self.ending:
+            raise SceneError(f"{kind} {path}: the name of the file must end in {self.ending}")
+        self._writers: list[Any] = []  # on the first process one, while it is open
+
+    def begin(self, simulation: StateView, state: State | None = None) -> None:
+        """Write the mesh and the initial state, or cut off what was written after a state."""
+        self._comm: MPI.Intracomm = simulation.comm
+        self._scene, self._count, before = LineData(simulation), 0, tuple[Any, ...]()
+        if state is not None:
+            self._count, *complete = map(int, state["sizes"])
+            before = complete, state["digest"].tobytes()
+        fields = self._scene.fields(simulation)
+
+        def make() -> None:
+            self.close()
+            try:
+                self._writers = [self.writer(self._path, self._scene.lines, fields, *before)]
+            except (FileNotFoundError, ValueError):
+                if not before:
+                    raise
+                raise changed(f"{type(self).__name__} {self._path}") from None
+            if not before:
+                self._writers[0].write(simulation.t, fields)
+
+        on_first(self._comm, make)
+
+    def write(self, simulation: StateView) -> None:
+        """Write the state, every so many steps."""
+        self._count += 1
+        if self._count % self._every == 0:
+            fields = self._scene.fields(simulation)
+            on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
+
+    def state(self) -> State:
+        """Return the number of steps, and sizes and checksum of what is complete, on the disk."""
+        digests: list[bytes] = []
+        on_first(self._comm, lambda: digests.extend(writer.sync() for writer in self._writers))
+        sizes = [n for writer in self._writers for n in writer.complete]
+        return {
+            "sizes": np.array([self._count, *sizes], dtype=float),
+            "digest": np.frombuffer(b"".join(digests), dtype=np.uint8),
+        }
+
+    def close(self) -> None:
+        """Close the files of the time series."""
+        writers, self._writers = self._writers, []
+        for writer in writers:
+            writer.close()
+
+
+class XDMF(TimeSeries):
+    """Time series for ParaView: all fields of a step on one data set of lines.
+
+    At points ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
+    ``velocity`` (m/s) and ``angular velocity`` (rad/s).  In cells ``N``, ``V`` (N), ``M`` (N m), as
+    in their middle; where something yields or breaks, also the ``jump`` of the hinge (rad) and the
+    ``dissipated energy`` (J).  ``part`` is 0 in beams; 1 in lines from the centre of each body to
+    its points; 2 along links and springs, where N is the force of what pulls along its line.
+
+    The file is valid and has all complete steps at any moment, also after a kill.  A step costs the
+    same however many there are.  On a path the time is the load factor.
+
+    Args:
+        path: File, ending in ``.xdmf``; its numbers are beside it in a file of the same name with
+            ``.bin`` behind it.
+        every: Write every so many steps.
+
+    Raises:
+        SceneError: ``every`` is no whole number of steps, or the path does not end in ``.xdmf``.
+
+    Example:
+        >>> film = ub.XDMF("beam.xdmf", every=5)
+        >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=film)
+        >>> [path.name for path in film.files]
+        ['beam.xdmf', 'beam.xdmf.bin']
+    """
+
+    ending = ".xdmf"
+    writer = XdmfWriter
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Paths of the file, and of that of its numbers."""
+        return self._path, data_path(self._path)
+
+    def require_writable(self) -> None:
+        """Raise :class:`SceneError` if a file cannot be written, or its name stand in XML."""
+        name = self._path.name
+        if name != name.strip() or not name.isprintable():
+            raise SceneError(
+                f"XDMF {name!r}: spaces at the ends and characters that cannot be printed do not "
+                "survive in XML; take another name"
+            )
+        super().require_writable()
+
+
+class VTKHDF(TimeSeries):
+    """Time series for ParaView, VTK and PyVista in one HDF5 file, with the fields of :class:`XDMF`.
+
+    Each step is flushed, so the file can be read during the run.  After a kill it has all complete
+    steps, except if HDF5 was just rearranging its index, for some microseconds.  A restarted run
+    compares the numbers and goes on in a copy, as HDF5 may crash in a damaged file.
+
+    Args:
+        path: File, ending in ``.vtkhdf``.
+        every: Write every so many steps.
+
+    Raises:
+        SceneError: ``every`` is no whole number of steps, or the path does not end in
+            ``.vtkhdf``.
+
+    Example:
+        >>> film = ub.VTKHDF("beam.vtkhdf", every=5)
+        >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=film)
+        >>> [path.name for path in film.files]
+        ['beam.vtkhdf', 'beam.vtkhdf.part']
+    """
+
+    ending = ".vtkhdf"
+    writer = VtkhdfWriter
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """Path of the file, and of the one that takes its place when a run is restarted."""
+        return self._path, part_of(self._path)

@@ -18,7 +18,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.display import one_line
+from ufl_beam.display import in_one_line
 from ufl_beam.errors import SceneError
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
 from ufl_beam.model.connector_laws import Guide
@@ -33,6 +33,7 @@ Vectors: TypeAlias = Any
 """Configurations or velocities at some times, an array or a ``Column``; (n, size)."""
 
 
+@in_one_line
 class JointHistory(NamedTuple):
     """History of a joint, b being its second place and a its first.
 
@@ -50,9 +51,6 @@ class JointHistory(NamedTuple):
     in_a: Array
     in_b: Array
     moment: Array
-
-    def __repr__(self) -> str:
-        return one_line(self)
 
 
 def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
@@ -161,6 +159,7 @@ def _direction(grid: Grid, holder: Connector, states: Vectors, turn: Array) -> A
 # -- section forces along cells --------------------------------------------------------------------
 
 
+@in_one_line
 class Diagram(NamedTuple):
     """Section forces along a beam; at a vertex the values before and after it.
 
@@ -181,10 +180,8 @@ class Diagram(NamedTuple):
     V: Array
     M: Array
 
-    def __repr__(self) -> str:
-        return one_line(self)
 
-
+@in_one_line
 class Material(NamedTuple):
     """State of the material of all cells at one time.
 
@@ -199,9 +196,6 @@ class Material(NamedTuple):
     jump: Array
     plastic: Array
     hinge: Array
-
-    def __repr__(self) -> str:
-        return one_line(self)
 
 
 MIDDLE: Array = np.full(1, 0.5)

@@ -234,6 +234,22 @@ class Recorder(ABC):
         self.state()
 
 
+class Restartable(Recorder):
+    """Base of the recorders of the package: :meth:`begin` is for new runs and restarted ones."""
+
+    @abstractmethod
+    def begin(self, simulation: StateView, state: State | None = None) -> None:
+        """Begin with the initial state, or go on after a :meth:`state`."""
+
+    def open(self, simulation: StateView) -> None:
+        """Begin, with the initial state."""
+        self.begin(simulation)
+
+    def resume(self, simulation: StateView, state: State) -> None:
+        """Go on from a :meth:`state`; see :meth:`Recorder.resume`."""
+        self.begin(simulation, state)
+
+
 def recorders_of(
     record: Sequence[Recorder] | Recorder, comm: MPI.Intracomm, call: str, *others: Output
 ) -> tuple[tuple[Recorder, ...], list[Output]]:

@@ -19,7 +19,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
 from ufl_beam.discretization.partition import Share
-from ufl_beam.display import one_line
+from ufl_beam.display import in_one_line
 from ufl_beam.mechanics.time_schemes import V
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
@@ -34,6 +34,7 @@ from, see :attr:`CellForces.kept`; q at the beginning of the step, if it is not 
 before (of the same row in the first one), and if forces depend on it."""
 
 
+@in_one_line
 class Connection(NamedTuple):
     """History of a connector.
 
@@ -54,9 +55,6 @@ class Connection(NamedTuple):
     work: Any
     rate: Any
     dissipated: Any
-
-    def __repr__(self) -> str:
-        return one_line(self)
 
 
 def connection(numbers: Array) -> Connection:

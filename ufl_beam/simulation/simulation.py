@@ -23,7 +23,7 @@ from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
-from ufl_beam.output.extremes import Watch
+from ufl_beam.output.extremes import ExtremesInC
 from ufl_beam.output.postprocessing import ForcesAlongCells
 from ufl_beam.output.recorders import StateView
 from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWriter, new_rows
@@ -149,7 +149,7 @@ class Simulation(StateView):
 
         self.solution, self._end = kind(scene, grid), np.zeros(1)
         self._describe(self.solution)
-        self._watches: list[Watch] = []
+        self._watches: list[ExtremesInC] = []
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
         extras = Extras(
             self.ask if self.controllers.asks else None,
@@ -224,12 +224,12 @@ class Simulation(StateView):
         except StepFailed as failure:
             self.give_up(failure, float(self._stepper.c.failed_end))
 
-    def watch(self, parts: Array) -> Watch | None:
+    def watch(self, parts: Array) -> ExtremesInC | None:
         """Begin to take in extremes after each step in C, or return None if that cannot be."""
         if not self.share.alone:
             return None
         along = ForcesAlongCells(self.grid), self.solution.between
-        self._watches.append(one := Watch(self.fields, self.cell_forces, *along, parts))
+        self._watches.append(one := ExtremesInC(self.fields, self.cell_forces, *along, parts))
         self._stepper.watch(self._watches)
         return one
 
