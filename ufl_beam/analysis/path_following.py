@@ -34,7 +34,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Content, above, below, require_arrays
 from ufl_beam.output.recorders import Recorder, recorders_of
 from ufl_beam.parallel import communicator, progress_bar
-from ufl_beam.simulation.run import running
+from ufl_beam.simulation.run import running, take_steps
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import NAMED, Solution
 from ufl_beam.simulation.stepper import Trial
@@ -188,35 +188,15 @@ def follow(
         scene, Static(), t0=t0, start=state, newton=newton, mesh=mesh, comm=comm, kind=Path
     )
     path = cast(Path, simulation.solution)
-    stepper = PathStepper(simulation, control)
+    stepper = PathStepper(simulation, control, steps)
     path.critical = stepper.critical
-
-    def after_step() -> bool:
-        if recorders:
-            simulation.settle()  # before anything is written
-        simulation.keep()
-        for recorder in recorders:
-            recorder.write(simulation)
-        return until is not None and bool(until(simulation))
-
-    bar = progress_bar(progress, comm, total=steps, unit="step")
-    with running(simulation, recorders, outputs, began), bar:
+    with running(simulation, recorders, outputs, began):
         try:
             stepper.begin(branch, fresh=state is None)
-            for recorder in recorders:
-                simulation.together(recorder.open, simulation)
-            simulation.keep()
-            for _ in range(steps):
-                stepper.advance()
-                bar.set_postfix_str(FACTOR.at(simulation.t), refresh=False)
-                bar.update()
-                if simulation.share.largest(simulation.together(after_step)):
-                    break
+            bar = progress_bar(progress, comm, total=steps, unit="step")
+            take_steps(simulation, stepper, recorders, bar, until=until)
         except StepFailed as failure:
             simulation.give_up(failure, stepper.tried, ADVICE)
-        simulation.end()
-    if comm.rank == 0:
-        path.opened.warn(simulation.scheme, path.times)
     return path
 
 
@@ -250,8 +230,9 @@ def _require_driven(scene: Scene, t0: float) -> None:
 class PathStepper:
     """Stepper of a path: it sets lengths of steps and locates critical points."""
 
-    def __init__(self, simulation: Simulation, control: Control) -> None:
+    def __init__(self, simulation: Simulation, control: Control, most: int) -> None:
         self._simulation, self._control = simulation, control
+        self.steps, self._most, self.error = 0, most, math.nan
         self._corrector = PathCorrector(simulation, control.factor)
         self.critical: list[CriticalPoint] = []
         self._part = 1.0
@@ -285,8 +266,18 @@ class PathStepper:
         """Load factor at which the latest attempt began."""
         return self._simulation.t + self._corrector.sought.t
 
-    def advance(self) -> None:
-        """Take a step, a shorter one where it fails, only up to a critical point in it.
+    @property
+    def finished(self) -> bool:
+        """True if all steps are done."""
+        return self.steps == self._most
+
+    @property
+    def progress(self) -> int:
+        """Number of steps that are done."""
+        return self.steps
+
+    def advance(self, most: int = 1, *, keep: bool = False) -> None:
+        """Take a step, a shorter one where it fails, only up to a critical point in it; keep it.
 
         Raises:
             StepFailed: Even the shortest one fails.
@@ -303,6 +294,9 @@ class PathStepper:
         count, part = self._simulation.iterations - iterations, self._part
         self._part = min(1.0, part * min(2.0, TARGET_ITERATIONS / max(count, 1)))
         self._accept(found, part)
+        self.steps += 1
+        if keep:
+            self._simulation.keep()
 
     def _accept(self, found: Candidate, part: float) -> None:
         """Go to the end of a step, or to a critical point before it."""

@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from itertools import chain
 from typing import Any, cast
@@ -44,7 +44,7 @@ from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps
 from ufl_beam.simulation.stepper import MOST_PARTS
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
-BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}]"
+BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}{postfix}]"
 
 
 def simulate(
@@ -144,50 +144,81 @@ def simulate(
             pace = AdaptiveSteps(simulation, t1, dt)
         else:
             pace = EqualSteps(simulation, t1, dt)
-        watch = LedgerWatch(simulation.grid, scheme, ROOM * simulation.solver.convergence.c.rtol)
-
-        def after_step() -> None:
-            solution.time_error = pace.error
-            if recorders or keeper is not None:
-                simulation.settle()  # before anything is written
-            if pace.steps % solution.every == 0 or pace.finished:
-                simulation.keep()
-                thins = len(solution) > most + 1 and not pace.finished
-                simulation.warn(watch.judge(solution, solution.every, last=thins or pace.finished))
-                if thins:
-                    solution.thin()
-                    solution.every *= 2
-                    watch.thinned(solution)
-            for recorder in recorders:
-                recorder.write(simulation)
-            if keeper is not None and (keeper.due(pace.steps) or pace.finished):
-                keeper.write(simulation, pace, time.perf_counter() - begin)
-
-        if keeper is not None and keeper.found:
-            simulation.together(keeper.resume, simulation, pace)
-            say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
-        else:
-            for recorder in recorders:
-                simulation.together(recorder.open, simulation)
-            simulation.keep()
-        with progress_bar(progress, comm, total=1.0, bar_format=BAR) as bar:
-            quiet = keeper is None and all(one.by_itself for one in recorders)
-            while not pace.finished:
-                if quiet and solution.every == 1 and most == sys.maxsize:
-                    pace.advance(sys.maxsize, keep=True)
-                    solution.time_error = pace.error
-                    simulation.together(simulation.warn, watch.judge(solution, solution.every))
-                else:
-                    left = solution.every - pace.steps % solution.every
-                    pace.advance(left if quiet else 1)
-                    simulation.together(after_step)
-                bar.update(pace.progress - bar.n)
-        simulation.end()
-        simulation.together(simulation.warn, watch.judge(solution, solution.every, last=True))
-        check_ledger(simulation)
-    if comm.rank == 0:
-        solution.opened.warn(scheme, solution.times)
+        bar = progress_bar(progress, comm, total=1.0, bar_format=BAR)
+        take_steps(simulation, pace, recorders, bar, most=most, keeper=keeper, begin=begin)
     return solution
+
+
+def take_steps(
+    simulation: Simulation,
+    pace: Any,
+    recorders: Sequence[Recorder],
+    bar: Any,
+    *,
+    most: int = sys.maxsize,
+    until: Callable[[Simulation], bool] | None = None,
+    keeper: Keeper | None = None,
+    begin: float = 0.0,
+) -> None:
+    """Take the steps of a run: keep states, judge the ledger, write files, show the progress.
+
+    Args:
+        simulation: At the beginning.
+        pace: Which step comes next: :class:`EqualSteps`, :class:`AdaptiveSteps`, or a path.
+        recorders: What is written after each step.
+        bar: Progress bar.
+        most: Largest number of kept states, see :func:`simulate`.
+        until: The run ends after the first step for which this is true.
+        keeper: Of checkpoints.
+        begin: Value of the clock as the run began, for checkpoints; s.
+    """
+    solution, ended = simulation.solution, False
+    claimed = ROOM * simulation.solver.convergence.c.rtol
+    watch = LedgerWatch(simulation.grid, simulation.scheme, claimed)
+
+    def after_step() -> bool:
+        solution.time_error = pace.error
+        if recorders or keeper is not None:
+            simulation.settle()  # before anything is written
+        if pace.steps % solution.every == 0 or pace.finished:
+            simulation.keep()
+            thins = len(solution) > most + 1 and not pace.finished
+            simulation.warn(watch.judge(solution, solution.every, last=thins or pace.finished))
+            if thins:
+                solution.thin()
+                solution.every *= 2
+                watch.thinned(solution)
+        for recorder in recorders:
+            recorder.write(simulation)
+        if keeper is not None and (keeper.due(pace.steps) or pace.finished):
+            keeper.write(simulation, pace, time.perf_counter() - begin)
+        return until is not None and bool(until(simulation))
+
+    if keeper is not None and keeper.found:
+        simulation.together(keeper.resume, simulation, pace)
+        say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
+    else:
+        for recorder in recorders:
+            simulation.together(recorder.open, simulation)
+        simulation.keep()
+    with bar:
+        quiet = until is None and keeper is None and all(one.by_itself for one in recorders)
+        while not (pace.finished or ended):
+            if quiet and solution.every == 1 and most == sys.maxsize:
+                pace.advance(sys.maxsize, keep=True)
+                solution.time_error = pace.error
+                simulation.together(simulation.warn, watch.judge(solution, solution.every))
+            else:
+                left = solution.every - pace.steps % solution.every
+                pace.advance(left if quiet else 1)
+                ended = simulation.together(after_step)
+                if until is not None:  # which processes need not agree on
+                    ended = simulation.share.largest(ended) > 0
+            if not bar.disable:
+                bar.set_postfix_str(simulation.parameter.at(simulation.t), refresh=False)
+                bar.update(pace.progress - bar.n)
+    simulation.end()
+    simulation.together(simulation.warn, watch.judge(solution, solution.every, last=True))
 
 
 def check_ledger(simulation: Simulation) -> None:
@@ -214,7 +245,8 @@ def running(
 ) -> Iterator[None]:
     """Close what a run has opened at its end, and let whatever stops it carry ``error.solution``.
 
-    Meanwhile no other run writes its files; ``begin`` is the value of a clock for its seconds.
+    Meanwhile no other run writes its files; ``begin`` is the value of a clock for its seconds.  A
+    run that reaches its end is judged: the ledger, and hinges that depend on the mesh.
     """
     with ExitStack() as stack:
         stack.callback(simulation.close)
@@ -223,6 +255,7 @@ def running(
         stack.callback(take(outputs))
         try:
             yield
+            check_ledger(simulation)
         except BaseException as error:
             simulation.leave()
             if simulation.share.comm.size == 1 or error is simulation.together.raised:
@@ -232,6 +265,8 @@ def running(
             raise
         finally:
             simulation.solution.seconds += time.perf_counter() - begin
+    if simulation.comm.rank == 0:
+        simulation.solution.opened.warn(simulation.scheme, simulation.solution.times)
 
 
 def require_times(t: tuple[float, float]) -> tuple[float, float]:
