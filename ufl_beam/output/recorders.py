@@ -80,7 +80,7 @@ class StateView(ABC):
     @property
     def iterations(self) -> int:
         """Newton iterations so far."""
-        return self.solver.iterations
+        return int(self.solver.c.total)
 
     @property
     def snes(self) -> Any:

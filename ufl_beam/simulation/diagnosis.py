@@ -35,7 +35,7 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.factorization import Factorisation
 from ufl_beam.solvers.newton import Solver
-from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vector
+from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
 from ufl_beam.terms.base import KINDS
 from ufl_beam.terms.beams import InelasticBeams
 from ufl_beam.terms.connectors import Links
@@ -104,7 +104,8 @@ def no_equilibrium(
     """
     if loose:
         return SceneError(f"{loose}{NOT_HELD}{failure}")
-    q1, (t, end), named = equation.supports.in_plane(newton.iterate()), times, solution.parameter
+    (t, end), named = times, solution.parameter
+    q1 = equation.supports.in_plane(newton.unknowns.copy())
     forces = _forces_by_kind(equation, newton, q1)
     sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
     where = f"at {named.at(t, '.9g')}"
@@ -136,23 +137,23 @@ def require_held(equation: StepEquation, newton: Solver, q1: Array, loose: str) 
     lengths[grid.rotations] = 1.0
     moves = np.ones(grid.size)
     moves[grid.multipliers] = 0.0
-    x = null_vector(K)[1]
+    x = null_vectors(K)[1][:, -1]
     motion = np.abs(x * moves[free] / lengths[free]).max()
     forces = np.linalg.norm((K @ x) * moves[free] * lengths[free])
-    if forces <= HELD * newton.convergence.scale() * grid.scene.size * motion:
+    if forces <= HELD * newton.scale() * grid.scene.size * motion:
         raise SceneError(f"{loose}The loads do not hold it either. {INSTEAD}")
     return ""
 
 
 def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:
     """Describe how far an exact ledger is open; empty if it closes as claimed."""
-    energy, claimed = solution.energy, ROOM * newton.convergence.c.rtol
+    energy, claimed = solution.energy, ROOM * newton.c.rtol
     if not energy.opened(claimed, 0.0):
         return ""
     # Errors of steps are independent: their squares add up.
     q = solution.q[:, share.dofs]
     steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
-    return energy.opened(claimed, newton.convergence.random_work(np.abs(q).max(axis=0), steps))
+    return energy.opened(claimed, newton.random_work(np.abs(q).max(axis=0), steps))
 
 
 def _forces_by_kind(equation: StepEquation, newton: Solver, q1: Array) -> dict[str, float]:
@@ -163,7 +164,7 @@ def _forces_by_kind(equation: StepEquation, newton: Solver, q1: Array) -> dict[s
             term.add_residual(q1, forces[term.kind])
         except Exception:
             forces[term.kind].fill(np.nan)  # it is why the step has failed
-    sizes = {kind: newton.convergence.size(force) for kind, force in forces.items()}
+    sizes = {kind: newton.size(force) for kind, force in forces.items()}
     return {kind: size for kind, size in sizes.items() if size}
 
 
@@ -198,7 +199,7 @@ def _near_limit(equation: StepEquation, solution: Solution, q0: Array, q1: Array
             return ""
         try:
             signs.append(Factorisation(csr_array(K)).negative)
-            least.append(null_vector(K)[0])
+            least.append(null_vectors(K)[0][-1])
         except (np.linalg.LinAlgError, RuntimeError):
             return ""
     if len(set(signs)) == 1 and least[1] > WEAK * least[0]:
@@ -226,11 +227,11 @@ def _singularity_at(equation: StepEquation, grid: Grid, q: Array) -> str:
     if not len(free) or not np.isfinite(K.data).all():
         return ""
     try:
-        size, vector = null_vector(K)
+        sizes, vectors = null_vectors(K)
     except (np.linalg.LinAlgError, RuntimeError):
         return ""
     x: Array = np.zeros(grid.size)
-    x[free] = vector
+    x[free], size = vectors[:, -1], sizes[-1]
     motions = np.abs(x)
     turns = np.zeros(grid.size, dtype=bool)
     turns[grid.rotations] = True

@@ -173,7 +173,7 @@ def take_steps(
         begin: Value of the clock as the run began, for checkpoints; s.
     """
     solution, ended = simulation.solution, False
-    claimed = ROOM * simulation.solver.convergence.c.rtol
+    claimed = ROOM * simulation.solver.c.rtol
     watch = LedgerWatch(simulation.grid, simulation.scheme, claimed)
 
     def after_step() -> bool:

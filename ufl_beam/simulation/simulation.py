@@ -6,7 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from functools import cached_property, partial
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from mpi4py import MPI
 
@@ -42,7 +42,6 @@ from ufl_beam.simulation.stepper import (
     Trial,
     begins_loaded,
 )
-from ufl_beam.solvers.newton import Border
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
 ROOM = 2**20
@@ -245,9 +244,7 @@ class Simulation(StateView):
         """
         return self._stepper.attempt(self, t1, t1 if end is None else end)
 
-    def attempt_along(
-        self, step: Step, guess: Array, border: Border, *, hold: bool = True
-    ) -> Trial:
+    def attempt_along(self, step: Step, guess: Array, border: Any, *, hold: bool = True) -> Trial:
         """Solve the next step with the load factor; see :meth:`Stepper.attempt_along`."""
         return self._stepper.attempt_along(self, step, guess, border, hold=hold)
 

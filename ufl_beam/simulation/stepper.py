@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
+from petsc4py import PETSc
+
 import numpy as np
 
 from ufl_beam.arrays import Array
@@ -25,7 +27,7 @@ from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.step_equation import StaticPath, StepEquation
-from ufl_beam.solvers.newton import Border, Solver
+from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.connectors import Links
@@ -266,7 +268,7 @@ class Stepper:
         return self._trial(solved)
 
     def attempt_along(
-        self, state: Any, step: Step, guess: Array, border: Border, *, hold: bool
+        self, state: Any, step: Step, guess: Array, border: Any, *, hold: bool
     ) -> Trial:
         """Solve a step, whose times are those of the guess, together with the load factor.
 
@@ -309,10 +311,11 @@ class Stepper:
         failure, c.failure = c.failure, lib.SUCCEEDS
         if failure == lib.RAISED:
             self._together.settle(error)
-        self.solver.require_no_error()
         if failure == lib.NO_EQUILIBRIUM:
+            if number := self._equation.c.error:
+                error = PETSc.Error(number)
             self._together.settle(error)
-            raise self.solver.convergence.failure()
+            raise self.solver.failure()
         if failure == lib.TURNS_TOO_FAR:
             raise StepFailed(
                 f"a node turns by {c.turn:.3g} rad in the step, and |Δψ| must stay below π; "

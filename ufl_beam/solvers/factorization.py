@@ -8,7 +8,7 @@ from petsc4py import PETSc
 import numpy as np
 from scipy.sparse import csr_array
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
 
 SCALINGS = 6
@@ -45,8 +45,14 @@ class Factorisation:
     def __init__(self, A: csr_array) -> None:
         if not np.isfinite(A.data).all():
             raise np.linalg.LinAlgError("the matrix has no inverse")
-        rows = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr))
-        self._scale = _scale(A, rows)
+        rows, sizes = np.repeat(np.arange(A.shape[0]), np.diff(A.indptr)), np.abs(A.data)
+        scale = np.ones(A.shape[0])
+        for _ in range(SCALINGS):  # Ruiz's iteration
+            scaled, largest = sizes * scale[rows] * scale[A.indices], np.zeros_like(scale)
+            np.maximum.at(largest, rows, scaled)
+            np.maximum.at(largest, A.indices, scaled)
+            scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
+        self._scale = np.exp2(np.round(np.log2(scale)))  # powers of two: nothing is rounded
         scaled = A.data * (self._scale[rows] * self._scale[A.indices])
         S = csr_array((scaled, A.indices, A.indptr), shape=A.shape)
         self.symmetric = bool(abs(S - S.T).max() <= SYMMETRIC)
@@ -72,25 +78,9 @@ class Factorisation:
     def solve(self, b: Array) -> Array:
         """The solution for one right-hand side, refined once."""
         rhs = self._scale * b
-        x = self._apply(rhs)
-        x += self._apply(rhs - self._S @ x)
+        x, more = np.zeros((2, len(b)))
+        for _ in range(2):
+            both = rhs - self._S @ x, more
+            self._pc.apply(*(PETSc.Vec().createWithArray(v, comm=PETSc.COMM_SELF) for v in both))
+            x += more
         return np.asarray(self._scale * x)
-
-    def _apply(self, b: Array) -> Array:
-        x = np.empty_like(b)
-        vectors = [PETSc.Vec().createWithArray(values, comm=PETSc.COMM_SELF) for values in (b, x)]
-        self._pc.apply(*vectors)
-        return x
-
-
-def _scale(A: csr_array, rows: Index) -> Array:
-    """Powers of two by which rows and columns are multiplied: Ruiz's iteration."""
-    scale = np.ones(A.shape[0])
-    sizes = np.abs(A.data)
-    for _ in range(SCALINGS):
-        scaled = sizes * scale[rows] * scale[A.indices]
-        largest = np.zeros_like(scale)
-        np.maximum.at(largest, rows, scaled)
-        np.maximum.at(largest, A.indices, scaled)
-        scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
-    return np.asarray(np.exp2(np.round(np.log2(scale))))

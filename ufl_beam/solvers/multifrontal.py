@@ -13,7 +13,6 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.memory import of_structure
-from ufl_beam.solvers.substructuring import Condensed
 
 ONE_FRONT = int(lib.ONE_FRONT)
 """Unknowns of a system that is one dense front at most."""
@@ -24,21 +23,17 @@ class Multifrontal:
 
     The order is that of :data:`ORDERINGS` which takes the fewest operations.  Each front exchanges
     rows among its pivots only, see fronts.c: all rows of systems of :data:`ONE_FRONT` unknowns,
-    else few, so that the matrix must not have structural zeros on the diagonal.  Satisfies
-    :class:`Condensed`.
+    else few, so that the matrix must not have structural zeros on the diagonal.
 
     Args:
-        inner: The system.
+        inner: The system, see substructuring.py.
         stays: Which of its unknowns stay.
 
     Attributes:
-        numbers: Unknowns that stay.
-        left: Matrix of what stays, with all entries.
-        f: Right-hand side of what stays.
         c: All of it in C, see loops.h.
     """
 
-    def __init__(self, inner: Condensed, stays: npt.NDArray[np.bool_]) -> None:
+    def __init__(self, inner: Any, stays: npt.NDArray[np.bool_]) -> None:
         self._inner, A = inner, inner.left
         self.numbers = inner.numbers[stays]
         *found, at, space = _structure(A.indptr, A.indices, stays)
@@ -61,19 +56,19 @@ class Multifrontal:
         fill(c, fronts=self.c, found=np.zeros(self.c.size))
 
     def factor(self, b: Array) -> bool:
-        """Eliminate from matrix and right-hand side; whether all of it is finite."""
-        good = self._inner.factor(b)
+        """Eliminate from matrix and right-hand side; return whether all of it is finite."""
+        good: bool = self._inner.factor(b)
         good &= bool(lib.factor_fronts(self.c, doubles(self._inner.left.data)))
         lib.reduce_fronts(self.c, doubles(self._inner.f))
         return good
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side; ``b`` at the degrees of freedom owned here."""
+        """Eliminate from another right-hand side."""
         self._inner.reduce(b)
         lib.reduce_fronts(self.c, doubles(self._inner.f))
 
     def expand(self, small: Array, x: Array) -> None:
-        """The solution at the degrees of freedom owned here, after that of what is left."""
+        """Find the solution after that of what is left."""
         self.f[:] = small
         of_inner = np.empty(self.c.size)
         lib.expand_fronts(self.c, doubles(of_inner))
@@ -103,8 +98,9 @@ def _structure(
     """
     A = Csr(np.empty(0), indices, indptr)
     n = np.count_nonzero(stays)
-    orders = [_order(A, stays, kind) for kind in ORDERINGS[: 1 + (A.size > ONE_FRONT)]]
-    found = [(order, *_fronts(A, order, A.size - n)) for order in orders]
+    pattern = csr_array((np.ones(len(indices)), indices, indptr), shape=(A.size, A.size))
+    orders = [_order(pattern, stays, kind) for kind in ORDERINGS[: 1 + (A.size > ONE_FRONT)]]
+    found = [(order, *_fronts(pattern, order, A.size - n)) for order in orders]
     unknown, first, begin, rest = min(found, key=lambda one: _operations(*one[1:3]))
     number = np.empty(A.size, dtype=np.int32)
     number[unknown] = np.arange(A.size)
@@ -131,16 +127,11 @@ def _structure(
     )  # fmt: skip
 
 
-def _pattern(A: Csr) -> csr_array:
-    ones = np.ones(len(A.indices), np.bool_)
-    return csr_array((ones, A.indices, A.indptr), shape=(A.size, A.size))
-
-
-def _order(A: Csr, stays: npt.NDArray[np.bool_], kind: str) -> Index:
+def _order(A: csr_array, stays: npt.NDArray[np.bool_], kind: str) -> Index:
     """Return all unknowns in an order of elimination of PETSc, those that stay at the end."""
-    these: Index = np.arange(A.size) if kind == "nd" else np.flatnonzero(~stays)
+    these: Index = np.arange(A.shape[0]) if kind == "nd" else np.flatnonzero(~stays)
     if len(these):
-        part = _pattern(A)[these][:, these].astype(np.float64)
+        part = A[these][:, these]
         _, found = Csr(part.data, part.indices, part.indptr).petsc().getOrdering(kind)
         these = these[found.indices]
     order = np.concatenate([these[~stays[these]], np.flatnonzero(stays)])
@@ -153,18 +144,16 @@ def _operations(first: Index, begin: Index) -> float:
     return float(np.sum(pivots * (pivots**2 / 3 + pivots * others + others**2)))
 
 
-def _fronts(A: Csr, order: Index, eliminated: int) -> tuple[Index, Index, Index]:
+def _fronts(A: csr_array, order: Index, eliminated: int) -> tuple[Index, Index, Index]:
     """Return ``first``, ``begin`` and ``rest`` of the fronts, see loops.h."""
-    pattern = csr_array(_pattern(A)[order][:, order])
+    size, pattern = A.shape[0], csr_array(A[order][:, order])
     first, begin = np.empty((2, eliminated + 2), dtype=np.int32)
-    room, space = 2 * len(A.indices) + 2 * A.size, np.empty(3 * A.size, dtype=np.int32)
+    room, space = 2 * A.nnz + 2 * size, np.empty(3 * size, dtype=np.int32)
+    structure = [integers(x.astype(np.int32)) for x in (pattern.indptr, pattern.indices)]
     while True:
         rest = np.empty(room, dtype=np.int32)
-        arrays = (first, begin, rest, space[: A.size], space[A.size :])
-        structure = (pattern.indptr.astype(np.int32), pattern.indices.astype(np.int32))
-        fronts = lib.find_fronts(
-            A.size, eliminated, *map(integers, structure), room, *map(integers, arrays)
-        )
+        arrays = map(integers, (first, begin, rest, space[:size], space[size:]))
+        fronts = lib.find_fronts(size, eliminated, *structure, room, *arrays)
         if fronts >= 0:
             break
         room *= 2

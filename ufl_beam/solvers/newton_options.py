@@ -109,7 +109,7 @@ def take_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
 
     The database is afterwards as it was: other solvers have the same prefix.
     """
-    options, before = PETSc.Options(PREFIX), database()
+    options, before, unused = PETSc.Options(PREFIX), database(), list[str]()
     try:
         for name in before:
             del options[name]  # it may be known as used
@@ -117,7 +117,12 @@ def take_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
             options[name] = value
         snes.setFromOptions()
         # PETSc may have given those of before 3.24 their new names.
-        unused = [name for name in chosen if name in database() and not _used(name)]
+        for name in chosen.keys() & database().keys():
+            used = ffi.new("char[8]")  # a bool of whatever size
+            of_petsc = ffi.new("char[]", (PREFIX + name).encode())
+            petsc("PetscOptionsUsed", ffi.NULL, of_petsc, used)
+            if not any(bytes(ffi.buffer(used))):
+                unused.append(name)
     finally:
         for name in {**chosen, **database()}:
             del options[name]
@@ -126,13 +131,6 @@ def take_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
     for name in before.keys() - {*unused}:
         options.hasName(name)  # or PETSc, at its end, would call it unused
     return unused
-
-
-def _used(name: str) -> bool:
-    """Return whether PETSc has asked for an option, of which it may know more than one name."""
-    used = ffi.new("char[8]")  # a bool of whatever size
-    petsc("PetscOptionsUsed", ffi.NULL, ffi.new("char[]", (PREFIX + name).encode()), used)
-    return any(bytes(ffi.buffer(used)))
 
 
 def checked_newton(newton: Newton | None, comm: MPI.Intracomm) -> Newton:

@@ -21,14 +21,7 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.memory import of_structure
 from ufl_beam.solvers.multifrontal import ONE_FRONT, Multifrontal
-from ufl_beam.solvers.substructuring import (
-    BAD_PIVOT,
-    GOOD,
-    Condensed,
-    Klu,
-    Summed,
-    succeeds,
-)
+from ufl_beam.solvers.substructuring import BAD_PIVOT, GOOD, Klu, Summed, succeeds
 
 
 def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any, ...]:
@@ -51,10 +44,15 @@ def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any
     # Vertex number k is the one between the cells k and k + 1.
     around = np.hstack([start[:-1], end[:-1], end[1:]])
     inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)
-    # With nine entries in rows and columns, these nine are all.
-    plain = alone & (np.diff(A.indptr) == 9)
-    plain &= np.bincount(A.indices, minlength=A.size) == 9
-    inside &= plain[end[:-1]].all(axis=1) & _in_turn(end[:-1])
+    of_row, of_column = np.diff(A.indptr), np.bincount(A.indices, minlength=A.size)
+    entries = np.where(alone & (of_row == of_column), of_row, 0)
+
+    def has(number: int, dofs: Index) -> npt.NDArray[np.bool_]:
+        """Which vertices have so many entries in rows and columns, and unknowns in turn."""
+        in_turn = (np.diff(dofs, axis=1) == 1).all(axis=1)
+        return np.asarray((entries[dofs] == number).all(axis=1) & in_turn)
+
+    inside &= has(9, end[:-1])  # those of the vertex and of its two neighbours are all
     first_of_vertex = np.zeros(len(inside), dtype=bool)
     first_of_vertex[np.unique(end[:-1, 0], return_index=True)[1]] = True
     inside &= first_of_vertex
@@ -66,14 +64,8 @@ def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any
     inside[inside] = ~middle[ends].any(axis=1)[chain]
 
     # A chain with one neighbour at both ends is eliminated from both, up to its middle.
-    narrow = alone & (np.diff(A.indptr) == 6)
-    narrow &= np.bincount(A.indices, minlength=A.size) == 6
-
-    def has_one_neighbour(of: Index) -> npt.NDArray[np.bool_]:
-        return np.asarray(narrow[of].all(axis=1) & _in_turn(of))
-
     _, first, last = _runs(inside)
-    free = has_one_neighbour(start[:-1][first]) & has_one_neighbour(end[1:][last])
+    free = has(6, start[:-1][first]) & has(6, end[1:][last])
     free &= last - first > 1
     inside[(first + last)[free] // 2] = False
 
@@ -81,7 +73,7 @@ def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any
     left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
     before, after = start[:-1][inside], end[1:][inside]
     # A vertex with six entries has no neighbour but the first or last of its chain.
-    dead_left, dead_right = map(has_one_neighbour, (left, right))
+    dead_left, dead_right = has(6, left), has(6, right)
     backward = dead_right & ~dead_left
     dead = dead_left | dead_right
     long = last - first + 1
@@ -103,11 +95,6 @@ def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any
     for column in around.reshape(-1, 9).T:
         at += around[:, :, 0] > column[:, None]
     return around[:, 1], first_of_chain, ends, ~dead, at
-
-
-def _in_turn(dofs: Index) -> npt.NDArray[np.bool_]:
-    """Return whether the three degrees of freedom of each vertex follow each other."""
-    return np.asarray((np.diff(dofs, axis=1) == 1).all(axis=1))
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
@@ -181,14 +168,11 @@ def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index,
 class Elimination:
     """Solves with a matrix but for a small one of what cannot be eliminated in chains.
 
-    Satisfies :class:`Condensed`.  The entries of ``A`` must not change between its calls.  On one
-    process C does the same with :attr:`c`, see newton.c.
+    See substructuring.py.  The entries of ``A`` must not change between its calls.  On one process
+    C does the same with :attr:`c`, see newton.c.
 
     Attributes:
-        numbers: Degrees of freedom that are left here, in numbers of the grid, ascending.
-        shared: Which of them other processes have too.
-        left: The small matrix, of the cells of this process.
-        f: Right-hand side of the small system, of :meth:`reduce`.
+        shared: Which of the unknowns that are left other processes have too.
         c: All of it in C, see loops.h.
     """
 
@@ -212,16 +196,16 @@ class Elimination:
         )  # fmt: skip
 
     def factor(self, b: Array) -> bool:
-        """Eliminate the chains from matrix and right-hand side; whether all of it is finite."""
+        """Eliminate the chains from matrix and right-hand side; return whether all is finite."""
         lib.eliminate(self.c, doubles(b))
         return bool(lib.all_finite(len(self.left.data), doubles(self.left.data)))
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side; ``b`` at the degrees of freedom owned here."""
+        """Eliminate from another right-hand side."""
         lib.reduce(self.c, doubles(b))
 
     def expand(self, small: Array, x: Array) -> None:
-        """The solution at the degrees of freedom owned here, after that of the small system."""
+        """Find the solution after that of the small system."""
         lib.expand(self.c, doubles(small), doubles(x))
 
 
@@ -237,7 +221,7 @@ class ChainsFirst:
         # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
         # round-off, on the diagonal; several fronts exchange too few rows for that, KLU does not.
         few_rows = not len(share.grid.multipliers)
-        rest: Condensed = self._elimination
+        rest: Any = self._elimination
         if not share.alone:
             if few_rows:
                 rest = Multifrontal(rest, self._elimination.shared)
@@ -245,6 +229,7 @@ class ChainsFirst:
         none = np.zeros(len(rest.numbers), dtype=bool)
         fronts = few_rows or len(none) <= ONE_FRONT
         self._solved = Multifrontal(rest, none) if fronts else Klu(rest)
+        self.factor = self._solved.factor
         if fronts:
             del self._elimination.left.indices  # nobody asks for them again
 
@@ -266,10 +251,6 @@ class ChainsFirst:
         if not (self._good and self.solve(b.array_r, x.array_w, reduced=reduced)):
             x.array_w[:] = 0.0
             pc.setFailedReason(BAD_PIVOT)
-
-    def factor(self, b: Array) -> bool:
-        """Factor, and eliminate from a right-hand side; return whether the matrix is regular."""
-        return bool(self._solved.factor(b))
 
     def solve(self, b: Array, x: Array, *, reduced: bool) -> bool:
         """Solve for ``x``; return whether that succeeds.

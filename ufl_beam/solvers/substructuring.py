@@ -4,56 +4,37 @@
 Substructuring: each process factors what the elimination along chains leaves in its own part.  Only
 the Schur complement of the unknowns that several processes have is summed over them, and factored
 by each.
+
+A system of which some unknowns are eliminated (``Elimination``, ``Multifrontal``, ``Summed``,
+``Klu``) is made of one of which less are.  It has
+
+* ``numbers``: unknowns that are left, in numbers of the grid, ascending;
+* ``factor(b)``: elimination from the matrix and a right-hand side, which is at the degrees of
+  freedom owned here; returns whether all of the matrix is finite;
+* ``reduce(b)``: elimination from another right-hand side;
+* ``left``, ``f``: matrix and right-hand side of what is left, which the caller solves;
+* ``expand(small, x)``: the solution at the degrees of freedom owned here, after that.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 from mpi4py import MPI
 from petsc4py import PETSc
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
+from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, fill, lib, opaque
 from ufl_beam.compiled.csr import Csr
-
-
-class Condensed(Protocol):
-    """A linear system of which some unknowns are eliminated.
-
-    The call is :meth:`factor`, for other right-hand sides :meth:`reduce`, then the solution of the
-    system that is left by the caller, and :meth:`expand`.
-
-    Attributes:
-        numbers: Unknowns that are left, in numbers of the grid, ascending.
-        left: Matrix of what is left, of :meth:`factor`.
-        f: Right-hand side of what is left.
-    """
-
-    numbers: Index
-    left: Csr
-    f: Array
-
-    def factor(self, b: Array) -> bool:
-        """Eliminate from the matrix and a right-hand side; whether all of the matrix is finite.
-
-        ``b`` is at the degrees of freedom owned here.
-        """
-
-    def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side."""
-
-    def expand(self, small: Array, x: Array) -> None:
-        """The solution at the degrees of freedom owned here, after that of what is left."""
 
 
 class Summed:
     """Condensed systems of several processes, summed over them; all of them have the sum."""
 
-    def __init__(self, inner: Condensed, comm: MPI.Intracomm) -> None:
+    def __init__(self, inner: Any, comm: MPI.Intracomm) -> None:
         self._inner, self._comm = inner, comm
         self.numbers = np.unique(np.concatenate(comm.allgather(inner.numbers)))
         size = len(self.numbers)
@@ -69,7 +50,7 @@ class Summed:
         self.left = Csr(entries, keys % size if size else keys, indptr)
 
     def factor(self, b: Array) -> bool:
-        """Eliminate on all processes; whether all of it is finite on each of them."""
+        """Eliminate on all processes; return whether all is finite on each of them."""
         good = self._inner.factor(b)
         self._sums[:] = 0.0
         self.left.data[self._place] = self._inner.left.data
@@ -79,14 +60,14 @@ class Summed:
         return self._failed == 0.0 and bool(lib.all_finite(len(self._sums), doubles(self._sums)))
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side; ``b`` at the degrees of freedom owned here."""
+        """Eliminate from another right-hand side."""
         self._inner.reduce(b)
-        self.f[:] = 0.0
+        self.f.fill(0.0)
         self.f[self._number] = self._inner.f
         self._comm.Allreduce(MPI.IN_PLACE, self.f)
 
     def expand(self, small: Array, x: Array) -> None:
-        """The solution at the degrees of freedom owned here, after that of what is left."""
+        """Find the solution after that of what is left."""
         self._inner.expand(small[self._number], x)
 
 
@@ -108,12 +89,9 @@ def succeeds(function: Callable[..., None], *arguments: Any) -> bool:
 
 
 class Klu:
-    """Factorization of all of a system, which exchanges rows wherever that is needed.
+    """Factorization of all of a system, which exchanges rows wherever that is needed."""
 
-    Satisfies :class:`Condensed`; nothing is left.
-    """
-
-    def __init__(self, inner: Condensed) -> None:
+    def __init__(self, inner: Any) -> None:
         self._inner, self._matrix = inner, inner.left.petsc()
         self.numbers = inner.numbers[:0]
         self.left, self.f = Csr(np.empty(0), self.numbers, np.zeros(1)), np.empty(0)
@@ -131,15 +109,15 @@ class Klu:
         fill(c, found=doubles(self._solution.array_r))
 
     def factor(self, b: Array) -> bool:
-        """Eliminate from matrix and right-hand side; whether that succeeds."""
-        good = self._inner.factor(b)
+        """Eliminate from matrix and right-hand side; return whether that succeeds."""
+        good: bool = self._inner.factor(b)
         self._matrix.stateIncrease()
         good = good and succeeds(self._factors.setUp)
         good = good and int(self._factors.getFailedReason()) == GOOD
         return good and succeeds(self._solve)
 
     def reduce(self, b: Array) -> None:
-        """Eliminate from another right-hand side; ``b`` at the degrees of freedom owned here.
+        """Eliminate from another right-hand side.
 
         Raises:
             PETSc.Error: The matrix is singular after all.
@@ -152,5 +130,5 @@ class Klu:
         self._factors.apply(self._rhs, self._solution)
 
     def expand(self, small: Array, x: Array) -> None:
-        """The solution at the degrees of freedom owned here."""
+        """Find the solution."""
         self._inner.expand(self._solution.array_r, x)
