@@ -7,7 +7,7 @@ import scenes
 from time_series import read_xdmf
 
 import ufl_beam as ub
-from ufl_beam.plotting.drawing import open_hinges
+from ufl_beam.plotting.inelastic import open_hinges
 from ufl_beam.plotting.style import decimal_prefix, with_unit
 
 LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0

@@ -12,12 +12,21 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
-from ufl_beam.plotting import drawing, style
-from ufl_beam.plotting.drawing import draw_damage
+from ufl_beam.plotting import style, symbols
+from ufl_beam.plotting.inelastic import circle, dissipated_per_length, draw_damage, open_hinges
 from ufl_beam.plotting.labels import Label, Spot, place
-from ufl_beam.plotting.layout import Pose, directions, joined, left_of, segments, unit_vectors
+from ufl_beam.plotting.layout import (
+    Pose,
+    Stage,
+    directions,
+    joined,
+    left_of,
+    segments,
+    unit_vectors,
+)
 from ufl_beam.plotting.style import (
     BLUE,
+    GREY,
     INK,
     POINTS,
     RED,
@@ -27,9 +36,11 @@ from ufl_beam.plotting.style import (
     half_size,
     make_room,
     number,
+    require_axes,
     shade,
     size_of,
 )
+from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -61,10 +72,58 @@ SIGNS = {
 Values = tuple[Member, Array]  # a beam, and the values in points of its cells, (num_cells, points)
 
 
+def plane_stage(
+    solution: Solution,
+    shown: Sequence[int],
+    magnify: float,
+    ax: Axes | None = None,
+    size: tuple[float, float] | None = None,
+) -> tuple[Stage, tuple[float, float]]:
+    """Make a stage whose symbols have their size in points.
+
+    Args:
+        solution: Solution to draw.
+        shown: Numbers of the kept times.
+        magnify: Factor on the displacements.
+        ax: Axes of the user, if there are any.
+        size: Largest width and height of the figure; by default 9 inches, and what points need that
+            do not stand upright; inch.
+
+    Returns:
+        The stage, and the size of the figure.
+    """
+    points = Stage(solution, magnify, 0.02 * solution.scene.size, shown).points()
+    extent = np.ptp(points, axis=0)
+    high = float(np.clip(8.0 * extent[1] / max(extent[0], 1e-12), 3.2, 6.8))
+    size = (9.0, high) if size is None else size
+    if ax is None:
+        room = np.subtract(size, (0.9, 0.9))  # but for numbers and words
+    else:
+        require_axes(ax)
+        room = size_of(ax) / POINTS
+    scale = float(np.max((1.12, 1.20) * extent / room)) / POINTS
+    return Stage.at_scale(solution, magnify, scale, shown), size
+
+
+def draw_beams(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
+    """Draw the axes of all beams through these points."""
+    grid = solution.grid
+    chains = [points[grid.nodes_along(beam)] for beam in solution.scene.beams]
+    axes.plot(*joined(chains).T, **line)
+
+
+def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
+    """Draw undeformed beams, bodies and rods in grey."""
+    pose = stage.undeformed
+    draw_beams(axes, solution, pose.nodes, color=GREY, linewidth=1.2, zorder=1)
+    outlines = joined(s.points for s in (*symbols.bodies(pose), *symbols.rods(pose)))
+    axes.plot(*outlines.T, color=GREY, linewidth=1.2, zorder=1)
+
+
 def plot_state(solution: Solution, what: str, *, n: int, magnify: float, ax: Axes | None) -> Figure:
     """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
     style.require_choice(what, ("shape", *RESULTANTS), "plot: what")
-    pose = drawing.plane_stage(solution, [n], magnify, ax, MOST)[0].pose(n)
+    pose = plane_stage(solution, [n], magnify, ax, MOST)[0].pose(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
     if what == "shape":
         return draw_frame(ax, solution, n, pose, ("shape", when))
@@ -93,13 +152,13 @@ def draw_frame(
     unit = f"({prefix}{RESULTANTS[what][1]}) " if diagrams else ""
     with style.panel(ax, MOST) as axes:
         style.plane_axes(axes, f"{name} {unit}{when}")
-        drawing.draw_undeformed(axes, solution, pose.stage)
+        draw_undeformed(axes, solution, pose.stage)
         peaks: list[Peak] = []
         if _is_loaded(what, diagrams):
             rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
             peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MANY else 1.0)
-        drawing.draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
-        drawing.draw_symbols(axes, pose)
+        draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
+        draw_strokes(axes, symbols.in_plane(pose))
         meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
         areas = {area.get_gid(): area for area in axes.collections}
         named: dict[str, Artist] = {
@@ -254,6 +313,69 @@ def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[
             largest = float(sizes.max())
             equal = np.flatnonzero(sizes >= ALIKE * largest)
             yield Area(outline, sign * largest, int(places[begin + equal[len(equal) // 2]]))
+
+
+def plot_damage(
+    solution: Solution, n: int = -1, *, magnify: float = 1.0, ax: Axes | None = None
+) -> Figure:
+    """Draw yielded cells and opened hinges on the frame at the n-th kept time.
+
+    Cells that have yielded are coloured by the energy that plastic strains dissipated per length
+    (J/m); in cells of fibres that includes cracks.  Hinges that have opened are circles, the larger
+    the more of their fracture energy is spent; from 99 % they are as hollow as a joint.
+
+    Args:
+        solution: Solution to draw.
+        n: Number of the kept time; negative from the end.
+        magnify: Factor on the displacements.
+        ax: Axes to draw in; by default those of a new figure.
+
+    Raises:
+        SceneError: The scene is elastic, no such time, ``magnify`` is not positive, or ``ax`` is no
+            axes.
+
+    Example:
+        >>> ub.plot_damage(broken).savefig("damage.png")
+    """
+    from matplotlib.collections import LineCollection
+
+    grid = solution.grid
+    for beam in solution.scene.beams[:1]:
+        solution.material(beam)  # or its error
+    stage, (width, height) = plane_stage(solution, [n], magnify, ax)
+    pose, density = stage.pose(n), dissipated_per_length(solution, n)
+    length, rise = np.ptp(stage.points(), axis=0)
+    # Upright frames need less; the bar and the legend have their own widths.
+    across = height * length / max(rise, 1e-12)
+    with style.panel(ax, (min(width, max(6.0, across + 3.0)), height)) as axes:
+        time = solution.parameter.at(solution.times[n])
+        style.plane_axes(axes, f"damage at {time}{style.magnified(magnify)}")
+        axes.set_adjustable("datalim")  # room for the broad lines of a slender frame
+        draw_undeformed(axes, solution, stage)
+        draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.0, zorder=2)
+        draw_strokes(axes, symbols.in_plane(pose))
+        yielded = density > 0.0
+        if yielded.any():
+            unit, prefix = style.decimal_prefix(float(density.max()))
+            colors = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
+            zones = LineCollection(
+                list(pose.nodes[grid.cells[yielded]]),
+                colors=colors.to_rgba(density[yielded] / unit),
+                linewidths=11.0, capstyle="butt", zorder=3, gid="yielded",
+            )  # fmt: skip
+            axes.add_collection(zones)
+            placed = [beam.section.fibres for beam in solution.scene.beams]
+            cracks = any(p is not None and p.fibres.softening is not None for p in placed)
+            title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
+            style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
+        if hinges := open_hinges(solution, n, pose.nodes):
+            for hinge in hinges:
+                axes.plot(*hinge.at, **circle(hinge.part))
+            examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
+            sizes = [axes.plot([], [], **circle(part), label=words)[0] for part, words in examples]
+            style.draw_legend(axes, ax, sizes, loc="outside upper left", ncols=3)
+        style.make_room(axes)
+    return style.figure_of(axes)
 
 
 # -- labels ------------------------------------------------------------------------------------

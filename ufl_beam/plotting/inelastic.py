@@ -5,16 +5,16 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError
-from ufl_beam.model.bodies import Place
-from ufl_beam.model.connectors import law_of
-from ufl_beam.plotting import drawing, style
-from ufl_beam.plotting.drawing import circle, dissipated_per_length, open_hinges
+from ufl_beam.model.bodies import Member, Place
+from ufl_beam.model.connector_laws import HingeLaw
+from ufl_beam.model.connectors import law_of, place_of
+from ufl_beam.plotting import style
 from ufl_beam.plotting.style import (
     BLUE,
     GREEN,
@@ -31,9 +31,84 @@ from ufl_beam.plotting.style import (
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
+
+
+FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
+
+
+class OpenHinge(NamedTuple):
+    """Hinge that has opened."""
+
+    beam: Member
+    at: Array  # where it is now; (2,); m
+    part: float  # of its fracture energy, from 0 (closed) to 1 (a joint); 0 if it hardens
+
+
+def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
+    """Find hinges, in cells and of zero length, that are open; ``points`` are nodes as drawn."""
+    grid = solution.grid
+    found: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
+    for beam in solution.scene.beams:
+        laws = grid.hinges(beam)
+        if all(law is None or math.isinf(law.limit) for law in laws):
+            continue
+        state = solution.material(beam, n)
+        rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
+        for cell, law, jump, lost in rows:
+            if law is not None and (jump != 0.0 or lost > 0.0):
+                found.append((beam, points[grid.cells[cell]].mean(axis=0), law, float(lost)))
+    for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
+        kept = solution.connector(hinge)
+        if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
+            dissipated = float(kept.dissipated[n])
+            found.append((place_of(hinge).beam, points[vertex], law_of(hinge), dissipated))
+    return [
+        # One that never resisted is a joint.
+        OpenHinge(beam, at, min(lost / law.energy, 1.0) if law.limit > 0.0 else 1.0)
+        for beam, at, law, lost in found
+    ]
+
+
+def dissipated_per_length(solution: Solution, n: int) -> Array:
+    """Compute the energy that plastic strains and cracks dissipated; (num_cells,); J/m."""
+    grid = solution.grid
+    energy = np.zeros(len(grid.cells))
+    for beam in solution.scene.beams:
+        layout = beam.section.layout(None)
+        if layout is not None and not layout.elastic:
+            state = solution.material(beam, n)
+            cracks = state.hinge if beam.section.fibres is not None else 0.0
+            energy[grid.cells_of(beam)] = state.plastic + cracks
+    return energy / grid.lengths(np.arange(len(grid.cells)))
+
+
+def circle(part: float) -> dict[str, Any]:
+    """Return the look of a hinge of which a part of the fracture energy is spent."""
+    paper = shade(WHITE)
+    inside, edge = (paper, BLUE) if part >= FULLY_OPEN else (BLUE, paper)
+    size = 4.0 + 6.0 * math.sqrt(part)
+    look: dict[str, Any] = {"marker": "o", "ms": size, "mfc": inside, "mec": edge, "mew": 1.8}
+    return {**look, "ls": "none", "zorder": 6}
+
+
+def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[str, Artist]:
+    """Mark yielded cells and open hinges on the axes of beams; return their names for a legend."""
+    named: dict[str, Artist] = {}
+    yielded = np.flatnonzero(dissipated_per_length(solution, n))
+    for ends in nodes[solution.grid.cells[yielded]]:
+        (zone,) = axes.plot(*ends.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
+        named["yielded or cracked"] = zone
+    for hinge in open_hinges(solution, n, nodes):
+        (mark,) = axes.plot(*hinge.at, **circle(hinge.part))
+        named["fully open hinge" if hinge.part >= FULLY_OPEN else "hinge, open"] = mark
+    return named
+
+
+# -- pictures ----------------------------------------------------------------------------------
 
 
 def plot_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
@@ -98,69 +173,6 @@ def plot_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
         if math.isfinite(law.energy):
             spent += f", {100 * lost / law.energy:.3g} % of {with_unit(law.energy, 'J')}"
         axes.set_title(f"hinge at {place}: {spent}", loc="left")
-    return style.figure_of(axes)
-
-
-def plot_damage(
-    solution: Solution, n: int = -1, *, magnify: float = 1.0, ax: Axes | None = None
-) -> Figure:
-    """Draw yielded cells and opened hinges on the frame at the n-th kept time.
-
-    Cells that have yielded are coloured by the energy that plastic strains dissipated per length
-    (J/m); in cells of fibres that includes cracks.  Hinges that have opened are circles, the larger
-    the more of their fracture energy is spent; from 99 % they are as hollow as a joint.
-
-    Args:
-        solution: Solution to draw.
-        n: Number of the kept time; negative from the end.
-        magnify: Factor on the displacements.
-        ax: Axes to draw in; by default those of a new figure.
-
-    Raises:
-        SceneError: The scene is elastic, no such time, ``magnify`` is not positive, or ``ax`` is no
-            axes.
-
-    Example:
-        >>> ub.plot_damage(broken).savefig("damage.png")
-    """
-    from matplotlib.collections import LineCollection
-
-    grid = solution.grid
-    for beam in solution.scene.beams[:1]:
-        solution.material(beam)  # or its error
-    stage, (width, height) = drawing.plane_stage(solution, [n], magnify, ax)
-    pose, density = stage.pose(n), dissipated_per_length(solution, n)
-    length, rise = np.ptp(stage.points(), axis=0)
-    # Upright frames need less; the bar and the legend have their own widths.
-    across = height * length / max(rise, 1e-12)
-    with style.panel(ax, (min(width, max(6.0, across + 3.0)), height)) as axes:
-        time = solution.parameter.at(solution.times[n])
-        style.plane_axes(axes, f"damage at {time}{style.magnified(magnify)}")
-        axes.set_adjustable("datalim")  # room for the broad lines of a slender frame
-        drawing.draw_undeformed(axes, solution, stage)
-        drawing.draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.0, zorder=2)
-        drawing.draw_symbols(axes, pose)
-        yielded = density > 0.0
-        if yielded.any():
-            unit, prefix = style.decimal_prefix(float(density.max()))
-            colors = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
-            zones = LineCollection(
-                list(pose.nodes[grid.cells[yielded]]),
-                colors=colors.to_rgba(density[yielded] / unit),
-                linewidths=11.0, capstyle="butt", zorder=3, gid="yielded",
-            )  # fmt: skip
-            axes.add_collection(zones)
-            placed = [beam.section.fibres for beam in solution.scene.beams]
-            cracks = any(p is not None and p.fibres.softening is not None for p in placed)
-            title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
-            style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
-        if hinges := open_hinges(solution, n, pose.nodes):
-            for hinge in hinges:
-                axes.plot(*hinge.at, **circle(hinge.part))
-            examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
-            sizes = [axes.plot([], [], **circle(part), label=words)[0] for part, words in examples]
-            style.draw_legend(axes, ax, sizes, loc="outside upper left", ncols=3)
-        style.make_room(axes)
     return style.figure_of(axes)
 
 

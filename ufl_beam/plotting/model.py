@@ -17,7 +17,6 @@ from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.loads import Gravity, Load, Rayleigh, RotatingFrame
 from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.plotting.diagrams import plot_state
-from ufl_beam.plotting.drawing import draw_strokes
 from ufl_beam.plotting.labels import Placed, place
 from ufl_beam.plotting.layout import segments
 from ufl_beam.plotting.model_sheet import (
@@ -42,6 +41,7 @@ from ufl_beam.plotting.style import (
     size_of,
     with_unit,
 )
+from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -137,8 +137,7 @@ def plot_model(scene: Scene, ax: Axes | None = None) -> Figure:
             least = most = size_of(axes)
         sheet, placed, frame = _planned(subject, measure, least, most)
         _fit(axes, sheet.scale, frame, len(notes) if ax is None else None)
-        for group, strokes in sheet.strokes.items():
-            draw_strokes(axes, strokes, group)
+        draw_strokes(axes, sheet.strokes)
         _write(axes, placed, sheet.scale)
         _write_badges(axes, scene, measure, frame)
     return figure_of(axes)

@@ -12,6 +12,7 @@ from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.display import html_of, picture_of
 from ufl_beam.model.scene import Scene
+from ufl_beam.plotting.style import png
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.energy_ledger import Energy
 
@@ -86,10 +87,9 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def image(name: str, shown: object) -> str:
     """Draw the picture of an object; where that fails, the reason takes its place."""
     try:
-        from ufl_beam.plotting.figures import png
-
-        data, width = png(picture_of(shown))
+        data, look = png(picture_of(shown))
     except Exception as error:
         return lines(f"no picture: {type(error).__name__}: {error}")
-    look = f'width="{width}" style="max-width: 100%; height: auto"'
-    return f'<img alt="{name}" src="data:image/png;base64,{b64encode(data).decode()}" {look}>'
+    source = f'src="data:image/png;base64,{b64encode(data).decode()}"'
+    style = f'width="{look["width"]}" style="max-width: 100%; height: auto"'
+    return f'<img alt="{name}" {source} {style}>'

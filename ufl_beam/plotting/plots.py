@@ -16,9 +16,11 @@ from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
-from ufl_beam.plotting import drawing, style, symbols
-from ufl_beam.plotting.diagrams import MOST, draw_frame
+from ufl_beam.plotting import style, symbols
+from ufl_beam.plotting.diagrams import MOST, draw_beams, draw_frame, draw_undeformed, plane_stage
+from ufl_beam.plotting.layout import evenly
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture, shade
+from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -74,21 +76,22 @@ def plot_shapes(
             f"say count={times!r}"
         )
     kept = solution.times
-    chosen = drawing.nearest(kept, times) if len(times) else drawing.evenly(solution, int(count))
-    stage, size = drawing.plane_stage(solution, chosen, magnify, ax)
+    nearest = [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
+    chosen = nearest or evenly(solution, int(count))
+    stage, size = plane_stage(solution, chosen, magnify, ax)
     poses = [stage.pose(n) for n in chosen]
     with style.panel(ax, size) as axes:
         of_time = style.scale("viridis", 0.0, 0.88, kept[chosen].min(), kept[chosen].max())
         style.plane_axes(axes, style.magnified(magnify, ""))
-        drawing.draw_undeformed(axes, solution, stage)
+        draw_undeformed(axes, solution, stage)
         for pose, color in zip(poses, map(to_hex, of_time.to_rgba(kept[chosen])), strict=True):
             moving = *symbols.bodies(pose), *symbols.rods(pose)
-            drawing.draw_strokes(axes, moving, "moving", color)
-            drawing.draw_beams(axes, solution, pose.nodes, color=color, linewidth=2.2, zorder=3)
-            drawing.draw_strokes(axes, symbols.masses(pose, color), "masses")
+            draw_strokes(axes, {"moving": moving}, color)
+            draw_beams(axes, solution, pose.nodes, color=color, linewidth=2.2, zorder=3)
+            draw_strokes(axes, {"masses": symbols.masses(pose, color)})
         last = poses[-1]
         still = *symbols.rails(last), *symbols.connectors(last), *symbols.supports(last)
-        drawing.draw_strokes(axes, still, "still")
+        draw_strokes(axes, {"still": still})
         style.draw_bar(axes, of_time, solution.parameter.name)
     return style.figure_of(axes)
 
@@ -198,7 +201,7 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
     if not chosen:
         raise SceneError("plot_modes: there is no shape")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
-    stages = [drawing.plane_stage(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
+    stages = [plane_stage(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
     box = np.concatenate([stage.points() for stage in stages])
     # Room for the symbols of supports
     room = 0.08 * np.hypot(*np.ptp(box, axis=0))
@@ -212,10 +215,10 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
             axes.set_axis_off()
         for k, swing, stage, axes in zip(chosen, swings, stages, grid, strict=False):
             there, back = stage.pose(0), stage.pose(1)
-            drawing.draw_undeformed(axes, swing, stage)
-            drawing.draw_beams(axes, swing, back.nodes, color=SKY, linewidth=1.6, zorder=2)
-            drawing.draw_beams(axes, swing, there.nodes, color=BLUE, linewidth=2.6, zorder=4)
-            drawing.draw_symbols(axes, there)
+            draw_undeformed(axes, swing, stage)
+            draw_beams(axes, swing, back.nodes, color=SKY, linewidth=1.6, zorder=2)
+            draw_beams(axes, swing, there.nodes, color=BLUE, linewidth=2.6, zorder=4)
+            draw_strokes(axes, symbols.in_plane(there))
             axes.set_title(f"{k}: {shapes.titles[k]}", loc="left")
             axes.set(aspect="equal", xlim=corners[:, 0], ylim=corners[:, 1])
     return figure
@@ -314,7 +317,7 @@ def plot_extremes(
     ]
     until = f"until {solution.parameter.at(solution.times[-1])}"
     title = f"extremes of the {style.RESULTANTS[what][0]} {what}", until
-    pose = drawing.plane_stage(solution, [], 1.0, ax, MOST)[0].undeformed
+    pose = plane_stage(solution, [], 1.0, ax, MOST)[0].undeformed
     return draw_frame(ax, solution, -1, pose, title, what, diagrams)
 
 

@@ -20,9 +20,17 @@ from ufl_beam.model.bodies import Anchor, Member, Place, Spot, require_anchors
 from ufl_beam.model.records import Record
 from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting import style, symbols
-from ufl_beam.plotting.drawing import evenly, open_hinges
 from ufl_beam.plotting.films import WRITERS, Film, screen
-from ufl_beam.plotting.layout import Pose, Stage, directions, in_frame, left_of, unit_vectors
+from ufl_beam.plotting.inelastic import open_hinges
+from ufl_beam.plotting.layout import (
+    Pose,
+    Stage,
+    directions,
+    evenly,
+    in_frame,
+    left_of,
+    unit_vectors,
+)
 from ufl_beam.plotting.style import RESULTANTS
 from ufl_beam.plotting.symbols import FILLED, FRONT, MIDDLE, Pin
 from ufl_beam.simulation.solution import Solution

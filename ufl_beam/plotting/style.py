@@ -9,12 +9,15 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
+from io import BytesIO
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, shorten
+from ufl_beam.parallel import active_comm
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
@@ -31,6 +34,7 @@ INK, TEXT, GREY, WHITE = "#222222", "#444444", "#B5B5B5", "#FFFFFF"
 RESULTANTS = {"N": ("axial force", "N"), "V": ("shear force", "N"), "M": ("bending moment", "N m")}
 
 POINTS = 72.0  # points of an inch
+CSS_DPI = 80.0  # pixels of a page to an inch of a figure
 
 FONT = 13.0  # of numbers at axes and words beside them; points
 FRAME = "#888888"  # of axes and their ticks
@@ -97,14 +101,29 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
         >>> figure.savefig("drop.png")
     """
     import matplotlib as mpl
-
-    from ufl_beam.plotting.figures import Picture
+    from matplotlib.figure import Figure
 
     now, default = mpl.rcParams["font.size"], mpl.rcParamsDefault["font.size"]
     font = FONT if now == default else now  # the others are in proportion to it
     sizes = {"font.size": font, **{name: size / FONT * font for name, size in SIZES.items()}}
     with mpl.rc_context(_unless_chosen({**STYLE, **sizes})):
-        yield Picture(figsize=size, layout="constrained")
+        figure = Figure(figsize=size, layout="constrained")
+        # Notebooks look for the method of this name.
+        vars(figure).update(savefig=partial(_save, figure), _repr_png_=partial(png, figure))
+        yield figure
+
+
+def _save(figure: Figure, *args: Any, **options: Any) -> None:
+    """Save a figure; the first process alone writes, as all of them run the same script."""
+    if active_comm().rank == 0:
+        type(figure).savefig(figure, *args, **options)
+
+
+def png(figure: Figure) -> tuple[bytes, dict[str, int]]:
+    """Return a figure as PNG, and its width in a page; pixels."""
+    file = BytesIO()
+    figure.savefig(file, format="png")
+    return file.getvalue(), {"width": round(CSS_DPI * figure.get_figwidth())}
 
 
 @contextmanager

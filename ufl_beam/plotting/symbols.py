@@ -9,8 +9,9 @@ Symbols of loads are in `model_sheet.py`.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
-from typing import Any, NamedTuple
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -30,7 +31,10 @@ from ufl_beam.plotting.layout import (
     points_along,
     unit_vectors,
 )
-from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, with_unit
+from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, with_unit
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 # Layers: beneath the beams, over them, upon the areas there, pins, and over these
 BACK, MIDDLE, UPON, PINS, FRONT = 2.5, 4.2, 4.3, 5.0, 5.5
@@ -50,6 +54,29 @@ class Stroke(NamedTuple):
     weight: float = 1.6  # width of the line; points
     fill: str | None = None  # colour of the area
     layer: float = MIDDLE
+
+
+def draw_strokes(axes: Axes, groups: Mapping[str, Iterable[Stroke]], color: Any = None) -> None:
+    """Draw groups of lines and areas, in their own colours or all in one.
+
+    Those that look alike are one collection, so that large scenes are drawn fast.
+    """
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    alike: defaultdict[tuple[str, str, float, str | None, float], list[Array]] = defaultdict(list)
+    for group, strokes in groups.items():
+        for points, own, weight, fill, layer in strokes:
+            alike[group, own, weight, fill, layer].append(points)
+    for (group, own, weight, fill, layer), chains in alike.items():
+        edge = shade(own) if color is None else color
+        inside = "none" if fill is None else shade(fill) if color is None else (color, 0.15)
+        kind = LineCollection if fill is None else PolyCollection
+        collection = kind(
+            chains, edgecolors=edge, facecolors=inside, linewidths=weight, zorder=layer,
+            joinstyle="round", capstyle="round", gid=group,
+        )  # fmt: skip
+        axes.add_collection(collection)
+    axes.autoscale_view()
 
 
 def _line(*points: tuple[float, float], weight: float = 1.6, layer: float = MIDDLE) -> Stroke:
