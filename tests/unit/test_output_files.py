@@ -19,7 +19,7 @@ from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
 from ufl_beam.output import output_files
-from ufl_beam.output.output_files import OutputFile, read
+from ufl_beam.output.output_files import OutputFile, read, require_writable
 from ufl_beam.output.paraview_files import PAGE, Lines, VtkhdfWriter, XdmfWriter
 from ufl_beam.simulation.checkpoint import FORMAT
 
@@ -152,7 +152,7 @@ def test_the_file_of_a_study_is_not_that_of_a_member(shared_path):
     ("path", "message"),
     [
         (3, "History: path = 3 must be the name of a file"),
-        ("a\0b.csv", "cannot be written: embedded null"),
+        ("a\0b.csv", "cannot be written: .*embedded null"),
         ("x" * 300, "cannot be written: File name too long"),
     ],
 )
@@ -160,6 +160,12 @@ def test_names_that_are_none(path, message, shared_path, monkeypatch):
     monkeypatch.chdir(shared_path)
     with pytest.raises(ub.SceneError, match=message):
         run(ub.History(path))
+
+
+def test_a_check_makes_no_file_that_a_kill_could_leave(tmp_path):
+    os.utime(tmp_path, (0, 0))
+    require_writable(tmp_path / "a.csv")
+    assert tmp_path.stat().st_mtime == 0
 
 
 def test_names_that_xml_cannot_hold():
@@ -534,5 +540,5 @@ def test_recorders_close_also_when_one_fails(shared_path):
     table = ub.History(shared_path / "a.csv")
     with pytest.raises(RuntimeError, match="cannot close"):
         run(Bad(shared_path / "notes"), table, steps=1)
-    assert not table._files
+    assert not table._open
     assert MPI.COMM_WORLD.allreduce(1) == MPI.COMM_WORLD.size

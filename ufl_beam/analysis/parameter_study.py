@@ -35,7 +35,7 @@ from ufl_beam.output.output_files import (
     require_apart,
     require_arrays,
     require_path,
-    take,
+    reserved,
     write,
 )
 from ufl_beam.parallel import alone, communicator, on_first, progress_bar, say
@@ -250,14 +250,11 @@ def study(
             save()
 
     on_first(comm, prepare)
-    release = take(outputs)
-    try:
+    with reserved(outputs):
         if comm.rank > 0:
             for _ in _outcomes(comm, member, {}):
                 pass  # this process serves until the first one has everything
         on_first(comm, gather)
-    finally:
-        release()
     result = Study.of(name, comm.bcast({key: records[key] for key in todo}))
     if len(result.failed) == len(result):
         raise RuntimeError(f"study: all {len(result)} members failed, {result.failed[0]}")

@@ -228,6 +228,12 @@ class Grid:
         of_cell = of_beam[self.beam_of_cell]
         return [(layout, np.flatnonzero(np.isin(of_cell, one))) for layout, one in groups.items()]
 
+    @cached_property
+    def inelastic_cells(self) -> Index:
+        """Cells that can yield or break, ascending; (m,)."""
+        groups = [cells for _, cells in self.inelastic]
+        return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups]))
+
     def lengths(self, cells: Index) -> Array:
         """Lengths of some cells; (len(cells),); m."""
         start, end = self.cells[cells].T

@@ -13,8 +13,6 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.function_spaces import (
     DolfinxFields,
-    Fields,
-    Strains,
     derivative,
     dofs_of_cells,
     integrated,
@@ -46,6 +44,13 @@ class BeamForms(NamedTuple):
     mass: ufl.Form
 
 
+def put_in_cells(function: fem.Function, values: Array) -> fem.Function:
+    """Give a function values at the degrees of freedom of each cell; (num_cells, ...)."""
+    dofs = dofs_of_cells(function.function_space)
+    function.x.array[dofs] = values.reshape(dofs.shape)
+    return function
+
+
 class DolfinxView:
     """Mesh, functions and forms of a simulation, in the types of DOLFINx; ``simulation.dolfinx``.
 
@@ -72,14 +77,11 @@ class DolfinxView:
 
     def __init__(self, of: Any) -> None:  # a `StateView`, which is above this module
         self._of = of
+        self._fields = DolfinxFields(of.share)
         self._functions: dict[str, fem.Function] = {}
 
     def __repr__(self) -> str:
         return f"<DolfinxView of {self._of!r}>"
-
-    @cached_property
-    def _fields(self) -> DolfinxFields:
-        return DolfinxFields(self._of.share)
 
     # -- mesh and spaces -------------------------------------------------------------------------
 
@@ -185,8 +187,7 @@ class DolfinxView:
             >>> bool(view.stiffness.x.array[2] == section.EI)
             True
         """
-        values = self._fields.of_sections(self._fields.element.stiffness)
-        return self._put(self._named("stiffness"), values)
+        return self._function("stiffness", self._fields.of_sections(self._fields.element.stiffness))
 
     @property
     def configuration(self) -> fem.Function:
@@ -197,7 +198,7 @@ class DolfinxView:
             >>> bool(np.isclose(ψ.x.array.min(), simulation.displacement(beam.end)[2]))
             True
         """
-        return self._fill(self._named("configuration"), self._of.q)
+        return self._function("configuration", self._of.q[self._fields.cell_dofs])
 
     @property
     def velocity(self) -> fem.Function:
@@ -213,7 +214,7 @@ class DolfinxView:
         """
         if not has_inertia(self._of.scheme):
             raise SceneError("dolfinx.velocity: a static scheme has no velocities; run dynamics")
-        return self._fill(self._named("velocity"), self._of.velocities()[0])
+        return self._function("velocity", self._of.velocities()[0][self._fields.cell_dofs])
 
     @property
     def strains(self) -> fem.Function:
@@ -225,7 +226,7 @@ class DolfinxView:
             >>> view.strains.x.array.reshape(-1, 3).shape
             (4, 3)
         """
-        return self._put(self._named("strains"), self._mean_strains.mean(self._of.q))
+        return self._function("strains", self._of.now.mean_strains(0)[self.cells])
 
     @property
     def forces(self) -> fem.Function:
@@ -236,7 +237,7 @@ class DolfinxView:
             >>> bool(np.allclose(M, simulation.section_forces()[view.cells, 2]))
             True
         """
-        return self._put(self._named("forces"), self._of.section_forces()[self.cells])
+        return self._function("forces", self._of.section_forces()[self.cells])
 
     @property
     def jump(self) -> fem.Function:
@@ -260,35 +261,19 @@ class DolfinxView:
                 "dolfinx.jump: nothing in the scene can hinge; give a beam "
                 "hinges={0.5: Softening(...)}, or a section hinge=Softening(...)"
             )
-        return self._put(self._jump, self._of.damage()[0][self.cells])
+        return self._function("jump", self._of.damage()[0][self.cells])
 
-    @cached_property
-    def _mean_strains(self) -> Strains:
-        return Strains(Fields(self._of.share, self._fields.order))
-
-    @cached_property
-    def _jump(self) -> fem.Function:
-        return fem.Function(fem.functionspace(self.mesh, ("DG", 0)), name="jump")
-
-    def _named(self, name: str) -> fem.Function:
-        """A function of the configurations, or one with three values in each cell."""
+    def _function(self, name: str, values: Array) -> fem.Function:
+        """The function of a quantity, with values at the degrees of freedom of the cells."""
         if name not in self._functions:
             of = self._fields.element
-            in_cells = name not in ("configuration", "velocity")
-            space = of.stiffness.function_space if in_cells else of.space
+            space = of.stiffness.function_space
+            if name in ("configuration", "velocity"):
+                space = of.space
+            elif name == "jump":
+                space = fem.functionspace(self.mesh, ("DG", 0))
             self._functions[name] = fem.Function(space, name=name)
-        return self._functions[name]
-
-    def _fill(self, function: fem.Function, values: Array) -> fem.Function:
-        """Give a function values at the degrees of freedom of the scene."""
-        function.x.array[:] = values[self.dofs]
-        return function
-
-    def _put(self, function: fem.Function, values: Array) -> fem.Function:
-        """Give a function values in the cells of the mesh."""
-        dofs = dofs_of_cells(function.function_space)
-        function.x.array[dofs] = values.reshape(dofs.shape)
-        return function
+        return put_in_cells(self._functions[name], values)
 
     # -- forms -----------------------------------------------------------------------------------
 
@@ -310,13 +295,13 @@ class DolfinxView:
         """
         forms = self._forms
         for function in (forms.q0, forms.q1):
-            self._fill(function, self._of.q)
+            put_in_cells(function, self._of.q[self._fields.cell_dofs])
         tables = [np.zeros((len(self._of.share.grid.cells), k)) for k in (3, 9)]
         for cells, *values in (one.about_state() for one in self._of.inelastic):
             for table, rows in zip(tables, values, strict=True):
                 table[cells] = rows
         for function, table in zip(self._around, tables, strict=False):  # none if all is elastic
-            self._put(function, table[self.cells])
+            put_in_cells(function, table[self.cells])
         return forms
 
     @cached_property

@@ -114,11 +114,11 @@ class ExtremesInC:
             some=np.zeros(lib.SOME * self._kernel.cells.width),
             in_order=cell_forces.in_order(self._lanes),
         )  # fmt: skip
+        self.seen = -1
         for c, extent in zip((self.c.of_forces, self.c.of_motion), self._extents, strict=True):
             c.size = len(extent["low"])
             for name, values in extent.items():
                 setattr(c, name, doubles(values))
-        self.seen = -1
 
     def take(self, parts: int, t: float, q: Array, before: Array) -> None:
         """Take in the state after so many steps, if C has not."""
@@ -126,16 +126,12 @@ class ExtremesInC:
             return
         numbers = self._forces(q, before)
         given, self._forces.c.given = self._forces.c.given, doubles(numbers)
-        if self.seen < 0:
-            for extent in self._extents:
-                extent["low"].fill(np.inf)
-                extent["high"].fill(-np.inf)
         lib.watch_step(self.c, 0, t, doubles(before), doubles(q))
         self._forces.c.given = given
         self.seen = parts
 
     def begin(self, parts: int, extents: Any) -> None:
-        """Go on from extremes of forces and motions, as :meth:`extents` returns them."""
+        """Begin with extremes after so many steps, as :meth:`extents` returns them."""
         for to, of in zip(self._extents, extents, strict=True):
             for name, values in zip(EXTENT, of, strict=True):
                 batches = in_batches(values, self._lanes) if values.ndim == 3 else values
@@ -179,21 +175,6 @@ class Extent(NamedTuple):
     time_low: Array
     time_high: Array
 
-    @classmethod
-    def around(cls, values: Array, t: float) -> Extent:
-        """Return the range of the values of one time."""
-        return cls(values.copy(), values.copy(), *np.full((2, *values.shape), t))
-
-    def widen(self, values: Array, t: float) -> None:
-        """Extend the range by the values of a time."""
-        for reached, when, beyond in (
-            (self.low, self.time_low, values < self.low),
-            (self.high, self.time_high, values > self.high),
-        ):
-            if beyond.any():
-                reached[beyond] = values[beyond]
-                when[beyond] = t
-
     def of(self, rows: Index) -> Extent:
         """Return the range of some of the values."""
         return Extent(*(values[rows] for values in self))
@@ -229,40 +210,40 @@ class Extremes(Restartable):
         """Begin with the initial state, or go on after a :meth:`state`."""
         self._grid: Grid = simulation.grid
         self._in_c = simulation.watch(self._parts)
-        if state is None:
-            if self._in_c is None:
-                self._taken = [Extent.around(x, simulation.t) for x in self._state(simulation)]
-            self.write(simulation)
-            return
+        self.by_itself = self._in_c is not None
         shapes = (len(self._grid.cells), len(self._parts), 3), (self._grid.size,)
         self._taken = []
         for what, shape in zip(("forces", "q"), shapes, strict=True):
-            names = [f"{what} {name}" for name in Extent._fields]
-            require_arrays(state, dict.fromkeys(names, shape))
-            self._taken.append(Extent(*(state[name].copy() for name in names)))
+            extent = Extent(*(np.full(shape, x) for x in (np.inf, -np.inf, 0.0, 0.0)))
+            if state is not None:
+                names = [f"{what} {name}" for name in Extent._fields]
+                require_arrays(state, dict.fromkeys(names, shape))
+                extent = Extent(*(state[name].copy() for name in names))
+            self._taken.append(extent)
         if self._in_c is not None:
-            self._in_c.begin(simulation.parts, self._taken)
-
-    @property
-    def by_itself(self) -> bool:
-        """True if steps are taken in without a call of :meth:`write`."""
-        return self._in_c is not None
+            self._in_c.begin(-1 if state is None else simulation.parts, self._taken)
+        if state is None:
+            self.write(simulation)
 
     def write(self, simulation: StateView) -> None:
         """Take in the state of a step."""
         if self._in_c is not None:
             self._in_c.take(simulation.parts, simulation.t, simulation.q, simulation.q_before)
             return
-        for extent, values in zip(self._taken, self._state(simulation), strict=True):
-            extent.widen(values, simulation.t)
+        forces = simulation.now.cell_forces(0, self._parts)
+        q = simulation.share.gather(simulation.q)  # the same on every process
+        for extent, values in zip(self._taken, (forces, q), strict=True):
+            for reached, when, beyond in (
+                (extent.low, extent.time_low, values < extent.low),
+                (extent.high, extent.time_high, values > extent.high),
+            ):
+                if beyond.any():
+                    reached[beyond] = values[beyond]
+                    when[beyond] = simulation.t
 
     def close(self) -> None:
         """End the record; what was reached stays."""
         self._taken, self._in_c = self._extents, None
-
-    def _state(self, simulation: StateView) -> tuple[Array, Array]:
-        """Section forces of all cells, and the configuration, the same on every process."""
-        return simulation.now.cell_forces(0, self._parts), simulation.share.gather(simulation.q)
 
     @property
     def _extents(self) -> list[Extent]:

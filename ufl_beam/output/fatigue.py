@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -50,14 +50,17 @@ class Goodman(Record):
     """
 
     ultimate: Positive
+    _power: ClassVar[int] = 1
 
     def __call__(self, range: Array, mean: Array) -> Array:
-        """Equivalent ranges of cycles; Pa."""
-        return _over(range, 1 - np.maximum(mean, 0.0) / self.ultimate)
+        """Equivalent ranges of cycles; Pa; infinite where the mean stress leaves no strength."""
+        left = 1 - (np.maximum(mean, 0.0) / self.ultimate) ** self._power
+        infinite = np.full_like(range, np.inf)
+        return np.asarray(np.divide(range, left, out=infinite, where=left > 0))
 
 
 @dataclass(frozen=True)
-class Gerber(Record):
+class Gerber(Goodman):
     """Gerber's parabola: equivalent range S / (1 − (mean / ultimate)²) about a mean stress.
 
     Args:
@@ -69,21 +72,11 @@ class Gerber(Record):
         True
     """
 
-    ultimate: Positive
-
-    def __call__(self, range: Array, mean: Array) -> Array:
-        """Equivalent ranges of cycles; Pa."""
-        return _over(range, 1 - (np.maximum(mean, 0.0) / self.ultimate) ** 2)
-
-
-def _over(range: Array, part: Array) -> Array:
-    """Ranges over the part of the strength that the mean stress leaves; infinite where none."""
-    equivalent: Array = np.divide(range, part, out=np.full_like(range, np.inf), where=part > 0)
-    return equivalent
+    _power = 2
 
 
 def any_mean(range: Array, mean: Array) -> Array:
-    """Return the range itself, as in welds with residual stress: the mean does not count."""
+    """Equivalent ranges of welded details, of which the mean does not count."""
     return range
 
 
@@ -260,7 +253,6 @@ class RainflowCounter:
 
     def resume(self, counted: Array, waiting: Array) -> None:
         """Go on after a :meth:`state`."""
-        self._counts.clear()
         for low, high, count in (map(float, row) for row in counted):
             self._counts[low, high] = count
         self._waiting = [*map(float, waiting)]

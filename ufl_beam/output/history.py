@@ -80,19 +80,15 @@ class History(Restartable):
         require_count(most, f"History {path}: most")
         self._first_every, self._most = every, most
         self._path = require_path(path, "History")
-        self._part = part_of(self._path)
+        self._part = part_of(self._path)  # takes its place when rows go
+        self.files = (self._path,) if most == sys.maxsize else (self._path, self._part)
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")
         for i, place in enumerate(self._places):
             require_anchors(f"History {path}: places[{i}]", place)
         for i, one in enumerate(self._connectors):
             require_kind(one, (Connector, Joint), f"History {path}: connectors[{i}]")
-        self._files: list[OutputFile] = []
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Path of the file, and if rows may go that of the one that takes its place."""
-        return (self._path,) if self._most == sys.maxsize else (self._path, self._part)
+        self._open: list[OutputFile] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Write the header and the initial state, or cut off what was written after a state."""
@@ -127,12 +123,12 @@ class History(Restartable):
 
     def _write_anew(self, path: Path, content: bytes) -> None:
         self.close()
-        self._files, self._length = [OutputFile(path)], 0
+        self._open, self._length = [OutputFile(path)], 0
         self._append(content)
 
     def _append(self, line: bytes) -> None:
         """Write at the end of the complete part: an interrupted line is written over."""
-        self._files[0].put(self._length, line)
+        self._open[0].put(self._length, line)
         self._length += len(line)
 
     def write(self, simulation: StateView) -> None:
@@ -147,9 +143,9 @@ class History(Restartable):
 
     def _thin(self) -> None:
         """Leave out every other row; at no time is there less than one whole file."""
-        rows = self._files[0].read(len(self._header), self._length).splitlines(keepends=True)
+        rows = self._open[0].read(len(self._header), self._length).splitlines(keepends=True)
         self._write_anew(self._part, self._header + b"".join(rows[::2]))
-        self._files[0].rename(self._path)
+        self._open[0].rename(self._path)
 
     def _row(self, simulation: StateView) -> bytes:
         motion = [simulation.displacement(place) for place in self._places]
@@ -167,7 +163,7 @@ class History(Restartable):
 
         def sync() -> None:
             nonlocal content, digest
-            for file in self._files:
+            for file in self._open:
                 file.sync()
                 counts[3] = self._length
                 if self._most < sys.maxsize:
@@ -192,12 +188,12 @@ class History(Restartable):
         ):
             file.close()
             raise changed(f"History {self._path}")
-        self._files, self._length = [file], length
+        self._open, self._length = [file], length
         file.cut(length)
 
     def close(self) -> None:
         """Close the file, without what an interrupt has left behind the last complete row."""
-        files, self._files = self._files, []
+        files, self._open = self._open, []
         for file in files:
             file.cut(self._length)
             file.close()

@@ -19,7 +19,7 @@ import shutil
 import stat
 import warnings
 import zipfile
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import cache
 from importlib import metadata
@@ -45,16 +45,20 @@ def require_path(path: str | Path, what: str) -> Path:
 
 
 def require_writable(path: Path) -> None:
-    """Raise :class:`SceneError` if a file cannot be written; its content stays as it is."""
+    """Raise :class:`SceneError` if a file cannot be written.
+
+    Its content stays as it is, and no file is made, as a kill would leave an empty one.
+    """
     why = ""
     try:
         if not path.parent.is_dir():
             why = f": there is no directory {path.parent}; make it first"
+        elif os.path.exists(path) or os.access(path.parent, os.W_OK | os.X_OK):
+            os.close(os.open(path, os.O_WRONLY))
         else:
-            new = not path.exists()
-            path.open("ab").close()
-            if new:
-                path.unlink()
+            why = f" cannot be written: {os.strerror(errno.EACCES)}"
+    except FileNotFoundError:
+        pass  # it will be made
     except (OSError, ValueError) as error:  # a ValueError at a null character
         why = f" cannot be written: {getattr(error, 'strerror', error)}"
     if why:
@@ -90,16 +94,16 @@ def _identities(path: Path) -> list[object]:
     return [real, (found.st_dev, found.st_ino)] if stat.S_ISREG(found.st_mode) else []
 
 
-def take(outputs: Iterable[Output]) -> Callable[[], None]:
-    """Reserve the files of a run against runs within it; return the function that frees them."""
+@contextmanager
+def reserved(outputs: Iterable[Output]) -> Iterator[None]:
+    """Reserve the files of a run against runs within it."""
     taken = list(outputs)
     _in_use.extend(taken)
-
-    def release() -> None:
+    try:
+        yield
+    finally:
         for output in taken:
             _in_use.remove(output)
-
-    return release
 
 
 def part_of(path: Path) -> Path:

@@ -460,16 +460,19 @@ class TimeSeries(Restartable):
 
     Attributes:
         ending: End of the name of the file.
+        beside: What is behind it in the name of another file that is written.
         writer: Class of the writer, made of path, lines and fields of the first state; and to go
             on of what ``complete`` and ``sync()`` of an earlier one gave.
     """
 
     ending: ClassVar[str]
+    beside: ClassVar[str]
     writer: ClassVar[Any]
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
         kind = type(self).__name__
         self._path = require_path(path, kind)
+        self.files = self._path, self._path.with_name(self._path.name + self.beside)
         require_count(every, f"{kind} {path}: every")
         self._every, self._count = every, 0
         if self._path.suffix != self.ending:
@@ -549,13 +552,8 @@ class XDMF(TimeSeries):
         ['beam.xdmf', 'beam.xdmf.bin']
     """
 
-    ending = ".xdmf"
+    ending, beside = ".xdmf", ".bin"
     writer = XdmfWriter
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Paths of the file, and of that of its numbers."""
-        return self._path, data_path(self._path)
 
     def require_writable(self) -> None:
         """Raise :class:`SceneError` if a file cannot be written, or its name stand in XML."""
@@ -590,10 +588,5 @@ class VTKHDF(TimeSeries):
         ['beam.vtkhdf', 'beam.vtkhdf.part']
     """
 
-    ending = ".vtkhdf"
+    ending, beside = ".vtkhdf", ".part"
     writer = VtkhdfWriter
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Path of the file, and of the one that takes its place when a run is restarted."""
-        return self._path, part_of(self._path)

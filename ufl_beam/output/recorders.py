@@ -176,6 +176,10 @@ class StateView(ABC):
 class Recorder(ABC):
     """Base class of recorders, which see each accepted step; called by all processes together.
 
+    Attributes:
+        files: Paths that it writes: two outputs of a run must not share one.
+        by_itself: Whether it needs no call of :meth:`write` after steps, once it is open.
+
     Example:
         >>> class Speed(ub.Recorder):
         ...     def open(self, simulation):
@@ -185,18 +189,11 @@ class Recorder(ABC):
         >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())
     """
 
+    files: tuple[Path, ...] = ()
+    by_itself = False
+
     def __repr__(self) -> str:
         return f"<{' '.join([type(self).__name__, *map(str, self.files)])}>"
-
-    @property
-    def by_itself(self) -> bool:
-        """True if it needs no call of :meth:`write` after steps, once it is open."""
-        return False
-
-    @property
-    def files(self) -> tuple[Path, ...]:
-        """Files that it writes: two outputs of a run must not share one."""
-        return ()
 
     def require_writable(self) -> None:
         """Raise :class:`SceneError` if a file cannot be written; the first process asks."""

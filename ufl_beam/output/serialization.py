@@ -31,7 +31,9 @@ from ufl_beam.model.supports import still
 
 T = TypeVar("T")
 Data = Any  # data of JSON
-Sampling = Callable[[Any, str, Any], Any]  # from record, field and function what stands for it
+Sampling = Callable[[Any, str, Any], Any]
+"""From record, field and function what stands for it; None if it is lost."""
+
 SAMPLES = 1000  # intervals in which a curve is sampled
 
 
@@ -138,13 +140,11 @@ RECORDS |= {kind.__name__: kind for kind in (SavedFunction, SavedCurve, LostFunc
 KNOWN: dict[str, Any] = {"GROUND": GROUND, "HELD": HELD, "steady": steady, "still": still}
 
 
-def lost(owner: Any, field: str, function: Any) -> LostFunction:
-    """Replace a function by its name."""
-    return LostFunction(name_of(function))
+def to_data(value: Any, sampling: Sampling | None = None) -> Data:
+    """Describe a scene or another record as data.
 
-
-def to_data(value: Any, sampling: Sampling = lost) -> Data:
-    """Describe a scene or another record as data; ``sampling`` replaces functions of a user."""
+    Functions of a user are replaced by what ``sampling`` returns of them, or by their names.
+    """
     records: list[Data] = []
     # By identity; the objects are kept, so that none gets the identity of another.
     numbers: dict[int, tuple[int, Any]] = {}
@@ -170,7 +170,8 @@ def to_data(value: Any, sampling: Sampling = lost) -> Data:
             record = value
             if RECORDS.get(type(value).__name__) is not type(value):
                 if callable(value):
-                    record = sampling(owner, field, value)
+                    known = sampling(owner, field, value) if sampling else None
+                    record = LostFunction(name_of(value)) if known is None else known
                 elif not dataclasses.is_dataclass(value):
                     raise SceneError(
                         f"{value!r} cannot be saved: {type(value).__name__} is no record of "

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.partition import Share
 from ufl_beam.display import in_one_line
 from ufl_beam.mechanics.time_schemes import V
@@ -97,15 +99,12 @@ class Columns:
         self._others: dict[tuple[str, str], Columns] = {}
 
     @classmethod
-    def of(
-        cls, grid: Any, *, moving: bool, cells: int, ledger: Iterable[str], record: int | None
-    ) -> Columns:
+    def of(cls, grid: Grid, *, moving: bool, ledger: Iterable[str], record: int | None) -> Columns:
         """Table of a scene; a line of it is all that a quantity of connectors or cells needs.
 
         Args:
             grid: Its numbering.
             moving: Whether there are velocities.
-            cells: Number of the cells that can yield or break.
             ledger: Entries, such as "lost: plastic".
             record: Numbers that forces of cells follow from; None if the forces are in the row.
         """
@@ -116,7 +115,7 @@ class Columns:
             **({"v": (size,)} if moving else {}),  # velocities
             "reactions": (len(scene.supports), 3),  # forces of supports, in their axes
             "connectors": (len(scene.links), len(Connection._fields)),
-            "material": (cells, int(lib.POINT_KEPT)),  # `Points.kept`
+            "material": (len(grid.inelastic_cells), int(lib.POINT_KEPT)),  # `Points.kept`
             **dict.fromkeys(ledger, ()),  # J
             **({FORCES: (lib.CELL_NUMBERS, len(grid.cells))} if record is None
                else {RECORD: (record,)}),
@@ -140,17 +139,13 @@ def new_rows(number: int, width: int) -> Array:
     return np.frombuffer(bytearray(8 * number * width)).reshape(number, width)
 
 
+@dataclass
 class Block:
-    """Rows with the same columns, one below the other, with room for more that is never moved.
+    """Rows with the same columns, one below the other, with room for more that is never moved."""
 
-    Attributes:
-        columns: Of the rows.
-        number: Number of rows.
-        space: The rows, and behind them the room.
-    """
-
-    def __init__(self, columns: Columns, space: Array, number: int) -> None:
-        self.columns, self.space, self.number = columns, space, number
+    columns: Columns
+    space: Array  # the rows, and behind them the room
+    number: int  # of rows
 
     @property
     def rows(self) -> Array:
@@ -195,16 +190,14 @@ class StateWriter:
         self._alive, self._kinds = list[Any](), list[Any]()
         grid, moving = share.grid, march.rates != ffi.NULL
         accounts = ledger.state, ledger.supplied, ledger.lost
-        cells = [of for _, of in grid.inelastic]
-        all_cells = np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *cells]))
         record = cell_forces.kept if share.alone else []
         self.columns = columns = Columns.of(
-            grid, moving=moving, cells=len(all_cells), record=sum(n for _, n in record),
+            grid, moving=moving, record=sum(n for _, n in record),
             ledger=[f"{p}: {name}" for p, of in zip(LEDGER, accounts, strict=True) for name in of],
         )  # fmt: skip
         at = columns.at
         if share.comm.rank == 0:
-            self._copy(self._place_of(ffi.addressof(march, "t")), at["t"].start, 1)
+            self._copy(self._place(ffi.addressof(march, "t")), at["t"].start, 1)
         now = ffi.addressof(march, "q")
         vectors = {"q": now}
         if moving:
@@ -231,7 +224,7 @@ class StateWriter:
         for one in inelastic:
             mine, k = one.kept()[0], np.flatnonzero(one.kept_factors)
             width = columns.shapes["material"][1]
-            rows = at["material"].start + width * np.searchsorted(all_cells, mine)
+            rows = at["material"].start + width * np.searchsorted(grid.inelastic_cells, mine)
             first = width * np.arange(len(mine))
             self._add(self._place(one.points.kept), first[:, None] + k, rows[:, None] + k)
         for link in couplings:
@@ -250,13 +243,12 @@ class StateWriter:
         kept = ffi.new("kept_numbers[]", self._kinds)
         fill(march, kinds=len(kept), kept=kept, width=width, sums=sums, after_sums=after)
 
-    def _place(self, numbers: Array) -> Any:
-        """A place that has the address of an array, or of the first number of a view."""
-        self._alive.append(numbers)
-        return self._place_of(ffi.cast("double *", numbers.ctypes.data))
-
-    def _place_of(self, address: Any) -> Any:
-        self._alive.append(place := ffi.new("double *[1]", [address]))
+    def _place(self, numbers: Any) -> Any:
+        """A place that has the address of a number of C, of an array, or of a view."""
+        address = numbers
+        if isinstance(numbers, np.ndarray):
+            address = ffi.cast("double *", numbers.ctypes.data)
+        self._alive += [numbers, place := ffi.new("double *[1]", [address])]
         return place
 
     def _copy(self, place: Any, first: int, number: int) -> None:

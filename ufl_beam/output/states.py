@@ -81,12 +81,6 @@ class Cells:
         """Section forces of all cells."""
         return ForcesAlongCells(self.grid)
 
-    @cached_property
-    def inelastic(self) -> Index:
-        """Cells that can yield or break; (m,)."""
-        groups = [cells for _, cells in self.grid.inelastic]
-        return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups]))
-
 
 class States:
     """States of a scene at n+1 times, read alike in the solution of a run and while it runs.
@@ -225,10 +219,7 @@ class States:
         n, begins = len(history["t"]), BEFORE in history
         self._blocks, self._computed = [], None
         ledger = [name for name in history if name.startswith(tuple(f"{x}: " for x in LEDGER))]
-        columns = Columns.of(
-            self.grid, moving="v" in history, cells=len(self.cells.inelastic), ledger=ledger,
-            record=None,
-        )  # fmt: skip
+        columns = Columns.of(self.grid, moving="v" in history, ledger=ledger, record=None)
         if begins:
             columns = columns.plus(BEFORE, (self.grid.size,))
         rows: Array = np.zeros((n, columns.width))
@@ -388,14 +379,15 @@ class States:
 
         The curvature includes the jump of a hinge over the length of its cell.
         """
-        return self._strains(n)[self.grid.cells_of(beam)]
+        return self.mean_strains(n)[self.grid.cells_of(beam)]
 
     def strains_at(self, place: Place) -> Array:
         """(Σ, Γ, K) in the cell at a place, as :meth:`section_forces_at`; (n+1, 3); 1, 1, 1/m."""
         cell = self.grid.cell(place)
-        return np.array([self._strains(n)[cell] for n in range(len(self))])
+        return np.array([self.mean_strains(n)[cell] for n in range(len(self))])
 
-    def _strains(self, n: int) -> Array:
+    def mean_strains(self, n: int) -> Array:
+        """(Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
         strains = np.empty((len(self.grid.cells), 3))
         strains[self.cells.fields.order] = self.cells.strains.mean(self._one("q", n))
         return strains
@@ -409,7 +401,7 @@ class States:
         return self._material(n, self.grid.cells_of(beam))
 
     def _material(self, n: int, cells: Index | int) -> Material:
-        if not len(self.cells.inelastic) and not self.scene.hinges:
+        if not len(self.grid.inelastic_cells) and not self.scene.hinges:
             raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
         chosen = self.cells_of(n, self.cell_forces(n)[:, 0])[cells].T
         return Material(chosen[:3].T, *chosen[3:])
@@ -418,7 +410,7 @@ class States:
         """Column "material" of all cells; elastic ones have these forces; (num_cells, 6)."""
         everything = np.zeros((len(self.grid.cells), self.row(n)[0].shapes["material"][1]))
         everything[:, :3] = forces
-        everything[self.cells.inelastic] = self._one("material", n)
+        everything[self.grid.inelastic_cells] = self._one("material", n)
         return everything
 
     def material_at(self, place: Place) -> Material:

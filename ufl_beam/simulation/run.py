@@ -29,7 +29,7 @@ from ufl_beam.errors import (
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.output_files import Output, take
+from ufl_beam.output.output_files import Output, reserved
 from ufl_beam.output.postprocessing import turned
 from ufl_beam.output.recorders import Recorder, recorders_of
 from ufl_beam.output.state_rows import Columns
@@ -252,7 +252,7 @@ def running(
         stack.callback(simulation.close)
         for recorder in recorders:
             stack.callback(recorder.close)
-        stack.callback(take(outputs))
+        stack.enter_context(reserved(outputs))
         try:
             yield
             check_ledger(simulation)

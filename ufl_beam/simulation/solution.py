@@ -41,7 +41,6 @@ from ufl_beam.output.serialization import (
     SavedFunction,
     difference,
     from_data,
-    lost,
     require_no_code,
     to_data,
 )
@@ -276,7 +275,7 @@ class Opened:
         cells = np.flatnonzero(self.dissipated > 0)
         if not len(cells):
             return
-        rows = np.searchsorted(states.cells.inelastic, cells)
+        rows = np.searchsorted(grid.inelastic_cells, cells)
         dissipated, V = (states.column("material")[:, rows, k] for k in (HINGE, 1))
         self.first[cells] = first = (dissipated > 0).argmax(axis=0)
         # After an opening in a jump V is that of vibrations.
@@ -407,7 +406,7 @@ def text_of(grid: Grid, times: Array, position: Callable[[Anchor], Array]) -> di
             return _used_curve(grid.scene, position, function)
         if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
             return SavedFunction.of(function, map(float, times))
-        return lost(owner, field, function)
+        return None
 
     return {
         "version": version(), "scene": to_data(grid.scene, record), "mesh": to_data(grid.mesh),
