@@ -306,8 +306,8 @@ class Copies:
     def __init__(self, comm: MPI.Intracomm, share: Any) -> None:  # a `Share`, above this module
         self._comm = duplicate(comm)
         scales: Array = np.full(share.size, 1 / share.grid.scene.size)
-        scales[share.rotations()] = 1.0
-        scales[share.multipliers()] = 0.0
+        scales[share.rotations] = 1.0
+        scales[share.multipliers] = 0.0
         self._weights = scales * np.random.default_rng(0).uniform(0.5, 1.0, len(scales))
         self._sum = self._size = self._times = 0.0
         self._steps, self._compared = 0, 0

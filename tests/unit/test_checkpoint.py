@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.discretization.state_io import Restoring, Saving
+from ufl_beam.discretization.state_io import Memory
 from ufl_beam.output import output_files
 from ufl_beam.output.serialization import Description, difference
 from ufl_beam.simulation.checkpoint import FORMAT
@@ -391,7 +391,7 @@ def test_arrays_and_dicts():
 def test_a_state_is_that_of_all_processes():
     simulation = ub.Simulation(scene(), ub.Midpoint())
     share, grid = simulation.share, simulation.grid
-    memory = Saving(share)
+    memory = Memory(share)
     memory.at_dofs("dofs", share.dofs.astype(float))
     memory.added("added", np.ones(share.size))
     memory.total("total", 2.0)
@@ -403,7 +403,7 @@ def test_a_state_is_that_of_all_processes():
     assert state["total"] == 2.0 * share.comm.size
     assert state["number"] == 3.0
     assert (state["cells, 2"][:, 1] == np.arange(len(grid.cells))).all()
-    back = Restoring(share, state)
+    back = Memory(share, state)
     assert (back.at_dofs("dofs", share.dofs) == share.dofs).all()
     assert share.total(back.added("added", share.dofs).sum()) == share.total(share.size)
     assert share.total(back.total("total", 0.0)) == 2.0 * share.comm.size
@@ -415,7 +415,7 @@ def test_a_state_is_that_of_all_processes():
 
 def test_signs_of_zeros_are_kept():
     simulation = ub.Simulation(scene(), ub.Midpoint())
-    memory = Saving(simulation.share)
+    memory = Memory(simulation.share)
     memory.total("zero", -0.0)
     assert math.copysign(1.0, memory.state()["zero"][0]) == -1.0
     simulation.close()

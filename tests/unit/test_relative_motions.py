@@ -94,10 +94,10 @@ class Between:
         r = np.zeros((2, len(self.q0)))
         for force, row in zip((0.0, 1.0), r, strict=True):
             q = self.q1.copy()
-            q[self.simulation.share.multipliers()[self.coupling.numbers]] = force
+            q[self.simulation.share.multipliers[self.coupling.numbers]] = force
             self.coupling.add_residual(q, row)
         difference = r[1] - r[0]
-        difference[self.simulation.share.multipliers()] = 0.0
+        difference[self.simulation.share.multipliers] = 0.0
         return difference
 
 

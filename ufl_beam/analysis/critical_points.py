@@ -120,8 +120,8 @@ def metric(share: Share) -> Array:
     """
     grid = share.grid
     weights = np.full(share.size, 1 / grid.scene.size**2)
-    weights[share.rotations()] = 1.0
-    weights[share.multipliers()] = 0.0
+    weights[share.rotations] = 1.0
+    weights[share.multipliers] = 0.0
     weights[share.num_owned :] = 0.0
     return np.asarray(weights / (grid.size - len(grid.multipliers)))
 

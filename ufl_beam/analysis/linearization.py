@@ -300,7 +300,7 @@ class SmallMotions:
         """The n eigenvalues nearest to zero, with motions whose largest displacement is one."""
         order = np.argsort(np.abs(values), kind="stable")[:n]
         shapes = self._Z @ x[:, order]
-        turns = self._simulation.share.rotations()
+        turns = self._simulation.share.rotations
         sizes = np.abs(shapes)
         sizes[self.grid.multipliers] = 0.0
         turning = sizes[turns].max(axis=0, initial=0.0)

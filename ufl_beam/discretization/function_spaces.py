@@ -130,7 +130,8 @@ def applied(form: ufl.Form, q1: fem.Function) -> ufl.Form:
 class Fields:
     """Cells of one process, or some of them: what forms of the element are evaluated on.
 
-    Loops in C evaluate forms, which are compiled once for all scenes.
+    Loops in C evaluate forms, which are compiled once for all scenes.  A ``part`` are positions in
+    ``share.cells``.
 
     Attributes:
         cell_dofs: Local degrees of freedom of the cells; (num_cells, 3 (degree + 1)).
@@ -146,10 +147,6 @@ class Fields:
         self.cell_dofs = share.cell_dofs if whole else share.cell_dofs[self.order]
         self._matrix: Csr | None = None
         self.element = element_of(share.grid.mesh)
-
-    def part(self, part: Index) -> Fields:
-        """Some of the cells of the process; ``part`` are positions in ``share.cells``."""
-        return Fields(self.share, part)
 
     def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
         """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
@@ -249,7 +246,7 @@ def mass_matrix(fields: Fields) -> Csr:
     """Mass of the beams, the point masses and the bodies."""
     share, M = fields.share, fields.assembled(mass_form(fields.element))
     for place, mass, inertia in lumps(share.grid.scene):
-        dofs = share.at(place)
+        dofs = share.grid.node(place)
         mine = share.owns(dofs)
         here = share.local(dofs[mine])
         M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]

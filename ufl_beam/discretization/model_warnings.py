@@ -161,11 +161,16 @@ def warn_of_far_points(scene: Scene) -> None:
         near = tree.query_ball_point(spot.point, 1e-9 * scene.size)
         if any(others[i][1] is not spot.body for i in near):
             continue
-        if _is_far(spot, np.array([point for point, of in others if of is not spot.body])):
-            (x, y), (cx, cy) = spot.point, spot.body.center
-            out = math.dist(spot.point, spot.body.center)
+        body, ((x, y), (cx, cy)) = spot.body, (spot.point, spot.body.center)
+        out = math.dist(spot.point, body.center)
+        if body.mass and body.inertia:
+            far = out > FAR_OUT * math.sqrt(body.inertia / body.mass)
+        else:
+            box = np.array([*(point for point, of in others if of is not body), body.center])
+            far = _outside(np.array(spot.point), box) > math.hypot(*np.ptp(box, axis=0)) > 0.0
+        if far:
             warn(
-                f"{spot} is {out:.4g} m away from the centre of {spot.body.name}, and nothing else "
+                f"{spot} is {out:.4g} m away from the centre of {body.name}, and nothing else "
                 "is there. body.at(x, y) takes coordinates of the undeformed scene; what is meant "
                 f"relative to the centre is at({cx:g} + {x:g}, {cy:g} + {y:g})"
             )
@@ -180,15 +185,6 @@ def _points(scene: Scene) -> Iterator[tuple[tuple[float, float], object]]:
         yield body.center, body
     for _, place in scene.attachments():
         yield place.point, place.body if isinstance(place, Spot) else place.beam
-
-
-def _is_far(spot: Spot, others: Array) -> bool:
-    """Return true if a point is unlikely for what its body is, or far outside the scene."""
-    body, center = spot.body, np.array(spot.body.center)
-    if body.mass and body.inertia:
-        return math.dist(spot.point, center) > FAR_OUT * math.sqrt(body.inertia / body.mass)
-    box = np.vstack([others.reshape(-1, 2), center])
-    return _outside(np.array(spot.point), box) > float(np.linalg.norm(np.ptp(box, axis=0))) > 0.0
 
 
 def warn_of_origin(scene: Scene) -> None:

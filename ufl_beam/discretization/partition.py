@@ -48,6 +48,7 @@ class Share:
         alone: True if there is only one process; asking MPI takes longer.
         cells: Numbers of the cells of this process, ascending.
         dofs: Degrees of freedom, in numbers of the grid, by local number.
+        size: How many there are, ghosts included.
         num_owned: How many of them this process owns.
         ghosts: Global numbers of the others.
         cell_dofs: Local degrees of freedom of the cells: all u, all v, all ψ of their nodes;
@@ -56,6 +57,8 @@ class Share:
         body_dofs: Local degrees of freedom of the bodies that are here; (num, 3).
         link_dofs: Local degrees of freedom of the connectors: those of a cell, and their force;
             shape (len(links), 7).
+        rotations, multipliers: Local numbers of all rotations, and of the forces of connectors;
+            int32.
     """
 
     def __init__(self, grid: Any, comm: MPI.Intracomm) -> None:
@@ -89,7 +92,7 @@ class Share:
         ghost[of_link[self.links]] = True
         ghost &= ~own
         self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
-        self.num_owned = int(own.sum())
+        self.size, self.num_owned = len(self.dofs), int(own.sum())
         self.ghosts: Index = number[self.dofs[self.num_owned :]]
         self._local: Index = np.full(grid.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
@@ -100,23 +103,15 @@ class Share:
         self._all_owned: Index = order
         if self.alone:  # all numbers are the same
             self._local = self._all_owned = self.dofs
-        self._rotations = np.sort(self.local(grid.rotations)).astype(np.int32)
+        self.rotations = np.sort(self.local(grid.rotations)).astype(np.int32)
+        self.multipliers = self.local(grid.multipliers).astype(np.int32)
         self._parts: Array = np.empty(0 if self.alone else grid.size)  # new memory is slow
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
-
-    @property
-    def size(self) -> int:
-        """Number of local degrees of freedom, ghosts included."""
-        return len(self.dofs)
 
     @cached_property
     def scratch(self) -> Array:
         """Space for a number of each degree of freedom; loops in C leave it to what comes after."""
         return np.empty(self.size)
-
-    def at(self, anchor: Anchor) -> Index:
-        """Degrees of freedom (numbers of the grid) of what an anchor moves with; shape (3,)."""
-        return np.asarray(self.grid.node(anchor))
 
     def computes(self, anchor: Anchor) -> bool:
         """Return whether this process has the (first) cell at a place, or owns a body.
@@ -124,13 +119,9 @@ class Share:
         It then has all degrees of freedom of the place, even if others own some of them.
         """
         if isinstance(anchor, Spot):
-            return bool(self.owns(self.at(anchor)).all())
+            return bool(self.owns(self.grid.node(anchor)).all())
         place = np.searchsorted(self.cells, cell := self.grid.cell(anchor))
         return bool(np.any(self.cells[place : place + 1] == cell))
-
-    def rotations(self) -> Index:
-        """Local numbers of all rotations; int32."""
-        return self._rotations
 
     def translations(self) -> tuple[Index, Index]:
         """Local numbers of both components of all displacements."""
@@ -140,14 +131,6 @@ class Share:
         x, y = found[(found >= 0).all(axis=1)].T
         return x, y
 
-    def multipliers(self) -> Index:
-        """Local numbers of the forces of connectors."""
-        return self.local(self.grid.multipliers)
-
-    def cell_lengths(self) -> Array:
-        """Lengths of the cells; m."""
-        return np.asarray(self.grid.lengths(self.cells))
-
     def lengths(self) -> Array:
         """Change of each local dof by a strain of one: a cell's length, or a radian.
 
@@ -155,16 +138,16 @@ class Share:
         """
         lengths = np.full(self.size, self.grid.scene.size)
         displacements = self.cell_dofs[:, : 2 * (self.grid.mesh.degree + 1)]
-        lengths[displacements] = self.cell_lengths()[:, None]
-        lengths[self.rotations()] = 1.0
-        lengths[self.multipliers()] = 0.0
+        lengths[displacements] = self.grid.lengths(self.cells)[:, None]
+        lengths[self.rotations] = 1.0
+        lengths[self.multipliers] = 0.0
         return lengths
 
     def weights(self) -> Array:
         """Factors that make forces and moments comparable, see ``StepEquation``; a new array."""
         weights = np.ones(self.size)
-        weights[self.rotations()] = 1 / self.grid.scene.size
-        weights[self.multipliers()] = 0.0
+        weights[self.rotations] = 1 / self.grid.scene.size
+        weights[self.multipliers] = 0.0
         weights[self.num_owned :] = 0.0
         return weights
 

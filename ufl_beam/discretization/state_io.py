@@ -7,7 +7,6 @@ is; the same statement writes it down and takes it back.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
 from collections import defaultdict
 
 import numpy as np
@@ -22,11 +21,16 @@ NOWHERE: Array = np.empty(0)
 of the scene."""
 
 
-class Memory(ABC):
-    """Takes what a process remembers and gives back what it is to remember."""
+class Memory:
+    """What a process remembers: without a ``state`` it is written down, with one it is given back.
 
-    def __init__(self, share: Share) -> None:
-        self._share = share
+    Methods return the values that they get, or those of the state.
+    """
+
+    def __init__(self, share: Share, state: State | None = None) -> None:
+        self._share, self._given = share, state
+        self._sums: dict[str, tuple[int, Index, Array]] = {}
+        self._rows: defaultdict[str, list[Array]] = defaultdict(list)
         self._one = (1, np.zeros(1, dtype=int), int(share.comm.rank == 0))
         self._dofs = (share.grid.size, share.dofs, share.num_owned)
 
@@ -46,15 +50,6 @@ class Memory(ABC):
         """Values at the local degrees of freedom whose sums over the processes mean something."""
         return self._values(name, values, *self._dofs, summed=True)
 
-    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Rows of numbered things that all processes know."""
-        return self.rows(name, numbers, rows)
-
-    @abstractmethod
-    def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Rows of numbered things, each on one process only; of any lengths under one name."""
-
-    @abstractmethod
     def _values(
         self, name: str, values: Array, size: int, where: Index, owned: int, *, summed: bool = False
     ) -> Array:
@@ -62,34 +57,47 @@ class Memory(ABC):
 
         They are alike on all processes that have a place, or addends where they are ``summed``.
         """
+        if self._given is None:
+            mine = len(values) if summed else owned
+            self._sums[name] = size, where[:mine], values[:mine].copy()
+            return values
+        here = self._found(name, (size,))[where]
+        if summed:
+            here[owned:] = 0.0  # the owner has all of it
+        return np.asarray(here)
 
+    def rows(self, name: str, numbers: Index, rows: Array, *, known: bool = False) -> Array:
+        """Rows of numbered things, each on one process only, or all of them ``known`` to all.
 
-class Saving(Memory):
-    """A memory that writes down; :meth:`state` is what came together."""
+        Those of one name may have different lengths.  Rows that a state does not have stay.
+        """
+        columns = rows.shape[1]
+        table_of = f"{name}, {columns}"
+        if self._given is None:
+            if not known or self._share.comm.rank == 0:
+                self._rows[table_of].append(np.column_stack([numbers, rows]))
+            return rows
+        if not self.has(table_of):
+            return rows
+        table = self._found(table_of, (-1, columns + 1))
+        found = np.minimum(np.searchsorted(table[:, 0], numbers), len(table) - 1)
+        there = table[found, 0] == numbers
+        return np.where(there[:, None], table[found, 1:], rows)
 
-    def __init__(self, share: Share) -> None:
-        super().__init__(share)
-        self._sums: dict[str, tuple[int, Index, Array]] = {}
-        self._rows: defaultdict[str, list[Array]] = defaultdict(list)
+    def has(self, name: str) -> bool:
+        """Return whether the state that is given back has numbers of this name."""
+        return self._given is not None and name in self._given
 
-    def _values(
-        self, name: str, values: Array, size: int, where: Index, owned: int, *, summed: bool = False
-    ) -> Array:
-        mine = len(values) if summed else owned
-        self._sums[name] = size, where[:mine], values[:mine].copy()
+    def _found(self, name: str, shape: tuple[int, ...]) -> Array:
+        """Return an array of the state; :class:`SceneError` if it has not the shape; -1 is any."""
+        values = (self._given or {}).get(name)
+        if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
+            found = "missing" if values is None else f"of shape {values.shape}"
+            raise SceneError(f"the array {name!r} of the state is {found}, and must be {shape}")
         return values
 
-    def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Save numbered rows of a table."""
-        self._rows[f"{name}, {rows.shape[1]}"].append(np.column_stack([numbers, rows]))
-        return rows
-
-    def known_rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Save rows that all processes know, once."""
-        return self.rows(name, numbers, rows) if self._share.comm.rank == 0 else rows
-
     def state(self) -> State:
-        """Return the state of all processes, on each of them; they call it together."""
+        """Return what all processes have written down, on each of them; they call it together."""
         here = self._sums, self._rows
         everyone = [here] if self._share.comm.size == 1 else self._share.comm.allgather(here)
         state: State = {}
@@ -104,41 +112,3 @@ class Saving(Memory):
             table = np.concatenate(parts)
             state[name] = table[np.argsort(table[:, 0])]
         return state
-
-
-class Restoring(Memory):
-    """A memory that gives back a state; rows that the state does not have stay as they are."""
-
-    def __init__(self, share: Share, state: State) -> None:
-        super().__init__(share)
-        self._state = state
-
-    def has(self, name: str) -> bool:
-        """Return true if the state has numbers of this name."""
-        return name in self._state
-
-    def _values(
-        self, name: str, values: Array, size: int, where: Index, owned: int, *, summed: bool = False
-    ) -> Array:
-        here = self._found(name, (size,))[where]
-        if summed:
-            here[owned:] = 0.0  # the owner has all of it
-        return np.asarray(here)
-
-    def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Return the saved rows of these numbers."""
-        columns = rows.shape[1]
-        if f"{name}, {columns}" not in self._state:
-            return rows
-        table = self._found(f"{name}, {columns}", (-1, columns + 1))
-        found = np.minimum(np.searchsorted(table[:, 0], numbers), len(table) - 1)
-        known = table[found, 0] == numbers
-        return np.where(known[:, None], table[found, 1:], rows)
-
-    def _found(self, name: str, shape: tuple[int, ...]) -> Array:
-        """Return an array of the state; :class:`SceneError` if it has not the shape; -1 is any."""
-        values = self._state.get(name)
-        if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
-            found = "missing" if values is None else f"of shape {values.shape}"
-            raise SceneError(f"the array {name!r} of the state is {found}, and must be {shape}")
-        return values

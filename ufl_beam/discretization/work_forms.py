@@ -13,13 +13,11 @@ from ufl.core.expr import Expr
 from ufl.domain import extract_domains
 
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.function_spaces import Element, element_of
+from ufl_beam.discretization.function_spaces import Element
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError, shorten
 from ufl_beam.mechanics.kinematics import split
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.beams import Mesh
-from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork, Work
 
 GROWTH = "growth of works"
@@ -72,12 +70,16 @@ def _statement(
 ) -> Statement:  # fmt: skip
     work = kind(name, density.function, numbers=dict.fromkeys(names, 1.0), degree=degree)
     state = _of_virtual_work if issubclass(kind, VirtualWork) else _of_potential
-    return state(work, of, scheme, {name: of.in_cells() for name in ("t", "dt", GROWTH, *names)})
+    numbers = {name: of.in_cells() for name in ("t", "dt", GROWTH, *names)}
+    residual, *energies = state(work, of, scheme, numbers)
+    derivative = ufl.derivative(residual, of.q1, ufl.TrialFunction(of.space))
+    return Statement(residual, expand_derivatives(derivative), numbers, *energies)
 
 
 def _of_virtual_work(
     work: Work, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
-) -> Statement:
+) -> tuple[ufl.Form]:
+    """State minus the virtual work."""
     q0, q1, w = of.q0, of.q1, of.w
     part, v = scheme.load_weight, (q1 - q0) / numbers["dt"]
     q = (1.0 - part) * q0 + part * q1
@@ -89,13 +91,13 @@ def _of_virtual_work(
         raise SceneError(
             f"{work}: the function must return what is linear in w, such as f * w[1]"
         ) from None
-    residual = -numbers[GROWTH] * density * dx
-    return Statement(residual, _derivative(residual, of), numbers)
+    return (-numbers[GROWTH] * density * dx,)
 
 
 def _of_potential(
     work: Work, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
-) -> Statement:
+) -> tuple[ufl.Form, ufl.Form, ufl.Form | None]:
+    """State minus the virtual work, the energy at the end of a step, and what that loses of it."""
     q0, q1, w, q, dx = of.q0, of.q1, of.w, of.configuration(), of.dx(work.degree)
     energy = _returned(work, {"q": q, "axis": of.anywhere, **numbers}, of)
     gradient = expand_derivatives(ufl.derivative(energy, q, w))
@@ -105,28 +107,19 @@ def _of_potential(
     def along(way: Expr, at: Expr) -> Expr:
         return ufl.replace(gradient, {q: at, w: way})
 
-    s = _variation(of, scheme)
+    # The variation that is the increment of q, everywhere, if w is the step of the nodes
+    axis = of.anywhere
+    (_, ψ0), (_, ψ1), (w_u, w_ψ) = map(split, (q0, q1, w))
+    pairs = zip(axis.at_nodes(ψ1 - ψ0), axis.at_nodes(w_ψ), strict=True)
+    turn, _ = axis.interpolate([scheme.virtual_turn(0.0, turned, way) for turned, way in pairs])
+    s = ufl.as_vector([w_u[0], w_u[1], turn])
     force = scheme.mean(lambda at: along(s, at), q0, q1)
     lost = None
     if scheme.alpha:
         part, way = of.constant(scheme.alpha), q1 - q0
         force += part * (along(s, q1) - along(s, q0))
         lost = part * (along(way, q1) - along(way, q0)) * dx
-    stored = ufl.replace(energy, {q: q1}) * dx
-    return Statement(force * dx, _derivative(force * dx, of), numbers, stored, lost)
-
-
-def _variation(of: Element, scheme: Scheme) -> Expr:
-    """Variation that is the increment of q, everywhere, if w is the step of the nodes."""
-    axis = of.anywhere
-    (_, ψ0), (_, ψ1), (w_u, w_ψ) = map(split, (of.q0, of.q1, of.w))
-    pairs = zip(axis.at_nodes(ψ1 - ψ0), axis.at_nodes(w_ψ), strict=True)
-    turn, _ = axis.interpolate([scheme.virtual_turn(0.0, turned, w) for turned, w in pairs])
-    return ufl.as_vector([w_u[0], w_u[1], turn])
-
-
-def _derivative(residual: ufl.Form, of: Element) -> ufl.Form:
-    return expand_derivatives(ufl.derivative(residual, of.q1, ufl.TrialFunction(of.space)))
+    return force * dx, ufl.replace(energy, {q: q1}) * dx, lost
 
 
 def _returned(work: Work, known: Mapping[str, Any], of: Element) -> Expr:
@@ -153,9 +146,3 @@ def _returned(work: Work, known: Mapping[str, Any], of: Element) -> Expr:
             "`numbers` for what it needs besides"
         )
     return value
-
-
-def require_works(scene: Scene, scheme: Scheme, mesh: Mesh) -> None:
-    """Raise :class:`SceneError` if the function of a work is wrong."""
-    for work in scene.works:
-        statement(work, element_of(mesh), scheme)

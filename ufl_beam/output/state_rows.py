@@ -215,7 +215,7 @@ class StateWriter:
         held = [  # of supports, those that this process owns, and their numbers in the row
             (dof, at["reactions"].start + 3 * k + c)
             for k, support in enumerate(grid.scene.supports)
-            for c, dof in ((c, share.at(support.place)[c]) for c in support.held)
+            for c, dof in ((c, share.grid.node(support.place)[c]) for c in support.held)
             if share.owns(np.array([dof]))[0]
         ]  # fmt: skip
         dofs, to = np.array(held, dtype=np.int64).reshape(-1, 2).T

@@ -12,7 +12,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import NOWHERE, Memory, Restoring, Saving, State
+from ufl_beam.discretization.state_io import NOWHERE, Memory, State
 from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_laws import rubs
@@ -64,7 +64,7 @@ class Assembly:
 
     def internal_variables(self, q: Array, t: float) -> State:
         """Return what a run that starts here takes over: internal variables, reactions, rates."""
-        memory = Saving(self.equation.share)
+        memory = Memory(self.equation.share)
         self.controllers.remember(memory, t)
         for one in self.remembering:
             one.remember(memory, q)
@@ -93,7 +93,7 @@ class Assembly:
         ``internal`` are the :meth:`internal_variables` of a run of the same scene that ended there.
         """
         v = None if self.inertia is None else self.inertia.v
-        past = None if internal is None else Restoring(self.equation.share, internal)
+        past = None if internal is None else Memory(self.equation.share, internal)
         return [load.carry_on(t, q, v, past) for load in self.loads]
 
     def take_over(self, q: Array, t: float, internal: State, *, same: bool) -> None:
@@ -101,7 +101,7 @@ class Assembly:
 
         ``same`` says that no force has changed since, so that accelerations are what they were.
         """
-        memory = Restoring(self.equation.share, internal)
+        memory = Memory(self.equation.share, internal)
         self.controllers.remember(memory, t)
         for one in self.remembering:
             one.remember(memory, NOWHERE)
@@ -153,7 +153,7 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
         part = np.flatnonzero(np.isin(share.cells, cells))
         if len(part):
             elastic[part] = False
-            inelastic.append(InelasticBeams(fields.part(part), layout, *setting, search))
+            inelastic.append(InelasticBeams(Fields(share, part), layout, *setting, search))
     beams: list[Cells] = [*inelastic]
     loses = scheme.alpha or isinstance(scheme, DecayingMidpoint)
     if loses and sum(len(cells) for _, cells in share.grid.inelastic) < len(share.grid.cells):
@@ -161,7 +161,7 @@ def assemble(share: Share, scheme: Scheme, t0: float, v: Array, together: Agreem
     numerical: list[Term] = []
     if elastic.any():
         part = np.flatnonzero(elastic)
-        on_part = fields if elastic.all() else fields.part(part)
+        on_part = fields if elastic.all() else Fields(share, part)
         beams.append(ElasticBeams(on_part, *setting))
         if isinstance(scheme, DecayingMidpoint):
             numerical.append(SecondDifferences(scheme, on_part, A, ledger))

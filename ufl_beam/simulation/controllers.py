@@ -109,7 +109,7 @@ class Controllers:
         held[:, 0], held[:, 3] = self.numbers, t
         sampled = [self._at[link] for link in self.sampled]
         held[sampled, 1:3] = self._samples
-        rows = memory.known_rows("asked", self._numbers, held)
+        rows = memory.rows("asked", self._numbers, held, known=True)
         self.numbers[:] = rows[:, 0]
         if np.all(rows[:, 3] == t):
             self._samples[:] = rows[sampled, 1:3]

@@ -214,8 +214,8 @@ def _near(equation: StepEquation, q0: Array, q1: Array) -> Array:
     """A state on the way from ``q0`` to ``q1``, at most :data:`NEAR` away."""
     share, size = equation.share, equation.share.grid.scene.size
     way = np.abs(q1 - q0)
-    way[share.multipliers()] = 0.0
-    way[share.rotations()] *= size
+    way[share.multipliers] = 0.0
+    way[share.rotations] *= size
     far = share.largest(float(way.max(initial=0.0))) / size
     return np.asarray(q0 + min(1.0, NEAR / far) * (q1 - q0)) if 0 < far < np.inf else q0
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.function_spaces import element_of
 from ufl_beam.discretization.model_warnings import (
     warn_of_far_points,
     warn_of_free_hinges,
@@ -20,7 +21,7 @@ from ufl_beam.discretization.model_warnings import (
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
-from ufl_beam.discretization.work_forms import require_works
+from ufl_beam.discretization.work_forms import statement
 from ufl_beam.errors import SceneError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
 from ufl_beam.memory import no_garbage_collection
@@ -63,7 +64,8 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool) -> tu
         if fresh and scheme.theta < 1:  # it would oscillate about equilibrium for ever
             instead = "begin with a run by Static() or ExactStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
-    require_works(scene, scheme, mesh)
+    for work in scene.works:
+        statement(work, element_of(mesh), scheme)
     require_independent(scene)
     warn_of_far_points(scene)
     warn_of_free_hinges(scene)

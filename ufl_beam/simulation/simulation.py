@@ -15,7 +15,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory, Restoring, Saving, State
+from ufl_beam.discretization.state_io import Memory, State
 from ufl_beam.display import Parameter
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten, warn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
@@ -454,13 +454,13 @@ class Simulation(StateView):
 
     def state(self) -> State:
         """Return the state on which later steps depend; all processes call it together."""
-        memory = Saving(self.share)
+        memory = Memory(self.share)
         self._pass_on(memory)
         return memory.state()
 
     def resume(self, state: State) -> None:
         """Go on from a :meth:`state`, perhaps of other processes."""
-        self._pass_on(Restoring(self.share, state))
+        self._pass_on(Memory(self.share, state))
         self.ledger.begin()
         self.equation.add_state(self.q)
         self._stepper.begin_at(self, self.t, self.q)

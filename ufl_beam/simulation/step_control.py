@@ -131,7 +131,7 @@ class AdaptiveSteps:
         self._stops = [*apart, t1]
         self._fresh = True
         share = simulation.share
-        self._turns, (self._x, self._y) = share.rotations(), share.translations()
+        self._turns, (self._x, self._y) = share.rotations, share.translations()
         M = simulation.inertia.M
         bears = np.bincount(M.rows(), weights=np.abs(M.data), minlength=share.size)
         self._massless = np.flatnonzero(bears == 0.0)

@@ -312,7 +312,7 @@ class StaticPath:
         """``static_path`` of loops.h; ``changes`` are those of the terms."""
         parts = self._ledger.state, self._ledger.supplied, self._ledger.lost
         per_far = np.full(self._share.size, 1 / self._share.grid.scene.size)
-        per_far[self._share.rotations()] = 1.0
+        per_far[self._share.rotations] = 1.0
         self._c = struct(
             "static_path", slack=self._scheme.slack, far=FAR, kink=KINK, per_far=per_far,
             force=self.force, terms=len(changes),

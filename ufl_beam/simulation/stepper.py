@@ -155,11 +155,11 @@ class Stepper:
         fill(equation.c, agains=len(again), again=ffi.new("again_call[]", again))
         least = LEAST_IN_MOTION if inertia is not None else LEAST_AT_REST
         self.solver = solver = Solver(share, equation, newton, least)
-        rotations = share.rotations()
+        rotations = share.rotations
         half_tangents, in_motion = with_half_tangents(scheme, rotations), has_inertia(scheme)
         self._bytes = 8 * share.size
         loads = [one.vector for one in equation.loads]
-        multipliers = share.multipliers().astype(np.int32)
+        multipliers = share.multipliers.astype(np.int32)
         opens = [one.opens for one in phases if one.opens is not None]
         places = ffi.new("openable[]", opens)
         admits = [one.admits for one in phases if one.admits is not None]

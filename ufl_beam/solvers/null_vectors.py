@@ -121,7 +121,7 @@ def hold_idle_motions(
     if not share.total(float(new.any())) or share.total(float(driven.any())):
         return False
     turns, owned = np.isin(share.dofs, grid.rotations), np.arange(share.size) < share.num_owned
-    owned[share.multipliers()] = False
+    owned[share.multipliers] = False
     entries = np.abs(A.data[diagonal])
     for alike in (turns & owned, ~turns & owned):
         stiffest = share.largest(float(entries[alike].max(initial=0.0)))

@@ -288,7 +288,7 @@ class InelasticBeams(Cells):
         self.predicted = None if has_inertia(scheme) else PredictedStrains(fields)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
-        share, lengths = fields.share, fields.share.cell_lengths()[fields.order]
+        share, lengths = fields.share, fields.share.grid.lengths(self._cells)
         keys = share.grid.keys(self._cells)
         self.points = Points(layout, keys, lengths, scheme, search, predicts=True)
 

@@ -185,7 +185,7 @@ class Inertia(Term):
     def __init__(
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, rates: RatesInC
     ) -> None:
-        rotations = with_half_tangents(scheme, fields.share.rotations())
+        rotations = with_half_tangents(scheme, fields.share.rotations)
         self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
         self.loops, at = self._times.loops, (fields.order, self._times.rate)
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at)]
@@ -303,7 +303,7 @@ class RayleighForces(Term):
         C, M, form = fields.matrix(), mass_matrix(fields), _reference_stiffness(fields.element)
         K = fields.assembled(form)
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
-        rotations = with_half_tangents(scheme, fields.share.rotations())
+        rotations = with_half_tangents(scheme, fields.share.rotations)
         self._times = StepProduct(C, rotations, A, fields.share.scratch)
         self.loops = self._times.loops
         self._ledger, self._rates, self._A = ledger, rates, A
@@ -343,7 +343,7 @@ def damping_forces(
     part = np.flatnonzero(np.isin(fields.share.cells, cells))
     if not len(part):
         return []
-    return [KelvinVoigtForces(of, fields.part(part), scheme, A, ledger)]
+    return [KelvinVoigtForces(of, Fields(fields.share, part), scheme, A, ledger)]
 
 
 # -- of schemes ----------------------------------------------------------------------------------

@@ -24,7 +24,7 @@ from ufl_beam.discretization.function_spaces import (
     mass_matrix,
 )
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory, Restoring, Saving
+from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.kinematics import split, turn
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import carries
@@ -47,13 +47,13 @@ class LoadTerm(Term):
     _ledger: Ledger
 
     @abstractmethod
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them.
 
         ``v`` are the velocities, None in statics; ``past`` is the end of a run of the same scene.
         """
 
-    def pass_on(self, memory: Saving) -> None:
+    def pass_on(self, memory: Memory) -> None:
         """Save the forces of the last step that :meth:`carry_on` could not find again."""
 
 
@@ -135,7 +135,7 @@ class DeadLoads(_AtDofs):
         )  # fmt: skip
         return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
 
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         self._parts[:3] = factors = self._factors_at(t)
         self._forces[:] = sum(f * vector for f, vector in zip(factors, self._vectors, strict=True))
@@ -169,12 +169,12 @@ def _add_forces(load: Load, share: Share, forces: Array) -> Array | None:
         raise TypeError(f"{type(load).__name__} is not a dead load")
     for place, force in at_places:
         if carries(place):  # else Scene.links has connectors for it
-            dofs = share.at(place)
+            dofs = share.grid.node(place)
             mine = share.owns(dofs)
             forces[share.local(dofs[mine])] += np.array(force)[mine]
     if per_beam is None:
         return None
-    loads = per_beam[grid.beam_of_cell[share.cells]] * share.cell_lengths()[:, None]
+    loads = per_beam[grid.beam_of_cell[share.cells]] * share.grid.lengths(share.cells)[:, None]
     first, *between, last = grid.mesh.parts
     return np.kron(loads, [first, last, *between])
 
@@ -189,7 +189,7 @@ class FollowerLoads(_AtDofs):
         here = [i for i, load in enumerate(loads) if share.computes(load.place)]
         owners = [loads[i] for i in here]
         self._numbers: Index = np.array(here, dtype=np.int64)
-        places = [share.local(share.at(load.place)) for load in owners]
+        places = [share.local(share.grid.node(load.place)) for load in owners]
         dofs = np.array(places, dtype=np.int32).reshape(-1, 3)
         x, y, self._turning = np.ascontiguousarray(dofs.T)
         loaded: Array = np.zeros(share.size)
@@ -219,7 +219,7 @@ class FollowerLoads(_AtDofs):
         c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
 
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
         """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
         self._sizes[:] = self._given * self._factors_at(t).reshape(-1, 1)
         self._turns[:] = q[self._turning]
@@ -253,12 +253,12 @@ class FrameForces(LoadTerm):
         # Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force
         S, G = mass_matrix(fields), fields.assembled(_turned_mass(fields.element))
         for at, mass, _ in lumps(share.grid.scene):
-            dofs = share.at(at)[:2]
+            dofs = share.grid.node(at)[:2]
             if share.owns(dofs).all():
                 u, v = share.local(dofs)
                 G.data[G.positions(np.array([u, v]), np.array([v, u]))] += (-mass, mass)
         coriolis = 2 * frame.rate if has_inertia(scheme) else 0.0
-        S.data[np.isin(S.rows(), share.rotations())] = 0.0
+        S.data[np.isin(S.rows(), share.rotations)] = 0.0
         S.data *= frame.rate**2
         G.data *= coriolis
         self._matrices, self._A = (Product(S), Product(G)), A
@@ -290,7 +290,7 @@ class FrameForces(LoadTerm):
         self._c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
 
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
         """The forces at ``q``; take that state as one that is in equilibrium with them."""
         self._c.grown = 1.0
         still = np.zeros(len(q))

@@ -41,9 +41,9 @@ class Supports:
         held: list[int] = []
         self._motions: list[tuple[int, TimeFunction, Support]] = []
         if GROUND in share.grid.scene.rigid_bodies:
-            held.extend(share.local(share.at(GROUND.middle)))
+            held.extend(share.local(share.grid.node(GROUND.middle)))
         for support in share.grid.scene.supports:
-            dofs = share.at(support.place)
+            dofs = share.grid.node(support.place)
             if support.angle and len(share.local(dofs[:2])):
                 turned.append(_turned_axes(share.local(dofs[:2]), support.angle, A))
             for component, motion in support.held.items():

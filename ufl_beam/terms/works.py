@@ -16,7 +16,7 @@ from ufl_beam.compiled.c_library import ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields, element_of
-from ufl_beam.discretization.state_io import Memory, Restoring, Saving
+from ufl_beam.discretization.state_io import Memory
 from ufl_beam.discretization.work_forms import Statement, statement
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError, shorten
@@ -85,7 +85,7 @@ class Acting:
             of_time=callbacks.of_time([(number, work) for number in given]), **entries,
         )  # fmt: skip
 
-    def take(self, q: Array, past: Restoring | None) -> Array:
+    def take(self, q: Array, past: Memory | None) -> Array:
         """Take forces at ``q`` as those before the next step, or those that ``past`` knows."""
         force = np.zeros(len(q))
         self.residual.add(q, force)
@@ -155,7 +155,7 @@ class Works(LoadTerm):
             cells = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
             part = np.flatnonzero(np.isin(share.cells, cells))
             if len(part):
-                of = fields if len(part) == len(share.cells) else fields.part(part)
+                of = fields if len(part) == len(share.cells) else Fields(share, part)
                 self._parts.append(Acting(work, stated, of, scheme, A))
         self._force, space = np.zeros((2, share.size))
         self.vector = struct("vector", size=share.size, values=self._force)
@@ -180,7 +180,7 @@ class Works(LoadTerm):
         begin, accept = loop("begin_works", self._c), loop("accept_works", self._c)
         return Phases([begin], [accept], [loop("add_energy_of_works", self._c)])
 
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Restoring | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
         """The forces at ``q``; take that state as one that is in equilibrium with them."""
         self._c.t, self._c.grown = t, 1.0
         # As at the end of a second in which the velocities stayed.
@@ -192,7 +192,7 @@ class Works(LoadTerm):
         self._force[:] = sum(one.take(q, past) for one in self._parts)
         return self._force.copy()
 
-    def pass_on(self, memory: Saving) -> None:
+    def pass_on(self, memory: Memory) -> None:
         """Save the forces of works that depend on the motion of the last step."""
         for one in self._parts:
             if one.passes_on:
