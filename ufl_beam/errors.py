@@ -207,6 +207,7 @@ def require_number(
     *,
     positive: bool = False,
     at_least: float = -math.inf,
+    at_most: float = math.inf,
     infinite: bool = False,
 ) -> float:
     """Return ``value`` as a float in range, or raise :class:`SceneError` naming ``what``.
@@ -225,12 +226,9 @@ def require_number(
         raise SceneError(f"{what} = {number:g} must be positive")
     if number < at_least:
         raise SceneError(f"{what} = {number:g} must be at least {at_least:g}")
+    if number > at_most:
+        raise SceneError(f"{what} = {number:g} must lie between {at_least:g} and {at_most:g}")
     return number
-
-
-def require_from_zero_to_infinity(value: Any, what: str) -> None:
-    """Raise :class:`SceneError` unless ``value`` is a non-negative number or infinity."""
-    require_number(value, what, at_least=0.0, infinite=True)
 
 
 def require_returned(value: object, function: str, at: str, *, finite: bool = False) -> float:
@@ -268,8 +266,16 @@ def require_kind(value: Any, kind: type | tuple[type, ...], what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless ``value`` is an instance of ``kind``."""
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
-        names = " or ".join(k.__name__ for k in kinds)
+        names = " or ".join(getattr(k, "called", k.__name__) for k in kinds)
         raise SceneError(f"{what} = {shorten(value)} is not a {names}")
+
+
+def require_all(value: Any, what: str, kind: type | tuple[type, ...]) -> tuple[Any, ...]:
+    """Return ``value`` as a tuple of instances of ``kind``, or raise :class:`SceneError`."""
+    records = require_sequence(value, what)
+    for i, record in enumerate(records):
+        require_kind(record, kind, f"{what}[{i}]")
+    return records
 
 
 def closed(instead: str) -> Callable[[type[T]], type[T]]:

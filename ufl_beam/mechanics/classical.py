@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import Coefficients, Constant, require_between
+from ufl_beam.mechanics.time_schemes import Coefficients, Constant
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
 
@@ -243,7 +243,7 @@ class GeneralizedAlpha(_Accelerated):
     advice = "Try a smaller dt, a smaller rho_inf, or DecayingMidpoint(), whose energy is bounded"
 
     def __post_init__(self) -> None:
-        require_between("GeneralizedAlpha: rho_inf", self.rho_inf, 0.0, 1.0)
+        require_number(self.rho_inf, "GeneralizedAlpha: rho_inf", at_least=0.0, at_most=1.0)
 
     @property
     def weights(self) -> Weights:  # type: ignore[override]

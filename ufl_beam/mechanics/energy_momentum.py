@@ -12,10 +12,11 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
+from ufl_beam.errors import require_number
 from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.classical import InParts, PlainStep
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import Coefficients, Constant, require_between
+from ufl_beam.mechanics.time_schemes import Coefficients, Constant
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
 
@@ -114,7 +115,7 @@ class ExactStatic(InParts, ExactStep):
     slack = math.inf
 
     def __post_init__(self) -> None:
-        require_between("ExactStatic: theta", self.theta, 0.5, 1.0)
+        require_number(self.theta, "ExactStatic: theta", at_least=0.5, at_most=1.0)
 
     @property
     def alpha(self) -> float:  # type: ignore[override]
@@ -209,7 +210,7 @@ class Midpoint(ExactStep, _Velocities):
 
     def __post_init__(self) -> None:
         for name in ("alpha", "beta"):
-            require_between(f"Midpoint: {name}", getattr(self, name), 0.0, 0.5)
+            require_number(getattr(self, name), f"Midpoint: {name}", at_least=0.0, at_most=0.5)
 
 
 @dataclass(frozen=True)
@@ -251,7 +252,7 @@ class DecayingMidpoint(ExactStep, Midway):
     looks_back = True
 
     def __post_init__(self) -> None:
-        require_between("DecayingMidpoint: rho_inf", self.rho_inf, 1 / 3, 1.0)
+        require_number(self.rho_inf, "DecayingMidpoint: rho_inf", at_least=1 / 3, at_most=1.0)
 
     @property
     def part(self) -> float:

@@ -18,7 +18,6 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.display import in_one_line
-from ufl_beam.errors import SceneError, require_number
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
@@ -189,12 +188,6 @@ class DynamicScheme(Scheme, Protocol):
 def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
     """Return whether the scheme is a dynamic one."""
     return scheme.dynamic
-
-
-def require_between(what: str, value: float, low: float, high: float) -> None:
-    """Raise :class:`SceneError` if a number of a scheme lies outside its range."""
-    if require_number(value, what, at_least=low) > high:
-        raise SceneError(f"{what} = {value:g} must lie between {low:g} and {high:g}")
 
 
 def acting(scheme: Scheme, before: Array, now: Array) -> Array:

@@ -7,13 +7,15 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
 from fractions import Fraction
-from functools import cache, cached_property
+from functools import cached_property, partial
 from itertools import accumulate, pairwise
 from numbers import Rational, Real
+from typing import Annotated
 
 import numpy as np
 import numpy.typing as npt
 
+from ufl_beam.arrays import Array
 from ufl_beam.display import one_line
 from ufl_beam.errors import (
     SceneError,
@@ -22,7 +24,6 @@ from ufl_beam.errors import (
     require_memory,
     require_number,
     require_sequence,
-    require_text,
     require_vector,
     shorten,
     warn,
@@ -30,11 +31,14 @@ from ufl_beam.errors import (
 from ufl_beam.model.bodies import TOGETHER, Member, Place
 from ufl_beam.model.connector_laws import HingeLaw, require_hinge_law
 from ufl_beam.model.functions import Arc, Curve, Point, Polyline, Straight, point_of
+from ufl_beam.model.records import Instance, Record, Text
 from ufl_beam.model.sections import Section
+
+End = Annotated[Point, require_vector, "end"]
 
 
 @dataclass(frozen=True, eq=False)
-class Beam(Member):
+class Beam(Record, Member):
     """Beam with straight cells along a curve, by default along the line from ``a`` to ``b``.
 
     Args:
@@ -63,38 +67,41 @@ class Beam(Member):
         column.end (0, 3) and arch.start (5, 0)
     """
 
-    a: Point
-    b: Point
-    section: Section
+    a: End
+    b: End
+    section: Instance[Section]
     _: KW_ONLY
-    cells: int = 8
-    name: str = "beam"
+    cells: Annotated[int, require_count] = 8
+    name: Text = "beam"
     curve: Curve = field(default=None, repr=False)  # type: ignore[assignment]
-    corners: tuple[float, ...] = ()
-    hinges: Mapping[float, HingeLaw | None] = field(default_factory=dict)
+    corners: Annotated[tuple[float, ...], require_sequence] = ()
+    hinges: Annotated[Mapping[float, HingeLaw | None], partial(require_kind, kind=Mapping)] = field(
+        default_factory=dict
+    )
 
     def __post_init__(self) -> None:
-        require_text(self.name, "Beam: name")
-        a, b = (require_vector(x, f"{self.name}: end") for x in (self.a, self.b))
-        object.__setattr__(self, "a", a)
-        object.__setattr__(self, "b", b)
-        require_kind(self.section, Section, f"{self.name}: section")
-        object.__setattr__(self, "cells", require_count(self.cells, f"{self.name}: cells"))
+        super().__post_init__()
         require_memory(self.cells, f"{self.name}: cells = {self.cells}")
-        straight = self.curve is None
-        if straight:
-            if a == b:
-                raise SceneError(f"{self.name}: zero length, both ends are at {a}")
-            object.__setattr__(self, "curve", Straight(a, b))
-        else:
-            self._require_ends()
-        corners = require_sequence(self.corners, f"{self.name}: corners")
-        object.__setattr__(self, "corners", corners)
-        for s in corners:
+        for s in self.corners:
             require_number(s, f"{self.name}: corner")
             if not 0.0 < s < 1.0:
                 raise SceneError(f"{self.name}: corner s = {s:g} must lie between 0 and 1")
-        require_kind(self.hinges, Mapping, f"{self.name}: hinges")
+        self._require_hinges()
+        if self.curve is None:
+            if self.a == self.b:
+                raise SceneError(f"{self.name}: zero length, both ends are at {self.a}")
+            object.__setattr__(self, "curve", Straight(self.a, self.b))
+            self._warn_of_thickness(math.dist(self.a, self.b))
+            return
+        at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
+        points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
+        for s, there, end in ((0, points[0], self.a), (1, points[-1], self.b)):
+            if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
+                raise SceneError(f"{self.name}: curve({s}) = {there} is not the end {end}")
+        self._warn_of_thickness(sum(math.dist(p, q) for p, q in pairwise(points)))
+
+    def _require_hinges(self) -> None:
+        """Raise :class:`SceneError` unless the plastic hinges are complete, and apart."""
         for s, law in self.hinges.items():
             require_number(s, f"{self.name}: hinge at")
             if not 0.0 <= s <= 1.0:
@@ -110,20 +117,6 @@ class Beam(Member):
             raise SceneError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
             )
-        self._warn_of_thickness(math.dist(a, b) if straight else self._length())
-
-    def _require_ends(self) -> None:
-        """Raise :class:`SceneError` unless the curve leads from one end to the other."""
-        for s, end in ((0.0, self.a), (1.0, self.b)):
-            there = point_of(self.curve, s, f"{self.name}: curve")
-            if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
-                raise SceneError(f"{self.name}: curve({s:g}) = {there} is not the end {end}")
-
-    def _length(self) -> float:
-        """Length of the polygon through the ends of the cells, all of which must be points; m."""
-        at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
-        points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
-        return sum(math.dist(p, q) for p, q in pairwise(points))
 
     def _warn_of_thickness(self, length: float) -> None:
         """Warn if the radius of gyration of a section is larger than the beam is long."""
@@ -134,6 +127,9 @@ class Beam(Member):
                 f"given), but it is only {length:.3g} m long. Are sizes of the section in mm? "
                 "Units are SI: m, N, N m². If EI is large on purpose, give the section its depth"
             )
+
+    def _label(self) -> str:
+        return self.name
 
     def __repr__(self) -> str:
         a, b = (f"({x:g}, {y:g})" for x, y in (self.a, self.b))
@@ -236,35 +232,36 @@ class Mesh:
             raise SceneError(f"Mesh: degree = {shorten(self.degree)} must be 1, 2 or 3")
         object.__setattr__(self, "degree", int(self.degree))
 
-    @property
-    def nodes(self) -> npt.NDArray[np.float64]:
+    @cached_property
+    def nodes(self) -> Array:
         """Places of the nodes in a cell, from 0 to 1, ascending: Gauss-Lobatto points."""
-        return _nodes(self.degree)
+        inner = np.polynomial.legendre.Legendre.basis(self.degree).deriv().roots()
+        return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
 
     @property
-    def point_weights(self) -> npt.NDArray[np.float64]:
+    def point_weights(self) -> Array:
         """Parts of a cell that its Gauss points stand for."""
-        return _point_weights(self.degree)
+        return np.asarray(np.polynomial.legendre.leggauss(self.degree)[1] / 2)
 
     @cached_property
-    def parts(self) -> npt.NDArray[np.float64]:
+    def parts(self) -> Array:
         """Part of a uniform load on a cell, or of its mass, that each node bears."""
         p = self.degree
         at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)
         return np.asarray(1 / (p * (p + 1) * at**2))
 
-    def weights(self, part: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    def weights(self, part: npt.ArrayLike) -> Array:
         """Lagrange weights of the nodes of a cell in the values at parts of it; (..., nodes)."""
         powers = np.power.outer(part, np.arange(self.degree + 1))
         return np.asarray(powers @ self._polynomials)
 
-    def slopes(self, part: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    def slopes(self, part: npt.ArrayLike) -> Array:
         """Derivatives of :meth:`weights` by the part; (..., nodes)."""
         powers = np.arange(1, self.degree + 1) * np.power.outer(part, np.arange(self.degree))
         return np.asarray(powers @ self._polynomials[1:])
 
     @cached_property
-    def _polynomials(self) -> npt.NDArray[np.float64]:
+    def _polynomials(self) -> Array:
         """Coefficients of the polynomials that are one in one node, in columns."""
         return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
@@ -290,22 +287,5 @@ class Mesh:
                 )
         number = int((len(given) - 1) * self.refine)
         require_memory(number, f"Mesh: refine = {self.refine} of {beam.name}, {number} cells,")
-        return [_between(given, i / Fraction(self.refine)) for i in range(number + 1)]
-
-
-@cache
-def _nodes(degree: int) -> npt.NDArray[np.float64]:
-    inner = np.polynomial.legendre.Legendre.basis(degree).deriv().roots()
-    return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
-
-
-@cache
-def _point_weights(degree: int) -> npt.NDArray[np.float64]:
-    return np.asarray(np.polynomial.legendre.leggauss(degree)[1] / 2)
-
-
-def _between(values: Sequence[float], position: Fraction) -> float:
-    """Value at a position that need not be whole; linear in between."""
-    i = int(position)
-    part = float(position - i)
-    return values[i] * (1 - part) + values[i + 1] * part if part else values[i]
+        at = np.arange(number + 1) * self.refine.denominator / self.refine.numerator
+        return [float(s) for s in np.interp(at, np.arange(len(given)), given)]

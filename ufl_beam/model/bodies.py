@@ -7,24 +7,24 @@ import math
 from abc import ABC
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from itertools import pairwise
-from typing import Annotated, Any
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import (
     SceneError,
+    require_all,
     require_kind,
     require_number,
-    require_sequence,
     require_switch,
-    require_text,
     require_vector,
     shorten,
 )
 from ufl_beam.model.functions import Curve, Point, tangent_within
-from ufl_beam.model.records import NotNegative, Number, Record, Vector
+from ufl_beam.model.records import NotNegative, Number, Record, Text, Vector
 
 TOGETHER = 1e-9
 """Distance below which two places of a beam are one, as a part of a cell."""
@@ -33,6 +33,7 @@ TOGETHER = 1e-9
 class Member(ABC):
     """Base of :class:`Beam`: an axis with places on it; its attributes are those of a beam."""
 
+    called: ClassVar[str] = "Beam"  # in messages
     a: Point
     b: Point
     name: str
@@ -67,13 +68,16 @@ class Member(ABC):
         regular = [i / self.cells for i in range(self.cells + 1)]
         if not {*self.corners, *attached} - {0.0, 1.0}:
             return regular
-        vertices = sorted({*regular, *self.corners, *attached})
         kept = [0.0]
-        for s in vertices[1:]:
+        for s in sorted({*regular, *self.corners, *attached})[1:]:
             if (s - kept[-1]) * self.cells > TOGETHER:
                 kept.append(s)
         kept[-1] = 1.0
         return kept
+
+
+Beams = Annotated[Sequence[Member] | None, partial(require_all, kind=Member)]
+"""Field of a record with some beams; all of the scene without."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -158,11 +162,7 @@ class Body(Record):
     _: KW_ONLY
     mass: NotNegative = 0.0
     inertia: NotNegative = 0.0
-    name: str = "body"
-
-    def __post_init__(self) -> None:
-        require_text(self.name, "Body: name")
-        super().__post_init__()
+    name: Text = "body"
 
     def _label(self) -> str:
         return self.name
@@ -292,12 +292,6 @@ def require_anchors(owner: str, *anchors: object) -> None:
             )
 
 
-def require_beam(value: object, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is a beam."""
-    if not isinstance(value, Member):
-        raise SceneError(f"{what} = {shorten(value)} is not a Beam")
-
-
 def require_node(place: object, owner: str) -> None:
     """Raise :class:`SceneError` naming ``owner`` unless the motion of a place is that of a node."""
     require_anchors(owner, place)
@@ -356,17 +350,10 @@ class Velocity(Record):
         (-5.0, 0.0, 2.0)
     """
 
-    beams: tuple[Member | Body, ...]
+    beams: Annotated[tuple[Member | Body, ...], partial(require_all, kind=(Member, Body))]
     linear: Vector = (0.0, 0.0)
     angular: Number = 0.0
     about: Annotated[Point | None, require_vector] = None
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "beams", require_sequence(self.beams, "Velocity: beams"))
-        for i, beam in enumerate(self.beams):
-            if not isinstance(beam, Member | Body):
-                raise SceneError(f"Velocity: beams[{i}] = {shorten(beam)} is not a Beam or Body")
-        super().__post_init__()
 
     def at(self, x: float, y: float) -> tuple[float, float, float]:
         """(du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""

@@ -23,7 +23,14 @@ from ufl_beam.errors import (
     require_text,
     shorten,
 )
-from ufl_beam.model.material_law import State, Values, quadratic, require_dataclass, require_names
+from ufl_beam.model.material_law import (
+    State,
+    Values,
+    initial_state,
+    quadratic,
+    require_fields,
+    require_names,
+)
 from ufl_beam.model.records import parameters_by_name
 
 LOSSES = ("damping", "friction", "functions", "connectors", "contact")
@@ -111,11 +118,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
     def sliding(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
         """Size of the force against sliding, the limit by default; N or N m.
 
-        Args:
-            motion: At the time of the step at which the law holds; m or rad.
-            rate: Mean rate of the step; m/s or rad/s.
-            state: Internal variables at the time of the motion.
-            dt: Length of the step; s.
+        Arguments are those of :meth:`resistance`.
         """
         return self.limit(state)
 
@@ -164,10 +167,6 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         """Forces of the law as a tuple, also where there is one."""
         return (forces,) if self.components == 1 else tuple(forces)
 
-    def initially(self) -> State:
-        """Internal variables before anything has happened, each (1,)."""
-        return State({name: np.full(1, float(x)) for name, x in self.variables.items()})
-
     def elastic_forces(self, motions: Sequence[Values], state: State) -> list[Values]:
         """Derivatives of the energy by the motions, arrays of real numbers; N or N m."""
         forces = []
@@ -188,14 +187,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     Its methods are compiled when a run begins.
     """
     what = f"{what}: {type(law).__name__}"
-    require_dataclass(law, what)
-    reserved = {*vars(ConnectorLaw), *ConnectorLaw.__annotations__}
-    names = {field.name for field in fields(law)}  # type: ignore[arg-type]
-    if taken := sorted(reserved & names):
-        raise SceneError(
-            f"{what}: a field cannot have the name {' or '.join(taken)}, which every ConnectorLaw "
-            "gives to something else"
-        )
+    require_fields(law, ConnectorLaw, what)
     for name, value in law.numbers().items():
         require_number(value, f"{what}: {name}")
     stated = {n for n in CALLED if getattr(type(law), n) is not getattr(ConnectorLaw, n)}
@@ -222,7 +214,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
         require_number(value, f"{what}.variables[{name!r}]")
     if law.components not in (1, 2, 3):
         raise SceneError(f"{what}.components = {law.components!r} must be 1, 2 or 3")
-    motion, state = law.given([np.zeros(1)] * law.components), law.initially()
+    motion, state = law.given([np.zeros(1)] * law.components), initial_state(law)
     calls = {"energy": (motion, state), "limit": (state,)}
     calls |= dict.fromkeys(CALLED[2:], (motion, motion, state, 1.0))
     for name, arguments in calls.items():
@@ -259,7 +251,7 @@ def require_limit(law: ConnectorLaw, what: str) -> None:
     """Raise :class:`SceneError` unless increments of a law have a limit for ever longer steps."""
     motion, rest = (law.given([np.full(1, x)] * law.components) for x in (0.5, 0.0))
     with np.errstate(all="ignore"):
-        changes = law.increments(motion, rest, law.initially(), np.inf) if law.variables else {}
+        changes = law.increments(motion, rest, initial_state(law), np.inf) if law.variables else {}
     for name, change in changes.items():
         if not np.all(np.isfinite(change)):
             raise SceneError(

@@ -8,13 +8,12 @@ from collections.abc import Callable, Mapping
 from dataclasses import KW_ONLY, dataclass
 from functools import partial
 from numbers import Real
-from typing import Annotated, Any, Protocol
+from typing import Annotated, Any, ClassVar, Protocol
 
 from ufl_beam.display import one_line
 from ufl_beam.errors import (
     SceneError,
     closed,
-    require_from_zero_to_infinity,
     require_function,
     require_kind,
     require_number,
@@ -208,6 +207,7 @@ class Stop(Record, ConnectorLaw):
     damping: NotNegative = 0.0
 
     entry = "contact"
+    resists: ClassVar[bool] = False  # nothing is borne within the interval
 
     def energy(self, motion: Values, state: State) -> Values:
         """Energy of the depth; J."""
@@ -225,11 +225,6 @@ class Stop(Record, ConnectorLaw):
     def elastic(self) -> bool:
         """True if the stop has no damping."""
         return self.damping == 0.0
-
-    @property
-    def resists(self) -> bool:
-        """False: nothing is borne within the interval."""
-        return False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -281,6 +276,7 @@ class Clearance(Record, ConnectorLaw):
     radius: NotNegative = 0.0
 
     entry = "contact"
+    resists: ClassVar[bool] = False  # nothing is borne within the gap
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -312,34 +308,22 @@ class Clearance(Record, ConnectorLaw):
         """True if nothing is lost."""
         return self.damping == 0.0 and not self.rubs
 
-    @property
-    def resists(self) -> bool:
-        """False: nothing is borne within the gap."""
-        return False
-
-    def _contact(self, motion: Any) -> tuple[Values, Values, Values]:
-        """Depth (m), and the direction from the middle of the hole to that of the pin."""
+    def _contact(self, motion: Any, rate: Any = (0.0, 0.0)) -> tuple[Values, ...]:
+        """Elastic and damping force, N, and their direction, from the middle of hole to pin."""
         x, y = motion[:2]
         r = sqrt(larger(x**2 + y**2, (self.gap / 2) ** 2))  # not zero, where there is no direction
-        return positive(r - self.gap), x / r, y / r
-
-    def _pressure(self, motion: Any, rate: Any) -> tuple[Values, Values]:
-        """Pressing force, and the part of it that the damping gives; N."""
-        depth, x, y = self._contact(motion)
-        elastic = self.stiffness * depth
-        damped = elastic * larger(self.damping * (x * rate[0] + y * rate[1]), -1.0)
-        return elastic + damped, damped
+        x, y, elastic = x / r, y / r, self.stiffness * positive(r - self.gap)
+        return elastic, elastic * larger(self.damping * (x * rate[0] + y * rate[1]), -1.0), x, y
 
     def energy(self, motion: Any, state: State) -> Values:
         """Energy of the depth, and of the deflection of what sticks; J."""
-        depth, *_ = self._contact(motion)
-        stored = self.stiffness * depth**2 / 2
+        pressure, *_ = self._contact(motion)
+        stored = pressure**2 / (2 * self.stiffness)
         return stored + self.stiffness * state.deflection**2 / 2 if self.rubs else stored
 
     def resistance(self, motion: Any, rate: Any, state: State, dt: Values) -> Any:
         """Forces of damping and friction; N, N and N m."""
-        _, x, y = self._contact(motion)
-        _, damped = self._pressure(motion, rate)
+        _, damped, x, y = self._contact(motion, rate)
         if not self.rubs:
             return damped * x, damped * y
         rubbing = self.stiffness * state.deflection
@@ -349,9 +333,8 @@ class Clearance(Record, ConnectorLaw):
         """The surface of the pin takes the deflection along, up to the limit."""
         if not self.rubs:
             return {}
-        _, x, y = self._contact(motion)
-        pressure, _ = self._pressure(motion, rate)
-        limit = self.friction * pressure / self.stiffness
+        elastic, damped, x, y = self._contact(motion, rate)
+        limit = self.friction * (elastic + damped) / self.stiffness
         way = dt * (x * rate[1] - y * rate[0] + self.radius * rate[2])
         moved = smaller(larger(state.deflection + way, -limit), limit)
         return {"deflection": moved - state.deflection}
@@ -428,7 +411,7 @@ def require_hinge_law(law: object, what: str) -> None:
                 f"{what}: {type(law).__name__} is a subclass of Hardening, and a hinge of zero "
                 f"length would ignore what is its own; {OWN_HINGE}"
             )
-        require_from_zero_to_infinity(law.limit, f"{what}: limit")
+        require_number(law.limit, f"{what}: limit", at_least=0.0, infinite=True)
         if isinstance(law.viscosity, DuvautLions):
             raise SceneError(
                 f"{what}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "

@@ -232,7 +232,7 @@ def plastic_hinges(
     bearing: Iterable[Anchor],  # where supports, connectors or masses bear a moment
     loaded: Iterable[Anchor],  # where loads are moments
 ) -> tuple[Connector, ...]:
-    """Plastic hinges of zero length, as connectors of both sides.
+    """Plastic hinges of zero length, as connectors of both sides; motions are jumps of rotation.
 
     A beam has those of its ``hinges``, and one at each end if its section has a hinge.  There is
     none at an end that bears no moment, nor at one where nothing but a load is: the load acts on
@@ -258,7 +258,13 @@ def plastic_hinges(
         between = len(others) > 0 and (dof in acted or not _outlasts(place, others, laws))
         return dof in borne or between
 
-    return tuple(_hinge(place, law) for place, law in laws.items() if stays(place))
+    hinges = []
+    for place, law in laws.items():
+        if stays(place):
+            beyond = Place(place.beam, place.s, beyond=True)
+            before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
+            hinges.append(Connector("Hinge", "turning", before, after, RigidPlastic(law)))
+    return tuple(hinges)
 
 
 def law_of(link: Connector) -> HingeLaw:
@@ -283,10 +289,3 @@ def _outlasts(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLa
     if here.limit == there.limit and here.bounded and there.bounded:
         return order.index(others[0]) < order.index(place)
     return there.bounded and there.limit <= here.limit
-
-
-def _hinge(place: Place, law: HingeLaw) -> Connector:
-    """The connector of a hinge; its motion is the jump of the rotation along the beam."""
-    beyond = Place(place.beam, place.s, beyond=True)
-    before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
-    return Connector("Hinge", "turning", before, after, RigidPlastic(law))

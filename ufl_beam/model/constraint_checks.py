@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Protocol
 
@@ -30,7 +31,7 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import Point
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.material_law import MaterialLaw
+from ufl_beam.model.material_law import MaterialLaw, initial_state
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 
@@ -78,7 +79,13 @@ def require_inertia(scene: Scene) -> None:
         for component, inertia in enumerate((one.mass, one.mass, one.inertia))
         if inertia
     ]
-    rows = _constraints(scene, _determines, [*masses, *_under_works(scene)])
+
+    def determines(link: Connector) -> bool:
+        if isinstance(link.law, Stop):
+            return link.law.low == 0.0 or link.law.high == 0.0
+        return isinstance(link.law, (*RESISTING, ConnectorLaw, Damper, Coulomb))
+
+    rows = _constraints(scene, determines, [*masses, *_under_works(scene)])
     free = _null_space(csr_array(rows[:, loose]))
     if free.shape[1] == 0:
         return
@@ -96,13 +103,6 @@ def _under_works(scene: Scene) -> list[tuple[Anchor, int]]:
     """Components of motion of the beams on which works of the user act: they may hold them."""
     beams = (beam for work in scene.works for beam in work.on(scene.beams))
     return [(beam.start, component) for beam in beams for component in range(3)]
-
-
-def _determines(link: Connector) -> bool:
-    """Return true if a connector determines its motion where nothing has mass."""
-    if isinstance(link.law, Stop):
-        return link.law.low == 0.0 or link.law.high == 0.0
-    return isinstance(link.law, (*RESISTING, ConnectorLaw, Damper, Coulomb))
 
 
 def _fixed(scene: Scene) -> set[NodeDof]:
@@ -129,7 +129,10 @@ def require_independent(scene: Scene) -> None:
     joints = {holder: joint for joint in scene.joints for holder in joint.holders}
     owners: list[object] = [joints.get(owner, owner) for owner, _ in dependent]
     owners += _already(scene, [row for _, row in dependent])
-    names = [_with_law(owner) for owner in {id(owner): owner for owner in owners}.values()]
+    names = [
+        f"{owner} with {type(owner.law).__name__}" if isinstance(owner, Connector) else str(owner)
+        for owner in {id(owner): owner for owner in owners}.values()
+    ]
     rigid = any(isinstance(getattr(owner, "law", None), RigidPlastic) for owner in owners)
     raise SceneError(
         f"constraints repeat or contradict each other: {within.shape[1]} of those of "
@@ -141,12 +144,6 @@ def require_independent(scene: Scene) -> None:
             else "a Spring, or a Beam in the place of a rigid part"
         )
     )
-
-
-def _with_law(owner: object) -> str:
-    """Name of a joint, support or connector, with that of its law."""
-    kind = type(owner.law).__name__ if isinstance(owner, Connector) else ""
-    return f"{owner}{f' with {kind}' if kind else ''}"
 
 
 def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
@@ -186,19 +183,16 @@ def _dependences(
         *_of_supports(support for support in scene.supports if support.angle),
     ]
     moved: list[dict[NodeDof, float]] = []
-    for _, row in rows:
-        moved.append({})
+    users: dict[NodeDof, set[int]] = defaultdict(set)
+    for number, (_, row) in enumerate(rows):
+        sums: dict[NodeDof, float] = defaultdict(float)
         for of, factors in row:
             for component, factor in enumerate(factors):
-                dof = same[of, component]
-                if factor and dof not in fixed:
-                    moved[-1][dof] = moved[-1].get(dof, 0.0) + factor
+                sums[same[of, component]] += factor
         # Ends that are one node leave nothing but round-off.
-        moved[-1] = {dof: factor for dof, factor in moved[-1].items() if abs(factor) > 1e-12}
-    users: dict[NodeDof, set[int]] = {}
-    for number, factors_of in enumerate(moved):
-        for dof in factors_of:
-            users.setdefault(dof, set()).add(number)
+        moved.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
+        for dof in moved[-1]:
+            users[dof].add(number)
     left = set(range(len(rows)))
     alone = [dof for dof, numbers in users.items() if len(numbers) == 1]
     while alone:
@@ -208,6 +202,8 @@ def _dependences(
                 users[dof].discard(number)
                 if len(users[dof]) == 1:
                     alone.append(dof)
+    if not left:
+        return [], np.zeros((0, 0))
     numbers = sorted(left)
     columns: dict[NodeDof, int] = {}
     entries = [
@@ -215,8 +211,6 @@ def _dependences(
         for column, number in enumerate(numbers)
         for dof, factor in moved[number].items()
     ]
-    if not numbers:
-        return [], np.zeros((0, 0))
     gradients = _sparse(entries, (max(len(columns), 1), len(numbers)))
     return [rows[number] for number in numbers], _null_space(gradients)
 
@@ -362,7 +356,7 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
             rest, i = [np.zeros(1)] * link.law.components, link.component
             moved = LAST_DIGITS * (1.0 if link.turns else size)
             ends = (rest, [*rest[:i], rest[i] + moved, *rest[i + 1 :]])
-            state = link.law.initially()
+            state = initial_state(link.law)
             here, there = (link.law.elastic_forces(e, state)[i][0] for e in ends)
             if abs(here) > abs(there - here):
                 raise SceneError(

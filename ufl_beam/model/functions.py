@@ -177,9 +177,9 @@ def enclosing_diameter(points: Array) -> float:
     farthest outside are taken in, one after the other.
     """
     points = points - points.mean(axis=0)
-    held = [int(np.argmax(np.hypot(*points.T)))]
+    distances = np.hypot(*points.T)
+    slack, held = 1e-12 * float(distances.max()), [int(np.argmax(distances))]
     center, radius = points[held[0]], 0.0
-    slack = 1e-12 * float(np.hypot(*points.T).max())
     while True:
         distances = np.hypot(*(points - center).T)
         outside = int(np.argmax(distances))
@@ -194,27 +194,14 @@ def enclosing_diameter(points: Array) -> float:
 def _circle_around(points: Array, few: list[int]) -> tuple[list[int], Array, float]:
     """Smallest circle around at most four points: those that it goes through, centre, radius."""
     circles = []
-    for number in (2, 3):
-        for chosen in combinations(few, number):
-            center = _center(points[list(chosen)])
-            radius = float(np.hypot(*(points[chosen[0]] - center)))
-            far = float(np.hypot(*(points[few] - center).T).max())
-            circles.append((max(far, radius), list(chosen), center))
-    radius, held, center = min(circles, key=lambda circle: circle[0])
-    return held, center, radius
-
-
-def _center(corners: Array) -> Array:
-    """Centre of the circle through three points, or around two; infinitely far if in a row."""
-    middle = (corners[0] + corners[1]) / 2
-    if len(corners) == 2:
-        return np.asarray(middle)
-    (ax, ay), (bx, by) = corners[1] - corners[0], corners[2] - corners[0]
-    twice = 2 * (ax * by - ay * bx)
-    if twice == 0.0:
-        return np.full(2, np.inf)
-    a, b = ax * ax + ay * ay, bx * bx + by * by
-    return np.asarray(corners[0] + np.array([by * a - ay * b, ax * b - bx * a]) / twice)
+    for held in (*combinations(few, 2), *combinations(few, 3)):
+        first, *others = points[list(held)]
+        ways = np.array(others) - first
+        # as far from the first point as from the others; some circle around all, if in a row
+        center = first + np.linalg.lstsq(2 * ways, (ways**2).sum(axis=1), rcond=None)[0]
+        circles.append((float(np.hypot(*(points[few] - center).T).max()), list(held), center))
+    radius, through, center = min(circles, key=lambda circle: circle[0])
+    return through, center, radius
 
 
 # -- functions of time --------------------------------------------------------------------------

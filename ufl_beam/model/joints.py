@@ -56,12 +56,6 @@ class Joint(Bearing):
     def __str__(self) -> str:
         return f"{self.kind}({', '.join(map(str, self.places))})"
 
-    @property
-    def sameness(self) -> object:
-        """Key that joints share if they hold the same motions of the same places."""
-        held = [(link.motion, link.axis, id(link.law)) for link in self.holders]
-        return self.kind, frozenset(self.places), tuple(held)
-
     def equal(self, component: int) -> list[NodeDof]:
         """Components of motion that are equal; of displacements those that the nodes carry."""
         alike = [place for place in self.places if component == 2 or carries(place)]

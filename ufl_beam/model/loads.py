@@ -7,8 +7,8 @@ from abc import ABC
 from dataclasses import KW_ONLY, dataclass
 
 from ufl_beam.display import one_line
-from ufl_beam.errors import SceneError, closed, require_sequence
-from ufl_beam.model.bodies import Anchor, Member, carries, require_anchors, require_beam
+from ufl_beam.errors import SceneError, closed, require_kind
+from ufl_beam.model.bodies import Anchor, Beams, Member, carries, require_anchors
 from ufl_beam.model.functions import Timed, TimeFunction, steady
 from ufl_beam.model.records import NotNegative, Number, Positive, Record, Vector
 
@@ -115,7 +115,7 @@ class LineLoad(Record):
     __repr__ = one_line
 
     def __post_init__(self) -> None:
-        require_beam(self.beam, "LineLoad: beam")
+        require_kind(self.beam, Member, "LineLoad: beam")
         super().__post_init__()
 
     def __str__(self) -> str:
@@ -241,14 +241,7 @@ class KelvinVoigt(Record):
     """
 
     time: Positive
-    beams: tuple[Member, ...] | None = None
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if self.beams is not None:
-            object.__setattr__(self, "beams", require_sequence(self.beams, "KelvinVoigt: beams"))
-            for i, beam in enumerate(self.beams):
-                require_beam(beam, f"KelvinVoigt: beams[{i}]")
+    beams: Beams = None
 
 
 Damping = Rayleigh | KelvinVoigt

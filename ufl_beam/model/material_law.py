@@ -6,10 +6,9 @@ from __future__ import annotations
 import copy
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields
-from functools import cache
 from numbers import Real
 from typing import Any, ClassVar
 
@@ -140,13 +139,14 @@ class MaterialLaw(ABC):
     @property
     def prestressed(self) -> bool:
         """True if laws of this class may bear a stress at no strain; numbers do not matter."""
-        return _prestressed(type(self), tuple(vars(self)))
+        law = copy.copy(self)  # with numbers that have nothing in common
+        vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(vars(self))})
+        one = self.as_argument(tuple(1.0 for _ in self.resultants or "x"))
+        return any(np.any(σ != 0) for σ in _at_no_strain(law.of(one, {})))
 
     def stressed(self, C: tuple[Values, ...], least: tuple[Values, ...]) -> bool:
         """Return whether the law bears more stress at no strain than ``C`` times ``least``."""
-        numbers = self.numbers(self.as_argument(C))
-        known = {n: 1.0 if hasattr(x, "draw") else x for n, x in numbers.items()}
-        stresses = _at_no_strain(self.of(self.as_argument(C), known))
+        stresses = _at_no_strain(_with_numbers(self, C))
         return any(np.any(abs(σ) > c * e) for σ, c, e in zip(stresses, C, least, strict=True))
 
     @property
@@ -163,23 +163,23 @@ class MaterialLaw(ABC):
         return values if self.resultants else values[0]
 
 
-@cache
-def _prestressed(kind: type[MaterialLaw], numbers: tuple[str, ...]) -> bool:
-    """Whether a law whose numbers have nothing in common bears a stress at no strain."""
-    law = object.__new__(kind)
-    vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(numbers)})
-    one = law.as_argument(tuple(1.0 for _ in law.resultants or "x"))
-    return any(np.any(σ != 0) for σ in _at_no_strain(law.of(one, {})))
+def _with_numbers(law: MaterialLaw, C: tuple[Values, ...] = ()) -> MaterialLaw:
+    """A law at points of stiffness ``C``, 1 by default, with 1 in the place of random numbers."""
+    at = law.as_argument(C or tuple(np.ones(1) for _ in law.resultants or "x"))
+    numbers = law.numbers(at).items()
+    return law.of(at, {n: np.ones(1) if hasattr(x, "draw") else x for n, x in numbers})
 
 
 def _at_no_strain(law: MaterialLaw) -> tuple[Values, ...]:
     """Stresses at no strain."""
     none = law.as_argument(tuple(np.zeros(1) for _ in law.resultants or "x"))
     with np.errstate(all="ignore"):
-        stress = law.stress(
-            none, State({n: np.full(1, float(x)) for n, x in law.variables.items()})
-        )
-    return law.as_tuple(stress)
+        return law.as_tuple(law.stress(none, initial_state(law)))
+
+
+def initial_state(law: Any) -> State:
+    """Return the internal variables before anything has happened, each (1,)."""
+    return State({name: np.full(1, float(x)) for name, x in law.variables.items()})
 
 
 # -- checks --------------------------------------------------------------------------------------
@@ -209,45 +209,47 @@ def require_law(law: object, what: str) -> None:
     """Raise :class:`SceneError` unless a law is complete; it is called with numbers."""
     if not isinstance(law, MaterialLaw):
         raise SceneError(f"{what} = {shorten(law)} is not a Hardening or another MaterialLaw")
-    kind = type(law).__name__
-    require_dataclass(law, f"{what}: {kind}")
-    if taken := sorted(RESERVED & {field.name for field in fields(law)}):  # type: ignore[arg-type]
-        raise SceneError(
-            f"{what}: {kind}: a field cannot have the name {' or '.join(taken)}, which every "
-            "MaterialLaw gives to something else: C is the elastic stiffness at the point, the "
-            "others are its methods and attributes"
-        )
+    kind = f"{what}: {type(law).__name__}"
+    require_fields(law, MaterialLaw, kind)
     ways = [w for w in WAYS if getattr(type(law), w) is not getattr(MaterialLaw, w)]
     if len(ways) != (1 if law.variables else len(ways)):
         has = "both increments and residuals" if ways else "neither increments nor residuals"
-        raise SceneError(f"{what}: {kind} has {has}; define one of both methods")
-    C = tuple(np.ones(1) for _ in law.resultants or "x")
-    numbers = law.numbers(law.as_argument(C))
+        raise SceneError(f"{kind} has {has}; define one of both methods")
+    numbers = law.numbers(law.as_argument(tuple(np.ones(1) for _ in law.resultants or "x")))
     if "C" in numbers:
-        raise SceneError(f"{what}: {kind}.numbers has the name C, that of the elastic stiffness")
+        raise SceneError(f"{kind}.numbers has the name C, that of the elastic stiffness")
     for name, value in numbers.items():
-        number = isinstance(value, Real | np.ndarray) and not isinstance(value, bool)
-        if not number and not hasattr(value, "draw"):
-            raise SceneError(
-                f"{what}: {kind}: {name} = {shorten(value)} is no number; fields of a law are its "
-                "numbers, what else it knows can be a class variable"
-            )
-    tried = law.of(
-        law.as_argument(C), {n: np.ones(1) if hasattr(v, "draw") else v for n, v in numbers.items()}
-    )
-    state = State({name: np.full(1, float(x)) for name, x in law.variables.items()})
-    _try(tried, state, f"{what}: {kind}", (*ways, "increments")[0])
+        if not hasattr(value, "draw"):
+            require_field(value, f"{kind}: {name}", Real | np.ndarray)
+    _try(_with_numbers(law), initial_state(law), kind, (*ways, "increments")[0])
 
 
-def require_dataclass(law: object, what: str) -> None:
-    """Raise :class:`SceneError` unless the class of a law is a frozen dataclass."""
+def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -> None:
+    """Raise :class:`SceneError` unless a law is a frozen dataclass whose fields have free names.
+
+    Names of the base are taken, ``but`` some.
+    """
     parameters = getattr(type(law), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen or not parameters.eq:
         raise SceneError(f"{what} must be a dataclass: @dataclass(frozen=True)")
+    reserved = {*vars(base), *base.__annotations__} - {*but}
+    if taken := sorted(reserved & {field.name for field in fields(law)}):
+        means = ": C is the elastic stiffness at the point, the others are its methods and "
+        raise SceneError(
+            f"{what}: a field cannot have the name {' or '.join(taken)}, which every "
+            f"{base.__name__} gives to something else"
+            f"{f'{means}attributes' if base is MaterialLaw else ''}"
+        )
 
 
-RESERVED = frozenset({*vars(MaterialLaw), *MaterialLaw.__annotations__})
-"""Names that a field of a law cannot have."""
+def require_field(value: object, what: str, kinds: Any = Real) -> None:
+    """Raise :class:`SceneError` unless a field of a law is a number."""
+    if not isinstance(value, kinds) or isinstance(value, bool):
+        raise SceneError(
+            f"{what} = {shorten(value)} is no number; fields of a law are its numbers, what else "
+            "it knows can be a class variable"
+        )
+
 
 WAYS = ("increments", "residuals")
 """Methods of a law by which its variables evolve."""
@@ -322,13 +324,11 @@ def judges_dissipation(law: MaterialLaw) -> bool:
 
 def has_quadratic_energies(law: MaterialLaw) -> bool:
     """Return whether the energies of a law are quadratic in strains and variables."""
-    C = tuple(np.ones(1) for _ in law.resultants or "x")
-    numbers = law.numbers(law.as_argument(C)).items()
-    tried = law.of(law.as_argument(C), {n: 1.0 if hasattr(v, "draw") else v for n, v in numbers})
+    tried = _with_numbers(law)
 
     def energies(factor: float) -> list[float]:
         draw = np.random.default_rng(0).uniform
-        strain = law.as_argument(tuple(factor * draw(-1.0, 1.0, 1) for _ in C))
+        strain = law.as_argument(tuple(factor * draw(-1.0, 1.0, 1) for _ in law.resultants or "x"))
         state = State({name: factor * draw(-1.0, 1.0, 1) for name in law.variables})
         with np.errstate(all="ignore"):
             found = tried.elastic_energy(strain, state), tried.hardening_energy(state)

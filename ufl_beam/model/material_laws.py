@@ -9,6 +9,7 @@ derives their tangents and FFCx compiles them for the time loop, see
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -19,7 +20,6 @@ import numpy as np
 from ufl_beam.errors import (
     SceneError,
     closed,
-    require_from_zero_to_infinity,
     require_kind,
     require_number,
 )
@@ -35,18 +35,15 @@ from ufl_beam.model.law_functions import (
     where,
 )
 from ufl_beam.model.material_law import MaterialLaw, State
-from ufl_beam.model.records import NotNegative, Positive, Record
+from ufl_beam.model.records import FromZero, NotNegative, Positive, Record
 
 OWN_LAW = "state a MaterialLaw of your own"
 """Message of classes that are closed."""
 
 
-# -- bulk --------------------------------------------------------------------------------------
-
-
 @closed(OWN_LAW)
 @dataclass(frozen=True)
-class Perzyna:
+class Perzyna(Record):
     """Perzyna viscoplasticity: overstress in proportion to the plastic strain rate, P(39).
 
     Args:
@@ -58,10 +55,7 @@ class Perzyna:
         >>> viscous = ub.Fibres(law, number=10)
     """
 
-    eta: float
-
-    def __post_init__(self) -> None:
-        require_from_zero_to_infinity(self.eta, "Perzyna: eta")
+    eta: FromZero
 
     def coefficient(self, stiffness: Values) -> Values:
         """Overstress per rate of plastic strain, the same for any stiffness."""
@@ -70,7 +64,7 @@ class Perzyna:
 
 @closed(OWN_LAW)
 @dataclass(frozen=True)
-class DuvautLions:
+class DuvautLions(Record):
     """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
 
     The same law as :class:`Perzyna` with ``eta = tau (C + H)``, given by its relaxation time.
@@ -83,18 +77,46 @@ class DuvautLions:
         >>> viscous = ub.Fibres(law, number=10)
     """
 
-    tau: float
-
-    def __post_init__(self) -> None:
-        require_from_zero_to_infinity(self.tau, "DuvautLions: tau")
+    tau: FromZero
 
     def coefficient(self, stiffness: Values) -> Values:
         """Overstress per rate of plastic strain: tau times the stiffness of plastic flow."""
         return np.asarray(self.tau * stiffness)  # P(46)
 
 
+def _require_limit(value: Any, what: str, **limits: Any) -> None:
+    """Raise :class:`SceneError` unless a limit is a number in range, or a distribution."""
+    if not hasattr(value, "draw"):
+        require_number(value, what, **limits)
+
+
+def _require_modulus(value: Any, what: str) -> None:
+    if require_number(value, what) < 0.0:
+        raise SceneError(
+            f"{what} = {value:g} must not be negative: a softening bulk has no size, and results "
+            "would depend on the mesh; use Softening(limit, energy)"
+        )
+
+
+Limit = Annotated[Any, partial(_require_limit, positive=True)]
+Modulus = Annotated[float, _require_modulus]
+AtLeastOne = Annotated[float, partial(require_number, at_least=1.0)]
+
+
+class _Plastic(Record, MaterialLaw):
+    """Base of laws whose stress is that of the strain less a plastic strain."""
+
+    def stress(self, strain: Values, state: State) -> Values:
+        """Stress of the elastic part of the strain."""
+        return self.C * (strain - state.plastic)
+
+    def elastic_energy(self, strain: Values, state: State) -> Values:
+        """Energy per volume of the elastic part of the strain."""
+        return self.C * (strain - state.plastic) ** 2 / 2
+
+
 @dataclass(frozen=True)
-class Hardening(MaterialLaw):
+class Hardening(_Plastic):
     """Elasto-(visco)plastic law with linear isotropic and kinematic hardening, P(35)-P(48).
 
     Args:
@@ -112,34 +134,18 @@ class Hardening(MaterialLaw):
         >>> yielding = ub.Section(EA=4e9, GA=1e9, EI=1.4e7, rhoA=157.0, bending=law)
     """
 
-    limit: Any
-    modulus: float = 0.0
-    kinematic: float = 0.0
-    viscosity: Any = Perzyna(0.0)
-
-    def __post_init__(self) -> None:
-        if not hasattr(self.limit, "draw"):
-            require_from_zero_to_infinity(self.limit, "Hardening: limit")
-        for name in ("modulus", "kinematic"):
-            value = getattr(self, name)
-            require_number(value, f"Hardening: {name}")
-            if value < 0.0:
-                raise SceneError(
-                    f"Hardening: {name} = {value:g} must not be negative: a softening bulk has no "
-                    "size, and results would depend on the mesh; use Softening(limit, energy)"
-                )
-        require_kind(self.viscosity, (Perzyna, DuvautLions), "Hardening: viscosity")
-
+    limit: Annotated[Any, partial(_require_limit, at_least=0.0, infinite=True)]
+    modulus: Modulus = 0.0
+    kinematic: Modulus = 0.0
+    viscosity: Annotated[Any, partial(require_kind, kind=(Perzyna, DuvautLions))] = Perzyna(0.0)
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "accumulated": 0.0}
+    energy: ClassVar[float] = math.inf  # of fracture: it never breaks
+    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # fall of the stress, and where
 
     def numbers(self, C: Values) -> dict[str, Any]:
         """Limit and moduli; in the place of the viscosity, the overstress per plastic rate."""
         eta = self.viscosity.coefficient(C + self.modulus + self.kinematic)
         return super().numbers(C) | {"viscosity": eta}
-
-    def stress(self, strain: Values, state: State) -> Values:
-        """Stress of the elastic part of the strain."""
-        return self.C * (strain - state.plastic)
 
     def increments(self, strain: Values, state: State, dt: Values) -> dict[str, Values]:
         """Plastic strain of a step, and the size of it, in closed form, P(38)-P(44)."""
@@ -149,10 +155,6 @@ class Hardening(MaterialLaw):
         stiffness = self.viscosity / dt + (self.C + self.modulus + self.kinematic)
         γ = positive(overstress) / stiffness  # P(44)
         return {"plastic": direction * γ, "accumulated": γ}
-
-    def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Energy per volume of the elastic part of the strain."""
-        return self.C * (strain - state.plastic) ** 2 / 2
 
     def hardening_energy(self, state: State) -> Values:
         """Energy per volume that hardening stores."""
@@ -179,16 +181,6 @@ class Hardening(MaterialLaw):
         return not self.elastic
 
     @property
-    def energy(self) -> float:
-        """Fracture energy: infinite, as it never breaks."""
-        return np.inf
-
-    @property
-    def steepest(self) -> tuple[float, float]:
-        """Largest fall of the stress, and where: none, as it never softens."""
-        return 0.0, 0.0
-
-    @property
     def bounded(self) -> bool:
         """True if the stress never exceeds the limit."""
         viscous = bool(np.any(self.viscosity.coefficient(np.ones(1)) > 0.0))
@@ -196,43 +188,6 @@ class Hardening(MaterialLaw):
 
 
 # -- curved branches: power law, ratcheting, smooth hysteresis ----------------------------------
-
-
-def _require_positive_or_random(value: Any, what: str) -> None:
-    if not hasattr(value, "draw"):
-        require_number(value, what, positive=True)
-
-
-Limit = Annotated[Any, _require_positive_or_random]
-"""A positive number, or a distribution."""
-
-AtLeastOne = Annotated[float, partial(require_number, at_least=1.0)]
-
-
-def _require_part(value: float, what: str) -> None:
-    require_between(value, what, 0.0, 0.999)
-
-
-def _require_shape(value: float, what: str) -> None:
-    require_between(value, what, 0.5, 1.0)
-
-
-def require_between(value: float, what: str, low: float, high: float) -> None:
-    """Raise :class:`SceneError` unless a number lies between two others."""
-    if require_number(value, what, at_least=low) > high:
-        raise SceneError(f"{what} = {value:g} must lie between {low:g} and {high:g}")
-
-
-class _Plastic(Record, MaterialLaw):
-    """Base of laws whose stress is that of the strain less a plastic strain."""
-
-    def stress(self, strain: Values, state: State) -> Values:
-        """Stress of the elastic part of the strain."""
-        return self.C * (strain - state.plastic)
-
-    def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Energy per volume of the elastic part of the strain."""
-        return self.C * (strain - state.plastic) ** 2 / 2
 
 
 @dataclass(frozen=True)
@@ -345,9 +300,9 @@ class BoucWen(Record, MaterialLaw):
     """
 
     limit: Limit
-    hardening: Annotated[float, _require_part] = 0.0
+    hardening: Annotated[float, partial(require_number, at_least=0.0, at_most=0.999)] = 0.0
     exponent: AtLeastOne = 1.0
-    shape: Annotated[float, _require_shape] = 0.5
+    shape: Annotated[float, partial(require_number, at_least=0.5, at_most=1.0)] = 0.5
     strength: NotNegative = 0.0
     variables: ClassVar[Mapping[str, float]] = {"slip": 0.0, "strain": 0.0, "energy": 0.0}
 

@@ -21,14 +21,25 @@ from typing import (
 )
 from weakref import WeakKeyDictionary
 
-from ufl_beam.errors import require_kind, require_number, require_vector
+from ufl_beam.errors import (
+    require_kind,
+    require_number,
+    require_switch,
+    require_text,
+    require_vector,
+)
 
 T = TypeVar("T")
 
 Number = Annotated[float, require_number]
 Positive = Annotated[float, partial(require_number, positive=True)]
 NotNegative = Annotated[float, partial(require_number, at_least=0.0)]
+FromZero = Annotated[float, partial(require_number, at_least=0.0, infinite=True)]
+"""A number that is not negative, or infinity."""
+
 Vector = Annotated[tuple[float, float], require_vector]
+Text = Annotated[str, require_text]
+Switch = Annotated[bool, require_switch]
 Instance = Annotated[T, require_kind]
 """An object of a class, or of one of several."""
 
@@ -37,14 +48,16 @@ class Record:
     """Base of frozen dataclasses that check their fields by annotations ``Annotated[T, check]``.
 
     A check is called as ``check(value, what=name)`` with a value that is not the default; what it
-    returns takes the place of the value, unless it is None.
+    returns takes the place of the value, unless it is None.  The name is that of the field, or the
+    text that follows the check in the annotation.
     """
 
     def __post_init__(self) -> None:
-        for name, default, check in _checks(type(self)):  # type: ignore[arg-type]
+        for name, word, default, check in _checks(type(self)):  # type: ignore[arg-type]
             value = getattr(self, name)
             if value is not default:
-                kept = check(value, what=f"{self._label()}: {name}")
+                owner = type(self).__name__ if name == "name" else self._label()
+                kept = check(value, what=f"{owner}: {word}")
                 object.__setattr__(self, name, value if kept is None else kept)
 
     def _label(self) -> str:
@@ -53,17 +66,17 @@ class Record:
 
 
 @cache
-def _checks(record: type[Any]) -> list[tuple[str, object, Callable[..., object]]]:
-    """Name, default and check of each field that has a check."""
+def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., object]]]:
+    """Name, name in messages, default and check of each field that has a check."""
     found = []
     hints = get_type_hints(record, include_extras=True)
     for field in fields(record):
         if get_origin(hint := hints[field.name]) is Annotated:
-            kind, check = hint.__origin__, hint.__metadata__[0]
+            kind, (check, *word) = hint.__origin__, hint.__metadata__
             if check is require_kind:
                 kinds = tuple(k for k in get_args(kind) if k is not type(None))
                 check = partial(require_kind, kind=kinds or kind)
-            found.append((field.name, field.default, check))
+            found.append((field.name, *(word or [field.name]), field.default, check))
     return found
 
 

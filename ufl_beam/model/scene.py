@@ -6,13 +6,13 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from functools import cached_property, partial
+from typing import Annotated, Any
 
 import numpy as np
 
 from ufl_beam.display import Rich, counted
-from ufl_beam.errors import SceneError, clip, require_kind, require_sequence
+from ufl_beam.errors import SceneError, clip, require_all
 from ufl_beam.memory import no_garbage_collection
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import (
@@ -45,12 +45,18 @@ from ufl_beam.model.loads import (
     PointLoad,
     RotatingFrame,
 )
+from ufl_beam.model.records import Record
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.model.works import Potential, VirtualWork, Work
 
 
+def _all(*kinds: type) -> Callable[..., tuple[Any, ...]]:
+    """Check of a list of records."""
+    return partial(require_all, kind=kinds)
+
+
 @dataclass(frozen=True, eq=False)
-class Scene(Rich):
+class Scene(Record, Rich):
     """Model: beams and bodies with joints, supports, loads, masses and connectors.
 
     Args:
@@ -76,29 +82,20 @@ class Scene(Rich):
         >>> figure = ub.plot(frame)  # check it by eye before the run
     """
 
-    beams: Sequence[Beam] = ()
-    joints: Sequence[Joint] = ()
-    supports: Sequence[Support] = ()
-    loads: Sequence[Load] = ()
-    masses: Sequence[PointMass] = ()
-    initial: Sequence[Velocity] = ()
-    damping: Sequence[Damping] = ()
-    bodies: Sequence[Body] = ()
-    connectors: Sequence[Connector] = ()
-    works: Sequence[Work] = ()
+    beams: Annotated[Sequence[Beam], _all(Beam)] = ()
+    joints: Annotated[Sequence[Joint], _all(Joint)] = ()
+    supports: Annotated[Sequence[Support], _all(Support)] = ()
+    loads: Annotated[Sequence[Load], _all(*Load.__args__)] = ()
+    masses: Annotated[Sequence[PointMass], _all(PointMass)] = ()
+    initial: Annotated[Sequence[Velocity], _all(Velocity)] = ()
+    damping: Annotated[Sequence[Damping], _all(*Damping.__args__)] = ()
+    bodies: Annotated[Sequence[Body], _all(Body)] = ()
+    connectors: Annotated[Sequence[Connector], _all(Connector)] = ()
+    works: Annotated[Sequence[Work], _all(VirtualWork, Potential)] = ()
 
     @no_garbage_collection()
     def __post_init__(self) -> None:
-        kinds: dict[str, type | tuple[type, ...]] = {
-            "beams": Beam, "joints": Joint, "supports": Support, "loads": Load.__args__,
-            "masses": PointMass, "initial": Velocity, "damping": Damping.__args__, "bodies": Body,
-            "connectors": Connector, "works": (VirtualWork, Potential),
-        }  # fmt: skip
-        for part, kind in kinds.items():
-            records = require_sequence(getattr(self, part), f"Scene: {part}")
-            object.__setattr__(self, part, records)
-            for i, record in enumerate(records):
-                require_kind(record, kind, f"Scene: {part}[{i}]")
+        super().__post_init__()
         if not self.beams and not self.bodies:
             raise SceneError("Scene: no beams and no bodies")
         if GROUND in self.bodies:
@@ -181,26 +178,20 @@ class Scene(Rich):
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
         """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
-        loaded = (load.place for load in self.moments)
-        rigid = (joint.equal(2) for joint in self.joints if 2 in joint.shared)
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
-        return plastic_hinges(laws, rigid, self._bearing_moments(), loaded)
+        bearing = [support.place for support in self.supports if 2 in support.held]
+        bearing += [mass.place for mass in self.masses if mass.inertia]
+        for link in self._links_but_hinges if laws else ():
+            by_a, by_b = link.rigidly()
+            bearing += [link.a] * bool(by_a[2] or link.follows_a) + [link.b] * bool(by_b[2])
+        loaded = [load.place for load in self.moments]
+        rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
+        return plastic_hinges(laws, rigid, bearing, loaded)
 
     @property
     def moments(self) -> list[LoadAtPlace]:
         """Loads at places that are moments, or have one."""
         return [load for load in self.loads if isinstance(load, LoadAtPlace) and load.moment]
-
-    def _bearing_moments(self) -> Iterator[Anchor]:
-        """Places where supports, connectors or masses bear a moment."""
-        yield from (support.place for support in self.supports if 2 in support.held)
-        yield from (mass.place for mass in self.masses if mass.inertia)
-        for link in self._links_but_hinges:
-            by_a, by_b = link.rigidly()
-            if by_a[2] or link.follows_a:
-                yield link.a
-            if by_b[2]:
-                yield link.b
 
     @cached_property
     def rigid_bodies(self) -> tuple[Body, ...]:
@@ -260,7 +251,13 @@ class Scene(Rich):
                 raise SceneError(
                     f"Scene: {clip(str(record))} is there {twice}; remove one, or make two of them"
                 )
-        for joint, twice in _again("joints", self.joints, key=lambda joint: joint.sameness):
+        for joint, twice in _again(
+            "joints", self.joints,
+            key=lambda joint: (
+                joint.kind, frozenset(joint.places),
+                *((link.motion, link.axis, id(link.law)) for link in joint.holders),
+            ),
+        ):  # fmt: skip
             raise SceneError(f"Scene: {joint} is there {twice}; remove one")
         for work, twice in _again("works", self.works, key=lambda work: work.name):
             raise SceneError(

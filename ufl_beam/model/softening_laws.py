@@ -8,8 +8,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from functools import lru_cache
-from numbers import Real
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -18,12 +17,12 @@ from ufl_beam.errors import (
     SceneError,
     closed,
     raised_at,
-    require_from_zero_to_infinity,
     require_kind,
-    require_number,
     shorten,
 )
 from ufl_beam.model.law_functions import Values, below, exp, positive, where
+from ufl_beam.model.material_law import require_field, require_fields
+from ufl_beam.model.records import FromZero, Positive, Record
 
 OWN_LAW = "state a SofteningLaw of your own"
 """Message of classes that are closed."""
@@ -149,20 +148,12 @@ Far below round-off; but numbers that underflow would be forces and stiffnesses 
 
 
 @dataclass(frozen=True)
-class _OfLimitAndEnergy(SofteningLaw):
+class _OfLimitAndEnergy(Record, SofteningLaw):
     """Base of the laws of two numbers, whose means are closed forms."""
 
-    limit: float
-    energy: float
-
-    def __post_init__(self) -> None:
-        require_from_zero_to_infinity(self.limit, f"{type(self).__name__}: limit")
-        require_number(self.energy, f"{type(self).__name__}: energy", positive=True)
-
-    @property
-    def bounded(self) -> bool:
-        """True: the traction only falls."""
-        return True
+    limit: FromZero
+    energy: Positive
+    bounded: ClassVar[bool] = True
 
     @property
     def steepest(self) -> tuple[float, float]:
@@ -237,28 +228,16 @@ def require_softening(law: object, what: str) -> None:
     require_kind(law, (Softening, LinearSoftening, SofteningLaw), what)
     if isinstance(law, _OfLimitAndEnergy):
         return
-    kind = type(law).__name__
-    parameters = getattr(type(law), "__dataclass_params__", None)
-    if parameters is None or not parameters.frozen or not parameters.eq:
-        raise SceneError(f"{what}: {kind} must be a dataclass: @dataclass(frozen=True)")
-    names = {field.name for field in fields(law)}  # type: ignore[arg-type]
-    if taken := sorted(names & {*vars(SofteningLaw)}):
-        raise SceneError(
-            f"{what}: {kind}: a field cannot have the name {' or '.join(taken)}, which every "
-            "SofteningLaw gives to something else"
-        )
-    for name in names:
-        value = getattr(law, name)
+    kind = f"{what}: {type(law).__name__}"
+    require_fields(law, SofteningLaw, kind, but=("limit", "energy"))
+    for field in fields(law):  # type: ignore[arg-type]
+        value = getattr(law, field.name)
         if hasattr(value, "draw"):
             raise SceneError(
-                f"{what}: {kind}: {name} = {shorten(value)} is a distribution; numbers of "
-                "softening are the same in all cells; draw those of the bulk, Hardening(limit)"
+                f"{kind}: {field.name} = {shorten(value)} is a distribution; numbers of softening "
+                "are the same in all cells; draw those of the bulk, Hardening(limit)"
             )
-        if not isinstance(value, Real) or isinstance(value, bool):
-            raise SceneError(
-                f"{what}: {kind}: {name} = {shorten(value)} is no number; fields of a law are its "
-                "numbers, what else it knows can be a class variable"
-            )
+        require_field(value, f"{kind}: {field.name}")
     try:
         course(law)
     except SceneError as error:
@@ -290,12 +269,28 @@ def course(law: SofteningLaw) -> Course:
             "opens below it. For a hinge that never resists give Softening(0.0, 1.0)"
         )
     _require_no_drive(kind, edges, t)
-    energy = _integral(law, edges) + _tail(kind, edges, t)
+    energy = _integral(law, edges)
+    if t[-1] > 0:  # beyond, by the power with which it falls
+        power = np.log(t[-17] / t[-1]) / np.log(edges[-1] / edges[-17])
+        if power <= 1.01:
+            raise SceneError(
+                f"{kind}: its traction is still {t[-1]:.6g} at the opening {edges[-1]:g}, so that "
+                "its energy is not finite; let it fall to zero, or faster than 1/opening. For a "
+                "hinge that never breaks give Hardening(limit)"
+            )
+        energy += float(t[-1] * edges[-1] / (power - 1))
     unit = energy / limit
     some = np.append(0.0, unit * np.logspace(-6, 6, 4001))
     tractions = _called(law, "traction", some)
     _require_no_drive(kind, some, tractions)
-    _require_slope(law, limit, unit)
+    tiny = 1e-200
+    with np.errstate(all="ignore"):
+        slope = _called(law, "traction", np.array([1j * tiny])).imag[0] / tiny
+    if not abs(slope) * unit < 1e9 * limit:
+        raise SceneError(
+            f"{kind}: its traction has an infinite slope at zero opening, for which there is no "
+            "tangent; let it begin with a finite one"
+        )
     _require_integral(law, unit, energy)
     falls = -np.diff(tractions) / np.diff(some)
     worst = {int(np.argmax(falls)), int(np.argmax(np.abs(np.diff(tractions))))}
@@ -361,32 +356,6 @@ def _integral(law: SofteningLaw, edges: Array) -> float:
             break
         a, b = np.append(a, middle), np.append(middle, b)
     return total + float(lobatto(a, b).sum())
-
-
-def _tail(kind: str, openings: Array, t: Array) -> float:
-    """Energy beyond the last opening, of a traction that falls there by a power."""
-    if t[-1] == 0:
-        return 0.0
-    power = np.log(t[-17] / t[-1]) / np.log(openings[-1] / openings[-17])
-    if power <= 1.01:
-        raise SceneError(
-            f"{kind}: its traction is still {t[-1]:.6g} at the opening {openings[-1]:g}, so that "
-            "its energy is not finite; let it fall to zero, or faster than 1/opening. For a "
-            "hinge that never breaks give Hardening(limit)"
-        )
-    return float(t[-1] * openings[-1] / (power - 1))
-
-
-def _require_slope(law: SofteningLaw, limit: float, unit: float) -> None:
-    """Raise :class:`SceneError` unless the traction has a slope at zero opening."""
-    tiny = 1e-200
-    with np.errstate(all="ignore"):
-        slope = _called(law, "traction", np.array([1j * tiny])).imag[0] / tiny
-    if not abs(slope) * unit < 1e9 * limit:
-        raise SceneError(
-            f"{type(law).__name__}: its traction has an infinite slope at zero opening, for which "
-            "there is no tangent; let it begin with a finite one"
-        )
 
 
 def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:

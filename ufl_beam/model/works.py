@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass, field
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import (
@@ -14,18 +14,26 @@ from ufl_beam.errors import (
     require_count,
     require_function,
     require_number,
-    require_sequence,
     require_text,
     shorten,
 )
-from ufl_beam.model.bodies import Member
+from ufl_beam.model.bodies import Beams, Member
 from ufl_beam.model.connector_law import ENTRIES
 from ufl_beam.model.functions import TimeFunction, require_time_function
-from ufl_beam.model.records import parameters_by_name
+from ufl_beam.model.records import Record, parameters_by_name
+
+
+def _require_name(name: Any, what: str) -> None:
+    require_text(name, what)
+    if not name or name in ENTRIES:
+        raise SceneError(
+            f"{what} = {name!r} is an entry of the energy ledger already; give the work a name of "
+            "its own"
+        )
 
 
 @dataclass(frozen=True, eq=False)
-class Work:
+class Work(Record):
     """Base of what acts along beams by a function of a user; the function is a density of energy.
 
     Attributes:
@@ -34,40 +42,17 @@ class Work:
 
     arguments: ClassVar[tuple[str, ...]]
 
-    name: str
+    name: Annotated[str, _require_name]
     density: Callable[..., Any]
     _: KW_ONLY
-    beams: Sequence[Member] | None = None
+    beams: Beams = None
     numbers: Mapping[str, float | TimeFunction] = field(default_factory=dict)
-    degree: int = 2
+    degree: Annotated[int, require_count] = 2
 
     def __post_init__(self) -> None:
-        kind = type(self).__name__
-        require_text(self.name, f"{kind}: name")
-        if not self.name or self.name in ENTRIES:
-            raise SceneError(
-                f"{kind}: name = {self.name!r} is an entry of the energy ledger already; give the "
-                "work a name of its own"
-            )
-        require_count(self.degree, f"{self}: degree")
-        if self.beams is not None:
-            object.__setattr__(self, "beams", require_sequence(self.beams, f"{self}: beams"))
-            if not self.beams:
-                raise SceneError(f"{self}: beams is empty; leave it out for all beams")
-            for i, beam in enumerate(self.beams):
-                if not isinstance(beam, Member):
-                    raise SceneError(f"{self}: beams[{i}] = {shorten(beam)} is not a Beam")
-        self._require_numbers()
-        require_function(self.density, f"{self}: density", ", ".join(self.arguments))
-        asked = self.asked
-        for name in self.numbers:
-            if name not in asked:
-                raise SceneError(f"{self}: numbers[{name!r}] is no parameter of the function")
-
-    def __str__(self) -> str:
-        return f"{type(self).__name__} {self.name!r}"
-
-    def _require_numbers(self) -> None:
+        super().__post_init__()
+        if self.beams is not None and not self.beams:
+            raise SceneError(f"{self}: beams is empty; leave it out for all beams")
         if not isinstance(self.numbers, Mapping):
             raise SceneError(
                 f"{self}: numbers = {shorten(self.numbers)} must be numbers by name, as {{'c': 1}}"
@@ -81,6 +66,16 @@ class Work:
                 require_time_function(value, what)
             else:
                 require_number(value, what)
+        require_function(self.density, f"{self}: density", ", ".join(self.arguments))
+        asked = self.asked
+        for name in self.numbers:
+            if name not in asked:
+                raise SceneError(f"{self}: numbers[{name!r}] is no parameter of the function")
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__} {self.name!r}"
+
+    _label = __str__
 
     @property
     def asked(self) -> tuple[str, ...]:
