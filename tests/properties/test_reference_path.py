@@ -284,17 +284,17 @@ def motion_of_connectors(patch):
 
 def limit_of_slips(patch):
     """Plastic hinges of zero length slip at a limit that is too small."""
-    direction = _Slipping._direction
+    row = _Slipping.row
 
-    def wrong(self, motion, λ):
+    def wrong(self, e1, λ):
         limit = self.z["limit"]
         self.z["limit"] = 0.9 * limit
         try:
-            return direction(self, motion, λ)
+            return row(self, e1, λ)
         finally:
             self.z["limit"] = limit
 
-    patch.setattr(_Slipping, "_direction", wrong)
+    patch.setattr(_Slipping, "row", wrong)
 
 
 def energy_of_points(patch):

@@ -206,6 +206,29 @@ def test_reference(name, scheme):
         assert np.diff(found.energy["numerical"]).min() > -1e-16 or name == "bump"
 
 
+@dataclass(frozen=True)
+class Named(Maxwell):
+    """The same, with variables whose names are words that solvers use as well."""
+
+    variables: ClassVar = {"held": 0.0, "dissipated": 1.0, "slip": 1.0, "start": 1.0}
+
+    def energy(self, motion, state):
+        return state.slip * self.k * (motion - state.held) ** 2 / 2
+
+    def increments(self, motion, rate, state, dt):
+        creep = self.k * (motion - state.held) / (self.eta / dt + self.k)
+        return {"held": creep, "dissipated": 0.0, "slip": 0.0, "start": 0.0}
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(0.1, 0.1)], ids=str)
+def test_names_of_variables_are_free(scheme):
+    _, (link,), scene = cantilever(Named(200.0, 20.0))
+    named = require_reference(run, scene, link, scheme).connector(link)
+    _, (link,), scene = cantilever(LAWS["maxwell"])
+    for one, other in zip(named, run(scene, scheme).connector(link), strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(other).max())
+
+
 def test_an_end_of_equilibrium_is_at_rest():
     """With ExactStatic(1) forces are those at the ends of steps: nothing alternates [closed]."""
     push, soft = ub.ramp(0.3), ub.Spring(1.0)

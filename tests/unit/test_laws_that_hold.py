@@ -107,6 +107,30 @@ def test_a_constant_limit_is_dry_friction(scheme):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-11 * np.abs(other).max())
 
 
+@dataclass(frozen=True)
+class Named(Wearing):
+    """The same, with variables whose names are words that solvers use as well."""
+
+    variables: ClassVar = {"slip": 0.0, "held": 1.0, "dissipated": 2.0}
+
+    def limit(self, state):
+        way = self.way * state.held
+        return self.worn + (self.new - self.worn) * f.exp(-state.slip / way)
+
+    def increments(self, motion, rate, state, dt):
+        return {"slip": f.absolute(rate) * dt, "held": 0.0, "dissipated": 0.0}
+
+
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()], ids=str)
+def test_names_of_variables_are_free(scheme):
+    found = []
+    for law in (Named(2.0, 0.5, 0.1), LAWS["wearing"]):
+        _, (link,), scene = oscillator(law)
+        found.append(require_reference(run, scene, link, scheme).connector(link))
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(other).max())
+
+
 @CASES
 def test_held_exactly_and_never_gives_energy(name, scheme):
     _, (link,), scene = oscillator(LAWS[name])

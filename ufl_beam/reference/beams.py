@@ -147,7 +147,7 @@ class YieldingBeams(CellForce):
 
     def remember(self, memory: Memory) -> None:
         """Internal variables of all points."""
-        self.points.restore(memory.rows("cells", self.cells.numbers, self.points.state()))
+        self.points.state(memory.rows("cells", self.cells.numbers, self.points.state()))
 
     def material(self) -> Array:
         """Numbers of the cells, and what solutions keep of them; (num_cells, 7)."""

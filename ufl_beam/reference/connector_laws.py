@@ -3,12 +3,12 @@
 
 e is the relative motion at the end of the step and λ the force that resists its growth.  A law is
 a class: ``row`` states the equation, ``z`` has the internal variables, ``stored`` the energies.
+Variables that a user has named are in ``z`` as "state ...".
 """
 
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -51,8 +51,8 @@ EARLY, WEAK = 0.01, 1e-9
 """Motion, in rad or sizes of the scene, that counts as much as the limit in deciding whether a
 rigid-plastic connector slips in an iterate; least factor of motions, in EI over that size."""
 
-Row = tuple[float, float, float]
-"""α, β, γ."""
+Row = tuple[float, float, float] | Array
+"""α, β, γ; (k, k + 2) of the k components of a bushing."""
 
 Motions = Any
 """A relative motion, or an array of the components of a bushing; m or rad."""
@@ -71,13 +71,13 @@ class Setting:
     friction_repeats: bool  # whether places that stick may hold what is held already
 
 
-class LawInStep(ABC):
+class LawInStep:
     """Law of a connector in a step; its work is entered in ``entry`` of the ledger, if it has one.
 
     Attributes:
         saved_as: Name of the internal variables, that of the package's class.
         z: Internal variables of the accepted state; "dissipated" is what yielding, slip and laws of
-            users have lost since the beginning, J.
+            users have lost since the beginning, J; "start" the motion without round-off.
         stored: Energies in the accepted state, by entry of the ledger; J.
         opening: What opens beyond a limit, if the law does; see ``Solver._equilibrium``.
         slope: Factor that rows about the force were divided by.
@@ -85,6 +85,7 @@ class LawInStep(ABC):
 
     part, entry, sign, saved_as = "lost", "", 1.0, ""
     slope = 1.0
+    _row: Row
 
     def __init__(self, link: Connector, setting: Setting) -> None:
         self.link, self.setting, self.e0, self.dt = link, setting, 0.0, 1.0
@@ -92,19 +93,26 @@ class LawInStep(ABC):
         self.length = 1.0 if link.turns else setting.size  # of a motion that is large
         self.z: dict[str, float] = {}
         self.stored: dict[str, float] = {}
-        self.opening: MaterialPoints | _Slipping | _Holding | None = None
+        self.opening: Any = None
+        if isinstance(self.law, ConnectorLaw):
+            names = self.law.variables
+            self.saved_as, self.entry = f"{type(self.law).__qualname__}{[*names]}", self.law.entry
+            self.z = {f"state {name}": float(x) for name, x in names.items()}
+            self.z |= {"held": 0.0, "dissipated": 0.0}
+            if self.law.elastic:
+                self.entry = ""
         if self.entry:
             getattr(setting.ledger, self.part)[self.entry] += 0.0
 
-    def begin(self, e0: float, step: Step) -> None:
+    def begin(self, e0: Motions, step: Step) -> None:
         """Begin a step at the motion ``e0``; what iterates have tried is forgotten."""
         self.e0, self.dt = e0, step.dt
 
-    @abstractmethod
-    def row(self, e1: float, λ: float) -> Row:
-        """α, β, γ around an iterate."""
+    def row(self, e1: Motions, λ: Motions) -> Row:
+        """α, β, γ around an iterate; by default what ``begin`` has found."""
+        return self._row
 
-    def change(self, e1: float, work: float) -> float:
+    def change(self, e1: Motions, work: float) -> float:
         """Energy that is stored, dissipated or given away in a step; J.
 
         Raises:
@@ -112,37 +120,49 @@ class LawInStep(ABC):
         """
         return work
 
-    def accept(self, e1: float, work: float) -> None:
+    def accept(self, e1: Motions, work: float) -> None:
         """Take the end of the step; the connector has taken ``work`` in it."""
         if self.entry:
             getattr(self.setting.ledger, self.part)[self.entry] += self.sign * work
 
-    def start(self, e: float) -> float:
+    def start(self, e: Motions) -> Any:
         """Begin at a motion that no step has led to; return the force that the law has there."""
         return 0.0
 
-    def motion(self, e: float) -> float:
-        """Motion as solutions show it."""
-        return e
-
-    def state(self) -> Array:
-        """Return the internal variables as a row."""
+    def state(self, given: Array | None = None) -> Array:
+        """Internal variables as a row, after those of ``given`` are taken over."""
+        if given is not None:
+            self.z = dict(zip(self.z, map(float, given), strict=True))
         return np.array([*self.z.values()])
 
-    def restore(self, row: Array) -> None:
-        """Take over internal variables."""
-        self.z = dict(zip(self.z, map(float, row), strict=True))
+    def after(self, e1: Motions, part: float) -> tuple[Any, Any, State]:
+        """Motions and rates at the time of the law of a user, and variables after a part of a step.
+
+        All are as the methods of the law get them; the variables grow in proportion.
+        """
+        θ, e0, e1 = self.setting.scheme.theta, np.atleast_1d(self.e0), np.atleast_1d(e1)
+        both = (1 - θ) * e0 + θ * e1, (e1 - e0) / self.dt
+        e, rate = (self.law.given([*values[:, None]]) for values in both)
+        z = {name: np.array([self.z[f"state {name}"]]) for name in self.law.variables}
+        if part and z:
+            changes = self.law.increments(e, rate, State(z), θ * self.dt)
+            z = {name: x + part / θ * changes[name] for name, x in z.items()}
+        return e, rate, State(z)
 
 
-def around(force: Callable[[float], float], e: float, ε: float) -> Row:
-    """Row of a law whose force is a function of the motion, by central differences."""
-    D = (force(e + ε) - force(e - ε)) / (2 * ε)
-    return -D, 1.0, force(e) - D * e
+def around(forces: Callable[[Array], Any], e: Motions, ways: Motions) -> Array:
+    """Rows of a law whose forces are functions of the motions, by central differences."""
+    e, ways = np.atleast_1d(e), np.diag(np.atleast_1d(ways))
+    with np.errstate(all="ignore"):
+        slopes = [(forces(e + way) - forces(e - way)) / (2 * way.sum()) for way in ways]
+        D, force = np.reshape(slopes, (len(e), -1)).T, forces(e)
+    return np.column_stack([-D, np.ones(len(e)), force - D @ e])
 
 
-def small_way(e0: float, e1: float, length: float) -> float:
+def small_way(e0: Motions, e1: Motions, length: Motions) -> Any:
     """Third root of round-off, as a part of the step: it suits central differences."""
-    return 6e-6 * max(abs(e1 - e0), 1e-3 * max(abs(e1), 1e-3 * length))
+    least = 1e-3 * np.maximum(np.abs(e1), 1e-3 * length)
+    return 6e-6 * np.maximum(np.abs(e1 - e0), least)
 
 
 # -- what is held, driven, pushed, damped --------------------------------------------------------
@@ -163,11 +183,9 @@ class _Known(LawInStep):
         kind = held if link.law is HELD else self.KINDS[type(link.law)]
         self.part, self.entry, self.sign, self.saved_as = kind
         super().__init__(link, setting)
-        self._gives_force = isinstance(link.law, Actuator | Controller)
-        self.z = {"reached": 0.0} if self._gives_force else {}
+        self.z = {"reached": 0.0} if isinstance(self.law, Actuator | Controller) else {}
 
     def begin(self, e0: float, step: Step) -> None:
-        super().begin(e0, step)
         law, link = self.law, self.link
         if law is HELD:
             self._row = 1.0, 0.0, 0.0
@@ -183,12 +201,9 @@ class _Known(LawInStep):
             growth = step.fraction * (-wanted - reached)
             self._row, self._end = (0.0, 1.0, reached + step.at * growth), reached + growth
 
-    def row(self, e1: float, λ: float) -> Row:
-        return self._row
-
     def accept(self, e1: float, work: float) -> None:
         super().accept(e1, work)
-        if self._gives_force:
+        if self.z:
             self.z["reached"] = self._end
 
 
@@ -200,53 +215,23 @@ class _Stated(LawInStep):
 
     def __init__(self, link: Connector, setting: Setting) -> None:
         super().__init__(link, setting)
-        law, scheme, ledger = self.law, setting.scheme, setting.ledger
-        self.saved_as = f"{type(law).__qualname__}{[*law.variables]}"
-        self.z = {**{name: float(x) for name, x in law.variables.items()}, "held": 0.0}
-        self.z["dissipated"] = 0.0
-        self._loses, self._part, self._θ = not law.elastic, scheme.load_weight, scheme.theta
+        scheme = setting.scheme
+        self._part, self._θ = scheme.load_weight, scheme.theta
         self._delayed = scheme.weight_of_before == 0 and self._part > 0.5
-        if self._loses:
-            ledger.lost[law.entry] += 0.0
         if self._delayed:
-            ledger.lost["numerical"] += 0.0
+            setting.ledger.lost["numerical"] += 0.0
 
-    def _after(self, e1: Motions, part: float) -> State:
-        """Variables after a part of the step to ``e1``; they grow in proportion."""
-        z = {name: np.array([self.z[name]]) for name in self.law.variables}
-        if part and z:
-            e, rate = self._at_law(e1)
-            changes = self.law.increments(e, rate, State(z), self._θ * self.dt)
-            z = {name: x + part / self._θ * changes[name] for name, x in z.items()}
-        return State(z)
-
-    def _at_law(self, e1: Motions) -> tuple[Any, Any]:
-        """Motions and rates at the time of the law, as its methods get them."""
-        e0, e1 = np.atleast_1d(self.e0), np.atleast_1d(e1)
-        return tuple(
-            self.law.given([np.array([x]) for x in values])
-            for values in ((1 - self._θ) * e0 + self._θ * e1, (e1 - e0) / self.dt)
-        )
-
-    def _energy(self, e: Motions, z: State) -> float:
-        motion = self.law.given([np.array([x]) for x in np.atleast_1d(e)])
-        return float(np.sum(self.law.energy(motion, z)))
+    def _energy(self, e: Motions, z: State) -> Any:
+        return np.sum(self.law.energy(self.law.given([*np.atleast_1d(e)[:, None]]), z))
 
     def _elastic(self, e: Array, z: State) -> Array:
         """Derivatives of the energy by the motions; (k,)."""
-        forces = self.law.elastic_forces([np.array([x]) for x in e], z)
-        return np.array([float(np.sum(force)) for force in forces])
-
-    def _by_variable(self, e: Motions, z: State, name: str) -> float:
-        """Derivative of the energy by a variable, by a complex step."""
-        moved = State({n: x + 1e-30j if n == name else x for n, x in vars(z).items()})
-        motion = self.law.given([np.array([x]) for x in np.atleast_1d(e)])
-        return float(np.sum(np.imag(self.law.energy(motion, moved)))) / 1e-30
+        return np.array([float(np.sum(f)) for f in self.law.elastic_forces([*e[:, None]], z)])
 
     def _forces(self, e1: Array) -> Array:
         """Forces of a step to ``e1``: of the energy where loads act, and the resistance; (k,)."""
-        e0, z = np.atleast_1d(self.e0), self._after(e1, self._part)
-        resistance = self.law.resistance(*self._at_law(e1), self._after(e1, self._θ), self.dt)
+        e0, (*_, z) = np.atleast_1d(self.e0), self.after(e1, self._part)
+        resistance = self.law.each(self.law.resistance(*self.after(e1, self._θ), self.dt))
         elastic = end = self._elastic(e1, z)
         if self._part != 1.0:
             # By Gauss's rule; where the forces are not smooth, from the change of the energy.
@@ -261,45 +246,38 @@ class _Stated(LawInStep):
                     if way[group].any():
                         mean[group] += missing * share * way[group] / (way[group] @ way[group])
             elastic = mean + (2 * self._part - 1) * (end - mean)
-        return elastic + [float(np.sum(force)) for force in self.law.each(resistance)]
+        return elastic + [float(np.sum(force)) for force in resistance]
 
-    def row(self, e1: Motions, λ: Motions) -> Any:
-        """The law around an iterate, a row for each component; (k, k + 2)."""
-        e0, e1 = np.atleast_1d(self.e0), np.atleast_1d(e1)
-        lengths, slopes = [self.length] if len(e1) == 1 else [self.length, self.length, 1.0], []
-        with np.errstate(all="ignore"):
-            for i, ε in enumerate(map(small_way, e0, e1, lengths)):
-                moved = ε * np.eye(len(e1))[i]
-                slopes.append((self._forces(e1 + moved) - self._forces(e1 - moved)) / (2 * ε))
-            D, force = np.transpose(slopes), self._forces(e1)
-        return np.column_stack([-D, np.ones(len(e1)), force - D @ e1])
+    def row(self, e1: Motions, λ: Motions) -> Row:
+        lengths = np.array([self.length, self.length, 1.0])[: np.size(e1)]
+        return around(self._forces, e1, small_way(self.e0, e1, lengths))
 
     def change(self, e1: Motions, work: float) -> float:
-        if self._loses:
+        if self.entry:
             return work
-        return self._energy(e1, self._after(e1, 0.0)) - self.z["held"]
+        return float(self._energy(e1, self.after(e1, 0.0)[2])) - self.z["held"]
 
     def accept(self, e1: Motions, work: float) -> None:
         """Take the variables; what is neither stored nor lost by the scheme is lost."""
-        old, new, ledger = self._after(e1, 0.0), self._after(e1, 1.0), self.setting.ledger
-        held, numerical = self._energy(e1, new), 0.0
-        if self._delayed:
-            e0, e = np.atleast_1d(self.e0), np.atleast_1d(e1)
-            growth = float(self._elastic(e, new) @ (e - e0))
-            for name, z in vars(new).items():
-                growth += self._by_variable(e1, new, name) * float((z - getattr(old, name))[0])
-            numerical = (2 * self._part - 1) * (self._energy(self.e0, old) - held + growth)
-            ledger.lost["numerical"] += numerical
-        if self._loses:
+        (*_, old), (*_, new) = (self.after(e1, part) for part in (0.0, 1.0))
+        held, numerical = float(self._energy(e1, new)), 0.0
+        if self._delayed:  # its growth is the derivative along the step, by a complex step
+            z = {n: x + 1e-30j * (x - getattr(old, n)) for n, x in vars(new).items()}
+            along = self._energy(e1 + 1e-30j * (e1 - self.e0), State(z))
+            growth = float(np.imag(along)) / 1e-30
+            numerical = (2 * self._part - 1) * float(self._energy(self.e0, old) - held + growth)
+            self.setting.ledger.lost["numerical"] += numerical
+        if self.entry:
             lost = work - (held - self.z["held"]) - numerical
-            ledger.lost[self.law.entry] += lost
+            super().accept(e1, lost)
             self.z["dissipated"] += lost
-        self.z |= {name: float(x[0]) for name, x in vars(new).items()} | {"held": held}
+        self.z |= {f"state {name}": float(x[0]) for name, x in vars(new).items()}
+        self.z["held"] = held
         self.stored = {"stored": held}
 
     def start(self, e: Motions) -> Any:
-        z = self._after(e, 0.0)
-        self.z["held"] = self._energy(e, z)
+        *_, z = self.after(e, 0.0)
+        self.z["held"] = float(self._energy(e, z))
         self.stored = {"stored": self.z["held"]}
         return self._elastic(np.atleast_1d(e), z)
 
@@ -344,41 +322,50 @@ class _Sprung(LawInStep):
         self.z["dissipated"] = float(self._points.kept[0, 4:].sum())
         return float(self._points.kept[0, 0])
 
-    def state(self) -> Array:
-        return np.asarray(self._points.state()[0])
-
-    def restore(self, row: Array) -> None:
-        self._points.restore(row[None])
+    def state(self, given: Array | None = None) -> Array:
+        return np.asarray(self._points.state(None if given is None else given[None])[0])
 
 
 # -- friction and plastic hinges -----------------------------------------------------------------
 
 
 class _Rubbing(LawInStep):
-    """Dry friction: it sticks, or slips one way or the other (-1, 1)."""
+    """Dry friction: it sticks, or slips one way or the other (-1, 1); a law of a user as well.
+
+    The sliding force of such a law may be below its limit, so that to stick and to slide can both
+    be solutions.  It goes on as in the last step until an equilibrium is found that does not admit
+    this.
+
+    Attributes:
+        excess: Of a law of a user: infinite if it slides back or its coming to rest gives energy;
+            ``|force| / limit - 1`` if it is held and bears too much; else 0.
+        released: Whether it may change in the iterates from now on.
+    """
 
     entry, saved_as = "friction", "_Rubbing"
 
     def __init__(self, link: Connector, setting: Setting) -> None:
         super().__init__(link, setting)
-        self.z = {"slip": 0.0}
+        self.z = {"slip": 0.0, **self.z}
+        self.excess, self.released = 0.0, False
+        if isinstance(self.law, ConnectorLaw):
+            self.opening, self.stored = self, {"stored": 0.0}
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
-        self._limit = self._limit_now()
+        if self.opening:
+            self._limit = max(float(np.sum(self.law.limit(self.after(e0, 0.0)[2]))), 0.0)
+        else:
+            self._limit = self.setting.asked[self.link]
         softness = CREEP * self.length * self.setting.friction_repeats
         self._creep = softness / self._limit if self._limit > 0 else 0.0
         # With this way the velocity at the end is zero; with none, that before would come back.
         self._way = way_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.link]
         self._slip, self._against, self._guessed = self.z["slip"], False, True
 
-    def _limit_now(self) -> float:
-        return self.setting.asked[self.link]
-
     def row(self, e1: float, λ: float) -> Row:
         """Stick while the force is below the limit; slip until the sliding velocity reverses."""
-        moved = e1 - self.e0
-        stuck = self._slip == 0
+        moved, stuck, search = e1 - self.e0, self._slip == 0, self.setting.search
         if not self._against and self._slip * self._way > 0:
             moved -= self._way  # rest at the end, rather than a reversed velocity
         back = not stuck and self._slip * moved < -1e-14 * self.length
@@ -386,8 +373,12 @@ class _Rubbing(LawInStep):
         # The force of the guess does not decide this: it belongs to another motion.
         gives = not self._guessed and not self._against and stuck and λ * self._way < 0
         over = stuck and abs(λ) > self._limit * (1 + 1e-12)
-        self._guessed = False
-        if self._may_change(back or gives, over, λ):
+        self._guessed, self.excess = False, 0.0
+        if self.opening and search.hold and not self.released:
+            if back or gives or over:
+                turns = back or gives or not self._limit
+                self.excess, search.over = math.inf if turns else abs(λ) / self._limit - 1, True
+        else:
             self._against |= gives
             if back:
                 self._slip = 0.0
@@ -395,84 +386,21 @@ class _Rubbing(LawInStep):
                 self._slip = math.copysign(1.0, λ)
         if self._slip == 0 and self._limit > 0:
             return 1.0, -self._creep, self.e0 + (0.0 if self._against else self._way)
-        return self._sliding(e1)
+        if not self.opening:
+            return 0.0, 1.0, self._slip * self._limit
 
-    def _may_change(self, turns: bool, over: bool, λ: float) -> bool:
-        return True
+        def sliding(e: Array) -> Any:
+            return self._slip * self.law.sliding(*self.after(e, self.setting.scheme.theta), self.dt)
 
-    def _sliding(self, e1: float) -> Row:
-        return 0.0, 1.0, self._slip * self._limit
+        return around(sliding, e1, small_way(self.e0, e1, self.length))
 
     def accept(self, e1: float, work: float) -> None:
+        if self.opening:
+            new = vars(self.after(e1, 1.0)[2])
+            self.z |= {f"state {name}": float(x[0]) for name, x in new.items()}
+            self.z["dissipated"] += work
         super().accept(e1, work)
         self.z["slip"] = self._slip
-
-
-class _Holding(_Rubbing):
-    """Law of a user that holds the motion up to a limit, and slides beyond it.
-
-    Its sliding force may be below the limit, so that to stick and to slide can both be solutions.
-    It goes on as in the last step until an equilibrium is found that does not admit this.
-
-    Attributes:
-        excess: Infinite if it slides back or its coming to rest gives energy; ``|force| / limit -
-            1`` if it is held and bears too much; else 0.
-    """
-
-    def __init__(self, link: Connector, setting: Setting) -> None:
-        self.entry = link.law.entry  # type: ignore[union-attr]
-        super().__init__(link, setting)
-        law, self.opening = self.law, self
-        self._free, self.excess = False, 0.0
-        self.saved_as, self._θ = f"{type(law).__qualname__}{[*law.variables]}", setting.scheme.theta
-        self.z |= {name: float(x) for name, x in law.variables.items()}
-        self.z |= {"held": 0.0, "dissipated": 0.0}
-        self.stored = {"stored": 0.0}
-
-    def _may_change(self, turns: bool, over: bool, λ: float) -> bool:
-        self.excess = 0.0
-        if self._free or not self.setting.search.hold:
-            return True
-        if turns or over:
-            self.excess = math.inf if turns or not self._limit else abs(λ) / self._limit - 1
-            self.setting.search.over = True
-        return False
-
-    def release(self, least: float) -> None:
-        """Let it change in the iterates from now on if its excess is so large."""
-        self._free |= self.excess > 0 and self.excess >= least
-
-    def close(self) -> None:
-        """Take the release back."""
-        self._free = False
-
-    def _state(self) -> State:
-        return State({name: np.array([self.z[name]]) for name in self.law.variables})
-
-    def _limit_now(self) -> float:
-        return max(float(np.sum(self.law.limit(self._state()))), 0.0)
-
-    def _after(self, e1: float, part: float) -> tuple[Array, Array, State]:
-        """Motion and rate at the time of the law, and variables after a part of the step."""
-        e, rate = np.array([(1 - self._θ) * self.e0 + self._θ * e1]), np.array([e1 - self.e0])
-        rate, old = rate / self.dt, self._state()
-        if not vars(old):
-            return e, rate, old
-        changes = self.law.increments(e, rate, old, self._θ * self.dt)
-        z = {name: x + part / self._θ * changes[name] for name, x in vars(old).items()}
-        return e, rate, State(z)
-
-    def _sliding(self, e1: float) -> Row:
-        def force(e: float) -> float:
-            return self._slip * float(np.sum(self.law.sliding(*self._after(e, self._θ), self.dt)))
-
-        return around(force, e1, small_way(self.e0, e1, self.length))
-
-    def accept(self, e1: float, work: float) -> None:
-        *_, new = self._after(e1, 1.0)
-        super().accept(e1, work)
-        self.z |= {name: float(x[0]) for name, x in vars(new).items()}
-        self.z["dissipated"] += work
 
 
 class _Slipping(LawInStep):
@@ -486,6 +414,7 @@ class _Slipping(LawInStep):
 
     Attributes:
         excess: ``|force| / limit - 1`` if it is held closed and bears too much, else 0.
+        released: Whether it may open from now on.
     """
 
     saved_as = "CompiledSlips"
@@ -496,7 +425,7 @@ class _Slipping(LawInStep):
         self._law, self._numbers = law, {name: float(x) for name, x in numbers(law).items()}
         self.z = {"slipped": 0.0, "start": 0.0, "limit": float(law.limit), "back force": 0.0}
         self.z |= {"dissipated": 0.0, "way": 0.0, "stored": 0.0}
-        self._released, self.excess, self._hardens = False, 0.0, isinstance(law, Hardening)
+        self.excess, self.released, self._hardens = 0.0, False, isinstance(law, Hardening)
         setting.ledger.lost["hinges"] += 0.0
         self._loss = 2 * setting.scheme.alpha if self._hardens else 0.0
         if self._loss:
@@ -510,45 +439,32 @@ class _Slipping(LawInStep):
         at = {**self._numbers, **self.z, "θ": self.setting.scheme.theta, "dt": self.dt}
         return slip(self._law, {**at, "slip": grown, "direction": way}, self.setting.scheme)
 
-    def _force(self, motion: float, way: int) -> tuple[float, float]:
-        """Force of a slip, and its derivative by the motion."""
-        grown = np.array([max(way * motion, 0.0)])
-        force, slope = derivative(lambda a: self._slip(a, way).force, grown)
-        return float(force[0]), way * float(slope[0])
-
+    @np.errstate(all="ignore")
     def row(self, e1: float, λ: float) -> Row:
         """α, β, γ around an iterate, whose direction of slip is found first."""
-        motion, r = e1 - self.z["start"], self.slope
-        self._way = self._direction(motion, λ)
-        if self._way == 0:
-            return 1.0, 0.0, self.z["start"]
-        force, slope = self._force(motion, self._way)
-        return slope / r, -1 / r, (slope * e1 - force) / r
-
-    def _direction(self, motion: float, λ: float) -> int:
-        """Direction in which the connector slips in an iterate, or 0 if it is held."""
-        limit, search = self.z["limit"], self.setting.search
-        tested = λ - self.z["back force"] + self.slope * motion
-        over, way = abs(tested) > limit * (1 + 1e-12), -1 if tested < 0 else 1
-        self.excess = 0.0
+        z, r, search, self.excess = self.z, self.slope, self.setting.search, 0.0
+        motion, limit = e1 - z["start"], z["limit"]
+        tested = λ - z["back force"] + r * motion
+        over = abs(tested) > limit * (1 + 1e-12)
+        way = -1 if (tested if limit else motion) < 0 else 1
+        force, slope = (
+            float(x[0])
+            for x in derivative(
+                lambda a: self._slip(a, way).force, np.array([max(way * motion, 0)])
+            )
+        )
         if limit == 0:
-            return -1 if motion < 0 else 1
-        if search.hold and not self.z["way"] and not self._released:
+            slips = True
+        elif search.hold and not z["way"] and not self.released:
+            slips = False
             if over:
                 self.excess, search.over = abs(tested) / limit - 1, True
-            return 0
-        if way * motion <= 0:
-            return way * over
-        force, _ = self._force(motion, way)
-        return way if way * (λ + self.slope * motion - force) > 0 else 0
-
-    def release(self, least: float) -> None:
-        """Let it open from now on if its excess is so large."""
-        self._released |= self.excess > 0 and self.excess >= least
-
-    def close(self) -> None:
-        """Take the release back."""
-        self._released = False
+        else:
+            slips = over if way * motion <= 0 else way * (λ + r * motion - force) > 0
+        self._way = way * slips
+        if not slips:
+            return 1.0, 0.0, z["start"]
+        return way * slope / r, -1 / r, (way * slope * e1 - force) / r
 
     def accept(self, e1: float, work: float) -> None:
         """Take the slip of the step as the new state."""
@@ -570,10 +486,6 @@ class _Slipping(LawInStep):
         if self._hardens:
             self.stored = {"hardening": self.z["stored"]}
         return 0.0
-
-    def motion(self, e: float) -> float:
-        """Motion without the round-off of what is held."""
-        return self.z["start"]
 
 
 def _slope(link: Connector, size: float) -> float:
@@ -635,9 +547,6 @@ class _Asked(LawInStep):
                 raise NoNumber(f"{self.link}: the function returned {number} at {at}")
         return force, after
 
-    def _at(self, e1: float) -> float:
-        return self._respond(e1)[0]
-
     def row(self, e1: float, λ: float) -> Row:
         """The law around an iterate.
 
@@ -645,28 +554,27 @@ class _Asked(LawInStep):
         The two latest iterates tell how the rest of the scene yields: the law is taken where it
         meets this line, if that is between ``e1`` and the place before.
         """
-        force, last, at = self._at(e1), self._last, e1
-        missed = force - λ
+        last, at, missed = self._last, e1, self._respond(e1)[0] - λ
         if last is not None and abs(missed) > abs(last[2]) / 2 and e1 != last[0]:
             yielding = max(0.0, (last[1] - λ) / (e1 - last[0]))
 
             def excess(x: float) -> float:
-                return self._at(x) - λ + yielding * (x - e1)
+                return self._respond(x)[0] - λ + yielding * (x - e1)
 
             if excess(e1) * excess(last[3]) < 0:
                 at = float(scipy.optimize.brentq(excess, e1, last[3], xtol=1e-300, maxiter=2000))
-        ε = small_way(self.e0, at, self.length)
+        ε = float(small_way(self.e0, at, self.length))
         near = 6e-6 * max(abs(at), 0.0 if last is None else abs(last[3]))
         if 0.0 < near < ε:  # beside zero, where the slope may be infinite
-            steep = abs(self._at(at + near) - self._at(at - near)) > 1e-8 * abs(self._at(at))
-            ε = near if steep else ε
+            low, here, high = (self._respond(at + x)[0] for x in (-near, 0.0, near))
+            ε = near if abs(high - low) > 1e-8 * abs(here) else ε
         self._last = e1, λ, missed, at
-        return around(self._at, at, ε)
+        return around(lambda e: self._respond(float(e[0]))[0], at, ε)
 
     def accept(self, e1: float, work: float) -> None:
         """Enter what is not stored of the work, and take the internal variables."""
         before, (_, after) = self.stored["stored"], self._respond(e1)
-        self.restore(after)
+        self.state(after)
         self.start(e1)
         super().accept(e1, work - (self.stored["stored"] - before))
 
@@ -689,5 +597,5 @@ LAWS: dict[type, type[LawInStep]] = {
 def law_in_step(link: Connector, setting: Setting) -> LawInStep:
     """Law of a connector in a step."""
     if isinstance(link.law, ConnectorLaw) and link.law.holds:
-        return _Holding(link, setting)
+        return _Rubbing(link, setting)
     return next(LAWS[kind] for kind in type(link.law).__mro__ if kind in LAWS)(link, setting)

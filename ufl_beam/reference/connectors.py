@@ -196,7 +196,8 @@ class Connectors(Linked):
     def kept(self, q: Array) -> Array:
         """Columns of ``Connection`` of each; (num_links, 5)."""
         each = zip(self.laws, self._of_each(self._e0), strict=True)
-        e, dissipated = np.ravel([law.motion(e) for law, e in each]), np.zeros(len(self.links))
+        e = np.ravel([law.z.get("start", e) for law, e in each])
+        dissipated = np.zeros(len(self.links))
         dissipated[:: self._k] = [law.z.get("dissipated", 0.0) for law in self.laws]
         return np.column_stack([e, q[self.forces_at], self.work, self.rate, dissipated])
 
@@ -207,7 +208,7 @@ class Connectors(Linked):
             row = np.array([self.work[i], self.rate[i], self.before[i], self._e0[i], *law.state()])
             row = memory.rows(law.saved_as, self.numbers[i : i + 1], row[None])[0]
             self.work[i], self.rate[i], self.before[i], self._e0[i] = row[:4]
-            law.restore(row[4:])
+            law.state(row[4:])
 
 
 class GuideForce(Linked):

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -22,8 +23,8 @@ from ufl_beam.model.fibres import Layout
 from ufl_beam.model.law_functions import Values
 from ufl_beam.reference.cells import Ledger
 
-CLOSED, FLOWING, RELEASED = 0.0, 1.0, 2.0
-"""A discontinuity did not grow in the last step, grew in it, may open in this one."""
+CLOSED, FLOWING = 0.0, 1.0
+"""A discontinuity did not grow in the last step, or grew in it."""
 
 IMAGINARY = 1e-200
 """Step into the imaginary: its square disturbs no digit of the value."""
@@ -101,6 +102,7 @@ class MaterialPoints:
         stored: Energies in the accepted state, by entry of the ledger; J.
         softens: Whether points may open.
         excess: ``|stress| / limit - 1`` of the points that are held closed, else 0; (cells, n).
+        released: Which of these may open from now on.
     """
 
     def __init__(
@@ -132,6 +134,7 @@ class MaterialPoints:
         self.D: Array = np.zeros((cells, 3, 3))
         self.kept: Array = np.zeros((cells, 6))
         self.excess: Array = np.zeros((cells, n))
+        self.released: Any = False
         self.softens = layout.softening is not None
         # What has broken may have a stress at the ends of a step, and none where its law holds.
         over_step = scheme.average(0.0, 1.0) != 1.0
@@ -169,6 +172,7 @@ class MaterialPoints:
         first = stress[0]  # of points that can open it is the only one
         over = np.abs(first) > at["traction"]  # P(51)
         held = over & (at["flows"] == CLOSED) & (at["traction"] > 0) & self._search.hold
+        held &= np.logical_not(self.released)
         self.excess = np.where(held, np.abs(first) / at["traction"] - 1, 0.0)
         self._search.over |= bool(held.any())
         opens = over & ~held
@@ -270,14 +274,6 @@ class MaterialPoints:
             a = np.where(within, better, halved)
         return np.where(none, 0.0, found)
 
-    def release(self, least: float) -> None:
-        """Let points that are held open from now on whose excess is so large."""
-        self.at["flows"][(self.excess > 0) & (self.excess >= least)] = RELEASED
-
-    def close(self) -> None:
-        """Take back what was released: the step is accepted, or begins again."""
-        self.at["flows"][self.at["flows"] == RELEASED] = CLOSED
-
     # -- the end of a step -----------------------------------------------------------------------
 
     @np.errstate(all="ignore")
@@ -368,20 +364,21 @@ class MaterialPoints:
         of_entries = {"stored": elastic + self._of_rest(strains), "hardening": hardening}
         self.stored = {entry: of_entries[entry] for entry in self.stored}
 
-    def state(self) -> Array:
-        """Return the internal variables of the accepted state; (cells, k)."""
+    def state(self, given: Array | None = None) -> Array:
+        """Internal variables of the accepted state, (cells, k), after those given are taken over.
+
+        Forces and stored energies follow from :meth:`start`.
+        """
+        if given is not None:
+            n = self.at["length"].shape[1]
+            for i, name in enumerate(self._variables):
+                self.at[name][:] = given[:, i * n : (i + 1) * n]
+            self.kept = given[:, -11:-5].copy()
         stored = np.zeros((len(self.kept), 2))
         # That of all cells together; to whom it belongs does not matter.
         stored[:1] = self.stored["stored"], self.stored.get("hardening", 0.0)
         variables = [self.at[name] for name in self._variables]
         return np.asarray(np.hstack([*variables, self.kept, self.strains0, stored]))
-
-    def restore(self, table: Array) -> None:
-        """Take over :meth:`state`; forces and stored energies follow from :meth:`start`."""
-        n = self.at["length"].shape[1]
-        for i, name in enumerate(self._variables):
-            self.at[name][:] = table[:, i * n : (i + 1) * n]
-        self.kept = table[:, -11:-5].copy()
 
 
 def _part_of(residuals: Array, sizes: Array) -> Array:

@@ -134,7 +134,7 @@ class Solver:
         self.forces: list[Force] = [*self.inner, *self.loads, *inertia, *damping]
         groups = [one for one in self.connectors if isinstance(one, Connectors)]
         openings = (law.opening for one in groups for law in one.laws)
-        self._open = [one for one in openings if one is not None]
+        self._open: list[Any] = [one for one in openings if one is not None]
         self._open += [beams.points for beams in self.yielding if beams.points.softens]
         self._with_friction = [one for one in groups if self.rates.keys() & {*one.links}]
 
@@ -352,7 +352,7 @@ class Solver:
             x, times = self._newton(guess), 0
             while excess := max(float(np.max(one.excess)) for one in self._open):
                 for one in self._open:
-                    one.release(FALL**times * excess - TIE)
+                    one.released |= (one.excess > 0) & (one.excess >= FALL**times * excess - TIE)
                 x, times = self._newton(x), times + 1
             return x
         except StepFailed:
@@ -361,7 +361,7 @@ class Solver:
         finally:
             self.search.hold = False
             for one in self._open:
-                one.close()
+                one.released = False
         self.begin(step)
         return self._newton(guess)
 
