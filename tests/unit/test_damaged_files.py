@@ -16,8 +16,7 @@ import pytest
 
 import ufl_beam as ub
 from ufl_beam.output import output_files
-from ufl_beam.output.output_files import above, version
-from ufl_beam.output.paraview_files import data_path
+from ufl_beam.output.output_files import above, beside, version
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1, bending=ub.Hardening(0.5, 10.0))
 
@@ -556,7 +555,7 @@ def numbers(path):
             )
             return found
     if path.suffix == ".xdmf":
-        return path.read_bytes(), data_path(path).read_bytes()
+        return path.read_bytes(), beside(path, ".bin").read_bytes()
     return path.read_bytes()
 
 

@@ -28,8 +28,8 @@ from ufl_beam.errors import SceneError, require_kind, require_sequence, require_
 from ufl_beam.output.output_files import (
     above,
     below,
+    beside,
     decoding,
-    part_of,
     plain,
     read,
     require_apart,
@@ -201,7 +201,7 @@ def study(
     outputs = []
     if path is not None:
         path = require_path(path, "study")
-        outputs.append(("study", (path, part_of(path))))
+        outputs.append(("study", (path, beside(path))))
     todo: dict[str, Case] = {}
     records: dict[str, Record] = {}
 

@@ -87,12 +87,7 @@ class DolfinxView:
 
     @property
     def mesh(self) -> meshes.Mesh:
-        """Mesh of the cells of this process, in the plane, undeformed; m.
-
-        Example:
-            >>> view.mesh.topology.index_map(1).size_local, view.mesh.geometry.dim
-            (4, 2)
-        """
+        """Mesh of the cells of this process, in the plane, undeformed; m."""
         return self._fields.mesh
 
     @cached_property
@@ -121,12 +116,7 @@ class DolfinxView:
 
     @property
     def function_space(self) -> fem.FunctionSpace:
-        """Space of configurations (u_x, u_y, ψ): continuous, P1 with cells of degree 1.
-
-        Example:
-            >>> len(fem.Function(view.function_space).x.array)
-            15
-        """
+        """Space of configurations (u_x, u_y, ψ): continuous, P1 with cells of degree 1."""
         return self._fields.element.space
 
     @cached_property
@@ -151,12 +141,7 @@ class DolfinxView:
 
     @property
     def dx(self) -> ufl.Measure:
-        """Integration over the cells with the points of the resultants, one for degree 1.
-
-        Example:
-            >>> view.dx.metadata()
-            {'quadrature_degree': 1}
-        """
+        """Integration over the cells with the points of the resultants, one for degree 1."""
         return self._fields.element.dx(1)
 
     def total(self, integral: ufl.Form | Expr) -> float:
@@ -206,11 +191,6 @@ class DolfinxView:
 
         Raises:
             SceneError: The scheme is a static one.
-
-        Example:
-            >>> v = view.velocity.sub(1).collapse()
-            >>> bool(np.isclose(v.x.array.min(), simulation.velocity(beam.end)[1]))
-            True
         """
         if not has_inertia(self._of.scheme):
             raise SceneError("dolfinx.velocity: a static scheme has no velocities; run dynamics")
@@ -221,10 +201,6 @@ class DolfinxView:
         """Strains (Σ, Γ, K) of the configuration, means of the cells; 1, 1, 1/m.
 
         Those of the bulk have no part of a jump, see ``mechanics/functional.py``.
-
-        Example:
-            >>> view.strains.x.array.reshape(-1, 3).shape
-            (4, 3)
         """
         return self._function("strains", self._of.now.mean_strains(0)[self.cells])
 

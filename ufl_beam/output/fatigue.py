@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
@@ -211,15 +211,22 @@ class RainflowCounter:
     """Rainflow counter of a series that comes in pieces, in constant memory.
 
     Values are rounded to multiples of ``resolution`` (Pa), so that cycles fall into classes, and no
-    more turning points wait than there are classes.  Without it they are counted as they are.
+    more turning points wait than there are classes.  Without it they are counted as they are.  It
+    goes on after what :meth:`state` returned, ``counted`` and ``waiting``.
     """
 
-    def __init__(self, resolution: float | None = None) -> None:
+    def __init__(
+        self, resolution: float | None = None, counted: Array | None = None,
+        waiting: Iterable[float] = (),
+    ) -> None:  # fmt: skip
         self._rounds, self._unit = resolution is not None, 1.0
         if resolution is not None:
             self._unit = require_number(resolution, "RainflowCounter: resolution", positive=True)
         self._counts: defaultdict[tuple[float, float], float] = defaultdict(float)  # by both ends
-        self._waiting: list[float] = []  # turning points between which ranges become smaller
+        for low, high, count in () if counted is None else counted:
+            self._counts[float(low), float(high)] = float(count)
+        # Turning points between which ranges become smaller
+        self._waiting: list[float] = [*map(float, waiting)]
 
     def add(self, series: Array) -> None:
         """Count the next piece by the method of ASTM E1049; (n,)."""
@@ -250,12 +257,6 @@ class RainflowCounter:
         """Return ends and numbers of cycles, (n, 3), and waiting turning points, in classes."""
         counted = [(*ends, count) for ends, count in self._counts.items()]
         return np.array(counted, dtype=float).reshape(-1, 3), np.array(self._waiting, dtype=float)
-
-    def resume(self, counted: Array, waiting: Array) -> None:
-        """Go on after a :meth:`state`."""
-        for low, high, count in (map(float, row) for row in counted):
-            self._counts[low, high] = count
-        self._waiting = [*map(float, waiting)]
 
 
 # -- counting in a run ----------------------------------------------------------------------------
@@ -354,16 +355,17 @@ class Fatigue(Restartable):
         at = [simulation.grid.cell_and_part(spot.place) for spot in self.spots]
         self._cells = np.array([cell for cell, _ in at], dtype=np.int64)
         self._parts, self._part = np.unique([part for _, part in at], return_inverse=True)
-        self._counters = {spot: RainflowCounter(self._resolution) for spot in self.spots}
         self._block: list[Array] = []
-        if state is None:
+        self._counters = {}
+        for i, spot in enumerate(dict.fromkeys(self.spots)):
+            before = (state[f"counted {i}"], state[f"waiting {i}"]) if state else ()
+            self._counters[spot] = RainflowCounter(self._resolution, *before)
+        if state:
+            self._begin, self._end = map(float, state["duration"])
+        else:
             self._begin = simulation.t
             self.write(simulation)
             self._count()  # A stress that is no number is found at once.
-            return
-        self._begin, self._end = map(float, state["duration"])
-        for i, counter in enumerate(self._counters.values()):
-            counter.resume(state[f"counted {i}"], state[f"waiting {i}"])
 
     def write(self, simulation: StateView) -> None:
         """Note the section forces, and count now and then."""

@@ -27,7 +27,7 @@ from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
-from ufl_beam.output.output_files import OutputFile, changed, part_of, require_path
+from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
 from ufl_beam.output.postprocessing import links_of
 from ufl_beam.output.recorders import Restartable, StateView
 from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC
@@ -80,7 +80,7 @@ class History(Restartable):
         require_count(most, f"History {path}: most")
         self._first_every, self._most = every, most
         self._path = require_path(path, "History")
-        self._part = part_of(self._path)  # takes its place when rows go
+        self._part = beside(self._path)  # takes its place when rows go
         self.files = (self._path,) if most == sys.maxsize else (self._path, self._part)
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")

@@ -71,27 +71,24 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
     Files are compared through symbolic and hard links; devices such as ``/dev/null`` may be shared.
     """
     owners: dict[object, str] = {}
-    for owner, paths in (*_in_use, *outputs):
-        for path in paths:
-            for identity in _identities(path):
-                other = owners.setdefault(identity, owner)
-                if other is not owner:
-                    raise SceneError(
-                        f"{call}: {other} and {owner} would both write {os.path.realpath(path)}; "
-                        "give one of them another path"
-                    )
-
-
-def _identities(path: Path) -> list[object]:
-    """The real path, and the inode of a file that exists; none of a device."""
-    try:
-        real = os.path.realpath(path)
-        found = os.stat(real)
-    except OSError:
-        return [real]
-    except ValueError as error:  # a null character
-        raise SceneError(f"output {path} cannot be written: {error}") from None
-    return [real, (found.st_dev, found.st_ino)] if stat.S_ISREG(found.st_mode) else []
+    for owner, path in ((owner, path) for owner, paths in (*_in_use, *outputs) for path in paths):
+        identities: list[object] = []
+        try:
+            identities = [real := os.path.realpath(path)]
+            found = os.stat(real)
+            same = (found.st_dev, found.st_ino)
+            identities = [real, same] if stat.S_ISREG(found.st_mode) else []
+        except OSError:
+            pass  # there is no file yet
+        except ValueError as error:  # a null character
+            raise SceneError(f"output {path} cannot be written: {error}") from None
+        for identity in identities:
+            other = owners.setdefault(identity, owner)
+            if other is not owner:
+                raise SceneError(
+                    f"{call}: {other} and {owner} would both write {os.path.realpath(path)}; "
+                    "give one of them another path"
+                )
 
 
 @contextmanager
@@ -106,9 +103,9 @@ def reserved(outputs: Iterable[Output]) -> Iterator[None]:
             _in_use.remove(output)
 
 
-def part_of(path: Path) -> Path:
-    """Return the path of the file that takes the place of another one once it is complete."""
-    return path.with_name(f"{path.name}.part")
+def beside(path: Path, ending: str = ".part") -> Path:
+    """Path of a file beside another one, such as that which takes its place once complete."""
+    return path.with_name(f"{path.name}{ending}")
 
 
 @contextmanager
@@ -221,7 +218,7 @@ class OutputFile:
 
 def put_in_place(path: Path, data: bytes | memoryview) -> None:
     """Write a whole file; the one before stays until the new one is on the disk."""
-    part = part_of(path)
+    part = beside(path)
     try:
         with part.open("wb") as file:
             file.write(data)

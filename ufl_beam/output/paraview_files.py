@@ -20,7 +20,7 @@ from ufl_beam.errors import SceneError, require_count
 from ufl_beam.model.bodies import Anchor, arm
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene, spots_of
-from ufl_beam.output.output_files import OutputFile, changed, part_of, require_path
+from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
 from ufl_beam.output.postprocessing import turned
 from ufl_beam.output.recorders import Restartable, StateView
 from ufl_beam.parallel import on_first
@@ -136,11 +136,6 @@ CLOSING = b"<?e?>"  # its end; an instruction of its own once the one before has
 PAGE, ROOM = mmap.PAGESIZE, 1 << 16
 
 
-def data_path(path: Path) -> Path:
-    """Return the path of the numbers of an XDMF file."""
-    return path.with_name(path.name + ".bin")
-
-
 class Complete(NamedTuple):
     """Sizes of the complete part of both files."""
 
@@ -168,7 +163,7 @@ class XdmfWriter:
         self, path: Path, lines: Lines, fields: LineFields,
         complete: Sequence[int] | None = None, digest: bytes = b"",
     ) -> None:  # fmt: skip
-        self._name, mesh = escape(data_path(path).name), bytearray()
+        self._name, mesh = escape(beside(path, ".bin").name), bytearray()
         items = []
         for values in (lines.cells.astype("<i8"), lines.points, lines.parts):
             items.append(self._item(values, len(mesh)))
@@ -181,13 +176,13 @@ class XdmfWriter:
         )
         new = complete is None
         self.complete = Complete(*(complete or (0, len(HEAD), ROOM, len(mesh))))
-        self._data, self._xml = OutputFile(data_path(path), new=new), OutputFile(path, new=new)
+        self._data, self._xml = OutputFile(beside(path, ".bin"), new=new), OutputFile(path, new=new)
         if new:
             self._data.put(0, mesh)
             self._xml.put(0, (HEAD + TAIL).ljust(ROOM) + CLOSING)
         else:
             short = self._xml.size < self.complete.room + len(CLOSING)
-            if short or self._digest() != digest:
+            if short or self.sync() != digest:
                 self._xml.close()
                 self._data.close()
                 raise ValueError("not the files that were written up to there")
@@ -248,13 +243,13 @@ class XdmfWriter:
         self._data.cut(length)
 
     def sync(self) -> bytes:
-        """Bring everything to the disk; return its checksum; raises if a file was removed."""
+        """Bring everything to the disk; return SHA-256 of the document up to its tail, and of data.
+
+        Raises:
+            FileNotFoundError: A file was removed.
+        """
         self._data.sync()
         self._xml.sync()
-        return self._digest()
-
-    def _digest(self) -> bytes:
-        """SHA-256 of the document up to its tail, and of the numbers."""
         return self._xml.digest(self.complete.tail) + self._data.digest(self.complete.data)
 
     def close(self) -> None:
@@ -304,7 +299,7 @@ class VtkhdfWriter:
 
         self.complete = (*(complete or (0,)),)  # number of complete steps
         rows = _rows(0.0, 0, fields)
-        self._output = OutputFile(path if complete is None else part_of(path))
+        self._output = OutputFile(path if complete is None else beside(path, ".part"))
         self._output.put(0, _empty_file(lines, rows, fields))
         # Without a lock others may look at the file while the run goes on.
         self._file = h5py.File(self._output.path, "r+", locking=False)
@@ -460,19 +455,19 @@ class TimeSeries(Restartable):
 
     Attributes:
         ending: End of the name of the file.
-        beside: What is behind it in the name of another file that is written.
+        second: What is behind it in the name of the other file that is written.
         writer: Class of the writer, made of path, lines and fields of the first state; and to go
             on of what ``complete`` and ``sync()`` of an earlier one gave.
     """
 
     ending: ClassVar[str]
-    beside: ClassVar[str]
+    second: ClassVar[str]
     writer: ClassVar[Any]
 
     def __init__(self, path: str | Path, *, every: int = 1) -> None:
         kind = type(self).__name__
         self._path = require_path(path, kind)
-        self.files = self._path, self._path.with_name(self._path.name + self.beside)
+        self.files = self._path, beside(self._path, self.second)
         require_count(every, f"{kind} {path}: every")
         self._every, self._count = every, 0
         if self._path.suffix != self.ending:
@@ -552,7 +547,7 @@ class XDMF(TimeSeries):
         ['beam.xdmf', 'beam.xdmf.bin']
     """
 
-    ending, beside = ".xdmf", ".bin"
+    ending, second = ".xdmf", ".bin"
     writer = XdmfWriter
 
     def require_writable(self) -> None:
@@ -588,5 +583,5 @@ class VTKHDF(TimeSeries):
         ['beam.vtkhdf', 'beam.vtkhdf.part']
     """
 
-    ending, beside = ".vtkhdf", ".part"
+    ending, second = ".vtkhdf", ".part"
     writer = VtkhdfWriter

@@ -46,11 +46,13 @@ class StateView(ABC):
     share: Share  # degrees of freedom of this process
     fields: Fields
     t: float  # s
+    parameter: Parameter  # words for `t`: time, or the load factor of a path
     parts: int  # steps so far, parts of cut steps counted each
     cell_forces: CellForces
     inertia: Inertia
     inelastic: list[InelasticBeams]
     solver: Solver  # Newton's method
+    controllers: Any  # `Controllers` of the simulation
 
     @property
     @abstractmethod
@@ -68,14 +70,10 @@ class StateView(ABC):
         """That at the beginning of the last step."""
 
     @property
-    @abstractmethod
     def asked(self) -> dict[Connector, float]:
         """Forces of controllers, and limits of friction; N or N m."""
-
-    @property
-    @abstractmethod
-    def parameter(self) -> Parameter:
-        """Time, or the load factor of a path."""
+        values: dict[Connector, float] = self.controllers.values
+        return values
 
     @property
     def iterations(self) -> int:

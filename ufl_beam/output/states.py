@@ -481,10 +481,9 @@ class States:
         u, v, ψ = dofs[first, 0], dofs[first, 1], np.unique(dofs[:, 2])
         X, Y = np.vstack([grid.points, centers])[first].T
 
-        def of(q: Array, velocity: Array) -> tuple[float, float, float]:
-            p = times(velocity)
+        states = []
+        for n in range(len(self)):
+            q, p = self._one("q", n), times(self._one("v", n))
             turning = (X + q[u]) * p[v] - (Y + q[v]) * p[u]
-            return p[u].sum(), p[v].sum(), turning.sum() + p[ψ].sum()
-
-        states = range(len(self))
-        return np.array([of(self._one("q", n), self._one("v", n)) for n in states])
+            states.append((p[u].sum(), p[v].sum(), turning.sum() + p[ψ].sum()))
+        return np.array(states)

@@ -23,8 +23,8 @@ from ufl_beam.output.output_files import (
     Content,
     above,
     below,
+    beside,
     decoding,
-    part_of,
     read,
     require_path,
     require_writable,
@@ -91,7 +91,7 @@ class Checkpoint:
     def files(self) -> tuple[Path, ...]:
         """The file, and the one that takes its place; no other output may write them."""
         path = Path(self.path)
-        return path, part_of(path)
+        return path, beside(path)
 
 
 class Keeper:

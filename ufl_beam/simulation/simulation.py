@@ -16,11 +16,9 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory, State
-from ufl_beam.display import Parameter
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten, warn
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.connectors import Connector
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.extremes import ExtremesInC
@@ -147,6 +145,7 @@ class Simulation(StateView):
             self._begun_at = before
 
         self.solution, self._end = kind(scene, grid), np.zeros(1)
+        self.parameter = self.solution.parameter
         self._describe(self.solution)
         self._watches: list[ExtremesInC] = []
         self._watch = ForceWatch(self.couplings, self.controllers, scene.size)
@@ -271,11 +270,6 @@ class Simulation(StateView):
     def q_before(self) -> Array:
         """Configuration at the beginning of the last step."""
         return self.prediction.q_before if self._begun_at is None else self._begun_at
-
-    @property
-    def asked(self) -> dict[Connector, float]:
-        """Forces of controllers, and limits of friction; N or N m."""
-        return self.controllers.values
 
     def ask(self) -> None:
         """Ask controllers and friction for forces and limits in the next step, on all processes."""
@@ -424,11 +418,6 @@ class Simulation(StateView):
         solution.scheme = self.scheme
 
     # -- the end, and going on -----------------------------------------------------------------
-
-    @property
-    def parameter(self) -> Parameter:
-        """Time, or the load factor of a path."""
-        return self.solution.parameter
 
     @cached_property
     def dolfinx(self) -> DolfinxView:
