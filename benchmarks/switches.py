@@ -16,7 +16,7 @@ import ufl_beam as ub
 from ufl_beam.compiled import c_library
 from ufl_beam.compiled.jit import compiled
 from ufl_beam.discretization import compiled_forms
-from ufl_beam.simulation import simulation as stepping
+from ufl_beam.simulation import stepper
 from ufl_beam.simulation.stepper import Prediction
 from ufl_beam.solvers import newton, static_condensation
 from ufl_beam.solvers.substructuring import Klu
@@ -98,7 +98,7 @@ CELL_BY_CELL = (compiled_forms, "in_lanes", nothing)
 NO_CHAINS = (static_condensation, "_plan", without_chains)
 NO_FRONTS = (static_condensation, "Multifrontal", klu)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
-AT_VELOCITY = (stepping, "Prediction", AtVelocity)
+AT_VELOCITY = (stepper, "Prediction", AtVelocity)
 
 SHIPPED, PETSC = "as shipped", "PETSc's `newtonls`"
 SCALAR, WHOLE = "cell by cell", "fronts of the whole tangent"

@@ -301,9 +301,16 @@ class Copies:
     scene and another solution.  So all processes compare a weighted sum of all states so far: in
     the background after 1, 2, 4, ... and then every :data:`INTERVAL` steps, and before anything is
     written or given back.
+
+    Attributes:
+        several: False if there is one copy, and nothing to compare.
     """
 
     def __init__(self, comm: MPI.Intracomm, share: Any) -> None:  # a `Share`, above this module
+        self.several = self._open = comm.size > share.comm.size
+        self._pending: tuple[MPI.Request, Array] | None = None
+        if not self.several:
+            return
         self._comm = duplicate(comm)
         scales: Array = np.full(share.size, 1 / share.grid.scene.size)
         scales[share.rotations] = 1.0
@@ -311,8 +318,6 @@ class Copies:
         self._weights = scales * np.random.default_rng(0).uniform(0.5, 1.0, len(scales))
         self._sum = self._size = self._times = 0.0
         self._steps, self._compared = 0, 0
-        self._pending: tuple[MPI.Request, Array] | None = None
-        self._open = True
         _left[:] = [one for one in _left if not one[0].Test()]
 
     def note(self, t: float, q: Array) -> None:

@@ -149,7 +149,7 @@ def test_residuals_and_tangents(seed):
     solver.step_to(t0 + dt)
     random = np.random.default_rng(5)
     to = simulation.q + 1e-3 * scene.size * random.uniform(-1, 1, len(simulation.q))
-    simulation.ask()
+    simulation.controllers.ask(simulation)
     equation.begin(ub.Step.of(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, simulation.q))
     x = supports.in_axes(to)
     r = equation.forces(to)

@@ -52,7 +52,7 @@ def stepped(time):
         simulation.end()
         return simulation.solution.displacement(end)[-1].tolist()
     except BaseException:
-        simulation.leave()
+        simulation.copies.leave()
         raise
     finally:
         simulation.close()

@@ -436,7 +436,9 @@ def test_the_last_step_of_cells_that_the_first_process_does_not_have():
     runs = [ub.Simulation(scene, ub.DecayingMidpoint()) for _ in range(2)]
     for n in range(1, 6):
         runs[0].step_to(0.01 * n)
-    runs[1].resume(runs[0].state())
+    memory = Memory(runs[0].share)
+    runs[0].remember(memory)
+    runs[1].remember(Memory(runs[1].share, memory.state()))
     for one in runs:
         one.step_to(0.06)
     assert np.array_equal(*(one.q for one in runs))

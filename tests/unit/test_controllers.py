@@ -257,3 +257,22 @@ def test_one_process_warns_and_all_solutions_say_it():
     here = sum("changed its direction" in str(one.message) for one in caught)
     assert MPI.COMM_WORLD.allreduce(here) == 1
     assert solution.warnings.count("changed its direction") == 1
+
+
+def test_section_forces_that_a_controller_asks_for_after_a_start():
+    """They are those of the solution, of each step as it ends, also where C takes several steps."""
+    told = {}
+
+    def control(now):
+        told[now.t] = now.section_forces()
+        return 1.0
+
+    section = ub.Section(EA=1e4, GA=4e3, EI=10.0, rhoA=1.0, rhoI=0.01)
+    beam = ub.Beam((0, 0), (1, 0), section, cells=4)
+    push = ub.Slide(ub.ground(1, 0), beam.end, ub.Controller(control), axis=(0, 1))
+    scene = ub.Scene([beam], connectors=[push], supports=[ub.Clamped(beam.start)])
+    first = run(scene, t=(0.0, 0.05), dt=0.01)
+    told.clear()
+    solution = run(scene, t=(0.05, 0.1), dt=0.01, start=first)
+    for n in range(1, 5):
+        assert np.array_equal(told[solution.times[n]], solution.cell_forces(n)[:, 0])

@@ -205,5 +205,5 @@ def test_no_search_where_nothing_opens():
     _, scene = pushed()
     _, closed = pushed(ub.Softening(FOREVER, FOREVER))
     elastic = ub.Simulation(scene, ub.Midpoint())
-    assert not elastic._stepper.c.opens
+    assert not elastic.march.opens
     assert run(closed, ub.Midpoint(), 0.01).iterations == run(scene, ub.Midpoint(), 0.01).iterations

@@ -9,7 +9,7 @@ import pytest
 import ufl_beam as ub
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme
 from ufl_beam.model.records import members
-from ufl_beam.simulation import assembly
+from ufl_beam.simulation import step_equation
 
 BEAM = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0), cells=2)
 SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
@@ -22,7 +22,7 @@ def no_mesh(monkeypatch):
     def made(*_, **__):
         raise AssertionError("a mesh was made")
 
-    monkeypatch.setattr(assembly, "Fields", made)
+    monkeypatch.setattr(step_equation, "Fields", made)
     monkeypatch.setattr("ufl_beam.simulation.simulation.Share", made)
 
 

@@ -81,5 +81,5 @@ def test_one_process_compares_nothing():
     section = ub.Section(EA=1.0, GA=1.0, EI=1e-3, rhoA=1.0)
     scene = ub.Scene([ub.Beam((0, 0), (1, 0), section, cells=2)])
     simulation = ub.Simulation(scene, ub.Midpoint(), comm=MPI.COMM_SELF)
-    assert simulation._copies is None
+    assert not simulation.copies.several
     simulation.close()

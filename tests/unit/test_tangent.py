@@ -89,8 +89,9 @@ class Probe:
             self.in_motion(simulation, random)
         for inelastic in simulation.inelastic:
             self.at_random(inelastic, random)
-        simulation.ask()
-        simulation.equation.start(simulation.q)
+        simulation.controllers.ask(simulation)
+        for term in simulation.terms:
+            term.start(simulation.q)
         simulation.equation.begin(ub.Step.of(scheme, 0.0, 0.3, 0.3, simulation.q))
         self.x = simulation.supports.in_axes(simulation.q + random.uniform(-turn, turn, size))
         self.free = np.setdiff1d(np.arange(size), simulation.supports.dofs)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.simulation import assembly
+from ufl_beam.simulation import step_equation
 
 NAN, INF, HUGE = math.nan, math.inf, 10**400
 ARRAY = np.array([1.0, 2.0])
@@ -534,7 +534,7 @@ def test_wrong_values_are_refused_by_name(name, monkeypatch):
     def no_mesh(*_, **__):
         raise AssertionError("a mesh was made")
 
-    monkeypatch.setattr(assembly, "Fields", no_mesh)
+    monkeypatch.setattr(step_equation, "Fields", no_mesh)
     of, _ = TABLE[name]
     faults = []
     for parameter, value, values in _wrong(name):

@@ -44,7 +44,7 @@ def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array
 
     Nothing yields or opens any further, now and later: no step may follow.
     """
-    simulation.ask()
+    simulation.controllers.ask(simulation)
     for cells in simulation.inelastic:
         cells.points.freeze()
     for coupling in simulation.couplings:

@@ -72,8 +72,8 @@ class StateView(ABC):
     @property
     def asked(self) -> dict[Connector, float]:
         """Forces of controllers, and limits of friction; N or N m."""
-        values: dict[Connector, float] = self.controllers.values
-        return values
+        numbers: Any = self.controllers.numbers
+        return dict(zip(self.controllers.at, numbers.tolist(), strict=True))
 
     @property
     def iterations(self) -> int:

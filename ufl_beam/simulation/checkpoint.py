@@ -16,6 +16,7 @@ from mpi4py import MPI
 
 import numpy as np
 
+from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_system import Lock
 from ufl_beam.output.output_files import (
@@ -185,7 +186,7 @@ class Keeper:
         """Restore all from the file: the run, its step control ``pace``, recorders; forget it."""
         found, solution = self.found, simulation.solution
         with decoding(self.path, FORMAT):
-            simulation.resume(below("state/", found))
+            simulation.remember(Memory(simulation.share, below("state/", found)))
             solution.resume(below("history/", found))
             pace.restore(found["pace"])
             solution.seconds = float(found["seconds"])
@@ -225,11 +226,12 @@ class Keeper:
         def states() -> dict[str, Any]:
             return {name: _state(one) for name, one in self._stateful.items()}
 
-        solution = simulation.solution
+        solution, memory = simulation.solution, Memory(simulation.share)
+        simulation.remember(memory)
         content = {
             "seconds": solution.seconds + seconds, "pace": pace.state(),
             "stateful": simulation.together(states), "warnings": solution.warnings,
-            **above("state/", simulation.state()),
+            **above("state/", memory.state()),
         }  # fmt: skip
         for i, recorder in enumerate(self._recorders):
             content |= above(f"recorder {i}/", recorder.state())

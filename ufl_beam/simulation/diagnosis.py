@@ -50,10 +50,6 @@ NEAR = 1e-3
 """Motion from the beginning of a step, in sizes of the scene or radians, after which the tangent
 tells what yields as the step begins."""
 
-HELD = 1e-3
-"""Stiffness against a motion without strain, as a part of the forces over the size of the scene,
-below which loads do not hold it: weights and tensions are some tenths of it."""
-
 NOT_HELD = (
     "Loads can hold it where they balance, as a weight below its hinge, and there is no such state "
     f"near that in which the run begins. Begin there. {INSTEAD}. In the first step: "
@@ -120,29 +116,6 @@ def no_equilibrium(
         f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=t, dt=end - t,
         solution=solution, residuals=failure.residuals, forces=forces, reason=failure.reason,
     )  # fmt: skip
-
-
-def require_held(equation: StepEquation, newton: Solver, q1: Array, loose: str) -> str:
-    """Raise :class:`SceneError` if loads do not hold a motion without strain in an equilibrium.
-
-    It is described by ``loose``; what is loose now, nothing, is returned.  The tangent is regular
-    then, and needs no stiffness against idle motions.  All processes call it together.
-    """
-    newton.forget_idle()
-    share, grid = equation.share, equation.share.grid
-    if not equation.respond_at(q1):
-        return ""
-    K, free = free_matrix(share, equation.A, equation.supports.dofs)
-    lengths = np.full(grid.size, grid.scene.size)
-    lengths[grid.rotations] = 1.0
-    moves = np.ones(grid.size)
-    moves[grid.multipliers] = 0.0
-    x = null_vectors(K)[1][:, -1]
-    motion = np.abs(x * moves[free] / lengths[free]).max()
-    forces = np.linalg.norm((K @ x) * moves[free] * lengths[free])
-    if forces <= HELD * newton.scale() * grid.scene.size * motion:
-        raise SceneError(f"{loose}The loads do not hold it either. {INSTEAD}")
-    return ""
 
 
 def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:

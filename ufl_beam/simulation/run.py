@@ -179,7 +179,7 @@ def take_steps(
     def after_step() -> bool:
         solution.time_error = pace.error
         if recorders or keeper is not None:
-            simulation.settle()  # before anything is written
+            simulation.copies.settle()  # before anything is written
         if pace.steps % solution.every == 0 or pace.finished:
             simulation.keep()
             thins = len(solution) > most + 1 and not pace.finished
@@ -257,7 +257,7 @@ def running(
             yield
             check_ledger(simulation)
         except BaseException as error:
-            simulation.leave()
+            simulation.copies.leave()
             if simulation.share.comm.size == 1 or error is simulation.together.raised:
                 simulation.end()  # else the processes may not all be here
             stopped: Any = error

@@ -85,14 +85,14 @@ class Solution(States, Rich):
 
     parameter = TIME
 
-    def __init__(self, scene: Scene, grid: Grid) -> None:
-        super().__init__(grid)
+    def __init__(self, scene: Scene, grid: Grid, like: States | None = None) -> None:
+        super().__init__(grid, like)
         self.scene = scene
         self.parts = self.iterations = 0
         self.time_error, self.seconds, self.building = math.nan, 0.0, 0.0
         self.every, self.open_ledger, self.warnings = 1, "", ""
         self.internal: State = {}
-        self.scheme: Scheme | None = None
+        self.scheme: Scheme | None = like.scheme if isinstance(like, Solution) else None
         self.parts_of_last = UNKNOWN
 
     def count(self, parts: int, iterations: int) -> None:

@@ -189,8 +189,8 @@ class AdaptiveSteps:
             before, between = (inertia.velocities(whole.s, whole.step.dt) - inertia.v) / dt, -dt / 4
             dt /= 2
         else:
-            before = (inertia.v - inertia.rates.v_before) / simulation.prediction.last_dt
-            between = (dt + simulation.prediction.last_dt) / 2
+            before = (inertia.v - inertia.rates.v_before) / simulation.prediction.c.dt
+            between = (dt + simulation.prediction.c.dt) / 2
         trial = simulation.attempt(stop if dt == left else simulation.t + dt)
         dt = trial.step.dt
         a = (inertia.velocities(trial.s, dt) - inertia.v) / dt

@@ -1,29 +1,46 @@
 # SPDX-License-Identifier: MIT
-"""The equation of a step, its derivatives about a state, and the check of static steps."""
+"""The equation of a step: the terms of a scene and their sum; and the check of static steps."""
 
 from __future__ import annotations
 
+import math
 import sys
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, lib, struct
+from ufl_beam.arrays import Array
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
+from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import NOWHERE, Memory, State
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
+from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.model.connector_laws import rubs
+from ufl_beam.model.constraint_checks import friction_repeats
+from ufl_beam.model.loads import FollowerLoad, RotatingFrame
+from ufl_beam.parallel import Agreement
+from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.terms.base import Callbacks, Term
-from ufl_beam.terms.beams import Cells
-from ufl_beam.terms.connectors import Links
+from ufl_beam.terms.beams import Cells, ElasticBeams, InelasticBeams
+from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.connector_laws import Setting
+from ufl_beam.terms.connectors import couplings
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.inertia_and_damping import RatesInC
-from ufl_beam.terms.loads import LoadTerm
-from ufl_beam.terms.material_points import SearchFlags
+from ufl_beam.terms.inertia_and_damping import (
+    BEFORE,
+    Inertia,
+    RatesInC,
+    SecondDifferences,
+    damping_forces,
+)
+from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces, LoadTerm
+from ufl_beam.terms.material_points import SearchFlags, expect_entries
 from ufl_beam.terms.supports import Supports
+from ufl_beam.terms.works import Works
 
 MOVING = "inertia", "damping"
 """Kinds of terms that depend on velocities."""
@@ -32,38 +49,98 @@ MOVING = "inertia", "damping"
 class StepEquation:
     """Sum of the virtual works of all terms, less what supports carry, at local degrees of freedom.
 
-    The ``others`` are all terms but those of internal forces.
+    The terms are made for a scene that begins at t0 (s), on the part of one process.  Supports stop
+    the initial local velocities ``v`` in place.
 
     Attributes:
         A: Matrix that takes the tangent.
+        fields: On the cells of this process.
+        ledger: Energies of this process.
+        controllers: Forces of controllers and limits of friction in the step.
+        beams: Those with material points, which are ``inelastic``, first.
+        couplings: Connectors, those alike together.
+        inertia: None in statics.
+        terms: All of them; the forces of ``inner`` ones, ``beams`` and ``couplings``, are internal.
         weights: Of the residuals: 1 for forces, 1 over the size of the scene for moments, 0 for
             ghosts and forces of connectors.
         force: Internal forces in the latest residual, in statics; else empty.
         c: ``equation`` of loops.h, which a solver completes with its own numbers.
         callbacks: Python functions that take part.
         phases: Of the terms.
+        cell_forces: Forces of the terms on the nodes of cells.
     """
 
     def __init__(
-        self,
-        share: Share,
-        A: Csr,
-        beams: Sequence[Cells],
-        couplings: Sequence[Links],
-        loads: Sequence[LoadTerm],
-        others: Sequence[Term],
-        supports: Supports,
-        search: SearchFlags,
-        rates: RatesInC | None,
+        self, share: Share, scheme: Scheme, t0: float, v: Array, together: Agreement
     ) -> None:
-        self.share, self.A, self.supports, self.weights = share, A, supports, share.weights()
-        in_motion, self._rates = rates is not None, rates
-        # Where nothing has inertia, the work of the internal forces is compared with energies.
-        self.force = np.zeros(0 if in_motion else share.size)
-        self.beams, self.couplings, self.loads = beams, couplings, loads
-        self.inner: list[Term] = [*beams, *couplings]
-        self.others: list[Term] = [*loads, *others]
+        self.share, self.scheme, self.weights = share, scheme, share.weights()
+        scene, search = share.grid.scene, SearchFlags()
+        self.ledger, self.fields = ledger, fields = Ledger(), Fields(share)
+        self.A = A = fields.matrix()
+        setting = (scheme, A, ledger)
+
+        # Each kind makes its entries of the ledger: their order is that of the columns of tables.
+        # It follows from the scene alone, also where a process lacks cells or connectors of a kind.
+        self.inelastic, elastic = list[InelasticBeams](), np.ones(len(share.cells), dtype=bool)
+        for layout, cells in share.grid.inelastic:
+            expect_entries(layout, scheme, ledger)
+            part = np.flatnonzero(np.isin(share.cells, cells))
+            if len(part):
+                elastic[part] = False
+                on_part = Fields(share, part)
+                self.inelastic.append(InelasticBeams(on_part, layout, *setting, search))
+        self.beams: list[Cells] = [*self.inelastic]
+        loses = scheme.alpha or isinstance(scheme, DecayingMidpoint)
+        if loses and sum(len(cells) for _, cells in share.grid.inelastic) < len(share.grid.cells):
+            ledger.lost["numerical"] += 0.0
+        others: list[Term] = []
+        if elastic.any():
+            on_part = fields if elastic.all() else Fields(share, np.flatnonzero(elastic))
+            self.beams.append(ElasticBeams(on_part, *setting))
+            if isinstance(scheme, DecayingMidpoint):
+                others.append(SecondDifferences(scheme, on_part, A, ledger))
+
+        self.controllers = Controllers(share)
+        self._rates = rates = RatesInC(scheme, v) if has_inertia(scheme) else None
+        connectors = Setting(
+            self.controllers.place, None if rates is None else rates.c, scene.size, scheme, ledger,
+            friction_repeats(scene), search,
+        )  # fmt: skip
+        self.couplings = together(couplings, share, connectors, A)
+
+        if scene.loads:
+            ledger.supplied["loads"] += 0.0
+        followers = [load for load in scene.loads if isinstance(load, FollowerLoad)]
+        frames = [load for load in scene.loads if isinstance(load, RotatingFrame)]
+        dead = [load for load in scene.loads if load not in (*followers, *frames)]
+        self.loads: list[LoadTerm] = [FrameForces(x, fields, scheme, ledger, A) for x in frames]
+        if dead:
+            self.loads.append(DeadLoads(dead, share, scheme, ledger))
+        if followers:
+            self.loads.append(FollowerLoads(followers, share, scheme, ledger, A))
+        if scene.works:
+            self.loads.append(together(Works, fields, scheme, ledger, A, t0))
+        self.supports, self.inertia = Supports(share, scheme, ledger, A), None
+        if rates is not None and has_inertia(scheme):
+            self.supports.stop(v)
+            rates.take(v, v, math.inf)
+            self.inertia = Inertia(fields, scheme, A, ledger, rates)
+            others.append(self.inertia)
+        for damping in scene.damping:
+            others += damping_forces(damping, fields, *setting, rates)
+        if scene.beams:
+            ledger.state["stored"] += 0.0
+        self.inner: list[Term] = [*self.beams, *self.couplings]
+        self.others: list[Term] = [*self.loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]
+        self._give_to_c(search)
+        in_cells = [part for term in self.terms for part in term.in_cells]
+        in_c = [term.loads_in_cells() for term in self.loads if isinstance(term, DeadLoads)]
+        self.cell_forces = CellForces(share, in_cells, *in_c)
+
+    def _give_to_c(self, search: SearchFlags) -> None:
+        """Fill ``equation`` of loops.h, and let terms state their phases."""
+        share, A, supports = self.share, self.A, self.supports
         self.c = struct("equation", size=A.size, owned=share.num_owned, weight=self.weights)
         self.callbacks = callbacks = Callbacks(self.c)
         loops = [term.loops for term in self.terms]
@@ -78,10 +155,9 @@ class StepEquation:
             return one[1]
 
         product, cells = take("add_step_tangent"), take("add_cells")
-        both = (*couplings, *beams)
-        demands = [one.demand for one in both if one.demand is not None]
+        demands = [one.demand for one in self.inner if one.demand is not None]
         demanding = share.largest(float(bool(demands)))
-        predicted = [one.predicted.c for one in beams if one.predicted is not None]
+        predicted = [one.predicted.c for one in self.beams if one.predicted is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -99,15 +175,57 @@ class StepEquation:
             search=search.flags, switched=search.switched,
         )  # fmt: skip
         self._alive = loops, demands, predicted
-        if not in_motion:
+        # Where nothing has inertia, the work of the internal forces is compared with energies.
+        self.force = np.zeros(0 if self.inertia is not None else share.size)
+        if self.inertia is None:
             fill(self.c, inner_force=self.force)
         # The ledger has all its entries now, to whose places phases write.
         self.phases = [one.phases(callbacks) for one in self.terms]
 
-    @property
-    def held(self) -> Index:
-        """Degrees of freedom that supports hold; what stands for them in A means nothing."""
-        return self.supports.dofs
+    # -- runs that go on -----------------------------------------------------------------------
+
+    def internal_variables(self, q: Array, t: float) -> State:
+        """Return what a run that starts here takes over: internal variables, reactions, rates."""
+        memory = Memory(self.share)
+        self.controllers.remember(memory, t)
+        for one in (*self.inelastic, *self.couplings):
+            one.remember(memory, q)
+        slips = any(rubs(link.law) for link in self.share.grid.scene.links)
+        if self.inertia is None or self.supports.work or slips:
+            self.supports.carry_on(memory, q)
+        if self.inertia is not None:
+            self.inertia.carry_on(memory, len(self.inertia.rates.more))
+            self._pass_on_step(memory, q)
+        for load in self.loads:
+            load.pass_on(memory)
+        return memory.state()
+
+    def take_over(self, q: Array, t: float, internal: State, *, same: bool) -> None:
+        """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
+
+        ``same`` says that no force has changed since, so that accelerations are what they were.
+        """
+        memory = Memory(self.share, internal)
+        self.controllers.remember(memory, t)
+        for one in (*self.inelastic, *self.couplings):
+            one.remember(memory, NOWHERE)
+        if "reactions" in internal:
+            self.supports.carry_on(memory, q)
+        if self.inertia is not None and same:
+            known = sum(name in internal for name in self.inertia.scheme.kept)
+            self.inertia.carry_on(memory, known)
+            if BEFORE in internal:
+                self._pass_on_step(memory, q)
+
+    def _pass_on_step(self, memory: Memory, q: Array) -> None:
+        """State the changes of the last step, if the next one of the scheme depends on them."""
+        if self.inertia is not None and isinstance(self.scheme, DecayingMidpoint):
+            self.inertia.pass_on_step(memory)
+            for term in self.terms:
+                if isinstance(term, SecondDifferences):
+                    term.remember(memory, q)
+
+    # -- forces and tangent --------------------------------------------------------------------
 
     def begin(self, step: Step, terms: Sequence[Term] | None = None) -> None:
         """Let terms begin a step, by default all; beams have exact tangents in it."""
@@ -131,28 +249,21 @@ class StepEquation:
                 of = one.predicted.c
                 of.begins, of.stale, of.exact = 0, 1, 1
 
-    def forces_at_rest(self, scheme: Scheme, q: Array) -> Array:
-        """Forces of beams at ``q``, in a step so short that nothing viscous flows."""
-        short = sys.float_info.min
-        self.begin(Step.of(scheme, 0.0, short, short, q), self.beams)
-        forces = np.zeros(self.share.size)
+    def inner_forces(self, q: Array, t: float | None = None) -> Array:
+        """Forces of beams at ``q``, in a step so short that nothing viscous flows.
+
+        With a time ``t``, also those of connectors then, which have theirs among ``q``.
+        """
+        short, forces = sys.float_info.min, np.zeros(self.share.size)
+        self.begin(Step.of(self.scheme, 0.0, short, short, q), self.beams)
         for beam in self.beams:
             beam.add_residual(q, forces)
+        if t is not None:
+            step = Step.of(self.scheme, t, t + 1.0, t + 1.0, q)
+            self.begin(step._replace(load_time=t, motion_time=t), self.couplings)
+            for coupling in self.couplings:
+                coupling.add_residual(q, forces)
         return forces
-
-    def inner_forces(self, scheme: Scheme, q: Array, t: float) -> Array:
-        """The same, with those of connectors at the time ``t``; these have theirs among ``q``."""
-        forces = self.forces_at_rest(scheme, q)
-        step = Step.of(scheme, t, t + 1.0, t + 1.0, q)._replace(load_time=t, motion_time=t)
-        self.begin(step, self.couplings)
-        for coupling in self.couplings:
-            coupling.add_residual(q, forces)
-        return forces
-
-    def start(self, q: Array) -> None:
-        """Take ``q`` for the accepted configuration, which no step has led to."""
-        for term in self.terms:
-            term.start(q)
 
     def add_state(self, q: Array) -> None:
         """Enter the energies that the scene holds at ``q``."""
@@ -283,20 +394,47 @@ class StaticPath:
     method may have found another branch of equilibria: beyond a limit load, or where softening lets
     go more than it dissipates.  The ``slack`` of the scheme says how much work may stay
     unexplained; ``force`` are the internal forces at the end of the last step.
+
+    The first state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.
+    Reactions are set to those of it.  A path that ``goes_on`` from a static run of the same scene
+    has them already, with the forces of what is viscous.
+
+    Attributes:
+        c: ``static_path`` of loops.h.
     """
 
-    _c: Any
+    def __init__(
+        self, equation: StepEquation, q: Array, t0: float, loads: Sequence[Array],
+        together: Agreement, *, goes_on: bool,
+    ) -> None:  # fmt: skip
+        share, scheme, ledger = equation.share, equation.scheme, equation.ledger
+        supports = equation.supports
+        self.force = together(equation.inner_forces, q, t0)
+        equation.cell_forces.accept()
+        if not goes_on:
+            r = np.asarray(self.force - sum(loads))
+            supports.enter(r)
+            supports.hold(share.added(r))
+            supports.take()
+        changes = [one.change for one in equation.phases if one.change is not None]
+        parts = ledger.state, ledger.supplied, ledger.lost
+        per_far = np.full(share.size, 1 / share.grid.scene.size)
+        per_far[share.rotations] = 1.0
+        self.c = struct(
+            "static_path", slack=scheme.slack, far=FAR, kink=KINK, per_far=per_far,
+            force=self.force, terms=len(changes), weight_of_before=scheme.weight_of_before,
+            change=ffi.new("change_call[]", changes), accounts=len(parts),
+            account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),
+            entries=np.array([len(part) for part in parts], dtype=np.int32),
+        )  # fmt: skip
 
-    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, force: Array) -> None:
-        self._share, self._scheme, self._ledger, self.force = share, scheme, ledger, force
-
-    def remember(self, memory: Memory, q: Array) -> None:
+    def remember(self, memory: Memory) -> None:
         """The internal forces at the end of the last step."""
         self.force[:] = memory.added("internal forces", self.force)
 
     def failure(self, mechanism: bool) -> StepFailed:
         """Describe why the latest step was not followed: it leaves a mechanism, or leaps."""
-        c = self._c
+        c = self.c
         if mechanism:
             return StepFailed(
                 f"a node moves by {c.moves:.1e} times the size of the scene, or turns by so many "
@@ -307,21 +445,3 @@ class StaticPath:
             f"{c.work:.3e} J of work: it leaps to another branch of equilibria, or is too long "
             "to tell"
         )
-
-    def in_c(self, changes: Sequence[Loop]) -> Any:
-        """``static_path`` of loops.h; ``changes`` are those of the terms."""
-        parts = self._ledger.state, self._ledger.supplied, self._ledger.lost
-        per_far = np.full(self._share.size, 1 / self._share.grid.scene.size)
-        per_far[self._share.rotations] = 1.0
-        self._c = struct(
-            "static_path", slack=self._scheme.slack, far=FAR, kink=KINK, per_far=per_far,
-            force=self.force, terms=len(changes),
-            weight_of_before=self._scheme.weight_of_before,
-            change=ffi.new("change_call[]", list(changes)), accounts=len(parts),
-            account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),
-            entries=np.array([len(part) for part in parts], dtype=np.int32),
-        )  # fmt: skip
-        return self._c
-
-
-# -- steps -----------------------------------------------------------------------------------------

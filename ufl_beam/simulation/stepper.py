@@ -9,30 +9,30 @@ the first step has nothing left to do but to follow them.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any, NamedTuple
 
-from petsc4py import PETSc
+from mpi4py import MPI
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import Loop, doubles, ffi, fill, give_back_memory, lib, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia, with_half_tangents
-from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.scene import Scene
-from ufl_beam.parallel import Agreement
+from ufl_beam.errors import SceneError, StepFailed, warn
+from ufl_beam.mechanics.time_schemes import Step, with_half_tangents
+from ufl_beam.model.constraint_checks import INSTEAD
+from ufl_beam.output.recorders import StateView
+from ufl_beam.output.states import States
+from ufl_beam.parallel import Agreement, Copies
+from ufl_beam.simulation.controllers import ForceWatch
+from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StaticPath, StepEquation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.newton_options import Newton
-from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.connectors import Links
-from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.inertia_and_damping import Inertia
+from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
 
 # -- prediction ------------------------------------------------------------------------------------
 
@@ -61,20 +61,11 @@ class Prediction:
             size = {"scene": share.grid.scene.size, "unknowns": share.grid.size}
             fill(self.c, second=self._second, weight=weights, **size)
 
-    @property
-    def q_before(self) -> Array:
-        """Configuration at the beginning of the last step; a copy."""
-        return np.frombuffer(ffi.buffer(self.c.q_before, 8 * self._share.size)).copy()
-
-    @property
-    def last_dt(self) -> float:
-        """Length of the last step, infinite before the first; s."""
-        return float(self.c.dt)
-
     def remember(self, memory: Memory) -> None:
         """State it in numbers of the grid; see state_io.py."""
         self.c.dt = memory.number("last dt", self.c.dt)
-        q_before = memory.at_dofs("q before", self.q_before)
+        bytes_now = ffi.buffer(self.c.q_before, 8 * self._share.size)
+        q_before = memory.at_dofs("q before", np.frombuffer(bytes_now).copy())
         ffi.memmove(self.c.q_before, doubles(q_before), q_before.nbytes)
         if self._in_motion:
             self.c.equal = int(memory.number("equal steps", self.c.equal))
@@ -95,23 +86,21 @@ A column that nearly buckles magnifies a load that is hardly larger than the tol
 its inertia holds it meanwhile.
 """
 
-APPLYING = 1 / 8
-"""Part of the first step in which loads that are there from the start are applied."""
-
 APPLYING_TURN = 0.02
 """Largest turn of a node meanwhile in a part; rad.
 
 Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
 """
 
+HELD = 1e-3
+"""Stiffness against a motion without strain, as a part of the forces over the size of the scene,
+below which loads do not hold it: weights and tensions are some tenths of it."""
+
 SHORT_PART = 512
 """Parts shorter by this factor may turn nodes further: shorter ones would turn them as far."""
 
 MOST_PARTS: int = lib.MOST_PARTS
 """Largest number of parts that a step is cut into."""
-
-LONGEST = 0.05
-"""Time after which C returns, so that a run can be interrupted and shows its progress; s."""
 
 
 class Trial(NamedTuple):
@@ -125,48 +114,68 @@ class Trial(NamedTuple):
     s: Array
 
 
-class Extras(NamedTuple):
-    """Functions of Python that take part in the steps of some scenes, or None."""
-
-    ask: Callable[[], None] | None  # controllers and friction, when a step begins
-    stop: Callable[[float, float], float] | None  # the next sample of a controller after a time
-    require: Callable[[Array], None] | None  # that an accepted state is held; raises if not
-    note: Callable[[float, Array], None] | None  # (t1, q1) of an accepted step
-    forces: Any  # `force_watch` of loops.h
-
-
-class Stepper:
-    """Steps of a scene in C; see march.c.
+class Stepper(StateView):
+    """Steps of a scene in C, see march.c: the base class of :class:`Simulation`.
 
     The state is that of C.  What there is to see of it is in Python after each call: time,
-    configuration, velocities, reactions and ledger.  The ``state`` of methods is the
-    :class:`Simulation`, which is above this module.
+    configuration, velocities, reactions and ledger.
+
+    Args:
+        comm: Processes of the run.
+        newton: Tolerances and PETSc options.
+        t: Time of the initial state; s.
+        q: Local configuration then.
+        path: Check of static steps; None in dynamics.
+        loose: Motion that only loads may hold, in words; empty if there is none.
+
+    Attributes:
+        t: Time; s.
+        parts: Number of parts that steps were cut into, those not cut included.
+        equation: The equation of a step; ``ledger``, ``controllers`` and terms are those of it.
+        solver: Newton's method.
+        prediction: What the guess of the next step needs of the last ones.
+        solution: The motion so far.
+        march: ``march`` of loops.h.
+        copies: Comparison of processes that each compute a copy of the scene.
+        together: Calls that raise on all processes of a shared scene what they raise on one.
     """
 
     def __init__(
-        self, scheme: Scheme, equation: StepEquation, newton: Newton, ledger: Ledger,
-        inertia: Inertia | None, path: StaticPath | None, cell_forces: CellForces,
-        together: Agreement, extras: Extras,
+        self, comm: MPI.Intracomm, equation: StepEquation, newton: Newton, t: float, q: Array,
+        path: StaticPath | None, solution: Solution, together: Agreement, loose: str,
     ) -> None:  # fmt: skip
-        self._equation, self._inertia, self._path = equation, inertia, path
-        self._together, self._extras, self._callbacks = together, extras, equation.callbacks
-        share, phases = equation.share, equation.phases
+        share, scheme, ledger = equation.share, equation.scheme, equation.ledger
+        self.comm, self.share, self.grid, self.scene = comm, share, share.grid, share.grid.scene
+        self.equation, self.scheme, self.ledger, self.solution = equation, scheme, ledger, solution
+        self.together, self._path, self._loose = together, path, loose
+        self.copies, self.parameter = Copies(comm, share), solution.parameter
+        self.fields, self.terms, self.supports = equation.fields, equation.terms, equation.supports
+        self.beams, self.inelastic = equation.beams, equation.inelastic
+        self.couplings, self.loads = equation.couplings, equation.loads
+        self.controllers, self.cell_forces = equation.controllers, equation.cell_forces
+        if equation.inertia is not None:
+            self.inertia = equation.inertia
+        in_motion, phases = equation.inertia is not None, equation.phases
+        self._begun_at: Array | None = None  # of the state before the first step
+        self.parts = 0
+        self.prediction = Prediction(share, q, equation.weights, in_motion=in_motion)
+
         again = [one.again for one in phases if one.again is not None]
         fill(equation.c, agains=len(again), again=ffi.new("again_call[]", again))
-        least = LEAST_IN_MOTION if inertia is not None else LEAST_AT_REST
+        least = LEAST_IN_MOTION if in_motion else LEAST_AT_REST
         self.solver = solver = Solver(share, equation, newton, least)
         rotations = share.rotations
-        half_tangents, in_motion = with_half_tangents(scheme, rotations), has_inertia(scheme)
-        self._bytes = 8 * share.size
+        half_tangents = with_half_tangents(scheme, rotations)
         loads = [one.vector for one in equation.loads]
         multipliers = share.multipliers.astype(np.int32)
         opens = [one.opens for one in phases if one.opens is not None]
         places = ffi.new("openable[]", opens)
         admits = [one.admits for one in phases if one.admits is not None]
         s = np.zeros(share.size) if equation.supports.turned else solver.change
-        self.c = fill(
+        self.march = fill(
             ffi.new("march *"),
-            equation=equation.c, size=share.size, q=np.zeros(share.size), x=solver.unknowns, s=s,
+            equation=equation.c, size=share.size, t=t, q=q.copy(), x=solver.unknowns, s=s,
+            prediction=self.prediction.c,
             guess=np.zeros(share.size), in_parts=not in_motion,
             load_weight=scheme.load_weight, at=1.0 if in_motion else scheme.load_weight,
             limits_turn=scheme.limits_turn,
@@ -174,147 +183,179 @@ class Stepper:
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
             loads=len(loads), load=ffi.new("vector *[]", loads),
-            supports=equation.supports.in_c(self._callbacks),
-            states=len(ledger.state), state=ledger.state.numbers, cell_forces=cell_forces.c,
+            supports=equation.supports.in_c(equation.callbacks),
+            states=len(ledger.state), state=ledger.state.numbers, cell_forces=self.cell_forces.c,
             opens=int(share.largest(float(bool(opens)))), places=len(opens), place=places,
             admissions=len(admits), admission=ffi.new("admission_call[]", admits),
             judges=int(share.largest(float(bool(admits)))),
             applying_turn=APPLYING_TURN, short_part=SHORT_PART,
         )  # fmt: skip
-        if self.c.opens:
-            fill(self.c, found=np.zeros(share.size))
+        if self.march.opens:
+            fill(self.march, found=np.zeros(share.size))
         if equation.supports.turned:
-            fill(self.c, x=np.zeros(share.size))
-        if inertia is not None:
-            handle = self._callbacks.handle(self._prepare)
-            fill(self.c, rates=inertia.rates.c, prepare=lib.run_in_python)
-            self.c.handle = handle  # what `fill` keeps must not keep this object
-        if extras.forces is not None:
-            fill(self.c, forces=extras.forces)
+            fill(self.march, x=np.zeros(share.size))
         if path is not None:
-            changes = [one.change for one in phases if one.change is not None]
-            fill(self.c, path=path.in_c(changes))
+            fill(self.march, path=path.c)
         self._alive: list[Any] = [opens]
-        self._watches: Sequence[Any] = ()
-        self._state: Any = None  # while C takes steps
-        self._add_extras({
-            name: [x for one in phases for x in getattr(one, name)]
-            for name in ("begin", "accept", "add_state")
-        })  # fmt: skip
-        self._links = [one for one in equation.terms if isinstance(one, Links)]
+        self._watches = list[Any]()  # extremes that C takes in after each step
+        self._force_watch = ForceWatch(equation.couplings, self.controllers, self.scene.size)
+        if self._force_watch.c is not None:
+            fill(self.march, forces=self._force_watch.c)
+        self._add_callbacks()
+        self._moved(t)
 
-    def _add_extras(self, loops: dict[str, list[Loop]]) -> None:
-        """Let functions of Python take part in the phases of a step."""
-        extras, callbacks = self._extras, self._callbacks
-        if extras.stop is not None:
-            stop = callbacks.handle(lambda t: extras.stop(self.c.t, t))
-            self.c.stop, self.c.stops = lib.time_in_python, stop
+    def _add_callbacks(self) -> None:
+        """Let functions of Python take part in the phases of a step, with those of terms.
+
+        They are not kept by `fill`, which would keep this object.
+        """
+        c, callbacks, controllers = self.march, self.equation.callbacks, self.controllers
+        loops = {
+            name: [x for one in self.equation.phases for x in getattr(one, name)]
+            for name in ("begin", "accept", "add_state")
+        }
+        if self.equation.inertia is not None:
+            fill(c, rates=self.inertia.rates.c, prepare=lib.run_in_python)
+            c.handle = callbacks.handle(self._prepare)
+        if controllers.sampled:
+            c.stop = lib.time_in_python
+            c.stops = callbacks.handle(lambda t: controllers.next_sample(c.t, t))
         # What may raise comes first, before other loops of C have accepted anything.
         asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
         mine = [one for one in loops["accept"] if one[0] in asking]
-        if extras.require is not None:
-            require = extras.require
-            mine.insert(0, callbacks.phase(lambda step, q1, s: require(self._copy(q1))))
+        if self._loose:
+            mine.insert(0, callbacks.phase(self._require_held))
         loops["accept"] = mine + [one for one in loops["accept"] if one[0] not in asking]
-        if extras.ask is not None:
+        if controllers.asks:
             loops["begin"].insert(0, callbacks.phase(self._ask))
-        if extras.note is not None:
-            note = extras.note
+        if self.copies.several:
+            note = self.copies.note
             took = callbacks.phase(lambda step, q1, s: note(step.t1, self._copy(q1)))
             loops["add_state"].append(took)
         for name, calls in loops.items():
-            place, in_c = getattr(self.c, name), ffi.new("phase_call[]", calls)
+            place, in_c = getattr(c, name), ffi.new("phase_call[]", calls)
             self._alive += [in_c, calls]
             place.number, place.call = len(calls), in_c
 
-    # -- steps -----------------------------------------------------------------------------------
+    # -- callbacks -----------------------------------------------------------------------------
 
-    def take(self, state: Any, ends: Array, *, keep: bool = False) -> int:
-        """Take steps to these times, for :data:`LONGEST` at most; those that fail in parts.
+    def _ask(self, *_: Any) -> None:
+        """Let controllers and friction ask the scene, which has the state of C."""
+        self._moved(self.march.t)
+        self.together(self.controllers.ask, self)
 
-        Returns:
-            How many were taken.  With ``keep`` the state after each of them is in the solution.
+    def _prepare(self) -> None:
+        """Take from a trial step what the scheme keeps besides the velocities."""
+        c = self.march
+        self.inertia.prepare(self._copy(c.s), c.step.dt)
+        self.supports.take()
+        q1 = self._copy(c.x)
+        for one in self.couplings:
+            one.take(q1)
+
+    def _require_held(self, step: Any, q1: Any, s: Any) -> None:
+        """Raise if loads do not hold in an equilibrium what nothing else holds.
+
+        The tangent is regular if they do, and needs no stiffness against idle motions.  All
+        processes call it together.
+        """
+        equation, newton, grid, loose = self.equation, self.solver, self.grid, self._loose
+        if not loose:
+            return
+        newton.forget_idle()
+        if equation.respond_at(self._copy(q1)):
+            K, free = free_matrix(self.share, equation.A, self.supports.dofs)
+            lengths = np.full(grid.size, grid.scene.size)
+            lengths[grid.rotations] = 1.0
+            moves = np.ones(grid.size)
+            moves[grid.multipliers] = 0.0
+            x = null_vectors(K)[1][:, -1]
+            motion = np.abs(x * moves[free] / lengths[free]).max()
+            forces = np.linalg.norm((K @ x) * moves[free] * lengths[free])
+            if forces <= HELD * newton.scale() * grid.scene.size * motion:
+                raise SceneError(f"{loose}The loads do not hold it either. {INSTEAD}")
+        self._loose = ""
+
+    # -- steps ---------------------------------------------------------------------------------
+
+    def attempt(self, t1: float, end: float | None = None) -> Trial:
+        """Solve the next step, to ``t1``; the state changes if :meth:`accept` takes it.
+
+        Args:
+            t1: End of the step; s.
+            end: End of the whole step where this is a part of one; s.
 
         Raises:
-            StepFailed: Even the smallest part failed; the state is that before it.
-            BaseException: What a function of a user has raised; the steps before are taken.
+            StepFailed: There is no equilibrium, or it is too far away.
         """
-        c, steps, room, rows = self.c, len(ends), 0, ffi.NULL
-        if keep:
-            of_states = state.room(steps)
-            room, rows = len(of_states), doubles(of_states)
-            steps = max(room, 1)
-        with self._in_c(state):
-            taken: int = lib.take_steps(c, steps, doubles(ends), LONGEST, room > 0, rows)
-        if keep and taken:
-            state.grow(taken if room else 0, c.parts_of_last)
-        if c.failure:
-            self._fail()
-        return taken
-
-    def apply_loads(self, state: Any, end: float) -> None:
-        """Apply the loads that act at the present time, in parts, up to the time ``end``."""
-        fill(self.c, applies=1, begin_of_run=self.c.t, applied_by=end)
-        with self._in_c(state):
-            reached = lib.go_to_time(self.c, end)
-        self.c.applies = 0
-        if not reached:
-            self._fail()
-
-    def attempt(self, state: Any, t1: float, end: float) -> Trial:
-        """Solve the step to ``t1``, which is a part of one to ``end``."""
-        with self._in_c(state):
-            solved = lib.attempt_step(self.c, t1, end)
+        with self._in_c():
+            solved = lib.attempt_step(self.march, t1, t1 if end is None else end)
         return self._trial(solved)
 
-    def attempt_along(
-        self, state: Any, step: Step, guess: Array, border: Any, *, hold: bool
-    ) -> Trial:
+    def attempt_along(self, step: Step, guess: Array, border: Any, *, hold: bool = True) -> Trial:
         """Solve a step, whose times are those of the guess, together with the load factor.
 
         With ``hold`` what does not flow stays closed if it can, see material_points.py.  The guess
         is in the axes of supports.
         """
-        c = self.c
+        c = self.march
         self.solver.follow(border)
-        with self._in_c(state):
+        with self._in_c():
             of_step = c.step
             of_step.t0, of_step.t1, of_step.dt = step.t0, step.t1, step.dt
             of_step.load_time, of_step.motion_time = step.load_time, step.motion_time
             of_step.fraction = of_step.at = 1.0
             of_step.ratio, of_step.q0, of_step.q_before = 0.0, c.q, c.prediction.q_before
-            ffi.memmove(c.guess, doubles(guess), self._bytes)
+            ffi.memmove(c.guess, doubles(guess), guess.nbytes)
             solved = lib.solve_begun_step(c, hold)
         self.solver.follow(None)
         return self._trial(solved)
 
-    def accept(self, state: Any, trial: Trial) -> None:
-        """Go where the latest attempt went."""
-        self.c.step.t1 = trial.step.t1
-        with self._in_c(state):
-            accepted = lib.accept_step(self.c)
+    def accept(self, trial: Trial) -> None:
+        """Go where the latest :meth:`attempt` went."""
+        self.march.step.t1 = trial.step.t1
+        with self._in_c():
+            accepted = lib.accept_step(self.march)
         if not accepted:
             self._fail()
 
     def _trial(self, solved: int) -> Trial:
         if not solved:
             self._fail()
-        c = self.c
+        c = self.march
         q0, q1, s, q_before = map(self._copy, (c.q, c.x, c.s, c.step.q_before))
         of = c.step
         numbers = of.load_time, of.motion_time, of.fraction, of.at
         return Trial(Step(of.t0, of.t1, q0, *numbers, q_before, of.ratio), q1, s)
 
+    @contextmanager
+    def _in_c(self) -> Iterator[None]:
+        """Context in which C takes steps; then Python sees the state that follows."""
+        c = self.march
+        c.parts, c.failure, self.equation.callbacks.error = 0, lib.SUCCEEDS, None
+        try:
+            yield
+        except SystemError as error:
+            # Python's preconditioner under PETSc: its exception is still set when C returns.
+            raise error.__cause__ or error from None
+        finally:
+            self._moved(c.t)
+            self.parts += c.parts
+            if c.parts:
+                self._begun_at = None
+            for one in self._watches:
+                one.seen = self.parts
+        self.warn(self._force_watch.told(), here=not self.share.alone)
+
     def _fail(self) -> None:
         """Raise why the latest step failed; all processes call it together."""
-        c, error, self._callbacks.error = self.c, self._callbacks.error, None
+        c, callbacks = self.march, self.equation.callbacks
+        error, callbacks.error = callbacks.error, None
         failure, c.failure = c.failure, lib.SUCCEEDS
         if failure == lib.RAISED:
-            self._together.settle(error)
+            self.together.settle(error)
         if failure == lib.NO_EQUILIBRIUM:
-            if number := self._equation.c.error:
-                error = PETSc.Error(number)
-            self._together.settle(error)
+            self.together.settle(self.solver.error() or error)
             raise self.solver.failure()
         if failure == lib.TURNS_TOO_FAR:
             raise StepFailed(
@@ -324,80 +365,47 @@ class Stepper:
         if failure == lib.APPLIED_TOO_FAST:
             raise StepFailed("a node turns too far while the loads at the beginning are applied")
         if failure == lib.GIVES_ENERGY:
-            self._together(self._require_dissipation)
+            q1 = self._copy(c.x)
+
+            def require() -> None:
+                for one in self.equation.inner:
+                    if one.must_dissipate:
+                        one.require_dissipation(q1)
+
+            self.together(require)
         if self._path is not None:
             raise self._path.failure(failure == lib.LEAVES_MECHANISM)
         raise StepFailed("the step cannot be trusted")
 
-    def _require_dissipation(self) -> None:
-        q1 = self._copy(self.c.x)
-        for one in self._equation.inner:
-            if one.must_dissipate:
-                one.require_dissipation(q1)
+    def warn(self, found: Iterable[str], *, here: bool = False) -> None:
+        """Warn, and note in the solution, of what it does not say; by one process or ``here``."""
+        for said in found:
+            if said not in self.solution.warnings:
+                self.solution.warnings += f"{said}\n"
+                if here or self.comm.rank == 0:
+                    warn(said)
 
-    # -- callbacks -------------------------------------------------------------------------------
+    # -- the state -----------------------------------------------------------------------------
 
-    def _ask(self, *_: Any) -> None:
-        """Let controllers and friction ask the scene, which has the state of C."""
-        if self._state is not None and self._extras.ask is not None:
-            self._state.moved(self.c.t)
-            self._together(self._extras.ask)
-
-    def _prepare(self) -> None:
-        """Take from a trial step what the scheme keeps besides the velocities."""
-        if self._inertia is not None:
-            c = self.c
-            self._inertia.prepare(self._copy(c.s), c.step.dt)
-            self._equation.supports.take()
-            q1 = self._copy(c.x)
-            for one in self._links:
-                one.take(q1)
-
-    # -- the state -------------------------------------------------------------------------------
-
-    @contextmanager
-    def _in_c(self, state: Any) -> Iterator[None]:
-        """Context in which C takes steps from a state; then Python sees the one that follows."""
-        self._state = state
-        self.c.parts, self.c.failure, self._callbacks.error = 0, lib.SUCCEEDS, None
-        try:
-            yield
-        except SystemError as error:
-            # Python's preconditioner under PETSc: its exception is still set when C returns.
-            raise error.__cause__ or error from None
-        finally:
-            self._state = None
-            state.moved(self.c.t)
-            state.parts += self.c.parts
-            for one in self._watches:
-                one.seen = state.parts
-
-    def watch(self, watches: Sequence[Any]) -> None:
-        """Let these take in the state after each step."""
-        self._watches = watches
-        of_c = ffi.new("watch *[]", [one.c for one in watches])
-        fill(self.c, watches=len(watches), watch=of_c)
+    def _moved(self, t: float) -> None:
+        """Take note that the state is another one, at the time ``t``."""
+        self.t = t
+        self._q: Array | None = None  # copied when Python asks for it
+        self._now: States | None = None
 
     @property
     def q(self) -> Array:
-        """Accepted local configuration; a copy."""
-        return self._copy(self.c.q)
+        """Configuration at the local degrees of freedom."""
+        if self._q is None:
+            self._q = self._copy(self.march.q)
+        return self._q
+
+    @property
+    def q_before(self) -> Array:
+        """Configuration at the beginning of the last step."""
+        if self._begun_at is not None and not self.march.parts:  # C may have gone on since
+            return self._begun_at
+        return self._copy(self.march.prediction.q_before)
 
     def _copy(self, values: Any) -> Array:
-        return np.frombuffer(ffi.buffer(values, self._bytes)).copy()
-
-    def begin_at(self, state: Any, t: float, q: Array) -> None:
-        """Go on from a state that no step has led to."""
-        ffi.memmove(self.c.q, doubles(q), self._bytes)
-        fill(self.c, prediction=state.prediction.c)
-        self.c.t = t
-        give_back_memory(len(q))
-
-
-def begins_loaded(scene: Scene, scheme: Scheme, t: float) -> bool:
-    """Return whether loads that act at ``t`` are to be applied before the first step."""
-    over_step = scheme.average(0.0, 1.0) != 1.0
-    if has_inertia(scheme) or not over_step:
-        return False
-    frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
-    return frames or bool(scene.works) or any(f(t) != 0 for _, f in scene.time_functions())
+        return np.frombuffer(ffi.buffer(values, 8 * self.share.size)).copy()

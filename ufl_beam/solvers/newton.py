@@ -89,7 +89,7 @@ class Solver:
         self._diagonal = A.positions(every, every)
         self._stiffness: Array | None = None  # against idle motions, once a tangent was singular
         self._moves = np.ones(share.size, dtype=np.uint8)
-        self._moves[equation.held] = 0
+        self._moves[equation.supports.dofs] = 0
         c = self.c = equation.c
         fill(
             c,
@@ -193,7 +193,7 @@ class Solver:
         """Look for more idle motions, and hold them; return whether there are any."""
         if self._stiffness is None:
             self._stiffness = np.zeros(self._share.size)
-        of_tangent = self._equation.A, self._diagonal, self._equation.held
+        of_tangent = self._equation.A, self._diagonal, self._equation.supports.dofs
         forces = self._residuals(), self.scale()
         found = hold_idle_motions(self._stiffness, self._share, *of_tangent, *forces)
         self._put_idle(self._stiffness)
@@ -217,7 +217,7 @@ class Solver:
         idle = {"idle_entry": self._diagonal[here], "idle_stiffness": stiffness[here]}
         fill(self.c, idle=len(here), **idle)
         self._moves[:] = stiffness == 0.0
-        self._moves[self._equation.held] = 0
+        self._moves[self._equation.supports.dofs] = 0
 
     # -- paths -----------------------------------------------------------------------------------
 
@@ -253,7 +253,7 @@ class Solver:
         if self._stiffness is not None:
             self._equation.A.data[self._diagonal] += self._stiffness
         rates = share.added(rates)
-        rates[self._equation.held] = 0.0
+        rates[self._equation.supports.dofs] = 0.0
         if not self._factors.factor(self._r[owned]):
             return True
         self._factors.solve(self._r[owned], y[owned], reduced=True)
@@ -285,6 +285,10 @@ class Solver:
     def _residuals(self) -> Array:
         """Sizes of the latest residual, moments over the size of the scene, ghosts zero; N."""
         return np.asarray(np.abs(self._r) * self._weights)
+
+    def error(self) -> PETSc.Error | None:
+        """The error of PETSc that ended the latest solution, if one did."""
+        return PETSc.Error(self.c.error) if self.c.error else None
 
     def failure(self) -> StepFailed:
         """Describe why Newton's method has stopped without a solution."""
