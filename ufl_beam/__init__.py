@@ -115,7 +115,6 @@ from ufl_beam.output.paraview_files import VTKHDF, XDMF
 from ufl_beam.output.postprocessing import Diagram
 from ufl_beam.output.recorders import Recorder
 from ufl_beam.parallel import say
-from ufl_beam.plotting import notebook  # noqa: F401 - says how notebooks show models and results
 from ufl_beam.plotting.diagrams import plot_damage
 from ufl_beam.plotting.films import Film
 from ufl_beam.plotting.inelastic import (

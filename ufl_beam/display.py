@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Texts for prompts, notebooks and pictures: representations of one line, HTML, names and units.
 
-Models and results know no pictures: the modules that draw them register how, see `notebook.py`.
+Models and results know no pictures: the modules that draw them register their pages.
 """
 
 from __future__ import annotations
@@ -72,12 +72,6 @@ def counted(*things: tuple[int, str, str]) -> str:
 def html_of(shown: object) -> str:
     """Write an object as HTML: its text, unless a function is registered for its class."""
     return f"<pre>{html.escape(str(shown))}</pre>"
-
-
-@singledispatch
-def picture_of(shown: object) -> Any:
-    """Draw the figure that stands for an object in a notebook, by the function for its class."""
-    raise TypeError(f"a {type(shown).__name__} has no picture")
 
 
 class Rich:

@@ -453,7 +453,7 @@ def test_shapes_of_a_path_are_spaced_along_it():
             if len(line.get_xdata()) == 5 and line.get_linewidth() > 2  # both beams, NaN between
         }
     )
-    v = path.displacement(apex)[evenly(path, 8), 1]
+    v = path.displacement(apex)[evenly(path.progress, 8), 1]
     assert len(heights) >= 4
     steps = -np.diff(v)
     whole = -path.displacement(apex)[-1, 1]

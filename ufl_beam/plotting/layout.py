@@ -21,7 +21,6 @@ from ufl_beam.model.functions import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.output.postprocessing import motion_of
 from ufl_beam.output.states import States
-from ufl_beam.simulation.solution import Solution
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
 """Half the size of a symbol of a support where beams are not short; length of a beam below which it
@@ -77,9 +76,8 @@ def joined(lines: Iterable[Array]) -> Array:
     return np.concatenate(chains[:-1] or [np.empty((0, 2))])
 
 
-def evenly(solution: Solution, count: int) -> list[int]:
+def evenly(progress: Array, count: int) -> list[int]:
     """Choose numbers of so many kept states, evenly spaced in time or along a path."""
-    progress = solution.progress
     spaced = np.linspace(progress[0], progress[-1], count)
     return [int(np.argmin(np.abs(progress - x))) for x in spaced]
 

@@ -5,17 +5,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import picture_of
+from ufl_beam.display import counted, html_of
 from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.loads import Gravity, Load, Rayleigh, RotatingFrame
 from ufl_beam.model.scene import Scene, spots_of
+from ufl_beam.plotting import notebook
 from ufl_beam.plotting.diagrams import plot_state
 from ufl_beam.plotting.labels import Placed, place
 from ufl_beam.plotting.layout import segments
@@ -109,38 +110,54 @@ def plot(
             f"plot: a scene has no {', '.join(said)} before a run; plot(scene) draws the model, "
             f"plot(solution, {what!r}) what a run found"
         )
-    return plot_model(shown, ax)
-
-
-@picture_of.register(Scene)
-def plot_model(scene: Scene, ax: Axes | None = None) -> Figure:
-    """Draw the undeformed model with all that is in it; see :func:`plot`."""
-    require_independent(scene)
-    subject, notes = Subject(scene), notes_of(scene)
-    numbers = len(scene.beams), subject.cells, len(scene.bodies)
-    names = ("beam", "beams"), ("cell", "cells"), ("body", "bodies")
-    counted = (f"{k:,} {of[k > 1]}" for k, of in zip(numbers, names, strict=True) if k)
-    title = f"model: {'; '.join(counted).replace(',', ' ').replace(';', ',')}"
+    require_independent(shown)
+    subject, notes = Subject(shown), notes_of(shown)
+    cells = (subject.cells, "cell", "cells")
+    beams, bodies = (len(shown.beams), "beam", "beams"), (len(shown.bodies), "body", "bodies")
+    title = f"model: {counted(beams, cells, bodies)}"
     with panel(ax, MOST) as axes:
         measure: Measure = cache(lambda text: half_size(axes, text, font_size(LABEL_SIZE)))
-        _write_around(axes, title, notes)
+        note = font_size(NOTE)
+        axes.set(xlabel="x (m)", ylabel="y (m)")
+        pad = 8.0 + note * len(notes)
+        axes.set_title(title, loc="left", fontsize=font_size(TITLE_SIZE), pad=pad)
+        for k, words in enumerate(reversed(notes)):
+            axes.annotate(
+                words, (0.0, 1.0), (0.0, 6.0 + note * k), xycoords="axes fraction",
+                textcoords="offset points", fontsize=font_size(LABEL_SIZE), color=shade(TEXT),
+                gid="notes",
+            )  # fmt: skip
         if ax is None:
             figure_of(axes).set_layout_engine("none")
             around = LEFT + RIGHT, font_size(BELOW + ABOVE + NOTE * len(notes))
             least, most = (POINTS * np.array(size) - around for size in (LEAST, MOST))
             # At least as wide as the words above
-            badges = [2 * measure(text)[0] + BADGE for text, *_ in map(badge, scene.loads) if text]
+            badges = [2 * measure(text)[0] + BADGE for text, *_ in map(badge, shown.loads) if text]
             first = 2 * TITLE_SIZE / LABEL_SIZE * measure(title)[0] + sum(badges)
-            words = max([first, *(2 * measure(note)[0] for note in notes)])
-            least[0] = min(max(least[0], words), most[0])
+            above = max([first, *(2 * measure(words)[0] for words in notes)])
+            least[0] = min(max(least[0], above), most[0])
         else:
             least = most = size_of(axes)
         sheet, placed, frame = _planned(subject, measure, least, most)
         _fit(axes, sheet.scale, frame, len(notes) if ax is None else None)
         draw_strokes(axes, sheet.strokes)
         _write(axes, placed, sheet.scale)
-        _write_badges(axes, scene, measure, frame)
+        # The loads on the whole scene, right above the axes
+        x, y = frame[2:] - frame[:2] + (0.0, 17.0)
+        for text, arrow, angle in filter(any, map(badge, shown.loads)):
+            for words, size, turn in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
+                axes.annotate(
+                    words, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
+                    fontsize=font_size(size), rotation=turn, gid="badges", annotation_clip=False,
+                )  # fmt: skip
+                x -= 2 * float(measure(text)[0]) + 6.0 if words is text else BADGE
     return figure_of(axes)
+
+
+@html_of.register
+def of_scene(scene: Scene) -> str:
+    """Write a scene: its parts, and the picture of :func:`plot`."""
+    return notebook.lines(str(scene)) + notebook.image("model", partial(plot, scene))
 
 
 def notes_of(scene: Scene) -> list[str]:
@@ -227,19 +244,6 @@ def _arrange(sheet: Sheet, measure: Measure, frame: Array) -> list[Placed]:
     return [one for one in placed if one.overlap < 0.1]
 
 
-def _write_around(axes: Axes, title: str, notes: list[str]) -> None:
-    """Write title, notes and names of the axes."""
-    note = font_size(NOTE)
-    axes.set(xlabel="x (m)", ylabel="y (m)")
-    axes.set_title(title, loc="left", fontsize=font_size(TITLE_SIZE), pad=8.0 + note * len(notes))
-    for k, words in enumerate(reversed(notes)):
-        axes.annotate(
-            words, (0.0, 1.0), (0.0, 6.0 + note * k), xycoords="axes fraction",
-            textcoords="offset points", fontsize=font_size(LABEL_SIZE), color=shade(TEXT),
-            gid="notes",
-        )  # fmt: skip
-
-
 def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
     """Set limits and ticks; make a figure of its own as large as axes, and words around, need."""
     from matplotlib.ticker import MaxNLocator
@@ -275,15 +279,3 @@ def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
             ha="center", va="center", zorder=7, gid="labels",
             bbox={"facecolor": shade(WHITE), "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
         )  # fmt: skip
-
-
-def _write_badges(axes: Axes, scene: Scene, measure: Measure, frame: Array) -> None:
-    """Write the loads on the whole scene right above the axes."""
-    x, y = frame[2:] - frame[:2] + (0.0, 17.0)
-    for text, arrow, angle in filter(any, map(badge, scene.loads)):
-        for words, size, turn in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
-            axes.annotate(
-                words, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
-                fontsize=font_size(size), rotation=turn, gid="badges", annotation_clip=False,
-            )  # fmt: skip
-            x -= 2 * float(measure(text)[0]) + 6.0 if words is text else BADGE

@@ -4,32 +4,19 @@
 from __future__ import annotations
 
 from base64 import b64encode
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from html import escape
+from typing import TYPE_CHECKING
 
-from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
-from ufl_beam.analysis.tradeoff_result import Tradeoff
-from ufl_beam.display import html_of, picture_of
-from ufl_beam.model.scene import Scene
+from ufl_beam.display import html_of
 from ufl_beam.plotting.style import png
-from ufl_beam.simulation.solution import Solution
 from ufl_beam.terms.energy_ledger import Energy
 
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 ROWS = 12  # cases of a study that are shown
-
-
-@html_of.register
-def of_scene(scene: Scene) -> str:
-    """Write a scene: its parts, and the picture of :func:`plot`."""
-    return lines(str(scene)) + image("model", scene)
-
-
-@html_of.register
-def of_solution(solution: Solution) -> str:
-    """Write a solution: the lines of its text, the energy ledger, and shapes on the way."""
-    text = lines(*solution.summary()) + of_energy(solution.energy) + lines(solution.open_ledger)
-    return text + image("shapes", solution)
 
 
 @html_of.register
@@ -37,21 +24,6 @@ def of_energy(energy: Energy) -> str:
     """Write an energy ledger as a table of its entries at the end."""
     rows = [(kind, name, f"{value:.6g}") for kind, name, value in energy.entries()]
     return table(("energy", "", "at the end (J)"), rows) + lines(energy.balance()) if rows else ""
-
-
-@html_of.register
-def of_shapes(shapes: Shapes) -> str:
-    """Write modes: their frequencies or load factors, and pictures of the first ones."""
-    rows = [(str(k), title) for k, title in enumerate(shapes.titles)]
-    return table((shapes.word, ""), rows) + image("modes", shapes)
-
-
-@html_of.register
-def of_tradeoff(found: Tradeoff) -> str:
-    """Write a trade-off: the runs that no other one beats, remarks, and a picture."""
-    head, *rows = found.table()
-    text = lines(found.title()) + table(head, rows) + lines(*found.remarks())
-    return text + image("errors over wall times", found)
 
 
 @html_of.register
@@ -84,10 +56,10 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     return f"<table>{''.join(f'<tr>{row}</tr>' for row in cells)}</table>"
 
 
-def image(name: str, shown: object) -> str:
-    """Draw the picture of an object; where that fails, the reason takes its place."""
+def image(name: str, draw: Callable[[], Figure]) -> str:
+    """Draw a picture; where that fails, the reason takes its place."""
     try:
-        data, look = png(picture_of(shown))
+        data, look = png(draw())
     except Exception as error:
         return lines(f"no picture: {type(error).__name__}: {error}")
     source = f'src="data:image/png;base64,{b64encode(data).decode()}"'

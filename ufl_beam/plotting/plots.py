@@ -4,19 +4,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from itertools import cycle, product
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
-from ufl_beam.analysis.tradeoff_result import Run, Tradeoff
-from ufl_beam.display import picture_of
+from ufl_beam.analysis.tradeoff_result import Tradeoff
+from ufl_beam.display import html_of
 from ufl_beam.errors import SceneError, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
-from ufl_beam.plotting import style, symbols
+from ufl_beam.plotting import notebook, style, symbols
 from ufl_beam.plotting.diagrams import MOST, draw_beams, draw_frame, draw_undeformed, plane_stage
 from ufl_beam.plotting.layout import evenly
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture, shade
@@ -33,12 +34,11 @@ COMPONENTS = {
     "dpsi/dt": ("angular velocity", "rad/s"),
 }  # fmt: skip
 
-SHAPES = 5  # shapes of a solution in a notebook
+MODES, SHAPES = 6, 5  # in a notebook
 VISIBLE = 0.1  # displacements, as a part of the size of the scene, up to which it magnifies them
-LEAST_ERROR = 1e-12  # errors below are drawn there, in the unit of the quantity
-MODES = 6  # modes in a notebook
-CLASSES = 40  # classes of ranges and of means of cycles in pictures
 FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # larger ones would show round-off
+LEAST_ERROR = 1e-12  # errors below are drawn there, in the unit of the quantity
+CLASSES = 40  # classes of ranges and of means of cycles in pictures
 
 
 def plot_shapes(
@@ -77,7 +77,7 @@ def plot_shapes(
         )
     kept = solution.times
     nearest = [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
-    chosen = nearest or evenly(solution, int(count))
+    chosen = nearest or evenly(solution.progress, int(count))
     stage, size = plane_stage(solution, chosen, magnify, ax)
     poses = [stage.pose(n) for n in chosen]
     with style.panel(ax, size) as axes:
@@ -96,13 +96,22 @@ def plot_shapes(
     return style.figure_of(axes)
 
 
-@picture_of.register(Solution)
-def picture_of_solution(solution: Solution) -> Figure:
-    """Draw shapes on the way in a notebook; displacements that can hardly be seen are magnified."""
+@html_of.register
+def of_solution(solution: Solution) -> str:
+    """Write a solution: the lines of its text, the energy ledger, and shapes on the way.
+
+    Displacements that can hardly be seen are magnified.
+    """
+    text = (
+        notebook.lines(*solution.summary())
+        + notebook.of_energy(solution.energy)
+        + notebook.lines(solution.open_ledger)
+    )
     moved = solution.q[:, solution.grid.dofs[:, :2]]
     part = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
-    magnify = max(factor for factor in FACTORS if factor == 1 or factor * part <= VISIBLE)
-    return plot_shapes(solution, count=SHAPES, magnify=magnify if part > 0 else 1)
+    magnify = max(x for x in FACTORS if x == 1 or (part > 0.0 and x * part <= VISIBLE))
+    shapes = partial(plot_shapes, solution, count=SHAPES, magnify=magnify)
+    return text + notebook.image("shapes", shapes)
 
 
 def plot_history(
@@ -224,13 +233,16 @@ def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 
     return figure
 
 
-@picture_of.register(Shapes)
-def picture_of_shapes(shapes: Shapes) -> Figure:
-    """Draw the first modes in a notebook."""
-    return plot_modes(shapes, range(min(MODES, len(shapes))))
+@html_of.register
+def of_shapes(shapes: Shapes) -> str:
+    """Write modes: their frequencies or load factors, and pictures of the first ones."""
+    rows = [(str(k), title) for k, title in enumerate(shapes.titles)]
+    first = range(min(MODES, len(shapes)))
+    return notebook.table((shapes.word, ""), rows) + notebook.image(
+        "modes", partial(plot_modes, shapes, first)
+    )
 
 
-@picture_of.register(Tradeoff)
 def plot_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
     """Draw errors over wall times of all runs, and the recommended run in a ring.
 
@@ -249,26 +261,22 @@ def plot_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
         >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
         >>> ub.plot_tradeoff(found).savefig("tradeoff.png")
     """
-
-    def error(run: Run) -> float:
-        return max(tradeoff.ratio(run), LEAST_ERROR)
-
+    errors = {run: max(tradeoff.ratio(run), LEAST_ERROR) for run in tradeoff.runs}
     with style.panel(ax, (9.0, 6.0)) as axes:
         looks = cycle(product("os^", (BLUE, RED, GREEN, ORANGE, PINK, SKY)))
         for family, (name, look) in enumerate(zip(tradeoff.families, looks, strict=False)):
             marker, color = look
             runs = [run for run in tradeoff.runs if run.refinement.family == family]
             axes.scatter(
-                [run.seconds for run in runs], [error(run) for run in runs],
+                [run.seconds for run in runs], [errors[run] for run in runs],
                 s=[30 + 12 * np.log2(run.cells) for run in runs],
                 marker=marker, color=color, alpha=0.75, lw=0, label=f"from {name}", zorder=3,
             )  # fmt: skip
         front, best = tradeoff.front, tradeoff.best
+        line = [run.seconds for run in front], [errors[run] for run in front]
+        axes.plot(*line, color=shade(INK), lw=1.2, zorder=2)
         axes.plot(
-            [r.seconds for r in front], [*map(error, front)], color=shade(INK), lw=1.2, zorder=2
-        )
-        axes.plot(
-            best.seconds, error(best), "o", ms=18, mfc="none", mec=shade(INK), mew=1.8, zorder=4
+            best.seconds, errors[best], "o", ms=18, mfc="none", mec=shade(INK), mew=1.8, zorder=4
         )
         axes.set(xscale="log", yscale="log", xlabel="wall time of a run (s)")
         axes.set_ylabel(f"error ({tradeoff.target.measure})")
@@ -283,6 +291,18 @@ def plot_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
             title_fontsize=small,
         )  # fmt: skip
     return style.figure_of(axes)
+
+
+@html_of.register
+def of_tradeoff(found: Tradeoff) -> str:
+    """Write a trade-off: the runs that no other one beats, remarks, and a picture."""
+    head, *rows = found.table()
+    text = (
+        notebook.lines(found.title())
+        + notebook.table(head, rows)
+        + notebook.lines(*found.remarks())
+    )
+    return text + notebook.image("errors over wall times", partial(plot_tradeoff, found))
 
 
 def plot_extremes(

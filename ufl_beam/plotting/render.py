@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import gc
 from collections import defaultdict
-from collections.abc import Collection, Generator, Iterable, Iterator
+from collections.abc import Collection, Generator, Iterable
 from contextlib import closing
 from dataclasses import dataclass
 from functools import cached_property, partial
@@ -159,12 +159,12 @@ def render(
     """
     from matplotlib.image import imsave
 
-    solids = Solids(solution, color, thickness, magnify, size)
+    solids = Solids(solution, [n], color, thickness, magnify, size)
     path = _require_suffix(path, (".png",))
     require_kind(camera, Camera, "render: camera")
-    camera.origin(solids.stage([n]).pose(n))
+    camera.origin(solids.stage.pose(n))
     if active_comm().rank == 0:
-        with closing(_film(solids, [n], camera)) as frames:
+        with closing(_frames(solids, camera)) as frames:
             imsave(path, next(frames))
 
 
@@ -210,48 +210,33 @@ def animate(
         >>> ub.animate(solution, "beam.gif", fps=5, seconds=0.4, size=(320, 192))
         Film('beam.gif')
     """
-    solids = Solids(solution, color, thickness, magnify, size)
     path = _require_suffix(path, WRITERS)
     require_kind(camera, Camera, "animate: camera")
     require_switch(progress, "animate: progress")
     require_number(fps, "animate: fps", positive=True)
     require_number(seconds, "animate: seconds", positive=True)
-    shown = evenly(solution, max(1, round(fps * seconds)))
-    camera.origin(solids.stage(shown).undeformed)
+    shown = evenly(solution.progress, max(1, round(fps * seconds)))
+    solids = Solids(solution, shown, color, thickness, magnify, size)
+    camera.origin(solids.stage.undeformed)
     if active_comm().rank == 0:
-        with closing(_film(solids, shown, camera)) as frames:
+        with closing(_frames(solids, camera)) as frames:
             about = {"iterable": frames, "total": len(shown), "unit": "frame"}
             bar = progress_bar(progress, active_comm(), **about)
             WRITERS[path.suffix.lower()](path, iter(bar), fps)
     return Film(path)
 
 
-def _film(solids: Solids, shown: list[int], camera: Camera) -> Generator[Any, None, None]:
-    """Images (height, width, 3) of these states, one after the other."""
+def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
+    """Images (height, width, 3) of the states, in which only what moves is made anew."""
     try:
         import pyvista
     except ImportError as error:
         raise ImportError(
             "pictures of solid bodies need PyVista; install it by: pip install ufl_beam[view]"
         ) from error
-    with screen(pyvista):
-        plotter = pyvista.Plotter(off_screen=True, window_size=list(solids.size))
-        try:
-            yield from _frames(plotter, solids, shown, camera)
-        finally:
-            plotter.close()
-            del plotter
-            # A window that is left to the collector would outlive its X server.
-            gc.collect()
-
-
-def _frames(plotter: Any, solids: Solids, shown: list[int], camera: Camera) -> Iterator[Any]:
-    """Images of a plotter, in which only what moves is made anew."""
-    from pyvista import merge
-
-    solution, magnify, size = solids.solution, solids.magnify, solids.size
-    stage, grid, beams = solids.stage(shown), solution.grid, solution.scene.beams
-    largest = max(float(np.abs(solids.values(n)).max(initial=0.0)) for n in set(shown))
+    solution, stage, size = solids.solution, solids.stage, solids.size
+    grid, beams = solution.grid, solution.scene.beams
+    largest = max(float(np.abs(solids.values(n)).max(initial=0.0)) for n in set(solids.shown))
     factor, prefix = style.decimal_prefix(largest)
     limit, (quantity, unit) = largest / factor or 1.0, QUANTITIES[solids.color]
     text = {"font_size": size[1] // 40, "color": "black", "viewport": True}
@@ -260,35 +245,44 @@ def _frames(plotter: Any, solids: Solids, shown: list[int], camera: Camera) -> I
         "height": 0.09, "position_x": 0.46, "position_y": 0.01, "label_font_size": size[1] // 36,
     }  # fmt: skip
     xy = np.concatenate([pose.points() - camera.origin(pose) for pose in stage.poses()])
-    margin, half = 2.2 * solids.symbol, solids.thickest(beams)[1] / 2
+    margin, half = 2.2 * stage.unit, solids.thickest(beams)[1] / 2
     box = np.array([[*(xy.min(axis=0) - margin), -half], [*(xy.max(axis=0) + margin), half]])
-    plotter.set_background("white")
-    plotter.enable_anti_aliasing("msaa")
-    if beams:
-        undeformed = _lines([grid.points[grid.vertices_of(beam)] for beam in beams])
-        plotter.add_mesh(undeformed, color="#A0A0A0", reset_camera=False)
-        plotter.add_text(f"{quantity} ({prefix}{unit})", position=(0.02, 0.025), **text)
-    for n in shown:
-        plotter.suppress_rendering = True
-        pose = stage.pose(n)
-        camera.aim(plotter, box, camera.origin(pose), size)
-        # Meshes and texts replace those of the same name.
-        if beams:
-            plotter.add_mesh(
-                solids.beams(n, pose, factor), scalars="values", clim=(-limit, limit),
-                cmap="coolwarm", name="beams", scalar_bar_args=bar, reset_camera=False,
-                ambient=0.4, diffuse=0.7,
-            )  # fmt: skip
-            plotter.scalar_bars["values"].SetTitle("")  # VTK would set it over the numbers.
-        for color, meshes in solids.others(n, pose).items():
-            look = {"color": color, "name": color, "ambient": 0.25}
-            plotter.add_mesh(merge(meshes), reset_camera=False, **look)
-        time = f"{solution.parameter.at(solution.times[n], '.3f')}{style.magnified(magnify)}"
-        plotter.add_text(time, position=(0.02, 0.93), name="time", **text)
-        plotter.reset_camera_clipping_range()
-        plotter.suppress_rendering = False
-        plotter.render()
-        yield plotter.screenshot(return_img=True)
+    with screen(pyvista):
+        plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
+        try:
+            plotter.set_background("white")
+            plotter.enable_anti_aliasing("msaa")
+            if beams:
+                undeformed = _lines([grid.points[grid.vertices_of(beam)] for beam in beams])
+                plotter.add_mesh(undeformed, color="#A0A0A0", reset_camera=False)
+                plotter.add_text(f"{quantity} ({prefix}{unit})", position=(0.02, 0.025), **text)
+            for n in solids.shown:
+                plotter.suppress_rendering = True
+                pose = stage.pose(n)
+                camera.aim(plotter, box, camera.origin(pose), size)
+                # Meshes and texts replace those of the same name.
+                if beams:
+                    plotter.add_mesh(
+                        solids.beams(n, pose, factor), scalars="values", clim=(-limit, limit),
+                        cmap="coolwarm", name="beams", scalar_bar_args=bar, reset_camera=False,
+                        ambient=0.4, diffuse=0.7,
+                    )  # fmt: skip
+                    plotter.scalar_bars["values"].SetTitle("")  # VTK would set it over the numbers.
+                for color, meshes in solids.others(n, pose).items():
+                    look = {"color": color, "name": color, "ambient": 0.25}
+                    plotter.add_mesh(pyvista.merge(meshes), reset_camera=False, **look)
+                time = solution.parameter.at(solution.times[n], ".3f")
+                time += style.magnified(solids.magnify)
+                plotter.add_text(time, position=(0.02, 0.93), name="time", **text)
+                plotter.reset_camera_clipping_range()
+                plotter.suppress_rendering = False
+                plotter.render()
+                yield plotter.screenshot(return_img=True)
+        finally:
+            plotter.close()
+            del plotter
+            # A window that is left to the collector would outlive its X server.
+            gc.collect()
 
 
 def _require_suffix(path: str | Path, suffixes: Collection[str]) -> Path:
@@ -309,6 +303,7 @@ class Solids:
     """Solid bodies of a solution, as the arguments of :func:`render` ask for them, checked."""
 
     solution: Solution
+    shown: list[int]  # numbers of the kept times
     color: str
     thickness: float
     magnify: float
@@ -322,10 +317,11 @@ class Solids:
             require_number(pixels, "size", at_least=16)
 
     @cached_property
-    def symbol(self) -> float:
-        """Half the size of the symbols of supports and masses; m."""
+    def stage(self) -> Stage:
+        """Stage of bodies, joints, connectors and supports."""
         scene = self.solution.scene
-        return max(0.022 * scene.size, 0.7 * self.thickest(scene.beams)[0])
+        symbol = max(0.022 * scene.size, 0.7 * self.thickest(scene.beams)[0])
+        return Stage(self.solution, self.magnify, symbol, sorted(set(self.shown)))
 
     def thickest(self, of: Iterable[Member | Anchor]) -> tuple[float, float]:
         """Return the largest depth in the plane and width across it of beams, or at places; m.
@@ -335,10 +331,6 @@ class Solids:
         beams = [x.beam if isinstance(x, Place) else x for x in of if not isinstance(x, Spot)]
         depth = self.thickness * max((float(b.section.depth) for b in beams), default=0.0)
         return depth, max(depth, 0.04 * self.solution.scene.size)
-
-    def stage(self, shown: list[int]) -> Stage:
-        """Return the stage of bodies, joints, connectors and supports."""
-        return Stage(self.solution, self.magnify, self.symbol, sorted(set(shown)))
 
     def values(self, n: int) -> Array:
         """Values of the colours at both ends of all cells; (num_cells, 2)."""
@@ -383,15 +375,31 @@ class Solids:
 
     def others(self, n: int, pose: Pose) -> dict[str, list[Any]]:
         """Make bodies, joints, connectors, masses and supports; meshes by their colours."""
-        from pyvista import Sphere
+        from pyvista import Cylinder, PolyData, Sphere
 
         found: defaultdict[str, list[Any]] = defaultdict(list)
         self._add_strokes(found, pose)
-        self._add_pins(found, n, pose)
+        pins = [(pin, PIN) for pin in symbols.pins(pose)]
+        for hinge in open_hinges(self.solution, n, pose.nodes):
+            pins.append((Pin(hinge.at, True, (hinge.beam.start,)), style.ORANGE))
+        # Joints are cylinders as thick as the beams that they join; alike ones are one mesh.
+        alike: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)
+        for pin, color in pins:
+            depth, width = self.thickest(pin.places)
+            least = 0.4 * pose.stage.unit if pin.turns or not depth else 0.0
+            height = width * (1.25 if pin.turns else 1.02)
+            alike[max(depth / 2, least), height, color].append(pin.at)
+        solids: list[tuple[Any, str, list[Array]]] = []
+        for (radius, height, color), places in alike.items():
+            axis = {"direction": (0, 0, 1), "radius": radius, "height": height}
+            solids.append((Cylinder(**axis, resolution=32).triangulate(), color, places))
         if masses := [pose.at(mass.place) for mass in self.solution.scene.masses]:
-            found[style.INK].append(_copies(Sphere(radius=1.1 * self.symbol), masses))
+            solids.append((Sphere(radius=1.1 * pose.stage.unit), style.INK, masses))
+        for solid, color, places in solids:
+            points = PolyData(np.insert(np.array(places), 2, 0.0, axis=1))
+            found[color].append(points.glyph(geom=solid, orient=False, scale=False))
         for at, angle, outlines, color, place in symbols.footings(pose):
-            half, ahead = 0.6 * self.thickest([place])[1], self.symbol * directions(angle)
+            half, ahead = 0.6 * self.thickest([place])[1], pose.stage.unit * directions(angle)
             found[color] += [_extruded(in_frame(x, at, ahead), -half, half) for x in outlines]
         return found
 
@@ -416,33 +424,8 @@ class Solids:
                     z = 0.0 if fill is None and layer <= MIDDLE else high
                     lines[color, weight].append(np.insert(points, 2, z, axis=1))
         for (color, weight), several in lines.items():
-            tubes = _lines(several).tube(radius=weight * self.symbol / 20.0, n_sides=12)
+            tubes = _lines(several).tube(radius=weight * pose.stage.unit / 20.0, n_sides=12)
             found[color].append(tubes)
-
-    def _add_pins(self, found: dict[str, list[Any]], n: int, pose: Pose) -> None:
-        """Joints as cylinders as thick as the beams that they join; open hinges as orange ones."""
-        from pyvista import Cylinder
-
-        pins = [(pin, PIN) for pin in symbols.pins(pose)]
-        for hinge in open_hinges(self.solution, n, pose.nodes):
-            pins.append((Pin(hinge.at, True, (hinge.beam.start,)), style.ORANGE))
-        alike: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)
-        for pin, color in pins:
-            depth, width = self.thickest(pin.places)
-            least = 0.4 * self.symbol if pin.turns or not depth else 0.0
-            height = width * (1.25 if pin.turns else 1.02)
-            alike[max(depth / 2, least), height, color].append(pin.at)
-        for (radius, height, color), places in alike.items():
-            axis = {"direction": (0, 0, 1), "radius": radius, "height": height}
-            found[color].append(_copies(Cylinder(**axis, resolution=32).triangulate(), places))
-
-
-def _copies(mesh: Any, places: list[Array]) -> Any:
-    """Copies of a mesh at places of the plane, in one mesh."""
-    from pyvista import PolyData
-
-    points = PolyData(np.insert(np.array(places), 2, 0.0, axis=1))
-    return points.glyph(geom=mesh, orient=False, scale=False)
 
 
 def _lines(lines: list[Array]) -> Any:
