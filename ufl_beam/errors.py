@@ -63,16 +63,10 @@ class ModelWarning(UserWarning):
 class StepFailed(Exception):
     """No equilibrium was found for a step; attributes are as in :class:`ConvergenceError`."""
 
-    def __init__(self, message: str) -> None:
+    def __init__(self, message: str, residuals: dict[str, float] | None = None) -> None:
         super().__init__(message)
-        self.residuals: dict[str, float] = {}
+        self.residuals = residuals or {}
         self.reason = ""
-
-    def saying(self, message: str) -> StepFailed:
-        """Return the same failure with another message."""
-        other = StepFailed(message)
-        other.residuals = self.residuals
-        return other
 
 
 class NoNumber(StepFailed, SceneError):

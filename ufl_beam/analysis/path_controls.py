@@ -436,9 +436,10 @@ class _QuantityControl(Control):
             return corrector.attempt(size * corrector.direction, plane)
         except StepFailed as failure:
             if (kink := corrector.kink(size)) is None:
-                raise failure.saying(
+                raise StepFailed(
                     f"{failure}; perhaps {what} turns back here, where this control cannot "
-                    "follow: take ArcLength"
+                    "follow: take ArcLength",
+                    failure.residuals,
                 ) from None
         gone, way = kink
         rest = length(reach - corrector.along(normal, gone), way)

@@ -91,14 +91,21 @@ class Beam(Record, Member):
             if self.a == self.b:
                 raise SceneError(f"{self.name}: zero length, both ends are at {self.a}")
             object.__setattr__(self, "curve", Straight(self.a, self.b))
-            self._warn_of_thickness(math.dist(self.a, self.b))
-            return
-        at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
-        points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
-        for s, there, end in ((0, points[0], self.a), (1, points[-1], self.b)):
-            if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
-                raise SceneError(f"{self.name}: curve({s}) = {there} is not the end {end}")
-        self._warn_of_thickness(sum(math.dist(p, q) for p, q in pairwise(points)))
+            length = math.dist(self.a, self.b)
+        else:
+            at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
+            points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
+            for s, there, end in ((0, points[0], self.a), (1, points[-1], self.b)):
+                if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
+                    raise SceneError(f"{self.name}: curve({s}) = {there} is not the end {end}")
+            length = sum(math.dist(p, q) for p, q in pairwise(points))
+        depth = self.section.depth
+        if depth > math.sqrt(12) * length > 0.0:  # the radius of gyration is larger
+            warn(
+                f"{self.name}: its section is {depth:.3g} m deep (sqrt(12 EI/EA) where no depth is "
+                f"given), but it is only {length:.3g} m long. Are sizes of the section in mm? "
+                "Units are SI: m, N, N m². If EI is large on purpose, give the section its depth"
+            )
 
     def _require_hinges(self) -> None:
         """Raise :class:`SceneError` unless the plastic hinges are complete, and apart."""
@@ -116,16 +123,6 @@ class Beam(Record, Member):
         if self.hinges and self.section.fibres is not None:
             raise SceneError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
-            )
-
-    def _warn_of_thickness(self, length: float) -> None:
-        """Warn if the radius of gyration of a section is larger than the beam is long."""
-        depth = self.section.depth
-        if depth > math.sqrt(12) * length > 0.0:
-            warn(
-                f"{self.name}: its section is {depth:.3g} m deep (sqrt(12 EI/EA) where no depth is "
-                f"given), but it is only {length:.3g} m long. Are sizes of the section in mm? "
-                "Units are SI: m, N, N m². If EI is large on purpose, give the section its depth"
             )
 
     def _label(self) -> str:

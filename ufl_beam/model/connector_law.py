@@ -8,12 +8,12 @@ import inspect
 from abc import ABC
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
+from functools import partial
 from numbers import Real
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.display import one_line
 from ufl_beam.errors import (
     SceneError,
     closed,
@@ -31,7 +31,7 @@ from ufl_beam.model.material_law import (
     require_fields,
     require_names,
 )
-from ufl_beam.model.records import parameters_by_name
+from ufl_beam.model.records import Record, parameters_by_name
 
 LOSSES = ("damping", "friction", "functions", "connectors", "contact")
 """Entries of the energy ledger of what connectors and dampers lose."""
@@ -222,14 +222,16 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
             with np.errstate(all="ignore"):
                 found = getattr(law, name)(*arguments)
         except Exception as error:
-            raise SceneError(f"{what}.{name} fails at no motion: {error}{place_of(law)}") from error
+            raise SceneError(
+                f"{what}.{name} fails at no motion: {error}{stated_at(law)}"
+            ) from error
         if name == "increments":
             require_names(found, law, f"{what}.{name}")
         if name == "resistance" and law.components > 1:
             if not isinstance(found, tuple | list) or len(found) != law.components:
                 raise SceneError(
                     f"{what}.resistance returns {shorten(found)}; it must return a tuple of "
-                    f"{law.components} forces{place_of(law)}"
+                    f"{law.components} forces{stated_at(law)}"
                 )
             values = [("", force) for force in found]
         else:
@@ -239,7 +241,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
             if not number or not np.all(np.isfinite(value)):
                 raise SceneError(
                     f"{what}.{name} returns {f'{of} = ' * bool(of)}{shorten(value)} at no motion; "
-                    f"it must return a number there{place_of(law)}"
+                    f"it must return a number there{stated_at(law)}"
                 )
 
 
@@ -257,11 +259,11 @@ def require_limit(law: ConnectorLaw, what: str) -> None:
             raise SceneError(
                 f"{what}: {type(law).__name__}.increments returns {name} = {shorten(change)} for "
                 "dt = inf, and steps of a path are infinitely slow; state it so that it has a "
-                f"limit, as a / (b / dt + c), or use simulate(scene, Static(), ...){place_of(law)}"
+                f"limit, as a / (b / dt + c), or use simulate(scene, Static(), ...){stated_at(law)}"
             )
 
 
-def place_of(law: object) -> str:
+def stated_at(law: object) -> str:
     """Return file and line of the class of a law in brackets, if they are known."""
     try:
         file, (_, line) = inspect.getsourcefile(type(law)), inspect.getsourcelines(type(law))
@@ -289,9 +291,13 @@ def judges_loss(law: ConnectorLaw) -> bool:
 # -- functions of a user ------------------------------------------------------------------------
 
 
+def _require_state(value: Any, what: str) -> tuple[float, ...]:
+    return tuple(map(float, require_row(value, what)))
+
+
 @closed("give it a function of your own")
-@dataclass(frozen=True)
-class ForceLaw:
+@dataclass(frozen=True, repr=False)
+class ForceLaw(Record):
     """Force of a connector as a function of its motion and rate, of time and its own history.
 
     Args:
@@ -325,48 +331,35 @@ class ForceLaw:
         (True, True)
     """
 
-    force: Callable[..., Any]
-    state: Sequence[float] = ()
-    stored: Callable[..., float] | None = None
-
-    __repr__ = one_line
+    force: Annotated[Callable[..., Any], partial(require_function, of="(motion, rate)")]
+    state: Annotated[Sequence[float], _require_state] = ()
+    stored: Annotated[
+        Callable[..., float] | None,
+        partial(require_function, of="the motion, or (motion, state)"),
+    ] = None
 
     def __post_init__(self) -> None:
-        require_function(self.force, "ForceLaw: force", "(motion, rate)")
-        row = require_row(self.state, "ForceLaw: state")
-        object.__setattr__(self, "state", tuple(map(float, row.flat)))
+        super().__post_init__()
         if self.state and "state" not in self.asked:
             raise SceneError(
                 "ForceLaw: the function does not ask for the state; let it have a parameter state, "
                 "and return the force and the state after the step"
             )
-        if self.stored is not None:
-            require_function(self.stored, "ForceLaw: stored", "the motion, or (motion, state)")
         _ = self.asked, self.asked_by_stored  # which refuse names that nobody knows
-
-    @property
-    def _history(self) -> tuple[str, ...]:
-        return ("state",) if self.state else ()
 
     @property
     def asked(self) -> tuple[str, ...]:
         """Names by which the function asks for more than motion and rate."""
-        return _names(self.force, ("t", "dt", *self._history), "force", after=2)
+        return self._names(self.force, "force", "t", "dt", after=2)
 
     @property
     def asked_by_stored(self) -> tuple[str, ...]:
         """Names by which the energy asks for more than the motion."""
-        return _names(self.stored, self._history, "stored", after=1) if self.stored else ()
+        return self._names(self.stored, "stored", after=1) if self.stored else ()
 
-
-def _names(
-    function: Callable[..., Any], known: tuple[str, ...], what: str, after: int
-) -> tuple[str, ...]:
-    names = parameters_by_name(function, known, after)
-    for unknown in names.unknown if names else ():
-        known = (*known, *(() if "state" in known else ("with ForceLaw(..., state=[...]) state",)))
-        raise SceneError(
-            f"ForceLaw: {what} has a parameter {unknown!r}, which nobody knows; there are "
-            f"{', '.join(known)}"
-        )
-    return names.asked if names else ()
+    def _names(
+        self, function: Callable[..., Any], what: str, *known: str, after: int
+    ) -> tuple[str, ...]:
+        more = "" if self.state else f"{', ' * bool(known)}with ForceLaw(..., state=[...]) state"
+        known = (*known, "state") if self.state else known
+        return parameters_by_name(function, known, f"ForceLaw: {what}", after, more) or ()

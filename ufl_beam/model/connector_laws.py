@@ -10,7 +10,6 @@ from functools import partial
 from numbers import Real
 from typing import Annotated, Any, ClassVar, Protocol
 
-from ufl_beam.display import one_line
 from ufl_beam.errors import (
     SceneError,
     closed,
@@ -38,7 +37,7 @@ OWN_LAW = "state a ConnectorLaw of your own"
 
 
 @closed(OWN_LAW)
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Motor(Record):
     """Prescribed relative motion of a connector; its force is unknown.
 
@@ -55,11 +54,9 @@ class Motor(Record):
 
     motion: Timed
 
-    __repr__ = one_line
-
 
 @closed(OWN_LAW)
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Actuator(Record):
     """Prescribed force or moment of a connector; a positive one makes the motion grow.
 
@@ -75,8 +72,6 @@ class Actuator(Record):
     """
 
     force: Timed
-
-    __repr__ = one_line
 
 
 class Bearing:
@@ -94,7 +89,7 @@ class Running(Protocol):
 
 
 @closed(OWN_LAW)
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Controller(Record):
     """Force by a function of the running simulation, constant until it is evaluated again.
 
@@ -120,8 +115,6 @@ class Controller(Record):
 
     force: Annotated[Callable[[Any], float], partial(require_function, of="the simulation")]
     sample: Annotated[float | None, partial(require_number, positive=True)] = None
-
-    __repr__ = one_line
 
     def ask(self, simulation: Running, link: object) -> float:
         """Evaluate the force of ``link`` from now on; all processes call it together."""

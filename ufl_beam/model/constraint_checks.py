@@ -85,7 +85,7 @@ def require_inertia(scene: Scene) -> None:
             return link.law.low == 0.0 or link.law.high == 0.0
         return isinstance(link.law, (*RESISTING, ConnectorLaw, Damper, Coulomb))
 
-    rows = _constraints(scene, determines, [*masses, *_under_works(scene)])
+    rows = _constraints(scene, determines, masses)
     free = _null_space(csr_array(rows[:, loose]))
     if free.shape[1] == 0:
         return
@@ -97,12 +97,6 @@ def require_inertia(scene: Scene) -> None:
         "0), and nothing determines this motion. Give it mass (a section rho or rhoA), or hold or "
         "join it"
     )
-
-
-def _under_works(scene: Scene) -> list[tuple[Anchor, int]]:
-    """Components of motion of the beams on which works of the user act: they may hold them."""
-    beams = (beam for work in scene.works for beam in work.on(scene.beams))
-    return [(beam.start, component) for beam in beams for component in range(3)]
 
 
 def _fixed(scene: Scene) -> set[NodeDof]:
@@ -178,10 +172,8 @@ def _dependences(
     if not any(holds(link.law) for link in scene.links):
         return [], np.zeros((0, 0))
     same, fixed = scene.representatives, _fixed(scene)
-    rows = [
-        *_of_connectors(scene, lambda link: holds(link.law)),
-        *_of_supports(support for support in scene.supports if support.angle),
-    ]
+    turned = (support for support in scene.supports if support.angle)
+    rows = [*_rows(scene, lambda link: holds(link.law), turned)]
     moved: list[dict[NodeDof, float]] = []
     users: dict[NodeDof, set[int]] = defaultdict(set)
     for number, (_, row) in enumerate(rows):
@@ -223,7 +215,7 @@ def require_no_mechanism(scene: Scene) -> str:
     Loads may hold it, as its weight holds a pendulum.  Then the motion is described, for whoever
     knows the tangent in equilibrium; the description is empty if nothing is free.
     """
-    free = _null_space(_constraints(scene, also=_under_works(scene)))
+    free = _null_space(_constraints(scene))
     if free.shape[1] == 0:
         return ""
     moving = _moving(scene, free[:, 0])
@@ -246,21 +238,18 @@ def _center(part: Member | Body) -> Point:
     return (xa + xb) / 2, (ya + yb) / 2
 
 
-def _of_connectors(scene: Scene, acts: Callable[[Connector], bool]) -> Iterator[tuple[object, Row]]:
-    """Connectors that ``acts`` selects, and the row of each."""
+def _rows(
+    scene: Scene, acts: Callable[[Connector], bool], supports: Iterable[Support]
+) -> Iterator[tuple[object, Row]]:
+    """Connectors that ``acts`` selects, and supports, with the rows of each."""
     for link in filter(acts, scene.links):
         unit = np.array([1.0, 1.0, 1.0 if link.turns else 1 / scene.size])
         ends = zip((link.a, link.b), link.rigidly(), strict=True)
         yield link, [(node(end), np.multiply(factors, unit)) for end, factors in ends]
-
-
-def _of_supports(supports: Iterable[Support]) -> Iterator[tuple[object, Row]]:
-    """Supports, and a row for each component that they hold."""
     for support in supports:
         cos, sin = math.cos(support.angle), math.sin(support.angle)
         turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
-        for component in support.held:
-            yield support, [(node(support.place), turned[component])]
+        yield from ((support, [(node(support.place), turned[c])]) for c in support.held)
 
 
 def _constraints(
@@ -270,8 +259,8 @@ def _constraints(
 ) -> csr_array:
     """Matrix of constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
 
-    Its rows are those of joints, supports, connectors that ``acts`` selects, and components of
-    motion in ``also``.
+    Its rows are those of joints, supports, connectors that ``acts`` selects, components of motion
+    in ``also``, and of beams on which works of the user act: they may hold them.
     """
     unit = np.eye(3)
     rows: list[Row] = [
@@ -279,7 +268,9 @@ def _constraints(
         for (first, component), *others in scene.shared_by_joints
         for other, _ in others
     ]
-    rows += (row for _, row in (*_of_connectors(scene, acts), *_of_supports(scene.supports)))
+    rows += (row for _, row in _rows(scene, acts, scene.supports))
+    worked = (beam.start for work in scene.works for beam in work.on(scene.beams))
+    also = (*also, *((place, component) for place in worked for component in range(3)))
     rows += ([(node(place), unit[component])] for place, component in also)
     parts: dict[object, int] = {part: i for i, part in enumerate((*scene.beams, *scene.bodies))}
     entries: list[tuple[int, int, float]] = []

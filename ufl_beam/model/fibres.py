@@ -16,9 +16,9 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import one_line
-from ufl_beam.errors import SceneError, require_array, require_count, require_kind, shorten
+from ufl_beam.errors import SceneError, require_count, require_kind, shorten
 from ufl_beam.model.law_functions import Values
-from ufl_beam.model.material_law import MaterialLaw, require_bulk_law
+from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, uniform
 from ufl_beam.model.records import Positive, Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
@@ -31,13 +31,6 @@ class Kind(NamedTuple):
 
     law: MaterialLaw
     numbers: tuple[str, ...]
-
-    @classmethod
-    def of_law(cls, law: MaterialLaw) -> Kind:
-        """The kind of a law."""
-        C = tuple(np.ones(()) for _ in law.resultants or "x")
-        names = tuple(law.numbers(law.as_argument(C)))
-        return cls(law.of(1.0, dict.fromkeys(names, 1.0)), names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +66,11 @@ class Layout:
     def kind(self) -> Kind:
         """The law of one kind that points of the bulk follow, with numbers of their own."""
         laws = [law for law, _ in self.laws if not law.elastic] or [self.laws[0][0]]
-        kinds = {Kind.of_law(law): law for law in laws}
+        kinds: dict[Kind, MaterialLaw] = {}
+        for law in laws:
+            C = uniform(law, np.ones(()))
+            names = tuple(law.numbers(C))
+            kinds[Kind(law.of(1.0, dict.fromkeys(names, 1.0)), names)] = law
         if len(kinds) > 1:
             different = " and ".join(map(repr, kinds.values()))
             raise SceneError(f"Section: its laws must be of one class, not {different}")
@@ -104,7 +101,7 @@ class Layout:
         return columns
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Fibres(Record):
     """Number and material law of the fibres of a section, P(93).
 
@@ -129,8 +126,6 @@ class Fibres(Record):
     number: Annotated[int, require_count] = 20
     softening: Annotated[SofteningLaw | None, require_softening] = None
 
-    __repr__ = one_line
-
 
 @dataclass(frozen=True, eq=False)
 class PlacedFibres:
@@ -142,25 +137,6 @@ class PlacedFibres:
     A: Array  # areas; (n,); m²
 
     __repr__ = one_line
-
-    @classmethod
-    def at(cls, fibres: Fibres, E: float, y: Sequence[float], A: Sequence[float]) -> PlacedFibres:
-        """Fibres of a user; ``y`` from any line, the axis will run through their centroid."""
-        y_, A_ = (
-            require_array(x, f"Section.of_fibres: {name}") for name, x in (("y", y), ("A", A))
-        )
-        if y_.ndim != 1 or y_.shape != A_.shape or not len(y_):
-            raise SceneError(
-                f"Section.of_fibres: y and A must be lists of one length, not {y_.shape} and "
-                f"{A_.shape}"
-            )
-        if not (A_ > 0).all():
-            raise SceneError("Section.of_fibres: y must be finite, and all A positive")
-        if np.ptp(y_) == 0.0:
-            raise SceneError(
-                "Section.of_fibres: all fibres at one y have no bending stiffness; spread them"
-            )
-        return cls(fibres, E, y_ - (A_ @ y_) / A_.sum(), A_)
 
     @classmethod
     def layers(

@@ -101,9 +101,7 @@ def Rigid(*places: Anchor, measured: bool = False) -> Joint:
 def Revolute(*places: Anchor, measured: bool = False) -> Joint:
     """Revolute joint: displacement is shared by all ``places``, each turns freely.
 
-    Args:
-        places: Places to be joined, at one point.
-        measured: As in :func:`Rigid`; friction needs it.
+    Args are those of :func:`Rigid`; friction needs ``measured``.
 
     Example:
         >>> rod = ub.Beam((2, 0), (4, 0), section, name="rod")

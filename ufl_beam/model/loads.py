@@ -6,14 +6,13 @@ from __future__ import annotations
 from abc import ABC
 from dataclasses import KW_ONLY, dataclass
 
-from ufl_beam.display import one_line
 from ufl_beam.errors import SceneError, closed, require_kind
 from ufl_beam.model.bodies import Anchor, Beams, Member, carries, require_anchors
 from ufl_beam.model.functions import Timed, TimeFunction, steady
 from ufl_beam.model.records import NotNegative, Number, Positive, Record, Vector
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LoadAtPlace(Record, ABC):
     """Base of the loads that act at one place."""
 
@@ -37,7 +36,7 @@ OWN_LOAD = "state other loads as a VirtualWork, a Potential or a connector with 
 
 
 @closed(OWN_LOAD)
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class PointLoad(LoadAtPlace):
     """Dead force and moment at a place: they keep their direction in the plane.
 
@@ -55,19 +54,13 @@ class PointLoad(LoadAtPlace):
         [      0. -100000. -199989.]
     """
 
-    __repr__ = one_line
-
 
 @closed(OWN_LOAD)
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class FollowerLoad(LoadAtPlace):
     """Follower force at a place: it turns with the cross-section and is not conservative.
 
-    Args:
-        place: Where.
-        force: (F_x, F_y) before any rotation; N.
-        moment: Counter-clockwise; N m.
-        time: Factor at time t.
+    Args are those of :class:`PointLoad`; the force is that before any rotation.
 
     Example:
         >>> thrust = ub.FollowerLoad(beam.end, force=(0, -1e5), time=lambda t: t)
@@ -76,8 +69,6 @@ class FollowerLoad(LoadAtPlace):
         >>> bool(run.reaction(pushed.supports[0])[-1, 0] > 1e3)  # N: the force has turned
         True
     """
-
-    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -89,7 +80,7 @@ class FollowerLoad(LoadAtPlace):
 
 
 @closed(OWN_LOAD)
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LineLoad(Record):
     """Distributed dead force and moment along a beam, per undeformed length.
 
@@ -112,8 +103,6 @@ class LineLoad(Record):
     moment: Number = 0.0
     time: Timed = steady
 
-    __repr__ = one_line
-
     def __post_init__(self) -> None:
         require_kind(self.beam, Member, "LineLoad: beam")
         super().__post_init__()
@@ -125,7 +114,7 @@ class LineLoad(Record):
 
 
 @closed(OWN_LOAD)
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Gravity(Record):
     """Weight of all beams, bodies and point masses.
 
@@ -142,8 +131,6 @@ class Gravity(Record):
 
     acceleration: Vector = (0.0, -9.81)
     time: Timed = steady
-
-    __repr__ = one_line
 
     def __str__(self) -> str:
         return "Gravity"

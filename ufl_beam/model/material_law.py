@@ -141,7 +141,7 @@ class MaterialLaw(ABC):
         """True if laws of this class may bear a stress at no strain; numbers do not matter."""
         law = copy.copy(self)  # with numbers that have nothing in common
         vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(vars(self))})
-        one = self.as_argument(tuple(1.0 for _ in self.resultants or "x"))
+        one = uniform(self, 1.0)
         return any(np.any(σ != 0) for σ in _at_no_strain(law.of(one, {})))
 
     def stressed(self, C: tuple[Values, ...], least: tuple[Values, ...]) -> bool:
@@ -163,16 +163,21 @@ class MaterialLaw(ABC):
         return values if self.resultants else values[0]
 
 
+def uniform(law: MaterialLaw, value: Values) -> Values:
+    """Strains or stiffnesses of one value, as the methods of a law take them."""
+    return law.as_argument(tuple(value for _ in law.resultants or "x"))
+
+
 def _with_numbers(law: MaterialLaw, C: tuple[Values, ...] = ()) -> MaterialLaw:
     """A law at points of stiffness ``C``, 1 by default, with 1 in the place of random numbers."""
-    at = law.as_argument(C or tuple(np.ones(1) for _ in law.resultants or "x"))
+    at = law.as_argument(C) if C else uniform(law, np.ones(1))
     numbers = law.numbers(at).items()
     return law.of(at, {n: np.ones(1) if hasattr(x, "draw") else x for n, x in numbers})
 
 
 def _at_no_strain(law: MaterialLaw) -> tuple[Values, ...]:
     """Stresses at no strain."""
-    none = law.as_argument(tuple(np.zeros(1) for _ in law.resultants or "x"))
+    none = uniform(law, np.zeros(1))
     with np.errstate(all="ignore"):
         return law.as_tuple(law.stress(none, initial_state(law)))
 
@@ -215,13 +220,36 @@ def require_law(law: object, what: str) -> None:
     if len(ways) != (1 if law.variables else len(ways)):
         has = "both increments and residuals" if ways else "neither increments nor residuals"
         raise SceneError(f"{kind} has {has}; define one of both methods")
-    numbers = law.numbers(law.as_argument(tuple(np.ones(1) for _ in law.resultants or "x")))
+    numbers = law.numbers(uniform(law, np.ones(1)))
     if "C" in numbers:
         raise SceneError(f"{kind}.numbers has the name C, that of the elastic stiffness")
     for name, value in numbers.items():
         if not hasattr(value, "draw"):
             require_field(value, f"{kind}: {name}", Real | np.ndarray)
-    _try(_with_numbers(law), initial_state(law), kind, (*ways, "increments")[0])
+    tried, state = _with_numbers(law), initial_state(law)
+    strain = uniform(law, np.zeros(1))
+    way = (*ways, "increments")[0]
+    calls = {
+        "stress": (strain, state),
+        "elastic_energy": (strain, state),
+        "hardening_energy": (state,),
+        way: (strain, state, *([state] if way == "residuals" else []), 1.0),
+        "dissipation": (strain, state, state, 1.0),
+    }
+    for name, arguments in calls.items():
+        try:
+            with np.errstate(all="ignore"):
+                found = getattr(tried, name)(*arguments)
+        except Exception as error:
+            raise SceneError(
+                f"{kind}.{name} fails at no strain: {error}{raised_at(error)}"
+            ) from error
+        if name == way:
+            require_names(found, law, f"{kind}.{name}")
+        elif name == "stress" and not np.all(np.isfinite(law.as_tuple(found))):
+            raise SceneError(f"{kind}.stress is {shorten(found)} at no strain; it must be a number")
+        elif name == "stress" and len(law.as_tuple(found)) != len(law.resultants or "x"):
+            raise SceneError(f"{kind}.stress must return one stress for each of {law.resultants}")
 
 
 def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -> None:
@@ -253,33 +281,6 @@ def require_field(value: object, what: str, kinds: Any = Real) -> None:
 
 WAYS = ("increments", "residuals")
 """Methods of a law by which its variables evolve."""
-
-
-def _try(law: MaterialLaw, state: State, what: str, way: str) -> None:
-    """Call the methods of a law at no strain; raise :class:`SceneError` if they do not fit."""
-    strain = law.as_argument(tuple(np.zeros(1) for _ in law.resultants or "x"))
-    between = (state,) if way == "increments" else (state, state)
-    calls = {
-        "stress": (strain, state),
-        "elastic_energy": (strain, state),
-        "hardening_energy": (state,),
-        way: (strain, *between, 1.0),
-        "dissipation": (strain, state, state, 1.0),
-    }
-    for name, arguments in calls.items():
-        try:
-            with np.errstate(all="ignore"):
-                found = getattr(law, name)(*arguments)
-        except Exception as error:
-            raise SceneError(
-                f"{what}.{name} fails at no strain: {error}{raised_at(error)}"
-            ) from error
-        if name == way:
-            require_names(found, law, f"{what}.{name}")
-        elif name == "stress" and not np.all(np.isfinite(law.as_tuple(found))):
-            raise SceneError(f"{what}.stress is {shorten(found)} at no strain; it must be a number")
-        elif name == "stress" and len(law.as_tuple(found)) != len(law.resultants or "x"):
-            raise SceneError(f"{what}.stress must return one stress for each of {law.resultants}")
 
 
 @contextmanager

@@ -17,12 +17,7 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.errors import (
-    SceneError,
-    closed,
-    require_kind,
-    require_number,
-)
+from ufl_beam.errors import SceneError, closed, require_kind, require_number
 from ufl_beam.model.law_functions import (
     Values,
     absolute,

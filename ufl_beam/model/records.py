@@ -8,20 +8,12 @@ from abc import ABC
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import cache, lru_cache, partial
-from typing import (
-    Annotated,
-    Any,
-    Generic,
-    NamedTuple,
-    Protocol,
-    TypeVar,
-    get_args,
-    get_origin,
-    get_type_hints,
-)
+from typing import Annotated, Any, Generic, Protocol, TypeVar, get_args, get_origin, get_type_hints
 from weakref import WeakKeyDictionary
 
+from ufl_beam.display import one_line
 from ufl_beam.errors import (
+    SceneError,
     require_kind,
     require_number,
     require_switch,
@@ -51,6 +43,9 @@ class Record:
     returns takes the place of the value, unless it is None.  The name is that of the field, or the
     text that follows the check in the annotation.
     """
+
+    def __repr__(self) -> str:
+        return one_line(self)  # of dataclasses with ``repr=False``
 
     def __post_init__(self) -> None:
         for name, word, default, check in _checks(type(self)):  # type: ignore[arg-type]
@@ -89,31 +84,30 @@ _alike: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
 """Protocols that objects of a class were found to satisfy; signatures take a millisecond."""
 
 
-class Named(NamedTuple):
-    """Parameters of a function: names with a meaning; others, without which it cannot be called."""
-
-    asked: tuple[str, ...]
-    unknown: tuple[str, ...]
-
-
 def parameters_by_name(
-    function: Callable[..., Any], known: Sequence[str], after: int = 0
-) -> Named | None:
+    function: Callable[..., Any], known: Sequence[str], what: str, after: int = 0, more: str = ""
+) -> tuple[str, ...] | None:
     """Return the names by which a function asks, after so many parameters by position.
 
     A function with ``**more`` asks for all that is known; None if the function does not tell.
+
+    Raises:
+        SceneError: ``what`` has a parameter that is not known, without which it cannot be called.
     """
     try:
         parameters = [*inspect.signature(function).parameters.values()]
     except (TypeError, ValueError):
         return None
     if any(p.kind is p.VAR_KEYWORD for p in parameters):
-        return Named(tuple(known), ())
+        return tuple(known)
     named = [p for p in parameters[after:] if p.kind is not p.VAR_POSITIONAL]
-    return Named(
-        tuple(p.name for p in named if p.name in known),
-        tuple(p.name for p in named if p.name not in known and p.default is p.empty),
-    )
+    for p in named:
+        if p.name not in known and p.default is p.empty:
+            raise SceneError(
+                f"{what} has a parameter {p.name!r}, which nobody knows; there are "
+                f"{', '.join(known)}{more}"
+            )
+    return tuple(p.name for p in named if p.name in known)
 
 
 @lru_cache(maxsize=32)

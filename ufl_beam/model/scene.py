@@ -110,7 +110,15 @@ class Scene(Record, Rich):
                 part = "beams" if isinstance(one, Beam) else "bodies"
                 raise SceneError(f"{owner}: {one.name} is not in the scene; add it to {part}")
         for joint in self.joints:
-            self._require_together(joint)
+            for i, other in enumerate(joint.places[1:], start=1):
+                if other in joint.places[:i]:
+                    raise SceneError(f"{joint}: the same place twice")
+                gap = math.dist(joint.places[0].point, other.point)
+                if joint.meets and gap > 1e-9 * self.size:
+                    raise SceneError(
+                        f"{joint.kind}: joint ends lie {gap:.6g} m apart: {joint.places[0]} and "
+                        f"{other}; {joint.advice}"
+                    )
         for connector in self.links:
             if node(connector.a) == node(connector.b):
                 raise SceneError(f"{connector}: both ends are at the same body or cross-section")
@@ -278,19 +286,6 @@ class Scene(Record, Rich):
                 "one frame, whose forces go with the square of its rate; give one, of the whole "
                 "rate"
             )
-
-    def _require_together(self, joint: Joint) -> None:
-        here, *others = joint.places
-        point = here.point
-        for i, other in enumerate(others, start=1):
-            if other in joint.places[:i]:
-                raise SceneError(f"{joint}: the same place twice")
-            gap = math.dist(point, other.point)
-            if joint.meets and gap > 1e-9 * self.size:
-                raise SceneError(
-                    f"{joint.kind}: joint ends lie {gap:.6g} m apart: {here} and {other}; "
-                    f"{joint.advice}"
-                )
 
     def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
         """Raise unless the force of what presses on friction can be known."""

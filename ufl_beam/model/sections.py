@@ -14,8 +14,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import one_line
-from ufl_beam.errors import SceneError, require_kind, require_number
+from ufl_beam.errors import SceneError, require_array, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
 from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, require_interaction
 from ufl_beam.model.material_laws import Hardening
@@ -25,7 +24,7 @@ from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 ResultantLaw = Annotated[MaterialLaw | None, require_bulk_law]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Section(Record):
     """Stiffness and inertia of a cross-section, P(7) and P(18).
 
@@ -74,8 +73,6 @@ class Section(Record):
     fibres: Instance[PlacedFibres | None] = None
     interaction: Annotated[MaterialLaw | None, require_interaction] = None
     massless_by_default: bool = field(init=False, repr=False)
-
-    __repr__ = one_line
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -179,8 +176,22 @@ class Section(Record):
         """
         require_kind(fibres, Fibres, "Section.of_fibres: fibres")
         require_number(E, "Section: E", positive=True)
-        placed = PlacedFibres.at(fibres, E, y, A)
-        total, depth = float(placed.A.sum()), float(np.ptp(placed.y))
+        at, areas = (
+            require_array(x, f"Section.of_fibres: {name}") for name, x in (("y", y), ("A", A))
+        )
+        if at.ndim != 1 or at.shape != areas.shape or not len(at):
+            raise SceneError(
+                f"Section.of_fibres: y and A must be lists of one length, not {at.shape} and "
+                f"{areas.shape}"
+            )
+        if not (areas > 0).all():
+            raise SceneError("Section.of_fibres: y must be finite, and all A positive")
+        total, depth = float(areas.sum()), float(np.ptp(at))
+        if depth == 0.0:
+            raise SceneError(
+                "Section.of_fibres: all fibres at one y have no bending stiffness; spread them"
+            )
+        placed = PlacedFibres(fibres, E, at - (areas @ at) / total, areas)
         return cls.of_shape(
             A=total, I=placed.EI / E, E=E, nu=nu, rho=rho,
             shear_factor=shear_factor, depth=depth, fibres=placed,

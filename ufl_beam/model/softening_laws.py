@@ -13,13 +13,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import (
-    SceneError,
-    closed,
-    raised_at,
-    require_kind,
-    shorten,
-)
+from ufl_beam.errors import SceneError, closed, raised_at, require_kind, shorten
 from ufl_beam.model.law_functions import Values, below, exp, positive, where
 from ufl_beam.model.material_law import require_field, require_fields
 from ufl_beam.model.records import FromZero, Positive, Record

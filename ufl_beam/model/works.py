@@ -81,18 +81,15 @@ class Work(Record):
     def asked(self) -> tuple[str, ...]:
         """Names of the parameters of the function, each with a known meaning."""
         known = (*self.arguments, *self.numbers)
-        names = parameters_by_name(self.density, known)
-        if names is None:
+        asked = parameters_by_name(
+            self.density, known, f"{self}: the function", more=", and what `numbers` names"
+        )
+        if asked is None:
             raise SceneError(
                 f"{self}: the parameters of {shorten(self.density)} have no names; write a "
                 f"function of some of {', '.join(known)}"
             )
-        for unknown in names.unknown:
-            raise SceneError(
-                f"{self}: the function has a parameter {unknown!r}, which nobody knows; there are "
-                f"{', '.join(known)}, and what `numbers` names"
-            )
-        return names.asked
+        return asked
 
     @property
     def takes_rates(self) -> bool:
@@ -171,12 +168,7 @@ class Potential(Work):
     otherwise but for the ninth power of a step.  The energy is the entry ``name`` of the state of
     the ledger; what a change in time brings is the entry supplied "name in time".
 
-    Args:
-        name: Entry in the ledger.
-        density: The function; J/m.
-        beams: The beams it acts on; all by default.
-        numbers: Numbers, or functions of time, that the function names.
-        degree: As in :class:`VirtualWork`.
+    Args are those of :class:`VirtualWork`.
 
     Raises:
         SceneError: The function does not depend on q, or is no scalar of UFL; the name is taken.

@@ -24,7 +24,7 @@ from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import NoNumber, SceneError, require_returned, shorten
 from ufl_beam.mechanics.connector_steps import law_step
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, place_of
+from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, stated_at
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_law import State
 from ufl_beam.terms.base import Callbacks
@@ -66,7 +66,7 @@ class LawForms:
         except Exception as error:
             raise SceneError(
                 f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
-                f"written with + - * / ** and the functions of ub.law_functions{place_of(law)}"
+                f"written with + - * / ** and the functions of ub.law_functions{stated_at(law)}"
             ) from error
 
     @cached_property
