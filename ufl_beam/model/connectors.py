@@ -11,7 +11,7 @@ from ufl_beam.display import bracketed
 from ufl_beam.errors import SceneError, require_kind, require_vector
 from ufl_beam.model.bodies import Anchor, Node, NodeDof, Place, arm, merged, node, require_anchors
 from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
-from ufl_beam.model.connector_laws import Guide, HingeLaw, Law, Motor, RigidPlastic, rubs
+from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic
 from ufl_beam.model.functions import Point
 from ufl_beam.model.records import Record
 
@@ -71,11 +71,6 @@ class Connector:
 
     def __str__(self) -> str:
         return f"{self.kind}({self.a}, {self.b})"
-
-    @property
-    def holds(self) -> bool:
-        """True if the law may demand a motion, whatever force that takes."""
-        return isinstance(self.law, Motor | Guide | RigidPlastic) or rubs(self.law)
 
     @property
     def arms(self) -> tuple[Point, Point]:

@@ -21,7 +21,6 @@ from ufl_beam.model.connector_laws import (
     RESISTING,
     Coulomb,
     Damper,
-    Law,
     RigidPlastic,
     Spring,
     Stop,
@@ -116,7 +115,7 @@ def require_independent(scene: Scene) -> None:
     They do if their gradients in the undeformed scene, by what moves freely, are dependent.  What
     is rigid-plastic is a constraint below its limit.
     """
-    rows, within = _dependences(scene, lambda law: isinstance(law, (*HOLDING, RigidPlastic)))
+    rows, within = _dependences(scene)
     if within.shape[1] == 0:
         return
     dependent = [rows[i] for i in np.flatnonzero(np.abs(within).max(axis=1) > 1e-6)]
@@ -155,25 +154,25 @@ def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
 
 def friction_repeats(scene: Scene) -> bool:
     """Return whether places that stick hold what is held already, by joints or by each other."""
-    if not any(rubs(link.law) for link in scene.links):
-        return False
-    holding = (*HOLDING, RigidPlastic)
-    return _dependences(scene, lambda law: isinstance(law, holding) or rubs(law))[1].shape[1] > 0
+    rubbing = any(rubs(link.law) for link in scene.links)
+    return rubbing and _dependences(scene, rubbing=True)[1].shape[1] > 0
 
 
-def _dependences(
-    scene: Scene, holds: Callable[[Law], bool]
-) -> tuple[list[tuple[object, Row]], Array]:
-    """Find dependent constraints of connectors with laws that hold, and of supports in turned axes.
+def _dependences(scene: Scene, rubbing: bool = False) -> tuple[list[tuple[object, Row]], Array]:
+    """Find dependent constraints: laws that hold, places that stick, supports in turned axes.
 
     Returns the constraints with their owners, those left out that are alone in moving something,
     and, in columns, the combinations of constraints that vanish for all that can move.
     """
-    if not any(holds(link.law) for link in scene.links):
+
+    def holds(link: Connector) -> bool:
+        return isinstance(link.law, (*HOLDING, RigidPlastic)) or (rubbing and rubs(link.law))
+
+    if not any(map(holds, scene.links)):
         return [], np.zeros((0, 0))
     same, fixed = scene.representatives, _fixed(scene)
     turned = (support for support in scene.supports if support.angle)
-    rows = [*_rows(scene, lambda link: holds(link.law), turned)]
+    rows = [*_rows(scene, holds, turned)]
     moved: list[dict[NodeDof, float]] = []
     users: dict[NodeDof, set[int]] = defaultdict(set)
     for number, (_, row) in enumerate(rows):

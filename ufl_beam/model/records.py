@@ -12,14 +12,7 @@ from typing import Annotated, Any, Generic, Protocol, TypeVar, get_args, get_ori
 from weakref import WeakKeyDictionary
 
 from ufl_beam.display import one_line
-from ufl_beam.errors import (
-    SceneError,
-    require_kind,
-    require_number,
-    require_switch,
-    require_text,
-    require_vector,
-)
+from ufl_beam.errors import SceneError, require_kind, require_number, require_text, require_vector
 
 T = TypeVar("T")
 
@@ -31,7 +24,6 @@ FromZero = Annotated[float, partial(require_number, at_least=0.0, infinite=True)
 
 Vector = Annotated[tuple[float, float], require_vector]
 Text = Annotated[str, require_text]
-Switch = Annotated[bool, require_switch]
 Instance = Annotated[T, require_kind]
 """An object of a class, or of one of several."""
 
