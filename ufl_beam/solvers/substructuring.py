@@ -130,5 +130,5 @@ class Klu:
         self._factors.apply(self._rhs, self._solution)
 
     def expand(self, small: Array, x: Array) -> None:
-        """Find the solution."""
+        """Find the solution of all unknowns."""
         self._inner.expand(self._solution.array_r, x)
