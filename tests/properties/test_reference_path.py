@@ -158,10 +158,10 @@ def test_residuals_and_tangents(seed):
     K = dense(equation.A)
     solver.ask()
     solver.begin(ub.Step.of(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, solver.q))
-    of_solver, free = solver.residual(x), solver.supports.free
+    (of_solver, K_of_solver), free = solver.respond(x), solver.supports.free
     # States of both differ by the tolerance of one step.
     assert difference(r, of_solver) < SAME
-    tangent = solver.tangent(x).toarray()
+    tangent = K_of_solver.toarray()
     assert difference(K[np.ix_(free, free)], tangent[np.ix_(free, free)]) < SAME
     simulation.close()
 
@@ -271,8 +271,9 @@ def hardening_twice(patch):
 
 def factor_of_forms(patch):
     """Forms are too large by a part in a million."""
-    vector = cells.Form.vector
-    patch.setattr(cells.Form, "vector", lambda self: (1 + 1e-6) * vector(self))
+    joined = cells.Form.joined
+    wrong = lambda self, entries: (1 + 1e-6) * joined(self, entries)  # noqa: E731
+    patch.setattr(cells.Form, "joined", wrong)
 
 
 def motion_of_connectors(patch):
@@ -313,15 +314,16 @@ def energy_of_points(patch):
 
 def time_of_loads(patch):
     """Loads are taken at the end of the step."""
-    begin = loads.LoadForce.begin
-    wrong = lambda self, step: begin(self, step._replace(load_time=step.t1))  # noqa: E731
-    patch.setattr(loads.LoadForce, "begin", wrong)
+    respond = loads.LoadForce.respond
+    wrong = lambda self, step, q1: respond(self, step._replace(load_time=step.t1), q1)  # noqa: E731
+    patch.setattr(loads.LoadForce, "respond", wrong)
 
 
 def mass_of_beams(patch):
     """Inertia is too large by a part in a million."""
-    rate = beams.MatrixForce.rate
-    patch.setattr(beams.MatrixForce, "rate", lambda self, q1: (1 + 1e-6) * rate(self, q1))
+    respond = beams.MatrixForce.respond
+    wrong = lambda self, *at: tuple((1 + 1e-6) * x for x in respond(self, *at))  # noqa: E731
+    patch.setattr(beams.MatrixForce, "respond", wrong)
 
 
 MISTAKES = [

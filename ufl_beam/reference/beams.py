@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from itertools import zip_longest
 
 import numpy as np
@@ -21,8 +21,6 @@ from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_wo
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import (
     DynamicScheme,
-    Rates,
-    Scheme,
     Step,
     combined,
     nodal_step,
@@ -30,8 +28,17 @@ from ufl_beam.mechanics.time_schemes import (
 )
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
-from ufl_beam.reference.cells import CellForce, Cells, Force, Ledger, Memory, lumps, put
-from ufl_beam.reference.points import MaterialPoints, Search
+from ufl_beam.reference.cells import (
+    CellForce,
+    Cells,
+    Force,
+    Memory,
+    Response,
+    Setting,
+    lumps,
+    put,
+)
+from ufl_beam.reference.points import MaterialPoints
 
 
 class ElasticBeams(CellForce):
@@ -39,8 +46,8 @@ class ElasticBeams(CellForce):
 
     inner = True
 
-    def __init__(self, grid: Grid, numbers: Index, scheme: Scheme, ledger: Ledger) -> None:
-        cells = Cells(grid, numbers)
+    def __init__(self, numbers: Index, setting: Setting) -> None:
+        cells, scheme = Cells(setting.grid, numbers), setting.scheme
         of = cells.element
         C, e0, e1 = of.stiffness, strain(of.q0, of.axis), strain(of.q1, of.axis)
         r, losses = scheme.resultants(C, e0, e1, of.constant), []
@@ -54,25 +61,26 @@ class ElasticBeams(CellForce):
         w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
         energy = elastic_energy(e1, C) * of.dx(1), "stored"
         lost = (sum(losses) * of.dx(1), "numerical") if losses else None
-        super().__init__(cells, virtual_work(r, w_e) * of.dx(1), ledger, stored=energy, lost=lost)
-        self._last_change: Array = np.zeros((len(numbers), len(grid.mesh.point_weights), 3))
+        super().__init__(cells, virtual_work(r, w_e) * of.dx(1), setting, stored=energy, lost=lost)
+        points = len(setting.grid.mesh.point_weights)
+        self._last_change: Array = np.zeros((len(numbers), points, 3))
         self._last_dt = math.inf
 
-    def begin(self, step: Step) -> None:
-        """Take the beginning, and the changes of the strains in the step before."""
-        super().begin(step)
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Work of the resultants, which may depend on the change of strains in the step before."""
         put(self._change_before, min(1.0, step.dt / self._last_dt) * self._last_change)
+        return super().respond(step, q1)
 
-    def change(self, q1: Array) -> float:
+    def change(self, step: Step, q1: Array) -> float:
         """Energy that is stored in the step to ``q1``; J."""
         return self.energy(q1) - self.stored["stored"]
 
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Take the end of the step, and the changes of the strains in it."""
-        super().accept(q1, s)
+        super().accept(step, q1, s)
         if self._decays:
-            self._last_change = self.cells.strains(q1) - self.cells.strains(self.q0)
-            self._last_dt = self.dt
+            self._last_change = self.cells.strains(q1) - self.cells.strains(step.q0)
+            self._last_dt = step.dt
 
     def remember(self, memory: Memory) -> None:
         """Changes of the strains in the last step, and its length."""
@@ -93,47 +101,33 @@ class YieldingBeams(CellForce):
 
     inner = True
 
-    def __init__(
-        self, grid: Grid, numbers: Index, layout: Layout, scheme: Scheme, search: Search,
-        ledger: Ledger,
-    ) -> None:  # fmt: skip
-        cells = Cells(grid, numbers)
+    def __init__(self, numbers: Index, layout: Layout, setting: Setting) -> None:
+        cells, grid = Cells(setting.grid, numbers), setting.grid
         of, self._hinges = cells.element, layout.hinges
         self._r, self._b, self._D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
-        w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
+        w_e = setting.scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
         linear = self._b + ufl.dot(self._D, strain(of.q1, of.axis))
         work, around = (virtual_work(r, w_e) * of.dx(1) for r in (self._r, linear))
-        super().__init__(cells, work, ledger, around=around)
+        super().__init__(cells, work, setting, around=around)
         self._names = [grid.describe_cell(number) for number in cells.numbers]
-        keys = grid.keys(cells.numbers)
-        self.points = MaterialPoints(layout, keys, cells.lengths, scheme, search, ledger)
+        self.points = MaterialPoints(layout, grid.keys(cells.numbers), cells.lengths, setting)
 
-    def begin(self, step: Step) -> None:
-        """Begin the step at the points, too."""
-        super().begin(step)
-        self.points.begin(step.dt)
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Work of the resultants of the return map, with its consistent tangent."""
+        points = self.points
+        points.respond(self.cells.strains(q1)[:, 0], step.dt)
+        put(self._r, points.r)
+        put(self._b, points.r - np.einsum("kij,kj->ki", points.D, points.strains))
+        put(self._D, points.D)
+        return super().respond(step, q1)
 
-    def residual(self, q1: Array) -> Array:
-        """Work of the resultants that the return map gives."""
-        self.points.respond(self.cells.strains(q1)[:, 0])
-        put(self._r, self.points.r)
-        return super().residual(q1)
-
-    def tangent(self, q1: Array) -> csr_array:
-        """Its derivative, with the consistent tangent of the return map in the latest residual."""
-        r, D = self.points.r, self.points.D
-        put(self._b, r - np.einsum("kij,kj->ki", D, self.points.strains))
-        put(self._D, D)
-        return super().tangent(q1)
-
-    def change(self, q1: Array) -> float:
-        """Energy that is stored and dissipated in the step of the latest residual; J."""
+    def change(self, step: Step, q1: Array) -> float:
+        """Energy that is stored and dissipated in the step of the latest response; J."""
         self.points.require_dissipation(self._names)
         return self.points.change()
 
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Take the internal variables at the end of the step."""
-        self.note()
         self.points.accept()
 
     def start(self, q: Array) -> None:
@@ -190,41 +184,43 @@ class Mass:
         form, diagonal = mass_form(cells.element), np.zeros(grid.size)
         for dofs, mass, inertia in lumps(grid):
             np.add.at(diagonal, dofs, [mass, mass, inertia])
-        self.matrix = cells.form(form).matrix() + csr_array(scipy.sparse.diags_array(diagonal))
+        self.matrix = cells.form(form).assembled() + csr_array(scipy.sparse.diags_array(diagonal))
         self._of_beams = cells.form(ufl.action(form, cells.element.q1))
 
     def on_nodes(self, v: Array) -> Array:
         """Mass of the beams times a vector."""
         self.cells.set(self.cells.element.q1, v)
-        return self.cells.on_nodes("density", self._of_beams)
+        return self.cells.on_nodes("density", self._of_beams.assembled())
 
 
 class MatrixForce(Force):
-    """Constant matrix times the rate that a row of :class:`Coefficients` states."""
+    """Constant matrix times a rate, which a row of :class:`Coefficients` states.
 
-    def __init__(self, grid: Grid, scheme: DynamicScheme, matrix: csr_array) -> None:
-        self.size, self.scheme, self.matrix = grid.size, scheme, matrix
-        self._rotations = grid.rotations.astype(np.int32)
-        self._half_tangents = with_half_tangents(scheme, self._rotations)
+    Attributes:
+        rate: Of the latest response; (size,).
+        of_step: Numbers of the scheme in it.
+    """
 
-    def take(self, q0: Array, row: Sequence[float], rates: Rates) -> None:
-        """Take the configuration at the beginning of a step, and the row."""
-        self._q0, self._factor = q0, row[0]
-        self._push = combined(row, np.zeros(self.size), rates)
+    row: str
+    inertia: Inertia
 
-    def rate(self, q1: Array) -> Array:
-        """Vector that the matrix is multiplied with."""
-        return self._factor * nodal_step(self.scheme, self._q0, q1, self._rotations) + self._push
+    def __init__(self, setting: Setting, scheme: DynamicScheme, matrix: csr_array) -> None:
+        self.size, self.scheme, self.matrix = setting.grid.size, scheme, matrix
+        self.ledger, self._rotations = setting.ledger, setting.grid.rotations.astype(np.int32)
 
-    def residual(self, q1: Array) -> Array:
-        """Forces if the step ends at ``q1``."""
-        return np.asarray(self.matrix @ self.rate(q1))
-
-    def tangent(self, q1: Array) -> csr_array:
-        """Their derivative; the step of a rotation is 2 tan(Δψ/2) or Δψ, by the scheme."""
-        slope: Array = np.full(self.size, self._factor)
-        slope[self._half_tangents] /= np.cos((q1 - self._q0)[self._half_tangents] / 2) ** 2
-        return csr_array(self.matrix @ scipy.sparse.diags_array(slope))
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Forces; the step of a rotation is 2 tan(Δψ/2) or Δψ, by the scheme."""
+        scheme, before, rotations = self.scheme, self.inertia, self._rotations
+        self.of_step = scheme.coefficients(step.dt, before.last_dt, len(before.more))
+        row = getattr(self.of_step, self.row)
+        s, turned = (
+            nodal_step(scheme, step.q0, q1, rotations),
+            with_half_tangents(scheme, rotations),
+        )
+        self.rate, slope = combined(row, s, before), np.full(self.size, row[0])
+        slope[turned] /= np.cos((q1 - step.q0)[turned] / 2) ** 2
+        K = csr_array(self.matrix @ scipy.sparse.diags_array(slope))
+        return np.asarray(self.matrix @ self.rate), K
 
 
 class Inertia(MatrixForce):
@@ -237,33 +233,28 @@ class Inertia(MatrixForce):
         last_dt: Length of the last step, infinite before the first; s.
     """
 
-    def __init__(self, grid: Grid, scheme: DynamicScheme, v: Array, ledger: Ledger) -> None:
-        self.mass = Mass(grid)
-        super().__init__(grid, scheme, self.mass.matrix)
-        self.v, self.v_before, self.more = v, v, tuple[Array, ...]()
-        self.last_dt, self._ledger = math.inf, ledger
-        if scheme.coefficients(1.0, 1.0, len(scheme.kept)).slip is not None:
-            ledger.lost["numerical"] += 0.0
+    row = "inertia"
 
-    def begin(self, step: Step) -> None:
-        """Take the coefficients of the step."""
-        self._dt = step.dt
-        self.of_step = self.scheme.coefficients(step.dt, self.last_dt, len(self.more))
-        self.take(step.q0, self.of_step.inertia, self)
+    def __init__(self, setting: Setting, scheme: DynamicScheme, v: Array) -> None:
+        self.mass, self.inertia = Mass(setting.grid), self
+        super().__init__(setting, scheme, self.mass.matrix)
+        self.v, self.v_before, self.more, self.last_dt = v, v, tuple[Array, ...](), math.inf
+        if scheme.coefficients(1.0, 1.0, len(scheme.kept)).slip is not None:
+            setting.loses("numerical")
 
     def after(self, s: Array) -> tuple[Array, ...]:
         """Velocities after the step ``s``, and what the scheme keeps besides."""
         return tuple(combined(row, s, self) for row in self.of_step.rates)
 
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """New velocities, and what the scheme has lost."""
-        self.on_nodes = self.mass.on_nodes(self.rate(q1))
+        self.on_nodes = self.mass.on_nodes(self.rate)
         v, *more = self.after(s)
         if self.of_step.slip is not None:
             change = v - self.v
             lost = combined(self.of_step.slip, change, self) @ (self.matrix @ change)
-            self._ledger.lost["numerical"] += float(lost)
-        self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), self._dt
+            self.ledger.lost["numerical"] += float(lost)
+        self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), step.dt
         self.start(q1)
 
     def start(self, q: Array) -> None:
@@ -284,69 +275,62 @@ class Inertia(MatrixForce):
 class RayleighForce(MatrixForce):
     """Rayleigh damping: (a0 M + a1 K) v, with the stiffness K of the undeformed scene, P(92)."""
 
-    def __init__(self, damping: Rayleigh, grid: Grid, inertia: Inertia, ledger: Ledger) -> None:
-        self._mass, self._damping, cells = inertia.mass, damping, inertia.mass.cells
+    row = "velocity"
+
+    def __init__(self, damping: Rayleigh, setting: Setting, inertia: Inertia) -> None:
+        self.inertia, self._damping, cells = inertia, damping, inertia.mass.cells
         of = cells.element
         rest, v = of.configuration(), ufl.TrialFunction(of.space)
         e, w_e = (virtual_strain(rest, x, of.axis) for x in (v, of.w))
         K = virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
         self._stiffness = cells.form(ufl.action(K, of.q1))
-        matrix = damping.mass * self._mass.matrix + damping.stiffness * cells.form(K).matrix()
-        super().__init__(grid, inertia.scheme, csr_array(matrix))
-        self._inertia, self._ledger = inertia, ledger
+        matrix = damping.mass * inertia.matrix + damping.stiffness * cells.form(K).assembled()
+        super().__init__(setting, inertia.scheme, csr_array(matrix))
 
-    def begin(self, step: Step) -> None:
-        """Take the coefficients of the velocity of the step."""
-        self._dt = step.dt
-        self.take(step.q0, self._inertia.of_step.velocity, self._inertia)
-
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the energy that was damped."""
-        self._ledger.lost["damping"] += float(s @ (self.matrix @ s)) / self._dt
-        by_mass = self._mass.on_nodes(self.rate(q1))
-        by_stiffness = self._mass.cells.on_nodes("stress", self._stiffness)  # at the same vector
-        self.on_nodes = self._damping.mass * by_mass + self._damping.stiffness * by_stiffness
+        self.ledger.lost["damping"] += float(s @ (self.matrix @ s)) / step.dt
+        mass, damping = self.inertia.mass, self._damping
+        by_mass = mass.on_nodes(self.rate)
+        by_stiffness = mass.cells.on_nodes("stress", self._stiffness.assembled())  # at the same q1
+        self.on_nodes = damping.mass * by_mass + damping.stiffness * by_stiffness
 
 
 class KelvinVoigtForce(CellForce):
     """Kelvin-Voigt damping: resultants C Δe over the time of the step, times that of the law."""
 
-    def __init__(
-        self, damping: KelvinVoigt, grid: Grid, numbers: Index, scheme: Scheme, ledger: Ledger
-    ) -> None:
-        cells = Cells(grid, numbers)
+    def __init__(self, damping: KelvinVoigt, numbers: Index, setting: Setting) -> None:
+        cells = Cells(setting.grid, numbers)
         of, self._time, self._rate = cells.element, damping.time, cells.element.constant(1.0)
         change = strain(of.q1, of.axis) - strain(of.q0, of.axis)
         r = self._rate * resultants(change, of.stiffness)
-        w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
+        w_e = setting.scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
         lost = virtual_work(r, change) * of.dx(1), "damping"
-        super().__init__(cells, virtual_work(r, w_e) * of.dx(1), ledger, lost=lost)
+        super().__init__(cells, virtual_work(r, w_e) * of.dx(1), setting, lost=lost)
 
-    def begin(self, step: Step) -> None:
-        """Tell the form the length of the step."""
-        super().begin(step)
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Work of the resultants at the rates of the step."""
         self._rate.value = self._time / step.dt
+        return super().respond(step, q1)
 
 
-def damping_forces(
-    grid: Grid, scheme: Scheme, inertia: Inertia | None, ledger: Ledger
-) -> list[Force]:
+def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:
     """Forces of all damping in a scene."""
     forces: list[Force] = []
-    for damping in grid.scene.damping:
-        ledger.lost["damping"] += 0.0
+    for damping in setting.grid.scene.damping:
+        setting.loses("damping")
         if isinstance(damping, KelvinVoigt):
-            beams = grid.scene.beams if damping.beams is None else damping.beams
+            beams = setting.grid.scene.beams if damping.beams is None else damping.beams
             # Cells with a hinge are left out, so that an open hinge turns freely.
-            cells = [grid.cells_of(beam) for beam in beams if beam.section.hinge is None]
+            cells = [setting.grid.cells_of(beam) for beam in beams if beam.section.hinge is None]
             if cells:
                 numbers = np.unique(np.concatenate(cells))
-                forces.append(KelvinVoigtForce(damping, grid, numbers, scheme, ledger))
+                forces.append(KelvinVoigtForce(damping, numbers, setting))
         elif inertia is None:
             raise SceneError(
                 "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
                 "use KelvinVoigt, which acts in the time of a static run"
             )
         else:
-            forces.append(RayleighForce(damping, grid, inertia, ledger))
+            forces.append(RayleighForce(damping, setting, inertia))
     return forces

@@ -25,9 +25,13 @@ from ufl_beam.discretization.function_spaces import Element
 from ufl_beam.dolfinx_compat import compile_form, fem, jit_directory, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.model.connectors import Connector
 
 T = TypeVar("T", bound=Array | None)
+
+Response = tuple[Array, csr_array]
+"""Forces, and their derivative by the configuration."""
 
 Entry = tuple[ufl.Form, str]
 """Form of an energy, and its entry in the ledger."""
@@ -41,44 +45,68 @@ class Ledger:
     supplied: dict[str, float] = field(default_factory=lambda: defaultdict(float))
     lost: dict[str, float] = field(default_factory=lambda: defaultdict(float))
 
-    def copy(self) -> tuple[dict[str, float], ...]:
-        """Return the three parts as they are now."""
-        return dict(self.state), dict(self.supplied), dict(self.lost)
+
+@dataclass
+class Search:
+    """Search for the equilibrium of a step in which no more opens than must.
+
+    Attributes:
+        hold: Whether what did not flow in the last step stays closed.
+        over: Whether something that was held has borne more than its limit.
+    """
+
+    hold: bool = False
+    over: bool = False
 
 
+@dataclass
+class Setting:
+    """Arguments that all forces and laws of a scene are made with."""
+
+    grid: Grid
+    scheme: Scheme
+    asked: Mapping[Connector, float]  # forces of controllers, limits of friction
+    rates: Mapping[Connector, float]  # of motions with friction as the step begins
+    friction_repeats: bool  # whether places that stick may hold what is held already
+    ledger: Ledger = field(default_factory=Ledger)
+    search: Search = field(default_factory=Search)
+
+    def loses(self, *entries: str) -> None:
+        """Make entries of what is lost."""
+        for entry in entries:
+            self.ledger.lost[entry] += 0.0
+
+
+@dataclass
 class Memory:
     """Internal variables, by the names of :attr:`Solution.internal`.
 
     Whatever remembers something states it in one method ``remember``, which serves to write it down
     and to take it back.
 
-    Args:
+    Attributes:
         given: Variables to take back; without them all stay as they are.
+        kept: Those that were written down, in parts.
     """
 
-    def __init__(self, given: Mapping[str, Array] | None = None) -> None:
-        self._given, self._kept = given or {}, defaultdict[str, list[Array]](list)
+    given: Mapping[str, Array]
+    kept: dict[str, list[Array]] = field(default_factory=lambda: defaultdict(list))
 
     def vector(self, name: str, values: T) -> Array | T:
         """Write down values at the degrees of freedom if they are known; return those given."""
         if values is not None:
-            self._kept[name].append(values)
-        return self._given.get(name, values)
+            self.kept[name].append(values)
+        return self.given.get(name, values)
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
         """Write down rows of numbered things; return them, or those that were given."""
         name, found = f"{name}, {rows.shape[1]}", rows.copy()
-        self._kept[name].append(np.column_stack([numbers, rows]))
-        if name in self._given:
-            table = self._given[name]
+        self.kept[name].append(np.column_stack([numbers, rows]))
+        if name in self.given:
+            table = self.given[name]
             _, here, there = np.intersect1d(numbers, table[:, 0], return_indices=True)
             found[here] = table[there, 1:]
         return found
-
-    def state(self) -> dict[str, Array]:
-        """Return all that was written down."""
-        together = {name: np.concatenate(parts) for name, parts in self._kept.items()}
-        return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
 
 
 class Force:
@@ -96,18 +124,11 @@ class Force:
     stored: Mapping[str, float] = {}
     on_nodes: Array | float = 0.0
 
-    def begin(self, step: Step) -> None:
-        """Begin a step; iterates begin anew."""
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Virtual work if the step ends at ``q1``, and its derivative; (size,), (size, size)."""
+        return np.zeros(self.size), csr_array((self.size, self.size))
 
-    def residual(self, q1: Array) -> Array:
-        """Virtual work if the step ends at ``q1``; (size,)."""
-        return np.zeros(self.size)
-
-    def tangent(self, q1: Array) -> csr_array:
-        """Derivative of the residual; (size, size)."""
-        return csr_array((self.size, self.size))
-
-    def change(self, q1: Array) -> float:
+    def change(self, step: Step, q1: Array) -> float:
         """Energy that is stored and dissipated in the step to ``q1``, of inner forces; J.
 
         Raises:
@@ -115,10 +136,10 @@ class Force:
         """
         return 0.0
 
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Take the end of the step as the new state, and enter works and losses in the ledger.
 
-        ``s`` is the step of the nodes that forces work on.
+        ``q1`` is that of the latest response, and ``s`` the step of the nodes that forces work on.
         """
 
     def start(self, q: Array) -> None:
@@ -141,27 +162,26 @@ class Form:
     """
 
     def __init__(self, form: ufl.Form, at: Index, size: int) -> None:
-        self.compiled = compile_form(form, jit_directory())
+        self._form = compile_form(form, jit_directory())
         self._joins = csr_array((np.ones(len(at)), (np.arange(len(at)), at)), (len(at), size))
-        self._matrix: Any = None if self.compiled.rank < 2 else fem.create_matrix(self.compiled)
+        self._matrix: Any = None if self._form.rank < 2 else fem.create_matrix(self._form)
 
-    def entries(self) -> Array:
-        """Vector of a linear form, by the degrees of freedom of its own space."""
-        return np.array(fem.assemble_vector(self.compiled).array)
+    def assembled(self) -> Any:
+        """Value, vector by the degrees of freedom of the form's own space, or matrix of the scene.
 
-    def vector(self) -> Array:
-        """Vector of a linear form; cells that share a node add up."""
-        return np.asarray(self._joins.T @ self.entries())
-
-    def matrix(self) -> csr_array:
-        """Matrix of a bilinear form."""
+        There are as many arguments of the form: none, one, two.
+        """
+        if self._form.rank == 0:
+            return float(fem.assemble_scalar(self._form))
+        if self._form.rank == 1:
+            return np.array(fem.assemble_vector(self._form).array)
         self._matrix.set_value(0.0)
-        K = csr_array(fem.assemble_matrix(self._matrix, self.compiled).to_scipy())
+        K = csr_array(fem.assemble_matrix(self._matrix, self._form).to_scipy())
         return csr_array(self._joins.T @ K @ self._joins)
 
-    def value(self) -> float:
-        """Value of a form without arguments."""
-        return float(fem.assemble_scalar(self.compiled))
+    def joined(self, entries: Array) -> Array:
+        """Vector of the scene from that of a linear form; cells that share a node add up."""
+        return np.asarray(self._joins.T @ entries)
 
 
 def dofs_of_cells(space: fem.FunctionSpace) -> Index:
@@ -198,7 +218,7 @@ class Cells:
         mesh, order = separate_cells(grid.points[grid.cells[numbers]])
         self.numbers, self.size, self._grid = numbers[order], grid.size, grid
         self.lengths, self.element = grid.lengths(self.numbers), Element(grid.mesh, mesh)
-        of, self._weights = self.element, grid.mesh.point_weights
+        of, self._weights = self.element, np.asarray(grid.mesh.point_weights)
         self._dofs = dofs_of_cells(of.space)
         of_scene = grid.dofs[grid.nodes_of_cells[self.numbers]]  # (num_cells, nodes, 3)
         self.at: Index = np.empty(self._dofs.size, dtype=np.int64)
@@ -215,22 +235,21 @@ class Cells:
         """Give a function the configuration, or other vector, of the scene."""
         function.x.array[:] = q[self.at]
 
+    @cached_property
+    def _strains(self) -> Form:
+        return self.form(self.element.sampled(strain(self.element.q1, self.element.axis)))
+
     def strains(self, q: Array) -> Array:
         """Strains (Σ, Γ, K) in the quadrature points; (num_cells, points, 3); 1, 1, 1/m."""
-        form, dofs = self._strains
         self.set(self.element.q1, q)
-        weighted = form.entries()[dofs].reshape(len(self.numbers), -1, 3)
-        return np.asarray(weighted / np.reshape(self._weights, (-1, 1)))
+        space = self.element.at_points(3).function_space
+        weighted = self._strains.assembled()[dofs_of_cells(space)]
+        strains = weighted.reshape(len(self.numbers), -1, 3) / self._weights.reshape(-1, 1)
+        return np.asarray(strains)
 
-    @cached_property
-    def _strains(self) -> tuple[Form, Index]:
-        of, space = self.element, self.element.at_points(3).function_space
-        weighted = ufl.dot(strain(of.q1, of.axis), ufl.TestFunction(space)) / of.axis.h
-        return self.form(weighted * of.dx(1)), dofs_of_cells(space)
-
-    def on_nodes(self, kind: str, form: Form) -> Array:
-        """Forces of a linear form on the nodes of the cells, see :func:`numbers_of_cells`."""
-        forces = form.entries()[self._dofs].reshape(len(self.numbers), 3, self._dofs.shape[1] // 3)
+    def on_nodes(self, kind: str, entries: Array) -> Array:
+        """Vector of a linear form on the nodes of the cells, see :func:`numbers_of_cells`."""
+        forces = entries[self._dofs].reshape(len(self.numbers), 3, self._dofs.shape[1] // 3)
         return numbers_of_cells(self._grid, kind, self.numbers, forces)
 
 
@@ -262,7 +281,7 @@ class CellForce(Force):
     Args:
         cells: Where it acts.
         work: The form.
-        ledger: Where energies are entered.
+        setting: Its ledger has entries of energies.
         around: Form with the same derivative, if UFL cannot derive ``work``.
         stored: Form of the energy at the end of the step, and its entry.
         lost: Form of the energy that is lost in the step, and its entry.
@@ -270,50 +289,39 @@ class CellForce(Force):
     """
 
     def __init__(
-        self, cells: Cells, work: ufl.Form, ledger: Ledger, *, around: ufl.Form | None = None,
+        self, cells: Cells, work: ufl.Form, setting: Setting, *, around: ufl.Form | None = None,
         stored: Entry | None = None, lost: Entry | None = None, kind: str = "stress",
     ) -> None:  # fmt: skip
         of = cells.element
-        self.cells, self.size, self.of, self.ledger = cells, cells.size, of, ledger
+        self.cells, self.size, self.of, self.ledger = cells, cells.size, of, setting.ledger
         self.work, self._kind, trial = cells.form(work), kind, ufl.TrialFunction(of.space)
         derivative = expand_derivatives(ufl.derivative(around or work, of.q1, trial))
         self._derivative = None if derivative.empty() else cells.form(derivative)
         self._stored = {stored[1]: cells.form(stored[0])} if stored else {}
         self._lost = {lost[1]: cells.form(lost[0])} if lost else {}
-        for name in self._lost:
-            ledger.lost[name] += 0.0
+        setting.loses(*self._lost)
 
-    def begin(self, step: Step) -> None:
-        """Take the configuration at the beginning."""
-        self.q0, self.dt = step.q0, step.dt
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Virtual work if the step ends at ``q1``, and its derivative."""
         self.cells.set(self.of.q0, step.q0)
-
-    def residual(self, q1: Array) -> Array:
-        """Virtual work if the step ends at ``q1``."""
         self.cells.set(self.of.q1, q1)
-        return self.work.vector()
-
-    def tangent(self, q1: Array) -> csr_array:
-        """Derivative of the residual."""
-        self.cells.set(self.of.q1, q1)
-        return super().tangent(q1) if self._derivative is None else self._derivative.matrix()
+        forces = self.work.assembled()
+        self.on_nodes = self.cells.on_nodes(self._kind, forces)
+        none = csr_array((self.size, self.size))
+        K = none if self._derivative is None else self._derivative.assembled()
+        return self.work.joined(forces), K
 
     def energy(self, q: Array) -> float:
         """Energy that is stored at a configuration; J."""
         self.cells.set(self.of.q1, q)
-        return sum(form.value() for form in self._stored.values())
+        return sum(float(form.assembled()) for form in self._stored.values())
 
-    def accept(self, q1: Array, s: Array) -> None:
-        """Note the forces on the nodes, and enter what is lost."""
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
+        """Enter what is lost, and take the energy at the end."""
         self.cells.set(self.of.q1, q1)
-        self.note()
         for name, form in self._lost.items():
-            self.ledger.lost[name] += form.value()
+            self.ledger.lost[name] += form.assembled()
         self.start(q1)
-
-    def note(self) -> None:
-        """Note the forces on the nodes in the latest residual."""
-        self.on_nodes = self.cells.on_nodes(self._kind, self.work)
 
     def start(self, q: Array) -> None:
         """Take the energy of a configuration."""

@@ -9,8 +9,7 @@ Variables that a user has named are in ``z`` as "state ...".
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ import scipy  # its parts are loaded when they are used
 from ufl_beam.arrays import Array
 from ufl_beam.errors import NoNumber, SceneError, require_returned
 from ufl_beam.mechanics.slips import Slip, numbers, slip
-from ufl_beam.mechanics.time_schemes import Scheme, Step, way_to_rest
+from ufl_beam.mechanics.time_schemes import Step, way_to_rest
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
@@ -38,8 +37,8 @@ from ufl_beam.model.fibres import Layout
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.material_law import State
 from ufl_beam.model.material_laws import Hardening
-from ufl_beam.reference.cells import Ledger
-from ufl_beam.reference.points import MaterialPoints, Search, derivative
+from ufl_beam.reference.cells import Setting
+from ufl_beam.reference.points import MaterialPoints, derivative
 
 CREEP = 1e-12
 """Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
@@ -56,19 +55,6 @@ Row = tuple[float, float, float] | Array
 
 Motions = Any
 """A relative motion, or an array of the components of a bushing; m or rad."""
-
-
-@dataclass
-class Setting:
-    """Arguments that all laws are made with."""
-
-    size: float  # of the scene; m
-    scheme: Scheme
-    ledger: Ledger
-    search: Search
-    asked: Mapping[Connector, float]  # forces of controllers, limits of friction
-    rates: Mapping[Connector, float]  # of motions with friction as the step begins
-    friction_repeats: bool  # whether places that stick may hold what is held already
 
 
 class LawInStep:
@@ -90,7 +76,7 @@ class LawInStep:
     def __init__(self, link: Connector, setting: Setting) -> None:
         self.link, self.setting, self.e0, self.dt = link, setting, 0.0, 1.0
         self.law: Any = link.law
-        self.length = 1.0 if link.turns else setting.size  # of a motion that is large
+        self.length = 1.0 if link.turns else setting.grid.scene.size  # of a motion that is large
         self.z: dict[str, float] = {}
         self.stored: dict[str, float] = {}
         self.opening: Any = None
@@ -219,7 +205,7 @@ class _Stated(LawInStep):
         self._part, self._θ = scheme.load_weight, scheme.theta
         self._delayed = scheme.weight_of_before == 0 and self._part > 0.5
         if self._delayed:
-            setting.ledger.lost["numerical"] += 0.0
+            setting.loses("numerical")
 
     def _energy(self, e: Motions, z: State) -> Any:
         return np.sum(self.law.energy(self.law.given([*np.atleast_1d(e)[:, None]]), z))
@@ -295,16 +281,12 @@ class _Sprung(LawInStep):
             laws=((law, 1),), rest=np.zeros(3), breaking=slice(None),
             softening=softening if softening is not None and softening.opens else None,
         )  # fmt: skip
-        of = setting.scheme, setting.search, setting.ledger
-        self._points = MaterialPoints(layout, [(0, 0)], np.ones(1), *of)
+        self._points = MaterialPoints(layout, [(0, 0)], np.ones(1), setting)
         self.stored = self._points.stored
         self.opening = self._points if self._points.softens else None
 
-    def begin(self, e0: float, step: Step) -> None:
-        self._points.begin(step.dt)
-
     def row(self, e1: float, λ: float) -> Row:
-        self._points.respond(np.array([[e1, 0.0, 0.0]]))
+        self._points.respond(np.array([[e1, 0.0, 0.0]]), self.dt)
         f, D = float(self._points.r[0, 0]), float(self._points.D[0, 0, 0])
         return -D, 1.0, f - D * e1
 
@@ -421,15 +403,15 @@ class _Slipping(LawInStep):
 
     def __init__(self, link: Connector, setting: Setting) -> None:
         super().__init__(link, setting)
-        law, self.opening, self.slope = law_of(link), self, _slope(link, setting.size)
+        law, self.opening, self.slope = law_of(link), self, _slope(link, setting.grid.scene.size)
         self._law, self._numbers = law, {name: float(x) for name, x in numbers(law).items()}
         self.z = {"slipped": 0.0, "start": 0.0, "limit": float(law.limit), "back force": 0.0}
         self.z |= {"dissipated": 0.0, "way": 0.0, "stored": 0.0}
         self.excess, self.released, self._hardens = 0.0, False, isinstance(law, Hardening)
-        setting.ledger.lost["hinges"] += 0.0
+        setting.loses("hinges")
         self._loss = 2 * setting.scheme.alpha if self._hardens else 0.0
         if self._loss:
-            setting.ledger.lost["numerical"] += 0.0
+            setting.loses("numerical")
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)

@@ -4,16 +4,13 @@
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import NoNumber
 from ufl_beam.mechanics.connector_forms import connector_forms
 from ufl_beam.mechanics.relative_motions import MOTIONS
@@ -26,19 +23,21 @@ from ufl_beam.reference.cells import (
     Force,
     Form,
     Memory,
+    Response,
+    Setting,
     coupled,
     dofs_of_cells,
     put,
     separate_cells,
 )
-from ufl_beam.reference.connector_laws import Setting, law_in_step
+from ufl_beam.reference.connector_laws import law_in_step
 
 NEAR = 1e-5
 """Way of differences of the forces of guides, as a part of the scene; they are of second order, and
 the last digits of the curve spoil less than 1e-10."""
 
 
-class Linked(Force, ABC):
+class Linked(Force):
     """Base of connectors, whose forces are unknowns of the scene.
 
     Attributes:
@@ -50,27 +49,13 @@ class Linked(Force, ABC):
 
     inner = True
 
-    def __init__(self, grid: Grid, numbers: Index) -> None:
+    def __init__(self, numbers: Index, setting: Setting) -> None:
+        grid, self.setting = setting.grid, setting
         self.size, self.numbers = grid.size, numbers
         self.links: list[Connector] = [grid.scene.links[i] for i in numbers]
         self.dofs = grid.dofs_of_links[numbers]
         self.forces_at = self.dofs[:, 6]
-        self.work: Array = np.zeros(len(numbers))
-        self.rate: Array = np.zeros(len(numbers))
-        self.before: Array = np.zeros(len(numbers))
-        self.at_rest: Array = np.zeros(len(numbers))
-
-    @abstractmethod
-    def kept(self, q: Array) -> Array:
-        """Columns of ``Connection``; (num_links, 5)."""
-
-    @abstractmethod
-    def missed(self, q: Array, r: Array, scale: float, moved: float) -> float:
-        """Largest residual of a law, as a part of forces or of motions in the scene."""
-
-    def taken(self, q1: Array) -> Array:
-        """Works that the connectors take in the step to ``q1``; (num_links,); J."""
-        return np.zeros(len(self.links))
+        self.work, self.rate, self.before, self.at_rest = np.zeros((4, len(numbers)))
 
 
 class Connectors(Linked):
@@ -79,45 +64,41 @@ class Connectors(Linked):
     Each is a cell of unit length from one node to the other, with its forces as further unknowns.
     """
 
-    def __init__(
-        self, motions: Sequence[str], numbers: Index, grid: Grid, setting: Setting
-    ) -> None:
-        n, k = len(numbers), len(motions)
+    def __init__(self, motions: Sequence[str], numbers: Index, setting: Setting) -> None:
+        n, k, size = len(numbers), len(motions), setting.grid.size
         mesh, order = separate_cells(np.tile([[0.0, 0.0], [1.0, 0.0]], (n // k, 1, 1)))
-        super().__init__(grid, numbers.reshape(-1, k)[order].ravel())
+        super().__init__(numbers.reshape(-1, k)[order].ravel(), setting)
         self._k, self.laws = k, [law_in_step(link, setting) for link in self.links[::k]]
-        self._setting, self._stated = setting, connector_forms(motions, setting.scheme, mesh)
+        self._stated = connector_forms(motions, setting.scheme, mesh)
         stated = self._stated
         self._at: Index = np.empty(n // k * (6 + k), dtype=np.int64)
         self._at[dofs_of_cells(stated.q1.function_space)] = np.column_stack(
             [self.dofs[::k, :6], self.forces_at.reshape(-1, k)]
         )
         self._work, self._tangent, self._motion, self._rate = (
-            Form(form, self._at, grid.size)
+            Form(form, self._at, size)
             for form in (stated.work, stated.tangent, stated.motion, stated.rate)
         )
         numbers_of_links = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.links]
         put(stated.numbers, np.reshape(numbers_of_links, (-1, 8 * k)))
         by_cell = stated.motion.arguments()[0].ufl_function_space()
         self._cell_dofs = dofs_of_cells(by_cell).ravel()
-        self._length = np.where([link.turns for link in self.links], 1.0, setting.size)
+        self._length = np.where([link.turns for link in self.links], 1.0, setting.grid.scene.size)
         self._rows: Array = np.zeros((n, k + 2))
         self._e0: Array = np.zeros(n)
-        self._dt = 1.0
 
     def motion(self, q: Array) -> Array:
         """Relative motions at ``q``; (num_links,); m or rad."""
         self._stated.q1.x.array[:] = q[self._at]
-        return self._motion.entries()[self._cell_dofs]
+        return np.asarray(self._motion.assembled()[self._cell_dofs])
 
     def rates(self, q: Array, v: Array) -> Array:
         """Rates of the motions if the velocities are ``v``; (num_links,); m/s or rad/s."""
         self._stated.q1.x.array[:], self._stated.u.x.array[:] = q[self._at], v[self._at]
-        return self._rate.entries()[self._cell_dofs]
+        return np.asarray(self._rate.assembled()[self._cell_dofs])
 
     def begin(self, step: Step) -> None:
         """Begin the step in all laws."""
-        self._stated.q0.x.array[:], self._dt = step.q0[self._at], step.dt
         for law, e0 in zip(self.laws, self._of_each(self._e0), strict=True):
             law.begin(e0, step)
 
@@ -125,25 +106,21 @@ class Connectors(Linked):
         """Numbers of each connector: one, or an array of those of its components."""
         return [*map(float, values)] if self._k == 1 else [*values.reshape(-1, self._k)]
 
-    def residual(self, q1: Array) -> Array:
-        """Forces on the nodes, and the rows of the laws."""
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Forces on the nodes and the rows of the laws, and their derivative."""
         given = map(self._of_each, (self.motion(q1), q1[self.forces_at]))
         rows = [law.row(e, λ) for law, e, λ in zip(self.laws, *given, strict=True)]
         self._rows = np.vstack([np.reshape(row, (self._k, -1)) for row in rows])
         put(self._stated.row, self._rows.reshape(len(self.laws), -1))
-        return self._work.vector()
-
-    def tangent(self, q1: Array) -> csr_array:
-        """Their derivative; the rows are those of the latest residual."""
-        self._stated.q1.x.array[:] = q1[self._at]
-        return self._tangent.matrix()
+        self._stated.q0.x.array[:] = step.q0[self._at]
+        return self._work.joined(self._work.assembled()), self._tangent.assembled()
 
     def missed(self, q: Array, r: Array, scale: float, moved: float) -> float:
         """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``scale``.
 
         What the last digits of the motions make of a row does not count.
         """
-        size = self._setting.size
+        size = self.setting.grid.scene.size
         k, length = self._k, self._length.reshape(-1, self._k)
         amplitude, weight = moved / size, np.abs(self._rows[:, k])
         slopes = np.repeat([law.slope for law in self.laws], k)
@@ -160,20 +137,20 @@ class Connectors(Linked):
 
     def taken(self, q1: Array) -> Array:
         """Works of the forces of the step."""
-        force = acting(self._setting.scheme, self.before, q1[self.forces_at])
+        force = acting(self.setting.scheme, self.before, q1[self.forces_at])
         return np.asarray(force * (self.motion(q1) - self._e0))
 
-    def change(self, q1: Array) -> float:
+    def change(self, step: Step, q1: Array) -> float:
         """Energy that the connectors store, dissipate or give away in the step; J."""
         works = self.taken(q1).reshape(-1, self._k).sum(axis=1)
         each = zip(self.laws, self._of_each(self.motion(q1)), works, strict=True)
         return sum(law.change(e, float(work)) for law, e, work in each)
 
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Take the end of the step; enter what was supplied or lost."""
         e, taken = self.motion(q1), self.taken(q1)
         self.work = self.work + taken
-        self.rate, self._e0 = np.asarray((e - self._e0) / self._dt), e
+        self.rate, self._e0 = np.asarray((e - self._e0) / step.dt), e
         self.before = q1[self.forces_at]
         works = taken.reshape(-1, self._k).sum(axis=1)
         for law, motion, work in zip(self.laws, self._of_each(e), works, strict=True):
@@ -219,11 +196,11 @@ class GuideForce(Linked):
     place there.  The motion is the distance from the curve, zero when a step is accepted.
     """
 
-    def __init__(self, number: int, grid: Grid, setting: Setting) -> None:
-        super().__init__(grid, np.array([number]))
+    def __init__(self, number: int, setting: Setting) -> None:
+        super().__init__(np.array([number]), setting)
         link = self.links[0]
         assert isinstance(link.law, Guide)
-        self._place, self._curve, self._size = link.b, link.law.curve, setting.size
+        self._place, self._curve, self._size = link.b, link.law.curve, setting.grid.scene.size
         self._point = self._on0 = np.array(link.b.point)
         self._x, self._λ = self.dofs[0, [1, 3]], self.dofs[0, 6]
         self._over_step = setting.scheme.average(0.0, 1.0) != 1.0
@@ -256,34 +233,27 @@ class GuideForce(Linked):
         x_m, y_m = along / math.hypot(*along)
         return np.array([t[0] * (x - on)[1] - t[1] * (x - on)[0], -y_m, x_m])
 
-    def residual(self, q1: Array) -> Array:
-        """The force across the curve, and the distance from it."""
-        x, r = self._point + q1[self._x], np.zeros(self.size)
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Force across the curve, distance from it, and derivatives by central differences."""
+        x, λ, r = self._point + q1[self._x], q1[self._λ], np.zeros(self.size)
         self._s = self._nearest(x)
         r[self._λ], *direction = self._equation(x)
-        r[self._x] = q1[self._λ] * np.array(direction)
-        return r
-
-    def tangent(self, q1: Array) -> csr_array:
-        """Derivative of both by the unknowns, by central differences."""
-        at, ε, slopes = self._point + q1[self._x], NEAR * self._size, []
-        for way in ε * np.eye(2):
-            slopes.append((self._equation(at + way) - self._equation(at - way)) / (2 * ε))
-        K = np.zeros((3, 3))  # x, y, λ
-        K[2, :2], *K[:2, :2] = np.transpose(slopes)
-        K[:2, :2] *= q1[self._λ]
-        K[:2, 2] = self._equation(at)[1:]
+        r[self._x] = λ * np.array(direction)
+        ways, K = NEAR * self._size * np.eye(2), np.zeros((3, 3))  # of x, y, λ
+        slopes = [self._equation(x + way) - self._equation(x - way) for way in ways]
+        K[2, :2], *K[:2, :2] = np.transpose(slopes) / (2 * NEAR * self._size)
+        K[:2, :2] *= λ
+        K[:2, 2] = direction
         dofs = np.array([*self._x, self._λ])
-        return coupled(self.size, np.repeat(dofs, 3), np.tile(dofs, 3), K)
+        return r, coupled(self.size, np.repeat(dofs, 3), np.tile(dofs, 3), K)
 
     def missed(self, q: Array, r: Array, scale: float, moved: float) -> float:
         """Distance, as a part of 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._point + self._on0).max())
         return float(max(abs(r[self._λ]) - round_off, 0.0) / (0.01 * self._size))
 
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Take the point on the curve."""
-        self.residual(q1)
         self._on0 = np.array(self._curve(self._s), np.float64)
         t = tangent(self._curve, self._s, self._step)
         self._step, self._s0 = REACH * self._size / math.hypot(*t), self._s
@@ -305,24 +275,18 @@ class GuideForce(Linked):
         self._on0 = row[4:]
 
 
-def components(link: Connector) -> int:
-    """Number of motions that the law of a link acts on."""
-    return link.law.components if isinstance(link.law, ConnectorLaw) else 1
-
-
-def connectors_of(grid: Grid, setting: Setting) -> list[Linked]:
+def connectors_of(setting: Setting) -> list[Connectors | GuideForce]:
     """All connectors of a scene: those of one motion together, and each guide."""
-    found: list[Linked] = []
-    links = grid.scene.links
-    together = [("sliding", "sliding", "turning")[:k] for k in (2, 3)]
-    for motions in (*((motion,) for motion in MOTIONS), *together):
-        k = len(motions)
-        numbers = [
-            i
-            for i, link in enumerate(links)
-            if components(link) == k and (k > 1 or link.motion == motions[0])
-        ]
+    found: list[Connectors | GuideForce] = []
+    kinds: dict[tuple[str, ...], list[int]] = {(motion,): [] for motion in MOTIONS}
+    kinds |= {("sliding", "sliding", "turning")[:k]: [] for k in (2, 3)}
+    for i, link in enumerate(setting.grid.scene.links):
+        if isinstance(link.law, Guide):
+            continue
+        k = link.law.components if isinstance(link.law, ConnectorLaw) else 1
+        kinds[(link.motion,) if k == 1 else ("sliding", "sliding", "turning")[:k]].append(i)
+    for motions, numbers in kinds.items():
         if numbers:
-            found.append(Connectors(motions, np.array(numbers), grid, setting))
-    guides = (i for i, link in enumerate(links) if isinstance(link.law, Guide))
-    return [*found, *(GuideForce(i, grid, setting) for i in guides)]
+            found.append(Connectors(motions, np.array(numbers), setting))
+    guides = (i for i, x in enumerate(setting.grid.scene.links) if isinstance(x.law, Guide))
+    return [*found, *(GuideForce(i, setting) for i in guides)]

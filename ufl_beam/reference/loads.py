@@ -12,10 +12,9 @@ import ufl
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import split, turn
-from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia
+from ufl_beam.mechanics.time_schemes import Step, acting, has_inertia
 from ufl_beam.model.bodies import GROUND, carries
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
@@ -25,8 +24,9 @@ from ufl_beam.reference.cells import (
     CellForce,
     Cells,
     Force,
-    Ledger,
     Memory,
+    Response,
+    Setting,
     coupled,
     lumps,
     numbers_of_cells,
@@ -40,70 +40,55 @@ class LoadForce(Force, ABC):
     """Base of loads: a factor in time, times forces at the configuration where loads act.
 
     Attributes:
-        force: In the latest residual; (size,).
+        force: In the latest response; (size,).
         along: :attr:`on_nodes` at a factor of one, of loads along beams.
     """
 
     along: Array | float = 0.0
 
-    def __init__(self, load: Load, grid: Grid, scheme: Scheme, ledger: Ledger) -> None:
-        self.size, self.load, self.scheme, self.ledger = grid.size, load, scheme, ledger
-        self.force: Array = np.zeros(grid.size)
+    def __init__(self, load: Load | RotatingFrame, setting: Setting) -> None:
+        self.size, self.load, self.scheme = setting.grid.size, load, setting.scheme
+        self.time = (lambda t: 1.0) if isinstance(load, RotatingFrame) else load.time
+        self.force: Array = np.zeros(self.size)
         self._before: Array = self.force
-        self.factor = self._reached = 0.0
-        ledger.supplied["loads"] += 0.0
+        self.factor, self._reached, self.supplied = 0.0, 0.0, setting.ledger.supplied
+        self.supplied["loads"] += 0.0
 
     @abstractmethod
-    def forces(self, q: Array) -> Array:
-        """Forces at the configuration ``q`` and a factor of one; (size,)."""
+    def forces(self, q: Array) -> Response:
+        """Forces at the configuration ``q`` and a factor of one, and their derivative."""
 
-    def slope(self, q: Array) -> csr_array:
-        """Their derivative; (size, size)."""
-        return csr_array((self.size, self.size))
-
-    def wanted(self, t: float) -> float:
-        """The factor at a time."""
-        return value_at(self.load.time, t, self.load)
-
-    def begin(self, step: Step) -> None:
-        """Find the factor in the step, and at its end; parts of a step go in proportion."""
-        self.q0, self.dt = step.q0, step.dt
-        growth = step.fraction * (self.wanted(step.load_time) - self._reached)
-        self.factor, self._end = self._reached + step.at * growth, self._reached + growth
-
-    def place(self, q1: Array) -> Array:
+    def place(self, step: Step, q1: Array) -> Array:
         """Configuration at which the load acts if the step ends at ``q1``."""
-        return np.asarray(self.q0 + self.scheme.load_weight * (q1 - self.q0))
+        return np.asarray(step.q0 + self.scheme.load_weight * (q1 - step.q0))
 
-    def residual(self, q1: Array) -> Array:
-        """Minus the load of the step."""
-        self.force = self.factor * self.forces(self.place(q1))
-        return -self.force
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Minus the load of the step; parts of a step go in proportion."""
+        wanted = value_at(self.time, step.load_time, self.load)
+        growth = step.fraction * (wanted - self._reached)
+        self.factor, self._end = self._reached + step.at * growth, self._reached + growth
+        forces, slope = self.forces(self.place(step, q1))
+        self.force, self.on_nodes = self.factor * forces, self.factor * self.along
+        return -self.force, csr_array(-self.factor * self.scheme.load_weight * slope)
 
-    def tangent(self, q1: Array) -> csr_array:
-        """Derivative of the residual."""
-        return csr_array(-self.factor * self.scheme.load_weight * self.slope(self.place(q1)))
-
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the work of the load, that of its forces on the step of the nodes."""
-        self.residual(q1)
-        work = acting(self.scheme, self._before, self.force) @ s
-        self.ledger.supplied["loads"] += float(work)
+        self.supplied["loads"] += float(acting(self.scheme, self._before, self.force) @ s)
         self._before, self._reached = self.force, self._end
-        self.on_nodes = self.factor * self.along
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
         """The load at the time ``t``; the state is taken as one that is in equilibrium with it."""
-        self._reached = self.wanted(t)
-        self.force = self._before = self._reached * self.forces(q)
+        self._reached = value_at(self.time, t, self.load)
+        self.force = self._before = self._reached * self.forces(q)[0]
         return self.force
 
 
 class DeadLoad(LoadForce):
     """Dead load: consistent nodal forces times a function of time."""
 
-    def __init__(self, load: Load, grid: Grid, scheme: Scheme, ledger: Ledger) -> None:
-        super().__init__(load, grid, scheme, ledger)
+    def __init__(self, load: Load, setting: Setting) -> None:
+        super().__init__(load, setting)
+        grid = setting.grid
         scene, self._vector = grid.scene, np.zeros(grid.size)
         of_beams = np.zeros((len(scene.beams), 3))
         if isinstance(load, PointLoad) and carries(load.place):  # else Scene.links has connectors
@@ -120,29 +105,26 @@ class DeadLoad(LoadForce):
         np.add.at(self._vector, grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1), along)
         self.along = numbers_of_cells(grid, "density", cells, -along)
 
-    def forces(self, q: Array) -> Array:
+    def forces(self, q: Array) -> Response:
         """The consistent nodal forces."""
-        return self._vector
+        return self._vector, csr_array((self.size, self.size))
 
 
 class Follower(LoadForce):
     """Follower load: it turns with the cross-section or body that it acts on."""
 
-    def __init__(self, load: FollowerLoad, grid: Grid, scheme: Scheme, ledger: Ledger) -> None:
-        super().__init__(load, grid, scheme, ledger)
-        self._dofs, self._given = grid.node(load.place), (*load.force, load.moment)
+    def __init__(self, load: FollowerLoad, setting: Setting) -> None:
+        super().__init__(load, setting)
+        self._dofs, self._given = setting.grid.node(load.place), (*load.force, load.moment)
 
-    def forces(self, q: Array) -> Array:
+    def forces(self, q: Array) -> Response:
         """(F_x, F_y, M) turned by the rotation."""
         (x, y, M), ψ, force = self._given, q[self._dofs[2]], np.zeros(self.size)
         c, s = math.cos(ψ), math.sin(ψ)
-        np.add.at(force, self._dofs, [c * x - s * y, s * x + c * y, M])
-        return force
-
-    def slope(self, q: Array) -> csr_array:
-        """Derivative by the rotation."""
-        x, y = self.forces(q)[self._dofs[:2]]
-        return coupled(self.size, self._dofs[:2], np.repeat(self._dofs[2], 2), np.array([-y, x]))
+        x, y = c * x - s * y, s * x + c * y
+        np.add.at(force, self._dofs, [x, y, M])
+        turn = np.repeat(self._dofs[2], 2)
+        return force, coupled(self.size, self._dofs[:2], turn, np.array([-y, x]))
 
 
 class FrameForce(LoadForce):
@@ -151,59 +133,44 @@ class FrameForce(LoadForce):
     Rotary inertia keeps its spin in steady rotation, so no moments come of it.
     """
 
-    def __init__(
-        self, frame: RotatingFrame, grid: Grid, mass: Mass, scheme: Scheme, ledger: Ledger
-    ) -> None:
-        super().__init__(frame, grid, scheme, ledger)
-        self._Ω, self._mass, self._double = frame.rate, mass, 2 * frame.rate * has_inertia(scheme)
+    def __init__(self, frame: RotatingFrame, setting: Setting, mass: Mass) -> None:
+        super().__init__(frame, setting)
+        grid, self._Ω, self._mass, of = setting.grid, frame.rate, mass, mass.cells.element
+        self._double = 2 * self._Ω * has_inertia(setting.scheme)
         self._no_turn: Array = np.ones(grid.size)
         self._no_turn[grid.rotations] = 0.0
         self._pull = csr_array(mass.matrix.multiply(self._Ω**2 * self._no_turn[:, None]))
         nodes = np.concatenate([grid.dofs_of_bodies, grid.dofs])
         self._pairs = np.unique(nodes[:, :2], axis=0)  # degrees of freedom u, v of the nodes
-        self._gyro = self._double * _turned_mass(grid, mass.cells)
+        # Mass times a quarter turn of velocities; 2 Ω of it times them is Coriolis' force.
+        (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
+        density = of.inertia[0] * ufl.dot(turn(u), w_u)
+        G = mass.cells.form(density * of.dx_of_mass()).assembled()
+        for (i, j, _), m, _ in lumps(grid):
+            G = G + coupled(grid.size, np.array([i, j]), np.array([j, i]), m * np.array([-1, 1]))
+        self._gyro = csr_array(self._double * G)
         centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
         self._places: Array = np.zeros(grid.size)  # from the centre of rotation
         self._places[nodes[:, :2]] = np.concatenate([centers, grid.points]) - frame.about
 
-    def wanted(self, t: float) -> float:
-        """One: it acts from the beginning."""
-        return 1.0
-
-    def forces(self, q: Array) -> Array:
+    def forces(self, q: Array) -> Response:
         """Centrifugal forces at the places."""
-        return np.asarray(self._pull @ (self._places + q))
+        return np.asarray(self._pull @ (self._places + q)), self._pull
 
-    def slope(self, q: Array) -> csr_array:
-        """Derivative of centrifugal forces."""
-        return self._pull
-
-    def residual(self, q1: Array) -> Array:
+    def respond(self, step: Step, q1: Array) -> Response:
         """Minus the centrifugal forces, and Coriolis forces at the mean rate."""
-        return np.asarray(super().residual(q1) + self._gyro @ (q1 - self.q0) / self.dt)
+        r, K = super().respond(step, q1)
+        coriolis = self._gyro @ (q1 - step.q0) / step.dt
+        return np.asarray(r + coriolis), csr_array(K + self._gyro / step.dt)
 
-    def tangent(self, q1: Array) -> csr_array:
-        """Derivative of centrifugal and Coriolis forces."""
-        return csr_array(super().tangent(q1) + self._gyro / self.dt)
-
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the work, and note mass times the accelerations of the frame in the beams."""
-        super().accept(q1, s)
-        v = (q1 - self.q0) / self.dt
-        a = -self.factor * self._Ω**2 * self._no_turn * (self._places + self.place(q1))
+        super().accept(step, q1, s)
+        v = (q1 - step.q0) / step.dt
+        a = -self.factor * self._Ω**2 * self._no_turn * (self._places + self.place(step, q1))
         a[self._pairs[:, 0]] -= self._double * v[self._pairs[:, 1]]
         a[self._pairs[:, 1]] += self._double * v[self._pairs[:, 0]]
         self.on_nodes = self._mass.on_nodes(a)
-
-
-def _turned_mass(grid: Grid, cells: Cells) -> csr_array:
-    """Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force."""
-    of = cells.element
-    (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
-    G = cells.form(of.inertia[0] * ufl.dot(turn(u), w_u) * of.dx_of_mass()).matrix()
-    for (u, v, _), m, _ in lumps(grid):
-        G = G + coupled(grid.size, np.array([u, v]), np.array([v, u]), m * np.array([-1, 1]))
-    return csr_array(G)
 
 
 class WorkForce(CellForce):
@@ -213,23 +180,23 @@ class WorkForce(CellForce):
     loads do.
     """
 
-    def __init__(self, work: Work, grid: Grid, scheme: Scheme, ledger: Ledger, t0: float) -> None:
+    def __init__(self, work: Work, setting: Setting, t0: float) -> None:
+        grid, scheme, supplied = setting.grid, setting.scheme, setting.ledger.supplied
         numbers = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
         cells = Cells(grid, numbers)
         self._stated = stated = statement(work, cells.element, scheme)
         energy = None if stated.energy is None else (stated.energy, work.name)
         lost = None if stated.lost is None else (stated.lost, "numerical")
-        of = cells, stated.residual, ledger
-        super().__init__(*of, stored=energy, lost=lost, kind="work")
+        super().__init__(cells, stated.residual, setting, stored=energy, lost=lost, kind="work")
         self._work, self._scheme = work, scheme
         self._varies, self._is_potential = stated.varies(work), isinstance(work, Potential)
         self._t, self._grown = t0, 0.0
         self.force: Array = np.zeros(grid.size)
         self._before: Array = self.force
         if not self._is_potential:
-            ledger.supplied[work.name] += 0.0
+            supplied[work.name] += 0.0
         if self._varies:
-            ledger.supplied[work.in_time] += 0.0
+            supplied[work.in_time] += 0.0
 
     def _put(self, t: float, **clock: float) -> None:
         """Give the forms time, growth, length of the step, and the numbers of the work."""
@@ -239,32 +206,30 @@ class WorkForce(CellForce):
             self._stated.numbers[name].x.array[:] = value
         self._at = t
 
-    def begin(self, step: Step) -> None:
-        """Tell the forms of the step; parts of one go in proportion to the way of the loads."""
-        super().begin(step)
+    def respond(self, step: Step, q1: Array) -> Response:
+        """Minus the virtual work, or the derivative of the potential, and its derivative.
+
+        Parts of a step go in proportion to the way of the loads.
+        """
         part, growth = step.fraction, step.fraction * (1.0 - self._grown)
         self._end = self._t + part * (step.motion_time - self._t), self._grown + growth
         t = self._t + step.at * part * (step.load_time - self._t)
         self._put(t, **{"dt": min(step.dt, AT_REST), GROWTH: self._grown + step.at * growth})
-
-    def residual(self, q1: Array) -> Array:
-        """Minus the virtual work, or the derivative of the potential."""
-        r = super().residual(q1)
+        r, K = super().respond(step, q1)
         self.force = -r
-        return r
+        return r, K
 
-    def accept(self, q1: Array, s: Array) -> None:
+    def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter what the work did in the step."""
-        self.residual(q1)
         name, supplied, at = self._work.name, self.ledger.supplied, np.array(self._at)
         if not self._is_potential:
             supplied[name] += float(acting(self._scheme, self._before, self.force) @ s)
         held, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
         self._before, (self._t, self._grown) = self.force, self._end
-        super().accept(q1, s)
+        super().accept(step, q1, s)
         if self._varies:  # what time brings is all of the change but that by the motion
             self._put(t)
-            moved = self.energy(q1) - self.energy(self.q0)
+            moved = self.energy(q1) - self.energy(step.q0)
             supplied[self._work.in_time] += self.stored[name] - held - moved
 
     def start(self, q: Array) -> None:
@@ -277,9 +242,9 @@ class WorkForce(CellForce):
         """The forces at ``q``, as at the end of a second in which the velocities stayed."""
         self._t, self._grown = t, 1.0
         self.cells.set(self.of.q0, q if v is None else q - v)
+        self.cells.set(self.of.q1, q)
         self._put(t, **{"dt": AT_REST if v is None else 1.0, GROWTH: 1.0})
-        self.residual(q)
-        self._before = self.force
+        self.force = self._before = -self.work.joined(self.work.assembled())
         return self.force
 
     def remember(self, memory: Memory) -> None:
@@ -288,20 +253,17 @@ class WorkForce(CellForce):
             self._before = memory.vector(f"work of {self._work.name}", self._before)
 
 
-def loads_of(
-    grid: Grid, scheme: Scheme, mass: Mass | None, ledger: Ledger, t0: float
-) -> list[LoadForce | WorkForce]:
+def loads_of(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce | WorkForce]:
     """All loads and works of a scene."""
     found: list[LoadForce | WorkForce] = []
-    for load in grid.scene.loads:
+    for load in setting.grid.scene.loads:
         if isinstance(load, RotatingFrame):
-            found.append(FrameForce(load, grid, mass or Mass(grid), scheme, ledger))
+            found.append(FrameForce(load, setting, mass or Mass(setting.grid)))
         elif isinstance(load, FollowerLoad):
-            found.append(Follower(load, grid, scheme, ledger))
+            found.append(Follower(load, setting))
         else:
-            found.append(DeadLoad(load, grid, scheme, ledger))
-    found += [WorkForce(work, grid, scheme, ledger, t0) for work in grid.scene.works]
-    return found
+            found.append(DeadLoad(load, setting))
+    return [*found, *(WorkForce(work, setting, t0) for work in setting.grid.scene.works)]
 
 
 # -- supports ------------------------------------------------------------------------------------
@@ -318,8 +280,9 @@ class Supports:
         before: Those of the accepted step.
     """
 
-    def __init__(self, grid: Grid, scheme: Scheme, ledger: Ledger) -> None:
-        self._grid, self._scheme, self._ledger = grid, scheme, ledger
+    def __init__(self, setting: Setting) -> None:
+        self._grid, self._scheme = setting.grid, setting.scheme
+        grid, self._supplied = setting.grid, setting.ledger.supplied
         axes = scipy.sparse.eye_array(grid.size).tolil()
         held: dict[int, None] = {}
         if GROUND in grid.scene.rigid_bodies:
@@ -336,10 +299,10 @@ class Supports:
         self.axes = csr_array(axes.tocsr())
         self.held = np.array(sorted(held), dtype=np.int64)
         self.free = np.setdiff1d(np.arange(grid.size), self.held)
-        self.reactions: Array = np.zeros(grid.size)
-        self.before: Array = self.reactions
+        self.before: Array = np.zeros(grid.size)
+        self.note(self.before)
         if self._motions:
-            ledger.supplied["supports"] += 0.0
+            self._supplied["supports"] += 0.0
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
         """Set in ``x`` what is held and prescribed in the step that begins at ``x0``."""
@@ -357,15 +320,14 @@ class Supports:
 
     def note(self, r: Array) -> None:
         """Note the reactions in a residual, which is in the axes of the supports."""
-        reactions: Array = np.zeros(len(r))
-        reactions[self.held] = r[self.held]
-        self.reactions = reactions
+        self.reactions: Array = np.zeros(len(r))
+        self.reactions[self.held] = r[self.held]
 
     def accept(self, s: Array) -> None:
         """Enter the work of supports that move in a step of the nodes."""
         if self._motions:
             force = acting(self._scheme, self.before, self.reactions)
-            self._ledger.supplied["supports"] += float(force @ (self.axes @ s))
+            self._supplied["supports"] += float(force @ (self.axes @ s))
         self.before = self.reactions
 
     def forces(self) -> Array:

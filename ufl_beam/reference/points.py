@@ -9,7 +9,6 @@ both are equal, and the tangent is condensed.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -18,10 +17,9 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
-from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.law_functions import Values
-from ufl_beam.reference.cells import Ledger
+from ufl_beam.reference.cells import Setting
 
 CLOSED, FLOWING = 0.0, 1.0
 """A discontinuity did not grow in the last step, or grew in it."""
@@ -36,19 +34,6 @@ NO_ENERGY = 1e-9
 
 CORRECTIONS, HALVINGS = 100, 10
 """Most corrections of the variables of a law, and most halvings of each."""
-
-
-@dataclass
-class Search:
-    """Search for the equilibrium of a step in which no more opens than must.
-
-    Attributes:
-        hold: Whether what did not flow in the last step stays closed.
-        over: Whether something that was held has borne more than its limit.
-    """
-
-    hold: bool = False
-    over: bool = False
 
 
 # -- derivatives ---------------------------------------------------------------------------------
@@ -89,9 +74,7 @@ class MaterialPoints:
         layout: The points of a cell, with their laws.
         keys: Of the cells, for numbers that are drawn at random.
         length: Of the cells; (cells,); m.
-        scheme: Time scheme; it says where in a step the laws hold.
-        search: Of all points of a scene.
-        ledger: Where energies are entered.
+        setting: Its scheme says where in a step the laws hold.
 
     Attributes:
         at: Numbers of the points by name, internal variables among them; (cells, n) each.
@@ -106,10 +89,10 @@ class MaterialPoints:
     """
 
     def __init__(
-        self, layout: Layout, keys: list[tuple[int, int]], length: Array, scheme: Scheme,
-        search: Search, ledger: Ledger,
-    ) -> None:  # fmt: skip
-        self._layout, self._scheme, self._search, self._ledger = layout, scheme, search, ledger
+        self, layout: Layout, keys: list[tuple[int, int]], length: Array, setting: Setting
+    ) -> None:
+        self._layout, self._scheme, self._ledger = layout, setting.scheme, setting.ledger
+        scheme, self._search = setting.scheme, setting.search
         cells, n, self._law = len(keys), len(layout.weights), layout.kind.law
         self.at = at = {name: np.zeros((cells, n)) for name in inputs(layout)}
         of = (rows(self._law, name) for name in ("strain", "before", "stiffness"))
@@ -142,8 +125,7 @@ class MaterialPoints:
         entries = {"plastic": layout.yields, "hinges": self.softens}
         entries["numerical"] = bool(scheme.alpha) or releases
         self._lost = [name for name, there in entries.items() if there]
-        for name in self._lost:
-            ledger.lost[name] += 0.0
+        setting.loses(*self._lost)
         self.stored = {"stored": 0.0, **({"hardening": 0.0} if layout.yields else {})}
 
     def _of_points(self, strains: Array) -> Array:
@@ -156,15 +138,14 @@ class MaterialPoints:
 
     # -- a step ----------------------------------------------------------------------------------
 
-    def begin(self, dt: float) -> None:
-        """Begin a step of this length; s."""
-        self.at["dt"][:] = dt
-
     @np.errstate(all="ignore")
-    def respond(self, strains: Array) -> None:
-        """Answer the strains of an iterate, (cells, 3), with :attr:`r` and :attr:`D`."""
+    def respond(self, strains: Array, dt: float) -> None:
+        """Answer the strains of an iterate, (cells, 3), with :attr:`r` and :attr:`D`.
+
+        The step has the length ``dt``; s.
+        """
         at, θ, w = self.at, self._scheme.theta, self._layout.weights
-        self.strains = strains.copy()
+        self.strains, at["dt"][:] = strains.copy(), dt
         for name, values in zip(self._e, self._of_points(strains), strict=True):
             at[name][:] = values
         at["growth"][:] = at["direction"][:] = 0.0

@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 import sys
 from collections import defaultdict
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
 
@@ -31,7 +31,7 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.supports import Support
 from ufl_beam.output.postprocessing import links_of, motion_of, velocity_of
-from ufl_beam.output.state_rows import BEFORE, FORCES, LEDGER, Connection
+from ufl_beam.output.state_rows import BEFORE, FORCES, Connection
 from ufl_beam.reference.beams import (
     ElasticBeams,
     Inertia,
@@ -39,11 +39,9 @@ from ufl_beam.reference.beams import (
     damping_forces,
     inelastic_cells,
 )
-from ufl_beam.reference.cells import Force, Ledger, Memory
-from ufl_beam.reference.connector_laws import Setting
+from ufl_beam.reference.cells import Force, Memory, Response, Setting
 from ufl_beam.reference.connectors import Connectors, connectors_of
 from ufl_beam.reference.loads import Supports, loads_of
-from ufl_beam.reference.points import Search
 
 LARGEST_TURN = 0.75 * math.pi
 """A step that turns a node further is cut; the algorithmic strains end at π."""
@@ -99,44 +97,41 @@ class Solver:
         self, grid: Grid, scheme: Scheme, t: float, q: Array, v: Array, *, rtol: float,
         max_iterations: int, petsc: dict[str, Any],
     ) -> None:  # fmt: skip
-        self.scene, self.grid, self.scheme = grid.scene, grid, scheme
+        self.scene, self.grid, self.scheme, scene = grid.scene, grid, scheme, grid.scene
         self.t, self.q, self.q_before, self.last_dt = t, q, q, math.inf
-        self.ledger = ledger = Ledger()
-        self.search, self.parts, self.iterations = Search(), 0, 0
-        self.supports = Supports(grid, scheme, ledger)
-        links = self.scene.links
-        asked = [link for link in links if isinstance(link.law, Controller | Coulomb)]
+        self.parts = self.iterations = 0
+        asked = [link for link in scene.links if isinstance(link.law, Controller | Coulomb)]
+        rubbing = [link for link in scene.links if rubs(link.law)]
         self.asked: dict[Connector, float] = dict.fromkeys(asked, 0.0)
-        self.rates = dict.fromkeys([*asked, *(link for link in links if rubs(link.law))], 0.0)
+        self.rates: dict[Connector, float] = dict.fromkeys([*asked, *rubbing], 0.0)
         self.samples: dict[Connector, tuple[float, int]] = {}  # time of the first, number
         laws = {link: link.law for link in asked if isinstance(link.law, Controller)}
         self._sampled = {link: law.sample for link, law in laws.items() if law.sample}
 
+        repeats = friction_repeats(scene)
+        setting = Setting(grid, scheme, self.asked, self.rates, repeats)
+        self.ledger, self.search, self.supports = setting.ledger, setting.search, Supports(setting)
         rest = np.arange(len(grid.cells))
         self.yielding: list[YieldingBeams] = []
         for layout, cells in inelastic_cells(grid).items():
-            self.yielding.append(YieldingBeams(grid, cells, layout, scheme, self.search, ledger))
+            self.yielding.append(YieldingBeams(cells, layout, setting))
             rest = np.setdiff1d(rest, cells)
-        elastic = [ElasticBeams(grid, rest, scheme, ledger)] if len(rest) else []
+        elastic = [ElasticBeams(rest, setting)] if len(rest) else []
         self.beams = [*self.yielding, *elastic]
-        repeats = friction_repeats(self.scene)
-        asked_of = self.asked, self.rates, repeats
-        setting = Setting(self.scene.size, scheme, ledger, self.search, *asked_of)
-        self.connectors = connectors_of(grid, setting)
+        self.connectors = connectors_of(setting)
         self.inertia = None
         if has_inertia(scheme):
-            self.inertia = Inertia(grid, scheme, self.supports.stop(v), ledger)
+            self.inertia = Inertia(setting, scheme, self.supports.stop(v))
         inertia = [] if self.inertia is None else [self.inertia]
         mass = None if self.inertia is None else self.inertia.mass
-        self.loads = loads_of(grid, scheme, mass, ledger, t)
-        damping = damping_forces(grid, scheme, self.inertia, ledger)
+        self.loads = loads_of(setting, mass, t)
         self.inner: list[Force] = [*self.beams, *self.connectors]
+        damping = damping_forces(setting, self.inertia)
         self.forces: list[Force] = [*self.inner, *self.loads, *inertia, *damping]
-        groups = [one for one in self.connectors if isinstance(one, Connectors)]
-        openings = (law.opening for one in groups for law in one.laws)
+        self._groups = [one for one in self.connectors if isinstance(one, Connectors)]
+        openings = (law.opening for one in self._groups for law in one.laws)
         self._open: list[Any] = [one for one in openings if one is not None]
         self._open += [beams.points for beams in self.yielding if beams.points.softens]
-        self._with_friction = [one for one in groups if self.rates.keys() & {*one.links}]
 
         self._weights: Array = np.ones(grid.size)  # which make forces and moments comparable
         self._weights[grid.rotations] = 1 / self.scene.size
@@ -163,7 +158,7 @@ class Solver:
         if not same:  # rates and forces of the last step belong to the forces before the jump
             lasting = (n for n, x in given.items() if x.ndim == 2 or n == "reactions")
             given = {n: given[n] for n in lasting if not n.startswith("changes of strains")}
-        self._remember(Memory(given))
+        self.internal(given)
         for force in self.forces:
             force.start(self.q)
         if not self._continues:
@@ -173,29 +168,22 @@ class Solver:
         # Forces of beams at rest: in a step so short that nothing viscous flows.
         short = Step.of(scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
         for beam in self.beams:
-            beam.begin(short)
-            self._inner_before = self._inner_before + beam.residual(self.q)
-            beam.note()
+            self._inner_before = self._inner_before + beam.respond(short, self.q)[0]
         self.on_nodes = sum(beam.on_nodes for beam in self.beams)
         if self.inertia is None:
             step = Step.of(scheme, self.t, self.t + 1.0, self.t + 1.0, self.q)
+            step = step._replace(load_time=self.t, motion_time=self.t)
             for one in self.connectors:
-                one.begin(step._replace(load_time=self.t, motion_time=self.t))
-                self._inner_before = self._inner_before + one.residual(self.q)
+                one.begin(step)
+                self._inner_before = self._inner_before + one.respond(step, self.q)[0]
             if not known:
                 self.supports.note(self.supports.axes @ (self._inner_before - loads))
                 self.supports.before = self.supports.reactions
         self._sum_energies()
 
-    def internal(self) -> dict[str, Array]:
-        """Internal variables, forces and rates that another run may begin with."""
-        memory = Memory()
-        self._remember(memory)
-        return memory.state()
-
-    def _remember(self, memory: Memory) -> None:
-        """Write down all that later steps depend on, or take it back."""
-        supports = self.supports
+    def internal(self, given: Mapping[str, Array] | None = None) -> dict[str, Array]:
+        """All that later steps depend on, by name, after what is given is taken over."""
+        memory, supports = Memory(given or {}), self.supports
         supports.before = supports.reactions = memory.vector("reactions", supports.before)
         for force in self.forces:
             force.remember(memory)
@@ -206,6 +194,8 @@ class Solver:
             self.asked[link] = float(row[0])
             if math.isfinite(row[1]) and row[3] == self.t:
                 self.samples[link] = float(row[1]), int(row[2])
+        together = {name: np.concatenate(parts) for name, parts in memory.kept.items()}
+        return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
 
     # -- a step, and its parts -------------------------------------------------------------------
 
@@ -215,10 +205,15 @@ class Solver:
         Raises:
             StepFailed: Even the smallest part failed; the state is that of the last one before.
         """
-        if self.parts == 0 and not self._continues and self._begins_loaded():
-            begin, end = self.t, self.t + APPLYING * (t1 - self.t)
-            self._in_parts(end, partial(self._attempt, end=end, at_rest=begin))
-            self.last_dt = math.inf  # the next guess does not go on as loads were applied
+        scheme, scene = self.scheme, self.scene
+        at_end = has_inertia(scheme) or scheme.average(0.0, 1.0) == 1.0
+        if self.parts == 0 and not self._continues and not at_end:
+            frames = any(isinstance(load, RotatingFrame) for load in scene.loads)
+            if frames or scene.works or any(f(self.t) != 0 for _, f in scene.time_functions()):
+                # Loads that act at the beginning are applied before the first step.
+                begin, end = self.t, self.t + APPLYING * (t1 - self.t)
+                self._in_parts(end, partial(self._attempt, end=end, at_rest=begin))
+                self.last_dt = math.inf  # the next guess does not go on as loads were applied
         while self.t != t1:
             end = self._next_sample(t1)
             self._in_parts(end, partial(self._attempt, end=end))
@@ -238,14 +233,6 @@ class Solver:
             done += part
             if done % (2 * part) == 0 and part < MOST_PARTS:
                 part *= 2  # where the larger one would begin anyway
-
-    def _begins_loaded(self) -> bool:
-        """Whether loads that act at the beginning are applied before the first step."""
-        if has_inertia(self.scheme) or self.scheme.average(0.0, 1.0) == 1.0:
-            return False
-        frames = any(isinstance(load, RotatingFrame) for load in self.scene.loads)
-        at_once = any(f(self.t) != 0 for _, f in self.scene.time_functions())
-        return frames or bool(self.scene.works) or at_once
 
     def _attempt(self, t1: float, end: float, at_rest: float | None = None) -> None:
         """Take the step to ``t1``, a part of one to ``end``, if there is an equilibrium.
@@ -284,8 +271,8 @@ class Solver:
             raise StepFailed(
                 f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
             )
-        in_beams = sum(beam.change(q1) for beam in self.beams)
-        in_connectors = sum(one.change(q1) for one in self.connectors)
+        in_beams = sum(beam.change(step, q1) for beam in self.beams)
+        in_connectors = sum(one.change(step, q1) for one in self.connectors)
         if self.inertia is None:
             self._require_path(q1, s, in_beams, in_connectors)
         return q1, s
@@ -307,8 +294,8 @@ class Solver:
             return
         work = float(acting(self.scheme, self._inner_before, self._inner) @ s)
         size = abs(work) + abs(in_beams)
-        size += sum(float(np.abs(one.taken(q1)).sum()) for one in self.connectors)
-        entries = (abs(x) for part in self.ledger.copy() for x in part.values())
+        size += sum(float(np.abs(one.taken(q1)).sum()) for one in self._groups)
+        entries = (abs(x) for part in vars(self.ledger).values() for x in part.values())
         slack = self.scheme.slack * size + KINK * sum(entries) + sys.float_info.min
         slack += float(self._round_off(self.supports.axes @ q1) @ np.abs(s))
         change = in_beams + in_connectors
@@ -322,7 +309,7 @@ class Solver:
         """Take the end of a step as the new state, and enter works and losses."""
         self._inner_before = self._inner
         for force in self.forces:
-            force.accept(q1, s)
+            force.accept(step, q1, s)
         self.supports.accept(s)
         self.on_nodes = sum(force.on_nodes for force in self.forces)
         self.q_before, self.last_dt = self.q, step.dt
@@ -368,25 +355,21 @@ class Solver:
     # -- the equation of a step ------------------------------------------------------------------
 
     def begin(self, step: Step) -> None:
-        """Let all forces begin a step."""
+        """Begin a step: what iterates have tried is forgotten."""
         self._step = step
-        for force in self.forces:
-            force.begin(step)
+        for one in self.connectors:
+            one.begin(step)
 
-    def residual(self, x: Array) -> Array:
-        """Residual at ``x``; both are in the axes of the supports."""
-        q1 = self.supports.axes.T @ x
-        self._inner = sum((force.residual(q1) for force in self.inner), np.zeros(len(x)))
-        others = (force.residual(q1) for force in self.forces if not force.inner)
-        r = np.asarray(self.supports.axes @ sum(others, self._inner))
+    def respond(self, x: Array) -> Response:
+        """Residual at ``x``, and its derivative; all are in the axes of the supports."""
+        axes, q1, step = self.supports.axes, self.supports.axes.T @ x, self._step
+        responses = [force.respond(step, q1) for force in self.forces]
+        n, none = len(self.inner), np.zeros(len(x))
+        self._inner = sum((r for r, _ in responses[:n]), none)
+        r = np.asarray(axes @ sum((r for r, _ in responses[n:]), self._inner))
         self.supports.note(r)
-        return r
-
-    def tangent(self, x: Array) -> csr_array:
-        """Derivative of the residual at ``x``."""
-        axes, q1 = self.supports.axes, self.supports.axes.T @ x
-        K = sum((force.tangent(q1) for force in self.forces), csr_array((len(x), len(x))))
-        return csr_array(axes @ K @ axes.T)
+        K = sum((K for _, K in responses), csr_array((len(x), len(x))))
+        return r, csr_array(axes @ K @ axes.T)
 
     # -- Newton's method -------------------------------------------------------------------------
 
@@ -432,8 +415,7 @@ class Solver:
                 raise self._error
             if reason > 0:
                 return self._all(self._vector)
-            for one in self.connectors:
-                one.begin(self._step)
+            self.begin(self._step)
         raise self._error or self._failure(reason)
 
     def _iterate(self) -> int:
@@ -460,7 +442,7 @@ class Solver:
     def _function(self, snes: PETSc.SNES, vector: PETSc.Vec, f: PETSc.Vec) -> None:
         """Residual of the free degrees of freedom; NaN, at which SNES stops, after an error."""
         try:
-            self._r = self.residual(self._all(vector))
+            self._r, self._K = self.respond(self._all(vector))
         except Exception as error:  # of a function of the user
             self._error = error
         if self._error is not None:
@@ -468,11 +450,7 @@ class Solver:
         f.array_w[:] = self._r[self.supports.free]
 
     def _jacobian(self, snes: PETSc.SNES, vector: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        """Derivative of the residual by the free degrees of freedom."""
-        try:
-            self._K = self.tangent(self._all(vector))
-        except Exception as error:
-            self._error = error
+        """Derivative of the residual by the free degrees of freedom, in the latest response."""
         K = csr_array(self._K[self.supports.free][:, self.supports.free])
         if not np.isfinite(K.data).all():
             self._error = self._error or StepFailed("the tangent has entries that are no numbers")
@@ -539,7 +517,8 @@ class Solver:
             if due is not None:
                 self.samples[link] = due
         if self.inertia is not None:
-            for one in self._with_friction:
+            rubbing = (one for one in self._groups if self.rates.keys() & {*one.links})
+            for one in rubbing:
                 rates = one.rates(self.q, self.inertia.v)
                 self.rates.update(zip(one.links, map(float, rates), strict=True))
 
@@ -601,26 +580,22 @@ class Solver:
             SceneError: The joint shares its displacement; make it with ``measured=True``.
         """
         if isinstance(joint, Support):
-            force = self.reactions()[self.scene.supports.index(joint)]
+            force = self.supports.forces()[self.scene.supports.index(joint)]
             return float(np.linalg.norm(force[:2]))
         links = self.scene.links
         numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
         return float(np.linalg.norm(self.connections()[numbers, 1]))
 
-    def reactions(self) -> Array:
-        """Forces of all supports on the scene; (num_supports, 3); N, N, N m."""
-        return self.supports.forces()
-
     def snapshot(self) -> State:
         """The state now, by the names of the columns of solutions."""
-        reactions = self.reactions()
+        reactions = self.supports.forces()
         if self.parts == 0 and self.inertia is not None:
             reactions = np.full_like(reactions, np.nan)  # nobody knows them
         rows = np.concatenate([np.zeros((0, 7)), *(one.material() for one in self.yielding)])
         state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
         if self.inertia is not None:
             state["v"] = self.inertia.v
-        for part, entries in zip(LEDGER, self.ledger.copy(), strict=True):
+        for part, entries in vars(self.ledger).items():
             state |= {f"{part}: {name}": np.array(value) for name, value in entries.items()}
         state |= {
             "connectors": self.connections(), "material": rows[np.argsort(rows[:, 0]), 1:],
