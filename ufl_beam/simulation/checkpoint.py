@@ -96,7 +96,7 @@ class Checkpoint:
 
 
 class Keeper:
-    """The checkpoint of one run; its file is locked until :meth:`close`.
+    """The checkpoint of one run; its file is locked until the :attr:`lock` is released.
 
     The ``call`` is what the run is, by name.  If its steps are equal, ``step`` long (s), it may go
     on to another end ``t1`` (s).  What the file had is in ``found``, until :meth:`resume`.
@@ -120,19 +120,15 @@ class Keeper:
         also = {f"also[{i}]": one for i, one in enumerate(choice.also)}
         self._stateful = {**self._described.stateful, **also}
         self.found: Content = {}
-        self._lock = Lock(self.path)
+        self.lock = Lock(self.path)
         try:
             on_first(comm, self._find)
         except BaseException:
-            self.close()
+            self.lock.release()
             raise
         if comm.size > 1:
             self.found = comm.bcast(self.found)
         self._last_time, self._last_step = time.perf_counter(), -1
-
-    def close(self) -> None:
-        """Let other runs have the file."""
-        self._lock.release()
 
     # -- going on ------------------------------------------------------------------------------
 
@@ -144,11 +140,11 @@ class Keeper:
         if not os.access(folder, os.W_OK):
             raise SceneError(f"checkpoint {self.path}: the directory cannot be written to")
         try:
-            owner = self._lock.take()
+            owner = self.lock.take()
             exists = self.path.exists()
         except OSError as error:
             raise SceneError(
-                f"checkpoint {self.path}: {self._lock.path} cannot be written: {error.strerror}"
+                f"checkpoint {self.path}: {self.lock.path} cannot be written: {error.strerror}"
             ) from None
         if owner:
             raise SceneError(
@@ -158,29 +154,25 @@ class Keeper:
         if exists:
             with decoding(self.path, FORMAT):
                 self.found = read(self.path, FORMAT)
-                if differs := self._other(self.found):
+                now, then = self._described.texts, self.found["call"]
+                if self.found["python"] != PYTHON:
+                    now, then = (
+                        {name: one for name, one in texts.items() if not name.endswith(f".{CODE}")}
+                        for texts in (now, then)
+                    )
+                step, before, differs = self._step, self.found["step"], difference(now, then)
+                if not differs and (step is None) != (before is None):
+                    differs = "steps are equal in one of both, and adaptive in the other"
+                if not differs and step and abs(step - before) > 1e-9 * before:
+                    differs = f"the step is {step!r} s, in the file {before!r} s"
+                if not differs and [*self._stateful] != [*self.found["stateful"]]:
+                    differs = "other objects have a state"
+                if differs:
                     raise SceneError(f"it is of another run: {differs}")
                 t, t1 = float(self.found["state/t"][0]), self._t1
                 if t > t1 and t - t1 > 1e-9 * (self._step or 0.0):
                     raise SceneError(f"it is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s")
         require_writable(self.path)
-
-    def _other(self, found: Content) -> str:
-        """The first thing in which this run differs from that of a file; empty if there is none."""
-        now, then = self._described.texts, found["call"]
-        if found["python"] != PYTHON:
-            now, then = (
-                {name: text for name, text in texts.items() if not name.endswith(f".{CODE}")}
-                for texts in (now, then)
-            )
-        step, before = self._step, found["step"]
-        if differs := difference(now, then):
-            return differs
-        if (step is None) != (before is None):
-            return "steps are equal in one of both, and adaptive in the other"
-        if step and abs(step - before) > 1e-9 * before:
-            return f"the step is {step!r} s, in the file {before!r} s"
-        return "other objects have a state" * ([*self._stateful] != [*found["stateful"]])
 
     def resume(self, simulation: Simulation, pace: Any) -> None:
         """Restore all from the file: the run, its step control ``pace``, recorders; forget it."""
@@ -195,7 +187,12 @@ class Keeper:
         solution.warnings = found["warnings"]
         states = found["stateful"].values()
         for one, state in zip(self._stateful.values(), states, strict=True):
-            _restore(one, state)
+            if isinstance(one, np.random.Generator):
+                one.bit_generator.state = state
+            elif isinstance(one, np.random.RandomState):
+                one.set_state(state)
+            else:
+                one.restore(state)
         for i, recorder in enumerate(self._recorders):
             try:
                 recorder.resume(simulation, below(f"recorder {i}/", found))
@@ -224,7 +221,15 @@ class Keeper:
         """Write the file after so many seconds of the run; all processes call it together."""
 
         def states() -> dict[str, Any]:
-            return {name: _state(one) for name, one in self._stateful.items()}
+            found = dict[str, Any]()
+            for name, one in self._stateful.items():
+                if isinstance(one, np.random.Generator):
+                    found[name] = one.bit_generator.state
+                elif isinstance(one, np.random.RandomState):
+                    found[name] = one.get_state(legacy=False)
+                else:
+                    found[name] = one.state()
+            return found
 
         solution, memory = simulation.solution, Memory(simulation.share)
         simulation.remember(memory)
@@ -236,14 +241,13 @@ class Keeper:
         for i, recorder in enumerate(self._recorders):
             content |= above(f"recorder {i}/", recorder.state())
         self._require_told()
-        mine = {"python": PYTHON, "call": self._described.texts, "step": self._step}
-
-        def put() -> None:
-            history = above("history/", solution.history())
-            at = f" of t = {content['state/t'][0]:.9g} s"
-            write(self.path, FORMAT, {**mine, **content, **history}, at)
-
-        on_first(self._comm, put)
+        content |= {"python": PYTHON, "call": self._described.texts, "step": self._step}
+        at = f" of t = {content['state/t'][0]:.9g} s"
+        history = solution.history
+        on_first(
+            self._comm,
+            lambda: write(self.path, FORMAT, {**content, **above("history/", history())}, at),
+        )
         self._last_time, self._last_step = time.perf_counter(), pace.steps
 
     def _require_told(self) -> None:
@@ -259,26 +263,6 @@ class Keeper:
 
 PYTHON = ".".join(map(str, sys.version_info[:2]))
 """Version of Python, on which the code of functions depends."""
-
-
-# -- what has a state ---------------------------------------------------------------------------
-
-
-def _state(one: Any) -> Any:
-    if isinstance(one, np.random.Generator):
-        return one.bit_generator.state
-    if isinstance(one, np.random.RandomState):
-        return one.get_state(legacy=False)
-    return one.state()
-
-
-def _restore(one: Any, state: Any) -> None:
-    if isinstance(one, np.random.Generator):
-        one.bit_generator.state = state
-    elif isinstance(one, np.random.RandomState):
-        one.set_state(state)
-    else:
-        one.restore(state)
 
 
 def end_of(start: Solution | None) -> str:

@@ -9,12 +9,10 @@ from typing import NamedTuple
 from mpi4py import MPI
 
 import numpy as np
-import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import ConvergenceError, NoNumber, SceneError, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_law import ENTRIES, ConnectorLaw, judges_loss
@@ -28,7 +26,6 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.model.material_law import MaterialLaw, has_quadratic_energies, judges_dissipation
 from ufl_beam.model.material_laws import Hardening
-from ufl_beam.model.scene import Scene
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
 from ufl_beam.output.states import States
 from ufl_beam.simulation.solution import Solution
@@ -37,8 +34,6 @@ from ufl_beam.solvers.factorization import Factorisation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
 from ufl_beam.terms.base import KINDS
-from ufl_beam.terms.beams import InelasticBeams
-from ufl_beam.terms.connectors import Links
 
 SHARE = 0.1
 """Least motion or deformation that is named, as a part of the largest motion."""
@@ -68,20 +63,10 @@ NAMED = 3
 
 
 class Deformed(NamedTuple):
-    """Connectors, or cells, in a motion: sizes of their deformations, and which have given way."""
+    """Connectors, or cells, that deform in a motion."""
 
-    sizes: Array
-    yielding: npt.NDArray[np.bool_]
-
-    @property
-    def stiff(self) -> bool:
-        """True if one deforms that has its stiffness."""
-        return bool((self.sizes[~self.yielding] >= SHARE).any())
-
-    @property
-    def soft(self) -> Index:
-        """Numbers of those that have given way, the largest first."""
-        return _named(np.where(self.yielding, self.sizes, 0.0))
+    soft: Index  # numbers of those that have given way, the largest first
+    stiff: bool  # True if one deforms that has its stiffness
 
 
 def no_equilibrium(
@@ -102,15 +87,26 @@ def no_equilibrium(
         return SceneError(f"{loose}{NOT_HELD}{failure}")
     (t, end), named = times, solution.parameter
     q1 = equation.supports.in_plane(newton.unknowns.copy())
-    forces = _forces_by_kind(equation, newton, q1)
+    vectors = {kind: np.zeros(equation.share.size) for kind in KINDS}
+    for term in equation.terms:
+        try:
+            term.add_residual(q1, vectors[term.kind])
+        except Exception:
+            vectors[term.kind].fill(np.nan)  # it is why the step has failed
+    forces = {kind: size for kind, force in vectors.items() if (size := newton.size(force))}
     sizes = ", ".join(f"{kind} {size:.1e} N" for kind, size in forces.items())
     where = f"at {named.at(t, '.9g')}"
     if end != t:
         where = f"after {named.at(t, '.9g')}, even with {named.over(end - t)}"
-    # Where a function has no value there is no tangent to look at.
-    why, at = "", (solution, q0, q1)
-    if not isinstance(failure, NoNumber):
-        why = _singularity(equation, solution.grid, q0, q1) or _near_limit(equation, *at)
+    why = ""
+    if not isinstance(failure, NoNumber):  # where a function has no value there is no tangent
+        near = _near(equation, q0, q1)
+        why = _singularity(equation, q1)
+        # If the latest tangent says nothing, Newton's method may have been sent far away by a
+        # tangent before it.  Then one near the beginning of the step tells.
+        if not why and near is not q0 and equation.respond_at(near):
+            why = _singularity(equation, near)
+        why = why or _near_limit(equation, solution, q0, near)
     said = f"{failure} ({sizes})" if sizes else str(failure)
     return ConvergenceError(
         f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=t, dt=end - t,
@@ -118,53 +114,16 @@ def no_equilibrium(
     )  # fmt: skip
 
 
-def open_ledger(solution: Solution, share: Share, newton: Solver) -> str:
-    """Describe how far an exact ledger is open; empty if it closes as claimed."""
-    energy, claimed = solution.energy, ROOM * newton.c.rtol
-    if not energy.opened(claimed, 0.0):
-        return ""
-    # Errors of steps are independent: their squares add up.
-    q = solution.q[:, share.dofs]
-    steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
-    return energy.opened(claimed, newton.random_work(np.abs(q).max(axis=0), steps))
-
-
-def _forces_by_kind(equation: StepEquation, newton: Solver, q1: Array) -> dict[str, float]:
-    """Sizes of the forces at the latest iterate; N."""
-    forces = {kind: np.zeros(equation.share.size) for kind in KINDS}
-    for term in equation.terms:
-        try:
-            term.add_residual(q1, forces[term.kind])
-        except Exception:
-            forces[term.kind].fill(np.nan)  # it is why the step has failed
-    sizes = {kind: newton.size(force) for kind, force in forces.items()}
-    return {kind: size for kind, size in sizes.items() if size}
-
-
-def _singularity(equation: StepEquation, grid: Grid, q0: Array, q1: Array) -> str:
-    """Describe why the tangent of a failed step is singular, or nearly so; else empty.
-
-    Where the latest tangent, at ``q1``, says nothing, Newton's method may have been sent far away
-    by a tangent before it.  Then one near the beginning ``q0`` of the step tells.
-    """
-    if said := _singularity_at(equation, grid, q1):
-        return said
-    near = _near(equation, q0, q1)
-    if near is q0 or not equation.respond_at(near):
-        return ""
-    return _singularity_at(equation, grid, near)
-
-
-def _near_limit(equation: StepEquation, solution: Solution, q0: Array, q1: Array) -> str:
+def _near_limit(equation: StepEquation, solution: Solution, q0: Array, near: Array) -> str:
     """Say that a limit load or bifurcation is near the state ``q0`` of a static run; else empty.
 
     There the least stiffness is a small part of that in the first state, or the tangent has other
-    signs, perhaps only a little beyond, where what yields has less stiffness.
+    signs, perhaps only a little beyond, ``near`` it, where what yields has less stiffness.
     """
     if not len(equation.force) or not len(solution):
         return ""
     signs, least = [], []
-    for q in (solution.q[0][equation.share.dofs], q0, _near(equation, q0, q1)):
+    for q in (solution.q[0][equation.share.dofs], q0, near):
         if not np.isfinite(q).all() or not equation.respond_at(q):
             return ""
         K, free = free_matrix(equation.share, equation.A, equation.supports.dofs)
@@ -193,9 +152,9 @@ def _near(equation: StepEquation, q0: Array, q1: Array) -> Array:
     return np.asarray(q0 + min(1.0, NEAR / far) * (q1 - q0)) if 0 < far < np.inf else q0
 
 
-def _singularity_at(equation: StepEquation, grid: Grid, q: Array) -> str:
+def _singularity(equation: StepEquation, q: Array) -> str:
     """Describe why the latest tangent, which is that at ``q``, is singular; empty if it is not."""
-    scene = grid.scene
+    grid, scene = equation.share.grid, equation.share.grid.scene
     K, free = free_matrix(equation.share, equation.A, equation.supports.dofs)
     if not len(free) or not np.isfinite(K.data).all():
         return ""
@@ -220,23 +179,21 @@ def _singularity_at(equation: StepEquation, grid: Grid, q: Array) -> str:
         return said if size <= SINGULAR else ""
     x /= largest
     motions /= largest
-    links, cells = _deformations(equation, grid, q, x)
+    links, cells = _deformations(equation, q, x)
     said = _describe(grid, motions, links, cells)
     if size <= SINGULAR:
         return f"the tangent stiffness is singular: {said}"
-    yields = links.yielding.any() or cells.yielding.any()
+    yields = len(links.soft) or len(cells.soft)
     mechanism = yields and not (links.stiff or cells.stiff)
     return f"a mechanism has formed: {said}" if mechanism else ""
 
 
-def _deformations(
-    equation: StepEquation, grid: Grid, q: Array, x: Array
-) -> tuple[Deformed, Deformed]:
+def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     """Deformations of the connectors and of the cells in a motion from ``q``, all of them."""
-    share, scene = equation.share, grid.scene
+    share, grid, scene = equation.share, equation.share.grid, equation.share.grid.scene
     here, ε = x[share.dofs], 1e-6
     links, left = np.zeros(len(scene.links)), np.ones(len(scene.links))
-    for one in (term for term in equation.terms if isinstance(term, Links)):
+    for one in equation.couplings:
         try:
             change = (one.motion(q + ε * here) - one.motion(q - ε * here)) / (2 * ε)
         except StepFailed:
@@ -244,8 +201,19 @@ def _deformations(
         links[one.numbers] = np.abs(change)
         left[one.numbers] = one.response.remaining()
     links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
-    strains, left_of_cells = _strains(grid, share.gather(q), x), np.ones(len(grid.cells))
-    for beams in (term for term in equation.terms if isinstance(term, InelasticBeams)):
+    # Strains of a small motion, times lengths of cells; (num_cells, 3); m, m, rad
+    first, last = grid.cells[:, 0], grid.cells[:, 1]
+    position, motion = grid.points + share.gather(q)[grid.dofs[:, :2]], x[grid.dofs]
+    d = position[last] - position[first]
+    across = np.column_stack([-d[:, 1], d[:, 0]])
+    change = motion[last] - motion[first]
+    ψ = (motion[first, 2] + motion[last, 2]) / 2
+    apart = change[:, :2] - ψ[:, None] * across
+    length = np.linalg.norm(d, axis=1)
+    along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
+    strains = np.column_stack([along, shear, change[:, 2]])
+    left_of_cells = np.ones(len(grid.cells))
+    for beams in equation.inelastic:
         cells, _ = beams.kept()
         left_of_cells[cells] = beams.points.remaining(strains[cells])
     if share.comm.size > 1:
@@ -254,8 +222,12 @@ def _deformations(
         share.comm.Allreduce(MPI.IN_PLACE, left_of_cells, op=MPI.MIN)
     strains[:, :2] /= scene.size
     sizes = np.abs(strains).max(axis=1, initial=0.0)
-    soft, soft_cells = left <= SOFT, left_of_cells <= SOFT
-    return Deformed(links, soft & (links >= SHARE)), Deformed(sizes, soft_cells & (sizes >= SHARE))
+    found = []
+    for deformed, remaining in ((links, left), (sizes, left_of_cells)):
+        soft = remaining <= SOFT
+        stiff = bool((deformed[~soft] >= SHARE).any())
+        found.append(Deformed(_named(np.where(soft, deformed, 0.0)), stiff))
+    return found
 
 
 def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> str:
@@ -286,20 +258,6 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
             "little, as Hardening(limit, modulus) with a millionth of the stiffness"
         )
     return said
-
-
-def _strains(grid: Grid, q: Array, x: Array) -> Array:
-    """Strains of a small motion ``x``, times lengths of cells; (num_cells, 3); m, m, rad."""
-    first, last = grid.cells[:, 0], grid.cells[:, 1]
-    position, motion = grid.points + q[grid.dofs[:, :2]], x[grid.dofs]
-    d = position[last] - position[first]
-    across = np.column_stack([-d[:, 1], d[:, 0]])
-    change = motion[last] - motion[first]
-    ψ = (motion[first, 2] + motion[last, 2]) / 2
-    apart = change[:, :2] - ψ[:, None] * across
-    length = np.linalg.norm(d, axis=1)
-    along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
-    return np.column_stack([along, shear, change[:, 2]])
 
 
 def _named(sizes: Array) -> Index:
@@ -338,11 +296,20 @@ class LedgerWatch:
         grid: Its scene is watched.
         scheme: The time scheme.
         claimed: Part of the energy that went through by which entries may err.
+
+    Attributes:
+        judged: Number of the last state that was judged; all are if states were thinned.
     """
 
     def __init__(self, grid: Grid, scheme: Scheme, claimed: float) -> None:
         self._grid, self._claimed = grid, claimed
-        laws, links = [*_laws(grid.scene)], grid.scene.links
+        links, laws = grid.scene.links, list[MaterialLaw]()  # of material points
+        for beam in grid.scene.beams:
+            layout = beam.section.layout(beam.section.hinge)
+            if layout is not None and not layout.elastic:
+                laws += [law for law, _ in layout.laws]
+        springs = [link.law.law for link in links if isinstance(link.law, Spring)]
+        laws += [law for law in springs if law is not None]
         grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
         # Other schemes integrate works with the mean of the forces at both ends.
         exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
@@ -357,7 +324,7 @@ class LedgerWatch:
         self._bounded = not given and all(map(has_quadratic_energies, laws))
         self._in_motion = has_inertia(scheme)
         self._throughput = self._most = 0.0
-        self._judged = 0  # number of the last state that was judged
+        self.judged = 0
         self._told: set[str] = set()
 
     def judge(self, states: States, every: int, *, last: bool = False) -> Iterator[str]:
@@ -366,17 +333,12 @@ class LedgerWatch:
         ``every`` is the number of steps from one state to the next.  Yields warnings, of each kind
         the first.
         """
-        number = len(states) - 1 - self._judged
+        number = len(states) - 1 - self.judged
         number -= 0 if last else number % STATES
-        if number > 0:
-            first, self._judged = self._judged, self._judged + number
-            yield from self._judge(states.part(first, self._judged + 1), every)
-
-    def thinned(self, states: States) -> None:
-        """Go on where states, which were all judged, have been forgotten."""
-        self._judged = len(states) - 1
-
-    def _judge(self, states: States, every: int) -> Iterator[str]:
+        if number <= 0:
+            return
+        states = states.part(self.judged, self.judged + number + 1)
+        self.judged += number
         times, (state, supplied, lost) = states.times, states.ledger()
         works = sum(float(np.abs(np.diff(work)).sum()) for work in supplied.values())
         sizes = [e if name in ENTRIES else np.abs(e - e[0]) for name, e in state.items()]
@@ -390,7 +352,15 @@ class LedgerWatch:
                 n = int(np.argmax(falls))
                 if falls[n] > allowed:
                     self._told.add(name)
-                    yield self._falls(name, float(falls[n]), states, n)
+                    before, after = times[n : n + 2]
+                    yield (
+                        f"{self._where(name, states, n)}the dissipated energy, the entry {name!r} "
+                        f"of the ledger, falls by {falls[n]:.3g} J between t = {before:.6g} and "
+                        f"{after:.6g} s. No law of the scene gives dissipated energy back: a step "
+                        "found a wrong state there, and what follows is wrong. Use smaller steps; "
+                        "check the equations of a law of your own, or let one that is to give "
+                        "energy have active = True"
+                    )
         least = float(np.min(state["stored"])) if "stored" in state and self._bounded else 0.0
         if least < -allowed and "stored" not in self._told:
             self._told.add("stored")
@@ -419,16 +389,6 @@ class LedgerWatch:
                 "sample time, inertia at its place, or a ForceLaw instead"
             )
 
-    def _falls(self, name: str, fall: float, states: States, n: int) -> str:
-        before, after = states.times[n : n + 2]
-        return (
-            f"{self._where(name, states, n)}the dissipated energy, the entry {name!r} of the "
-            f"ledger, falls by {fall:.3g} J between t = {before:.6g} and {after:.6g} s. No law of "
-            "the scene gives dissipated energy back: a step found a wrong state there, and what "
-            "follows is wrong. Use smaller steps; check the equations of a law of your own, or let "
-            "one that is to give energy have active = True"
-        )
-
     def _where(self, name: str, states: States, n: int) -> str:
         """Cell or connector whose dissipated energy falls most in a step."""
         kind = {"friction": Coulomb, "damping": Damper}.get(name)
@@ -448,13 +408,3 @@ class LedgerWatch:
             falls[f"{place.beam.name}, cell at s = {place.s:.3g}: "] = float(fall)
         worst = max(falls, key=lambda one: falls[one], default="")
         return worst if worst and falls[worst] > 0.0 else ""
-
-
-def _laws(scene: Scene) -> Iterator[MaterialLaw]:
-    """Laws of the material points of a scene."""
-    for beam in scene.beams:
-        layout = beam.section.layout(beam.section.hinge)
-        if layout is not None and not layout.elastic:
-            yield from (law for law, _ in layout.laws)
-    springs = [link.law for link in scene.links if isinstance(link.law, Spring)]
-    yield from (spring.law for spring in springs if spring.law is not None)

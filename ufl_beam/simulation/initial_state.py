@@ -18,7 +18,6 @@ from ufl_beam.discretization.model_warnings import (
     warn_of_rates,
     warn_of_touching,
 )
-from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.discretization.work_forms import statement
@@ -115,21 +114,6 @@ def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, Sta
     return q, v if v0 is None else transfer.velocity(v0), transfer.internal(start.internal)
 
 
-def last_forces(
-    grid: Grid, share: Share, scheme: Scheme, start: Solution | None
-) -> tuple[Array | None, Array | None]:
-    """Forces of cells in the last step of ``start``, and the local configuration at its beginning.
-
-    None without a start, with other cells, and after steps in another part of which forces were in
-    equilibrium.
-    """
-    between = float(scheme.average(0.0, 1.0))
-    if start is None or start.between != between or not same_unknowns(start.grid, grid):
-        return None, None
-    before = start.before(-1)[share.dofs] if start.begun else None
-    return np.ascontiguousarray(start.numbers(-1)[:, share.cells]), before
-
-
 def _initial_velocity(grid: Grid) -> Array:
     """Velocities of :class:`Velocity`; zero elsewhere."""
     v: Array = np.full(grid.size, np.nan)
@@ -149,13 +133,26 @@ def _initial_velocity(grid: Grid) -> Array:
             v[dofs] = new
     v = np.nan_to_num(v)
     if grid.scene.initial:
-        _require_held(grid, v)
-        _require_free(grid, v)
+        _require_agreement(grid, v)
     return v
 
 
-def _require_free(grid: Grid, v: Array) -> None:
-    """Refuse velocities that supports take away altogether, and warn of those that lose a part."""
+def _require_agreement(grid: Grid, v: Array) -> None:
+    """Velocities must agree with what joints hold, or they would ring for ever, and with supports.
+
+    Refuse those that supports take away altogether, and warn of those that lose a part.
+    """
+    size, nodes = grid.scene.size, np.vstack([grid.dofs, grid.dofs_of_bodies])
+    fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()
+    for link, dofs in zip(grid.scene.links, grid.dofs_of_links, strict=True):
+        a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
+        by_a, by_b = link.rigidly()
+        rate = float(np.dot(by_a, a) + np.dot(by_b, b))
+        if link.law is HELD and abs(rate) > 1e-9 * fastest / (size if link.turns else 1.0):
+            raise SceneError(
+                f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
+                "or rad/s; give all that is joined a Velocity that agrees"
+            )
     held = {
         int(grid.node(support.place)[c]): support
         for support in grid.scene.supports if not support.moving and not support.angle
@@ -181,18 +178,3 @@ def _require_free(grid: Grid, v: Array) -> None:
             "there from the start while that of the rest is not, a blow. Give a velocity that "
             "agrees with the support, about= its place"
         )
-
-
-def _require_held(grid: Grid, v: Array) -> None:
-    """Velocities must agree with what joints hold, or they would ring for ever."""
-    size, nodes = grid.scene.size, np.vstack([grid.dofs, grid.dofs_of_bodies])
-    fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()
-    for link, dofs in zip(grid.scene.links, grid.dofs_of_links, strict=True):
-        a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
-        by_a, by_b = link.rigidly()
-        rate = float(np.dot(by_a, a) + np.dot(by_b, b))
-        if link.law is HELD and abs(rate) > 1e-9 * fastest / (size if link.turns else 1.0):
-            raise SceneError(
-                f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
-                "or rad/s; give all that is joined a Velocity that agrees"
-            )

@@ -36,10 +36,10 @@ from ufl_beam.output.state_rows import Columns
 from ufl_beam.parallel import communicator, progress_bar, say
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
-from ufl_beam.simulation.diagnosis import ROOM, LedgerWatch, open_ledger
+from ufl_beam.simulation.diagnosis import ROOM, LedgerWatch
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.simulation import Simulation
-from ufl_beam.simulation.solution import Solution
+from ufl_beam.simulation.solution import Opened, Solution
 from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, number_of_steps
 from ufl_beam.simulation.stepper import MOST_PARTS
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
@@ -101,7 +101,19 @@ def simulate(
     comm = communicator(comm, "simulate: comm")
     require_switch(progress, "simulate: progress")
     t0, t1 = require_times(t)
-    _require_step(dt, scheme, (t0, t1))
+    if not isinstance(dt, Adaptive):
+        require_number(dt, "simulate: dt", positive=True)
+        least = MOST_PARTS * math.ulp(max(abs(t0), abs(t1)))
+        if dt < least:
+            raise SceneError(
+                f"simulate: dt = {dt:g} s is too small: steps from t = {t0:g} to {t1:g} s can "
+                f"be told apart, and cut, from {least:.1e} s on; use a larger one, or begin at 0"
+            )
+    elif not has_inertia(scheme):
+        raise SceneError(
+            "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static "
+            "scheme has none; give a number"
+        )
     require_count(every, "simulate: every")
     require_count(most, "simulate: most")
     if start is not None:
@@ -132,7 +144,7 @@ def simulate(
                 "record": [type(recorder).__qualname__ for recorder in recorders],
             }  # fmt: skip
             keeper = Keeper(checkpoint, call, step, t1, recorders, comm)
-            stack.callback(keeper.close)
+            stack.callback(keeper.lock.release)
         simulation = Simulation(
             scene, scheme, t0=t0, start=start, newton=newton, mesh=mesh, comm=comm
         )
@@ -187,7 +199,7 @@ def take_steps(
             if thins:
                 solution.thin()
                 solution.every *= 2
-                watch.thinned(solution)
+                watch.judged = len(solution) - 1
         for recorder in recorders:
             recorder.write(simulation)
         if keeper is not None and (keeper.due(pace.steps) or pace.finished):
@@ -234,7 +246,13 @@ def check_ledger(simulation: Simulation) -> None:
         everyone = share.comm.allgather(solution.warnings.splitlines(keepends=True))
         solution.warnings = "".join(dict.fromkeys(chain.from_iterable(everyone)))
     if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
-        solution.open_ledger = open_ledger(solution, share, simulation.solver)
+        energy, claimed = solution.energy, ROOM * simulation.solver.c.rtol
+        if energy.opened(claimed, 0.0):
+            # Errors of steps are independent: their squares add up.
+            q = solution.q[:, share.dofs]
+            steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
+            round_off = simulation.solver.random_work(np.abs(q).max(axis=0), steps)
+            solution.open_ledger = energy.opened(claimed, round_off)
     if solution.open_ledger and simulation.comm.rank == 0:
         warn(solution.open_ledger)
 
@@ -266,7 +284,7 @@ def running(
         finally:
             simulation.solution.seconds += time.perf_counter() - begin
     if simulation.comm.rank == 0:
-        simulation.solution.opened.warn(simulation.scheme, simulation.solution.times)
+        Opened(simulation.solution).warn(simulation.scheme)
 
 
 def require_times(t: tuple[float, float]) -> tuple[float, float]:
@@ -280,22 +298,6 @@ def require_times(t: tuple[float, float]) -> tuple[float, float]:
     if t1 <= t0:
         raise SceneError(f"simulate: the end t[1] = {t1:g} must come after the beginning {t0:g}")
     return float(t0), float(t1)
-
-
-def _require_step(dt: float | Adaptive, scheme: Scheme, t: tuple[float, float]) -> None:
-    if not isinstance(dt, Adaptive):
-        require_number(dt, "simulate: dt", positive=True)
-        least = MOST_PARTS * math.ulp(max(map(abs, t)))
-        if dt < least:
-            raise SceneError(
-                f"simulate: dt = {dt:g} s is too small: steps from t = {t[0]:g} to {t[1]:g} s can "
-                f"be told apart, and cut, from {least:.1e} s on; use a larger one, or begin at 0"
-            )
-    elif not has_inertia(scheme):
-        raise SceneError(
-            "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static "
-            "scheme has none; give a number"
-        )
 
 
 # -- the reference solver --------------------------------------------------------------------------

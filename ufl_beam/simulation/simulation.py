@@ -16,6 +16,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, fill, give_back_memory, li
 from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
@@ -28,7 +29,7 @@ from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWrite
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
 from ufl_beam.simulation.diagnosis import no_equilibrium
-from ufl_beam.simulation.initial_state import checked_grid, initial_state, last_forces, mesh_of
+from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StaticPath, StepEquation
 from ufl_beam.simulation.stepper import Stepper
@@ -124,14 +125,16 @@ class Simulation(Stepper):
         else:
             together(equation.inner_forces, q_here)
         goes_on = goes_on or inertia is not None
-        forces, before = last_forces(grid, share, scheme, start) if goes_on else (None, None)
+        solution, forces, before = kind(scene, grid), None, None
+        solution.between, solution.scheme = float(scheme.average(0.0, 1.0)), scheme
+        alike = start is not None and start.between == solution.between
+        if goes_on and alike and start is not None and same_unknowns(start.grid, grid):
+            forces = np.ascontiguousarray(start.numbers(-1)[:, share.cells])
+            before = start.before(-1)[share.dofs] if start.begun else None
         if forces is not None or inertia is not None:
             equation.cell_forces.begin(forces)
-
-        solution = kind(scene, grid)
         super().__init__(comm, equation, newton, t0, q_here, path, solution, together, loose)
         self._begun_at = before
-        solution.between, solution.scheme = float(scheme.average(0.0, 1.0)), scheme
         solution.begun = solution.between < 1 or self.cell_forces.asks_for_before
         solution.of_record = self.cell_forces.of_record if share.alone else None
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,7 +17,7 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.display import TIME, Rich
 from ufl_beam.errors import SceneError, require_kind, warn
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.bodies import Anchor, Member, Place
+from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.fibres import Layout
@@ -130,8 +129,24 @@ class Solution(States, Rich):
         on_first(active_comm(), lambda: write(file, FORMAT, self._content()))
 
     def _content(self) -> Content:
-        text = {"kind": type(self).__name__, **text_of(self.grid, self.times, self.position)}
-        return {**text, **{name: getattr(self, name) for name in NAMED}, **self._arrays()}
+        grid = self.grid
+
+        def record(owner: Any, field: str, function: Any) -> Any:
+            """Return the record for a function that is a field of ``owner``."""
+            if field == "curve" and isinstance(owner, Member):
+                return SavedCurve.of(function, 0.0, 1.0, grid.parameters(owner))
+            if field == "curve":
+                return _used_curve(self, function)
+            if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
+                return SavedFunction.of(function, map(float, self.times))
+            return None
+
+        return {
+            "kind": type(self).__name__, "version": version(),
+            "scene": to_data(grid.scene, record), "mesh": to_data(grid.mesh),
+            "numbering": grid.checksum(), **{name: getattr(self, name) for name in NAMED},
+            **self._arrays(),
+        }  # fmt: skip
 
     def _arrays(self) -> State:
         counts = {"counts": np.array([self.parts, self.iterations])}
@@ -156,11 +171,6 @@ class Solution(States, Rich):
         """Abscissa that grows along the kept states; here the time; (n+1,)."""
         return self.times
 
-    @property
-    def opened(self) -> Opened:
-        """The cells whose embedded hinge or cracks opened in the run."""
-        return Opened(self)
-
     def hinge_place_error(self) -> dict[Member, float]:
         """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
 
@@ -169,18 +179,25 @@ class Solution(States, Rich):
         The number is ``|V| h / (2 limit)``, V being that of the last kept time before the opening.
         Beams without embedded hinges that opened in the run are left out.
         """
-        return {one.beam: one.error for one in self.opened.hinges()}
+        return {one.beam: one.error for one in Opened(self).hinges()}
 
     def summary(self) -> list[str]:
         """Return lines on the model, the run, and embedded hinges that opened."""
         ends = " to ".join(f"{t:g}" for t in (*self.times[:1], *self.times[-1:]))
-        return [
+        lines = [
             str(self.grid),
             f"{self.parameter.value.format(ends)} in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
             f"{self.seconds:.2f} s of wall time",
-            *self.opened.summary(),
         ]
+        if hinges := Opened(self).hinges():
+            number, worst = sum(one.number for one in hinges), max(hinges, key=lambda x: x.error)
+            lines.append(
+                f"embedded hinges opened in {_cells_in_words(number)}; their place within the cell "
+                f"shifts the limit by at most {_percent(worst.error)} ({worst.beam.name}, cell at "
+                f"s = {worst.place.s:.3g})"
+            )
+        return lines
 
     def __str__(self) -> str:
         said = *self.summary(), str(self.energy), self.open_ledger, self.warnings
@@ -192,12 +209,25 @@ class Solution(States, Rich):
 
 def restored(content: Content, scene: Scene | None = None) -> Solution:
     """Make a solution from what was saved of it, with a scene of its own or the given one."""
-    grid = grid_of(content, scene)
+    of = from_data(content["scene"]) if scene is None else scene
+    grid = Grid(of, from_data(content["mesh"]))
+    if grid.checksum() != content["numbering"]:
+        if scene is not None:
+            raise SceneError(
+                "it is a solution of another scene: its beams, cells, bodies or joints are others"
+            )
+        raise SceneError(
+            f"it was written by version {content['version']} of ufl_beam, which numbers degrees of "
+            f"freedom otherwise than this one, {version()}; load it with that version"
+        )
     kinds = {kind.__name__: kind for kind in (Solution, *Solution.__subclasses__())}
     solution = kinds[content["kind"]](grid.scene, grid)
     solution._take(content)
     if scene is not None:
-        require_same(content["scene"], solution._content()["scene"])
+        scenes = solution._content()["scene"], content["scene"]
+        now, then = (Description({"scene": json.loads(json.dumps(d))}).texts for d in scenes)
+        if differs := difference(now, then):
+            raise SceneError(f"it is a solution of another scene: {differs}")
     return solution
 
 
@@ -267,7 +297,8 @@ class Opened:
     """
 
     def __init__(self, states: States) -> None:
-        self._grid = grid = states.grid
+        self._grid, self._times = states.grid, states.times
+        grid = states.grid
         self.first, self.shear = np.full(len(grid.cells), -1), np.zeros(len(grid.cells))
         self.dissipated = np.zeros(len(grid.cells))
         if len(states):
@@ -298,42 +329,13 @@ class Opened:
             found.append(OpenedHinges(beam, len(cells), float(errors[worst]), place))
         return found
 
-    def __repr__(self) -> str:
-        number = np.count_nonzero(self.first >= 0)
-        return f"<Opened: hinges or cracks in {number} of {len(self.first)} cells>"
+    def warn(self, scheme: Scheme) -> None:
+        """Issue a :class:`ModelWarning` for each beam where much depends on the mesh.
 
-    def summary(self) -> list[str]:
-        """A line about embedded hinges that opened, if there are any."""
-        hinges = self.hinges()
-        if not hinges:
-            return []
-        number, worst = sum(one.number for one in hinges), max(hinges, key=lambda one: one.error)
-        return [
-            f"embedded hinges opened in {_cells_in_words(number)}; their place within the cell "
-            f"shifts the limit by at most {_percent(worst.error)} ({worst.beam.name}, cell at "
-            f"s = {worst.place.s:.3g})"
-        ]
-
-    def warn(self, scheme: Scheme, times: Array) -> None:
-        """Issue a :class:`ModelWarning` for each beam where much depends on the mesh."""
-        self._warn_of_jumps(scheme, times)
-        for beam, number, error, place in self.hinges():
-            if error > LARGE:
-                warn(
-                    f"{beam.name}: the hinge of the section opened in {_cells_in_words(number)}, "
-                    "in the middle of a cell. At the ends of the cell at "
-                    f"s = {place.s:.3g} the moment differs from that in its middle by "
-                    f"{_percent(error)} of the limit, so the load at which the hinge opens is "
-                    "uncertain by as much. Put a hinge exactly where it belongs, "
-                    "Beam(hinges={s: law}), or use shorter cells"
-                )
-
-    def _warn_of_jumps(self, scheme: Scheme, times: Array) -> None:
-        """Warn of resistances that fall faster with the opening than the stress of the cell.
-
-        The stiffness of a cell against an opening is θ EI/h, or θ E/h of a fibre.
+        First of resistances that fall faster with the opening than the stress of the cell.  The
+        stiffness of a cell against an opening is θ EI/h, or θ E/h of a fibre.
         """
-        grid = self._grid
+        grid, times = self._grid, self._times
         for beam in grid.scene.beams:
             cells, laws = grid.cells_of(beam), grid.hinges(beam)
             fall = {law: _fall(beam.section.layout(law), scheme) for law in set(laws)}
@@ -351,6 +353,16 @@ class Opened:
                     f"{length:.3g} m can follow. Energy that the cell released and the opening did "
                     "not dissipate went to the rest of the scene. Use cells shorter than "
                     f"{length / ratio:.3g} m, or an energy {ratio:.3g} times as large"
+                )
+        for member, number, error, place in self.hinges():
+            if error > LARGE:
+                warn(
+                    f"{member.name}: the hinge of the section opened in {_cells_in_words(number)}, "
+                    "in the middle of a cell. At the ends of the cell at "
+                    f"s = {place.s:.3g} the moment differs from that in its middle by "
+                    f"{_percent(error)} of the limit, so the load at which the hinge opens is "
+                    "uncertain by as much. Put a hinge exactly where it belongs, "
+                    "Beam(hinges={s: law}), or use shorter cells"
                 )
 
 
@@ -395,47 +407,6 @@ TIME_FUNCTIONS = ("time", "held", "motion", "force", "numbers")
 """Fields that are functions of time, but for the forces of controllers and functions."""
 
 
-def text_of(grid: Grid, times: Array, position: Callable[[Anchor], Array]) -> dict[str, Any]:
-    """Return the text for :func:`grid_of`; ``position`` gives a place at the times; (n+1, 2); m."""
-
-    def record(owner: Any, field: str, function: Any) -> Any:
-        """Return the record for a function that is a field of ``owner``."""
-        if field == "curve" and isinstance(owner, Member):
-            return SavedCurve.of(function, 0.0, 1.0, grid.parameters(owner))
-        if field == "curve":
-            return _used_curve(grid.scene, position, function)
-        if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
-            return SavedFunction.of(function, map(float, times))
-        return None
-
-    return {
-        "version": version(), "scene": to_data(grid.scene, record), "mesh": to_data(grid.mesh),
-        "numbering": grid.checksum(),
-    }  # fmt: skip
-
-
-def grid_of(text: dict[str, Any], scene: Scene | None) -> Grid:
-    """Make the grid of a saved solution, with its scene or another one of the same numbering."""
-    grid = Grid(from_data(text["scene"]) if scene is None else scene, from_data(text["mesh"]))
-    if grid.checksum() != text["numbering"]:
-        if scene is not None:
-            raise SceneError(
-                "it is a solution of another scene: its beams, cells, bodies or joints are others"
-            )
-        raise SceneError(
-            f"it was written by version {text['version']} of ufl_beam, which numbers degrees of "
-            f"freedom otherwise than this one, {version()}; load it with that version"
-        )
-    return grid
-
-
-def require_same(saved: Any, given: Any) -> None:
-    """Raise :class:`SceneError` unless two scenes are the same as data, see :func:`text_of`."""
-    now, then = (Description({"scene": json.loads(json.dumps(d))}).texts for d in (given, saved))
-    if differs := difference(now, then):
-        raise SceneError(f"it is a solution of another scene: {differs}")
-
-
 def of_earlier_version(content: Content, grid: Grid) -> Content:
     """Content of the formats 1 and 2 in that of this one: names, axes, rows of material."""
     old = below("history/", content)
@@ -456,13 +427,13 @@ def of_earlier_version(content: Content, grid: Grid) -> Content:
     return {**others, "begun": BEFORE in new, **above("history/", new)}
 
 
-def _used_curve(scene: Scene, position: Callable[[Anchor], Array], curve: Curve) -> SavedCurve:
+def _used_curve(solution: Solution, curve: Curve) -> SavedCurve:
     """The part of a guide curve that was used, a tenth more, and what tangents need."""
-    used = [0.0]
+    scene, used = solution.scene, [0.0]
     for link in scene.links:
         if isinstance(link.law, Guide) and link.law.curve is curve:
             s = 0.0
-            for point in position(link.b):
+            for point in solution.position(link.b):
                 s = nearest(curve, point, s, parameter_step(curve, s, scene.size), scene.size)
                 used.append(s)
     first, last = float(np.nanmin(used)), float(np.nanmax(used))

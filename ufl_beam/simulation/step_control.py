@@ -10,7 +10,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed, require_number, require_sequence
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
@@ -178,8 +177,13 @@ class AdaptiveSteps:
             simulation.keep()
 
     def _attempt(self, stop: float) -> tuple[Trial, float]:
-        """Solve the next step; also its error."""
-        simulation, inertia = self._simulation, self._simulation.inertia
+        """Solve the next step.
+
+        Also return its error: the largest of a position over the size of the scene, of a rotation,
+        or of a load.
+        """
+        simulation, supports = self._simulation, self._simulation.supports
+        inertia = simulation.inertia
         left = stop - simulation.t
         # Two equal steps to a stop in the place of a long and a tiny one
         dt = left if self._dt >= left else min(self._dt, left / 2)
@@ -196,13 +200,7 @@ class AdaptiveSteps:
         a = (inertia.velocities(trial.s, dt) - inertia.v) / dt
         jerk = (a - before) / between
         c2, c3 = inertia.scheme.error_weights()
-        error = self._size(trial, c2 * dt**2 * a + c3 * dt**3 * jerk)
-        missed = simulation.share.largest(simulation.together(self._missed, dt))
-        return trial, max(error, missed)
-
-    def _size(self, trial: Trial, error: Array) -> float:
-        """Largest error of a position over the size of the scene, or of a rotation."""
-        simulation, supports = self._simulation, self._simulation.supports
+        error = c2 * dt**2 * a + c3 * dt**3 * jerk
         error[self._turns] += (trial.q1 - simulation.q - trial.s)[self._turns]
         supports.enter(error)
         error[supports.dofs] = 0.0
@@ -211,8 +209,10 @@ class AdaptiveSteps:
         supports.leave(error)
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
         turns = np.abs(error[self._turns]).max(initial=0.0)
-        here = float(max(moves / simulation.scene.size, turns))
-        return simulation.share.largest(here)
+        missed = simulation.together(self._missed, dt)
+        return trial, simulation.share.largest(
+            float(max(moves / simulation.scene.size, turns, missed))
+        )
 
     def _missed(self, dt: float) -> float:
         """Return the error of the midpoint rule for a load, as a part of its largest impulse."""
