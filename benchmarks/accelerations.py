@@ -79,7 +79,7 @@ ACCELERATIONS = {
         "which repeats itself. Without it, a step begins at the velocity of the last one.",
         by.SHIPPED, by.VELOCITY,
         (
-            "compiled/c/prediction.c:enter_step", "compiled/c/prediction.c:compare_differences",
+            "compiled/c/march.c:enter_step", "compiled/c/march.c:compare_differences",
             "compiled/c/march.c~p->both|compare_differences",
         ),
         (ELASTIC, LARGE, SWING, HINGED, JOINTED),

@@ -78,7 +78,7 @@ def parts(simulation):
         "of it beams ": microseconds(lambda: simulation.beams[0].add_tangent(x)),
         "factor": microseconds(lambda: lib.factor_tangent(equation, failed)),
         "solve": microseconds(lambda: lib.solve_tangent(equation, 0)),
-        "sizes of forces": microseconds(lambda: lib.norm(len(r), equation.weight, at_r)),
+        "sizes of forces": microseconds(lambda: lib.norm(len(r), ffi.NULL, equation.weight, at_r)),
     }
 
 

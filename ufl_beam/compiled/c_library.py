@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 SOURCES = (
     "loops", "material_points", "rigid_plastic", "connectors", "guide_curves", "elimination",
-    "fronts", "newton", "cell_forces", "prediction", "march",
+    "fronts", "newton", "cell_forces", "march",
 )  # fmt: skip
 """Files of C beside this one; they are one translation unit."""
 

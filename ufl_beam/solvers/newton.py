@@ -267,7 +267,7 @@ class Solver:
 
     def size(self, forces: Array) -> float:
         """Euclidean norm over the scene of forces, and moments over its size; N."""
-        here = lib.norm(self._share.size, doubles(self._weights), doubles(forces))
+        here = lib.norm(self._share.size, ffi.NULL, doubles(self._weights), doubles(forces))
         return float(lib.over_processes(self.c, lib.HYPOT, here))
 
     def scale(self) -> float:

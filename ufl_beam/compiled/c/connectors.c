@@ -221,7 +221,7 @@ static double taken_by(const couplings *c, int i, const double *q)
 }
 
 /* Take the end of the step as the new state; what all have taken in it. */
-double commit_couplings(const couplings *c, const double *q, double dt)
+static double commit_couplings(const couplings *c, const double *q, double dt)
 {
   double sum = 0;
   find_motions(c, q);

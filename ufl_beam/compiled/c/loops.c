@@ -71,7 +71,7 @@ static void add_linear_strains(const predicted_strains *p, const double *about, 
 
 /* Strains at q that are linear about the configuration of the latest tangent; first those at the
  * beginning, extrapolated as the configuration is. */
-void predict_strains(predicted_strains *p, const double *q)
+static void predict_strains(predicted_strains *p, const double *q)
 {
   double *e = p->e, factor = 1;
   if (p->exact && !p->begins) memcpy(p->about, q, p->size * sizeof *q);
@@ -115,7 +115,7 @@ double value_of_cells(const cells *c, const double *q)
 }
 
 /* out = a x + b y */
-void combine(int size, double a, const double *x, double b, const double *y, double *out)
+static void combine(int size, double a, const double *x, double b, const double *y, double *out)
 {
   for (int i = 0; i < size; ++i) out[i] = a * x[i] + b * y[i];
 }
@@ -419,8 +419,9 @@ void give_back_memory(void)
 #endif
 }
 
-/* Euclidean norm of w f, also where its squares are too small or too large to have all digits. */
-static inline double norm_at(int rows, const int32_t *at, const double *w, const double *f)
+/* Euclidean norm of w f, also where its squares are too small or too large to have all digits. f has all
+ * rows, or if `at` is not null those. */
+double norm(int rows, const int32_t *at, const double *w, const double *f)
 {
   double sum = 0, largest = 0, scaled = 0;
 #define W(i) w[at ? at[i] : i]
@@ -435,16 +436,8 @@ static inline double norm_at(int rows, const int32_t *at, const double *w, const
   return largest * sqrt(scaled);
 }
 
-double norm(int rows, const double *w, const double *f) { return norm_at(rows, 0, w, f); }
-
-/* The same of some of the rows: f has their numbers, w those of all. */
-double norm_of_some(int rows, const int32_t *at, const double *w, const double *f)
-{
-  return norm_at(rows, at, w, f);
-}
-
 /* Largest displacement in q, and rotation times the size of the scene; w as for forces. */
-double largest_motion(int rows, const double *w, const double *q)
+static double largest_motion(int rows, const double *w, const double *q)
 {
   double largest = 0;
   for (int i = 0; i < rows; ++i)

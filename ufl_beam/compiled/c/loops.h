@@ -6,16 +6,10 @@
 
 /* Adds to `out`, a vector or the entries of a matrix, its part at the unknowns q. */
 typedef void (part)(void *self, const double *q, double *out);
-typedef struct {
-  part *add;
-  void *self;
-} call;
+typedef struct { part *add; void *self; } call;
 
 /* Several of them. */
-typedef struct {
-  int number;
-  const call *part;
-} calls;
+typedef struct { int number; const call *part; } calls;
 part add_calls, add_cells, add_static_tangent, subtract_vector, subtract_follower_loads,
   add_tangent_of_follower_loads, subtract_frame_forces, add_tangent_of_frame, add_step_force,
   add_step_tangent, add_inelastic_force, add_inelastic_tangent;
@@ -109,8 +103,6 @@ typedef struct {
 
 void set_cells(const cells *c, const double *q, int at);
 double value_of_cells(const cells *c, const double *q);
-void combine(int size, double a, const double *x, double b, const double *y, double *out);
-void predict_strains(predicted_strains *p, const double *q);
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
                  const int32_t *row, const int32_t *column, int32_t *found);
 int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int number, int of_cell,
@@ -120,9 +112,7 @@ int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *
 void add_product(const constant_matrix *A, const double *x, double *y);
 double quadratic_form(const constant_matrix *A, const double *x);
 void give_back_memory(void);
-double norm(int rows, const double *w, const double *f);
-double norm_of_some(int rows, const int32_t *at, const double *w, const double *f);
-double largest_motion(int rows, const double *w, const double *q);
+double norm(int rows, const int32_t *at, const double *w, const double *f);
 
 /* -- forces in cells --------------------------------------------------------------------------- */
 
@@ -328,17 +318,11 @@ typedef struct {
 
 void find_motions(const couplings *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
-void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums);
 void find_rows(const couplings *c, const double *q, double *rows);
 void ask_law(kernel *law, const double *w, int answers, double *s);
-void add_couplings_force(void *self, const double *q, double *r);
-double missed_by_couplings(void *self, const double *q, const double *r, double scale,
-                           double moved);
-double commit_couplings(const couplings *c, const double *q, double dt);
+part add_couplings_force, add_guides_force, add_guides_tangent;
 void respond(points *p);
-void release(const points *p, double least);
 void respond_at(const inelastic *m, const double *q);
-double missed_by_points(void *self, const double *q, const double *r, double scale, double moved);
 int gives_energy(const points *p);
 void commit(points *p);
 
@@ -381,9 +365,6 @@ typedef struct {
 
 int find_frames(guides *g, const double *q);
 void begin_guides_again(void *self);
-void add_guides_force(void *self, const double *q, double *r);
-void add_guides_tangent(void *self, const double *q, double *tangent);
-double missed_by_guides(void *self, const double *q, const double *r, double scale, double moved);
 
 /* -- elimination along chains ------------------------------------------------------------------ */
 
@@ -500,10 +481,9 @@ enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU says so of a singular matrix */
 
 /* How far a law is missed by an iterate q and its residual r, without dimension; scale is the size
  * of the forces, and moved the largest motion, see largest_motion. */
-typedef struct {
-  double (*missed)(void *self, const double *q, const double *r, double scale, double moved);
-  void *self;
-} demand;
+typedef double (miss)(void *self, const double *q, const double *r, double scale, double moved);
+typedef struct { miss *missed; void *self; } demand;
+miss missed_by_couplings, missed_by_points, missed_by_guides;
 
 /* Displacement of a place in axes of a support at an angle, whose cosine and sine are c and s; entries of
  * the tangent in the rows, and in the columns, of both of its degrees of freedom. */
@@ -533,10 +513,7 @@ typedef struct {
 } border;
 
 /* Functions that begin a step again: forget what iterates have tried. */
-typedef struct {
-  void (*run)(void *self);
-  void *self;
-} again_call;
+typedef struct { void (*run)(void *self); void *self; } again_call;
 
 /* The equation of a step, and how far its solution is. Unknowns and residuals are in the axes of supports. */
 typedef struct {
@@ -605,8 +582,6 @@ enum {
   SINGULAR = -3, TOO_MANY = -5, STALLED = -6, DIVERGED = -9
 };
 
-int raised_anywhere(equation *e);
-void agree(const equation *e, int number, const enum agreement *how, double *values);
 double over_processes(const equation *e, enum agreement how, double here);
 void turn_axes(int number, const turned_axes *axes, double *x, int way);
 int residual(equation *e, const double *x, double *r, void *f);
@@ -617,14 +592,13 @@ int solve_tangent(const equation *e, int reduced);
 void find_motion(equation *e, const double *x);
 void find_round_off(const equation *e, const double *q, double *forces);
 void restart(const equation *e, enum tangents kind);
-int find_equilibrium(equation *e, const double *guess);
 int snes_function(void *snes, void *x, void *f, void *self);
 int snes_jacobian(void *snes, void *x, void *A, void *P, void *self);
 int snes_newton(void *snes, void *x);
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason,
               void *self);
 
-/* -- prediction of the end of a step, see prediction.c -------------------------------------------- */
+/* -- prediction of the end of a step, see march.c ------------------------------------------------- */
 
 /* The last steps. `second` is the second difference of the configuration; in dynamics only. */
 typedef struct {
@@ -641,7 +615,6 @@ typedef struct {
   double repeated;          /* part of `second` that repeats itself */
 } prediction;
 
-int as_last(const prediction *p, double dt);
 void predict(const prediction *p, double dt, const double *q, double *out);
 void enter_step(prediction *p, double dt, const double *q, const double *q1);
 void compare_differences(prediction *p);
@@ -657,14 +630,8 @@ typedef struct {
 /* What a term does when a step begins, or is accepted: q1 is its end, s the step of the nodes. When it
  * begins both are none. */
 typedef void (phase)(void *self, const time_step *step, const double *q1, const double *s);
-typedef struct {
-  phase *run;
-  void *self;
-} phase_call;
-typedef struct {
-  int number;
-  const phase_call *call;
-} phases;
+typedef struct { phase *run; void *self; } phase_call;
+typedef struct { int number; const phase_call *call; } phases;
 
 /* A function of time: linear between points and constant outside, or one of Python. */
 typedef struct {
@@ -675,10 +642,7 @@ typedef struct {
 } time_function;
 
 /* Forms that know the configuration q0 at the beginning of a step, which they have from `at` on. */
-typedef struct {
-  const cells *form;
-  int at;
-} form_of_step;
+typedef struct { const cells *form; int at; } form_of_step;
 
 /* Forms that know a time over that of the step, in each point of a cell, which they have from `at` on. */
 typedef struct {
@@ -878,23 +842,15 @@ typedef struct {
 } force_watch;
 
 /* Energy stored and dissipated in a step, and the sum of the sizes of the works on connectors. */
-typedef struct {
-  double in_beams, in_connectors, effort;
-} energy_change;
+typedef struct { double in_beams, in_connectors, effort; } energy_change;
 
 /* Adds the part of a term in a step to q1. */
 typedef void (change_of_energy)(void *self, const double *q1, energy_change *sum);
-typedef struct {
-  change_of_energy *of;
-  void *self;
-} change_call;
+typedef struct { change_of_energy *of; void *self; } change_call;
 
 /* Whether a step to q1 may be accepted. */
 typedef int (admission)(void *self, const double *q1);
-typedef struct {
-  admission *of;
-  void *self;
-} admission_call;
+typedef struct { admission *of; void *self; } admission_call;
 
 /* Checks of static steps, see step_equation.py; and what the latest one has found. */
 typedef struct {
@@ -983,18 +939,11 @@ phase begin_forms, add_values, begin_static_tangent, begin_predicted_strains, be
   accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_frame, accept_frame, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
   accept_second_differences, begin_inertia, accept_inertia, add_kinetic_energy, begin_rayleigh,
-  accept_rayleigh, begin_inelastic, accept_inelastic, add_energy_of_points;
-void begin_couplings(void *self, const time_step *step, const double *q1, const double *s);
+  accept_rayleigh, begin_inelastic, accept_inelastic, add_energy_of_points, begin_couplings,
+  accept_couplings, add_energy_of_couplings, begin_guides, accept_guides;
 void begin_couplings_again(void *self);
-void accept_couplings(void *self, const time_step *step, const double *q1, const double *s);
-void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s);
-void begin_guides(void *self, const time_step *step, const double *q1, const double *s);
-void accept_guides(void *self, const time_step *step, const double *q1, const double *s);
-int points_dissipate(void *self, const double *q1);
-int springs_dissipate(void *self, const double *q1);
-void change_of_form(void *self, const double *q1, energy_change *sum);
-void change_of_points(void *self, const double *q1, energy_change *sum);
-void change_of_couplings(void *self, const double *q1, energy_change *sum);
+admission points_dissipate, springs_dissipate;
+change_of_energy change_of_form, change_of_points, change_of_couplings;
 double value_at(const time_function *f, double t);
 void keep_state(const march *m, double *row);
 int solve_begun_step(march *m, int hold);

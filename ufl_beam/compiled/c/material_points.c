@@ -359,7 +359,7 @@ void respond(points *p)
 }
 
 /* Let the closed points open, in this step, whose excess in the latest response is so large. */
-void release(const points *p, double least)
+static void release(const points *p, double least)
 {
   double s[3 + 9], *w = p->w;
   for (int i = 0; i < p->cells * p->of_cell; ++i, w += p->width) {

@@ -7,7 +7,7 @@
 /* -- processes that share a scene -------------------------------------------------------------- */
 
 /* Replace numbers by those of all processes. */
-void agree(const equation *e, int number, const enum agreement *how, double *values)
+static void agree(const equation *e, int number, const enum agreement *how, double *values)
 {
   if (e->agree) e->agree(e->handle, number, (const int *)how, values);
 }
@@ -21,7 +21,7 @@ double over_processes(const equation *e, enum agreement how, double here)
 /* Norm over the scene of forces, and moments over its size, at the degrees of freedom of this process. */
 static double norm_of(const equation *e, const double *forces)
 {
-  return over_processes(e, HYPOT, norm(e->size, e->weight, forces));
+  return over_processes(e, HYPOT, norm(e->size, 0, e->weight, forces));
 }
 
 static int exchange_ghosts(const equation *e, void *v, int mode, int way)
@@ -36,7 +36,7 @@ static int update_ghosts(const equation *e, void *v) { return exchange_ghosts(e,
 static int add_ghosts(const equation *e, void *v) { return exchange_ghosts(e, v, ADD_VALUES, REVERSE); }
 
 /* What a function of a user has raised on any process, see enum raised; all know it then. */
-int raised_anywhere(equation *e) { return e->raised = (int)over_processes(e, LARGEST, e->raised); }
+static int raised_anywhere(equation *e) { return e->raised = (int)over_processes(e, LARGEST, e->raised); }
 
 /* -- supports at an angle ---------------------------------------------------------------------- */
 
@@ -73,7 +73,7 @@ static void turn_entries(double *data, int number, const int32_t *first, const i
 /* What is asked of the internal forces, which r consists of so far. */
 static void note_inner_forces(equation *e, const double *r)
 {
-  e->inner_size = norm(e->size, e->weight, r);
+  e->inner_size = norm(e->size, 0, e->weight, r);
   if (e->inner_force) memcpy(e->inner_force, r, e->size * sizeof *r);
 }
 
@@ -240,7 +240,7 @@ void find_motion(equation *e, const double *x)
 static int verdict(equation *e, const double *x, int iteration)
 {
   const enum agreement how[] = {HYPOT, HYPOT, LARGEST, LARGEST};
-  const double here = norm(e->size, e->weight, e->residual), switched = e->demanding ? *e->switched : 0;
+  const double here = norm(e->size, 0, e->weight, e->residual), switched = e->demanding ? *e->switched : 0;
   double of_all[] = {here, e->inner_size, e->raised, switched};
   agree(e, 4, how, of_all);
   const double now = of_all[0], scale = e->loads + of_all[1];
@@ -538,7 +538,7 @@ static int stiffen(equation *e, int stiff)
 
 /* Find the unknowns at which the residual vanishes from a guess; the reason to end is the return value,
  * positive if they are found. */
-int find_equilibrium(equation *e, const double *guess)
+static int find_equilibrium(equation *e, const double *guess)
 {
   e->error = 0;
   if (e->border) return iterate_from(e, guess, PATIENCE_ALONG, FIRST);

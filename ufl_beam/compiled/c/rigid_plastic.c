@@ -80,7 +80,7 @@ double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, co
 
 /* Take the motions e1 as the new state, those of held connectors as they were; sums get what the step
  * dissipated and lost numerically, and what the connectors store. */
-void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums)
+static void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums)
 {
   double *w = p->w, s[SLIP_OUTPUTS];
   memset(sums, 0, 3 * sizeof *sums);
