@@ -312,10 +312,8 @@ class Copies:
         if not self.several:
             return
         self._comm = duplicate(comm)
-        scales: Array = np.full(share.size, 1 / share.grid.scene.size)
-        scales[share.rotations] = 1.0
-        scales[share.multipliers] = 0.0
-        self._weights = scales * np.random.default_rng(0).uniform(0.5, 1.0, len(scales))
+        random = np.random.default_rng(0).uniform(0.5, 1.0, share.size)
+        self._weights: Array = share.grid.scales[share.dofs] * random
         self._sum = self._size = self._times = 0.0
         self._steps, self._compared = 0, 0
         _left[:] = [one for one in _left if not one[0].Test()]

@@ -119,9 +119,7 @@ def metric(share: Share) -> Array:
     what a process owns does, so that sums over the processes are right.
     """
     grid = share.grid
-    weights = np.full(share.size, 1 / grid.scene.size**2)
-    weights[share.rotations] = 1.0
-    weights[share.multipliers] = 0.0
+    weights = grid.scales[share.dofs] ** 2
     weights[share.num_owned :] = 0.0
     return np.asarray(weights / (grid.size - len(grid.multipliers)))
 

@@ -109,7 +109,7 @@ class Shapes(Rich, ABC):
         states = np.ascontiguousarray(self.q + swing)
         share = Share(self.grid, MPI.COMM_SELF)
         fields, r = Fields(share), np.zeros(share.size)
-        form = fields.hot_kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
+        form = fields.kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
         forces_of, cells = CellForces(share, [InCells(lambda: form, lib.STRESS, fields.order)]), []
         for q in states:
             form.add(q, r)

@@ -126,16 +126,6 @@ def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
     return indices, indptr.copy()
 
 
-def as_slice(index: Index) -> Index | slice:
-    """Return the slice that selects the same as ``index``, if there is one: slices copy nothing."""
-    if len(index) < 2:
-        return index
-    steps = np.unique(np.diff(index))
-    if len(steps) > 1 or steps[0] <= 0:
-        return index
-    return slice(int(index[0]), int(index[-1]) + 1, int(steps[0]))
-
-
 class Product:
     """Operator ``x -> A x`` on this process, without the zeros that ``A`` stores.
 

@@ -56,7 +56,13 @@ class Grid:
         require_kind(mesh, Mesh, "mesh")
         self.scene, self.mesh, beams = scene, mesh, scene.beams
         self._number_of_beam: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
-        self._parameters = self._divide()
+        self._parameters: list[Array] = []
+        of_kind: dict[object, Array] = {}  # beams alike have one array of parameters
+        for beam, attached in scene.attached.items():
+            kind = beam.cells, beam.corners, frozenset(attached) - {0.0, 1.0}
+            if kind not in of_kind:
+                of_kind[kind] = np.array(mesh.vertices(beam, attached))
+            self._parameters.append(of_kind[kind])
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self.first_vertices = np.concatenate([[0], np.cumsum(counts)])
         self._first_cells = self.first_vertices - np.arange(len(beams) + 1)
@@ -80,17 +86,6 @@ class Grid:
         self._add_hinges([place_of(hinge) for hinge in scene.hinges])
         self._number()
         scene.release()
-
-    def _divide(self) -> list[Array]:
-        """Return the parameters of the vertices of each beam; beams alike have one array."""
-        of_kind: dict[object, Array] = {}
-        found = []
-        for beam, attached in self.scene.attached.items():
-            kind = beam.cells, beam.corners, frozenset(attached) - {0.0, 1.0}
-            if kind not in of_kind:
-                of_kind[kind] = np.array(self.mesh.vertices(beam, attached))
-            found.append(of_kind[kind])
-        return found
 
     def __str__(self) -> str:
         scene = self.scene
@@ -338,6 +333,17 @@ class Grid:
     def rotations(self) -> Index:
         """Degrees of freedom that are rotations, those that joints share once."""
         return np.unique(np.r_[self.dofs[:, 2], self.dofs_of_bodies[:, 2]])
+
+    @property
+    def scales(self) -> Array:
+        """Factors of comparable motions: 1 over the size of the scene, 1 for rotations; (size,).
+
+        Forces of connectors have 0.
+        """
+        scales = np.full(self.size, 1 / self.scene.size)
+        scales[self.rotations] = 1.0
+        scales[self.multipliers] = 0.0
+        return scales
 
     @cached_property
     def dofs_of_links(self) -> Index:

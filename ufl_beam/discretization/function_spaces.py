@@ -148,37 +148,40 @@ class Fields:
         self._matrix: Csr | None = None
         self.element = element_of(share.grid.mesh)
 
-    def kernel(self, form: ufl.Form, unknown: fem.Function) -> Kernel:
-        """A form on the cells, compiled; ``unknown`` is the configuration that changes."""
-        return self._with_sections(Kernel(form, unknown, self.cell_dofs, self._coordinates()))
+    def kernel(
+        self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index | None = None, *,
+        several: bool = True,
+    ) -> Kernel:  # fmt: skip
+        """A form on the cells, compiled.
 
-    def hot_kernel(
-        self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index | None = None
-    ) -> Kernel:
-        """Such a form, several cells at once; ``cell_dofs`` if not all are unknown."""
+        It has the numbers of the sections of the cells.
+
+        Args:
+            form: Cell integrals with one quadrature rule.
+            unknown: The configuration that changes.
+            cell_dofs: Its degrees of freedom, if not all of the cells are unknown.
+            several: Whether to compute several cells at once, if that is possible.
+        """
         dofs = self.cell_dofs if cell_dofs is None else cell_dofs
-        coordinates = self._coordinates(), self._coordinates_in_lanes
-        return self._with_sections(Kernel(form, unknown, dofs, *coordinates))
-
-    def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
-        """Kernels of a virtual work and of its derivative, for ``A``, that share coefficients."""
-        forms = work, derivative(work, q1)
-        coordinates = self._coordinates(), self._coordinates_in_lanes
-        force, tangent = (Kernel(form, q1, self.cell_dofs, *coordinates) for form in forms)
-        if force.lanes != tangent.lanes:  # they would not share numbers
-            force, tangent = (Kernel(form, q1, self.cell_dofs, coordinates[0]) for form in forms)
-        self._with_sections(force)
-        if not tangent.share(force):
-            raise ValueError("force and tangent do not have the same coefficients")
-        tangent.place(A)
-        return force, tangent
-
-    def _with_sections(self, kernel: Kernel) -> Kernel:
-        """A kernel with the numbers of the sections that its form has."""
+        lanes = self._coordinates_in_lanes if several else None
+        kernel = Kernel(form, unknown, dofs, self._coordinates(), lanes)
         for function in (self.element.stiffness, self.element.inertia):
             if kernel.uses(function):
                 kernel.put(function, self.of_sections(function))
         return kernel
+
+    def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
+        """Kernels of a virtual work and of its derivative, for ``A``, that share coefficients."""
+        form, lanes = derivative(work, q1), self._coordinates_in_lanes
+        force = self.kernel(work, q1)
+        tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), lanes)
+        if force.lanes != tangent.lanes:  # they would not share numbers
+            force = self.kernel(work, q1, several=False)
+            tangent = Kernel(form, q1, self.cell_dofs, self._coordinates())
+        if not tangent.share(force):
+            raise ValueError("force and tangent do not have the same coefficients")
+        tangent.place(A)
+        return force, tangent
 
     def _coordinates(self) -> Array:
         """Vertices of the cells; (num_cells, 2, 2); m."""
@@ -207,7 +210,7 @@ class Fields:
     def assembled(self, form: ufl.Form) -> Csr:
         """A new matrix with a bilinear form of the undeformed scene."""
         matrix = self.matrix()
-        kernel = self.kernel(form, self.element.q1)
+        kernel = self.kernel(form, self.element.q1, several=False)
         kernel.place(matrix)
         kernel.add(np.zeros(self.share.size), matrix.data)
         return matrix
@@ -233,7 +236,7 @@ def mass_form(of: Element) -> ufl.Form:
 def mass_kernel(fields: Fields) -> Kernel:
     """Mass of the beams times a vector, the unknown q1."""
     q1 = fields.element.q1
-    return fields.hot_kernel(applied(mass_form(fields.element), q1), q1)
+    return fields.kernel(applied(mass_form(fields.element), q1), q1)
 
 
 def lumps(scene: Scene) -> list[tuple[Anchor, float, float]]:
@@ -266,7 +269,7 @@ class Strains:
     """
 
     def __init__(self, fields: Fields) -> None:
-        self.kernel = fields.hot_kernel(_weighted_strains(fields.element), fields.element.q1)
+        self.kernel = fields.kernel(_weighted_strains(fields.element), fields.element.q1)
         self.weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
         self.shape = (len(fields.order), len(self.weights))
 
@@ -293,7 +296,7 @@ def _section_forces(of: Element) -> ufl.Form:
 
 def section_forces(fields: Fields) -> Kernel:
     """(N, V, M) in the cells were they elastic, from the strains of a configuration, P(7)."""
-    return fields.kernel(_section_forces(fields.element), fields.element.q1)
+    return fields.kernel(_section_forces(fields.element), fields.element.q1, several=False)
 
 
 # -- the cells as a mesh of DOLFINx ----------------------------------------------------------------

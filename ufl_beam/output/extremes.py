@@ -99,7 +99,7 @@ class ExtremesInC:
     ) -> None:  # fmt: skip
         size, works = fields.share.size, bool(fields.share.grid.scene.works)
         of = along_cells(fields.element, tuple(map(float, parts)), works)
-        self._kernel = fields.hot_kernel(of.form, of.motions, fields.cell_dofs[:, -of.moves :])
+        self._kernel = fields.kernel(of.form, of.motions, fields.cell_dofs[:, -of.moves :])
         _, self._lanes, spare = self._kernel.keep_entries()
         self._cells, self._points, self._forces = len(along.angles), len(parts), cell_forces
         sizes = spare.size, size

@@ -144,11 +144,9 @@ def _near_limit(equation: StepEquation, solution: Solution, q0: Array, near: Arr
 
 def _near(equation: StepEquation, q0: Array, q1: Array) -> Array:
     """A state on the way from ``q0`` to ``q1``, at most :data:`NEAR` away."""
-    share, size = equation.share, equation.share.grid.scene.size
-    way = np.abs(q1 - q0)
-    way[share.multipliers] = 0.0
-    way[share.rotations] *= size
-    far = share.largest(float(way.max(initial=0.0))) / size
+    share = equation.share
+    way = np.abs(q1 - q0) * share.grid.scales[share.dofs]
+    far = share.largest(float(way.max(initial=0.0)))
     return np.asarray(q0 + min(1.0, NEAR / far) * (q1 - q0)) if 0 < far < np.inf else q0
 
 
@@ -164,11 +162,7 @@ def _singularity(equation: StepEquation, q: Array) -> str:
         return ""
     x: Array = np.zeros(grid.size)
     x[free], size = vectors[:, -1], sizes[-1]
-    motions = np.abs(x)
-    turns = np.zeros(grid.size, dtype=bool)
-    turns[grid.rotations] = True
-    motions[~turns] /= scene.size
-    motions[grid.multipliers] = 0.0
+    motions = np.abs(x) * grid.scales
     largest = float(motions.max())
     if not np.isfinite(largest):
         return ""

@@ -418,10 +418,9 @@ class StaticPath:
             supports.take()
         changes = [one.change for one in equation.phases if one.change is not None]
         parts = ledger.state, ledger.supplied, ledger.lost
-        per_far = np.full(share.size, 1 / share.grid.scene.size)
-        per_far[share.rotations] = 1.0
         self.c = struct(
-            "static_path", slack=scheme.slack, far=FAR, kink=KINK, per_far=per_far,
+            "static_path", slack=scheme.slack, far=FAR, kink=KINK,
+            per_far=share.grid.scales[share.dofs],
             force=self.force, terms=len(changes), weight_of_before=scheme.weight_of_before,
             change=ffi.new("change_call[]", changes), accounts=len(parts),
             account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),

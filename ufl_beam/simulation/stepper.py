@@ -265,13 +265,9 @@ class Stepper(StateView):
         newton.forget_idle()
         if equation.respond_at(self._copy(q1)):
             K, free = free_matrix(self.share, equation.A, self.supports.dofs)
-            lengths = np.full(grid.size, grid.scene.size)
-            lengths[grid.rotations] = 1.0
-            moves = np.ones(grid.size)
-            moves[grid.multipliers] = 0.0
-            x = null_vectors(K)[1][:, -1]
-            motion = np.abs(x * moves[free] / lengths[free]).max()
-            forces = np.linalg.norm((K @ x) * moves[free] * lengths[free])
+            x, scales = null_vectors(K)[1][:, -1], grid.scales[free]
+            motion = np.abs(x * scales).max()
+            forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
             if forces <= HELD * newton.scale() * grid.scene.size * motion:
                 raise SceneError(f"{loose}The loads do not hold it either. {INSTEAD}")
         self._loose = ""

@@ -108,10 +108,7 @@ def hold_idle_motions(
         _, vectors = null_vectors(K)
     except (np.linalg.LinAlgError, RuntimeError):
         return False
-    radians = np.full(grid.size, 1 / grid.scene.size)
-    radians[grid.rotations] = 1.0
-    radians[grid.multipliers] = 0.0
-    motions = radians[free, None] * vectors
+    motions = grid.scales[free, None] * vectors
     # One degree of freedom of each motion, such that these motions are independent there.
     pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
     found = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]

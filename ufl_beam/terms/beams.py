@@ -45,11 +45,11 @@ class OfForms(Term):
         if tangent is None:
             self._force, tangent = fields.force_and_tangent(work, self._q1, A)
         else:
-            self._force = fields.hot_kernel(work, self._q1)
+            self._force = fields.kernel(work, self._q1)
         force = self._force
         self.loops = loop("add_cells", force.cells), loop("add_cells", tangent.cells)
         self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
-        self._losses = [fields.hot_kernel(form, self._q1) for form in losses]
+        self._losses = [fields.kernel(form, self._q1) for form in losses]
         self._of_step = [force, *(loss for loss in self._losses if not loss.share(force))]
         if losses:
             ledger.lost[self._entry] += 0.0
@@ -93,7 +93,7 @@ class PredictedStrains:
 
     def __init__(self, fields: Fields) -> None:
         form, about = _linear_strains(fields.element)
-        self._form = fields.hot_kernel(form, fields.element.q1)
+        self._form = fields.kernel(form, fields.element.q1)
         weights = fields.share.grid.mesh.point_weights.repeat(3)
         last, change = np.zeros((2, fields.share.size))
         self.c = struct(
@@ -143,7 +143,7 @@ class Cells(Term):
         """The kernel of one of :func:`_works`, compiled when it is first asked for."""
         forms, kernels = self._derivatives
         if name not in kernels:
-            kernels[name] = self._fields.kernel(forms[name], self._q1)
+            kernels[name] = self._fields.kernel(forms[name], self._q1, several=False)
             if name == "matrix":
                 kernels[name].place(self._A)
         kernel = kernels[name]
@@ -215,14 +215,14 @@ class ElasticBeams(OfForms, Cells):
         forms, q1, tangent = elastic_forms(fields.element, scheme), fields.element.q1, None
         if not has_inertia(scheme):
             form, e = _static_tangent(fields.element, scheme)
-            tangent, self.predicted = fields.hot_kernel(form, q1), PredictedStrains(fields)
+            tangent, self.predicted = fields.kernel(form, q1), PredictedStrains(fields)
             tangent.place(A)
             self._static = struct(
                 "static_tangent", predicted=self.predicted.c, tangent=tangent.cells,
                 at_e=tangent.position(e),
             )  # fmt: skip
         super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
-        self._work_form, self._stored = forms.work, fields.hot_kernel(forms.stored, q1)
+        self._work_form, self._stored = forms.work, fields.kernel(forms.stored, q1)
         self._stored.share(self._force)
         if tangent is not None:
             self._of_step.append(tangent)
@@ -296,7 +296,7 @@ class InelasticBeams(Cells):
         self._q0, self._q1 = fields.element.q0, fields.element.q1
         self._b, self._D, self._fields, self._work_form = forms.b, forms.D, fields, forms.around
         self._force, self._tangent = (
-            fields.hot_kernel(form, self._q1) for form in (forms.work, forms.tangent)
+            fields.kernel(form, self._q1) for form in (forms.work, forms.tangent)
         )
         self._tangent.place(A)
         self.must_dissipate = layout.kind.law.must_dissipate

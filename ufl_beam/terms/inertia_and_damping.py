@@ -310,7 +310,7 @@ class RayleighForces(Term):
         at, q1 = (fields.order, self._times.rate), fields.element.q1
 
         def stiffness() -> Kernel:
-            return fields.hot_kernel(applied(form, q1), q1)
+            return fields.kernel(applied(form, q1), q1)
 
         self.in_cells = [
             InCells(stiffness, lib.STRESS, *at, damping.stiffness),

@@ -10,7 +10,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, struct
-from ufl_beam.compiled.csr import Csr, as_slice
+from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.mechanics.time_schemes import Scheme, Step
@@ -54,7 +54,6 @@ class Supports:
         self.turned, self.axes, self._alive = len(turned), ffi.new("turned_axes[]", turned), turned
         self.dofs = np.array(sorted(held), dtype=np.int64)
         self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
-        self._held = as_slice(self.dofs)
         is_held = np.zeros(A.size, dtype=bool)
         is_held[self.dofs] = True
         of_columns, of_rows = np.flatnonzero(is_held[A.indices]), A.entries_of(self.dofs)
@@ -108,14 +107,14 @@ class Supports:
     def hold(self, r: Array) -> None:
         """Note the reactions in a residual that is complete, and remove them from it."""
         if len(self.dofs):
-            self.reactions[:] = r[self._held]
-            r[self._held] = 0.0
+            self.reactions[:] = r[self.dofs]
+            r[self.dofs] = 0.0
 
     def stop(self, v: Array) -> None:
         """Set velocities of what does not move to zero, in place; else they would ring."""
         self.enter(v)
         moving = v[self.moving]
-        v[self._held] = 0.0
+        v[self.dofs] = 0.0
         v[self.moving] = moving
         self.leave(v)
 
@@ -130,16 +129,16 @@ class Supports:
     def carry_on(self, memory: Memory, q: Array) -> None:
         """Save or restore the reactions."""
         reactions: Array = np.zeros(len(q))
-        reactions[self._held] = self._before
-        self.reactions[:] = memory.at_dofs("reactions", reactions)[self._held]
+        reactions[self.dofs] = self._before
+        self.reactions[:] = memory.at_dofs("reactions", reactions)[self.dofs]
         self.take()
 
     def remember(self, memory: Memory, q: Array) -> None:
         """The reactions, and what stands for what is held in the tangent."""
         self.carry_on(memory, q)
         pivots = np.zeros(len(q))
-        pivots[self._held] = self.pivots
-        self.pivots[:] = memory.at_dofs("pivots", pivots)[self._held]
+        pivots[self.dofs] = self.pivots
+        self.pivots[:] = memory.at_dofs("pivots", pivots)[self.dofs]
 
 
 def _turned_axes(dofs: Index, angle: float, A: Csr) -> tuple[Any, ...]:

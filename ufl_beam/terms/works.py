@@ -49,9 +49,7 @@ class Acting:
         tangent = None if stated.tangent.empty() else stated.tangent
         forms = stated.residual, tangent, stated.energy, stated.lost
         try:
-            made: list[Any] = [
-                form and fields.hot_kernel(form, fields.element.q1) for form in forms
-            ]
+            made: list[Any] = [form and fields.kernel(form, fields.element.q1) for form in forms]
         except Exception as error:
             raise SceneError(f"{work}: its form cannot be compiled: {shorten(error)}") from error
         self.residual: Kernel = made[0]
@@ -118,7 +116,7 @@ class Acting:
         form = expand_derivatives(ufl.derivative(self._stated.tangent, of.q1, u))
         if form.empty():
             return None, u
-        change = self._fields.hot_kernel(form, of.q1)
+        change = self._fields.kernel(form, of.q1)
         change.place(self._A)
         return change, u
 
