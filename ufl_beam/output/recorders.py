@@ -36,71 +36,18 @@ from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.inertia_and_damping import Inertia
 
 
-class StateView(ABC):
+class PresentState(ABC):
     """State at the present time, by objects of the scene; all processes call methods together."""
 
     scene: Scene
-    comm: MPI.Intracomm  # all processes of the run
-    scheme: Scheme
     grid: Grid
-    share: Share  # degrees of freedom of this process
-    fields: Fields
+    scheme: Scheme
     t: float  # s
-    parameter: Parameter  # words for `t`: time, or the load factor of a path
-    parts: int  # steps so far, parts of cut steps counted each
-    cell_forces: CellForces
-    inertia: Inertia
-    inelastic: list[InelasticBeams]
-    solver: Solver  # Newton's method
-    controllers: Any  # `Controllers` of the simulation
 
     @property
     @abstractmethod
     def now(self) -> States:
         """The present state, read as a solution; all processes call it together."""
-
-    @property
-    @abstractmethod
-    def q(self) -> Array:
-        """Configuration at the local degrees of freedom."""
-
-    @property
-    @abstractmethod
-    def q_before(self) -> Array:
-        """That at the beginning of the last step."""
-
-    @property
-    def asked(self) -> dict[Connector, float]:
-        """Forces of controllers, and limits of friction; N or N m."""
-        numbers: Any = self.controllers.numbers
-        return dict(zip(self.controllers.at, numbers.tolist(), strict=True))
-
-    @property
-    def iterations(self) -> int:
-        """Newton iterations so far."""
-        return int(self.solver.c.total)
-
-    @property
-    def snes(self) -> Any:
-        """SNES that solves the steps, of petsc4py; it takes monitors, histories and other methods.
-
-        From when it is asked for, steps are solved by PETSc's ``newtonls``, also in the compiled
-        path, where an equivalent method in C is faster for few cells.  Its norms add forces (N),
-        moments (N m) and what connectors miss; convergence is judged by :class:`Newton`'s ``rtol``.
-        Monitors are also called in line searches and along paths.
-
-        Example:
-            >>> simulation, norms = ub.Simulation(scene, ub.Midpoint()), []
-            >>> simulation.snes.setMonitor(lambda snes, iteration, norm: norms.append(norm))
-            >>> simulation.step_to(0.05)
-            >>> len(norms) == simulation.iterations + 1
-            True
-        """
-        return self.solver.snes
-
-    def velocities(self) -> list[Array]:
-        """Velocities at the local degrees of freedom; none in statics."""
-        return [self.inertia.v] if has_inertia(self.scheme) else []
 
     def entries(self) -> tuple[dict[str, float], ...]:
         """The ledger over all processes: state, supplied, lost; J."""
@@ -156,6 +103,64 @@ class StateView(ABC):
         They belong to the equation of the last step, see :meth:`Solution.diagram`.
         """
         return np.asarray(self.now.cell_forces(0)[:, 0])
+
+
+class StateView(PresentState):
+    """State of a run, as recorders and controllers see it."""
+
+    comm: MPI.Intracomm  # all processes of the run
+    share: Share  # degrees of freedom of this process
+    fields: Fields
+    parameter: Parameter  # words for `t`: time, or the load factor of a path
+    parts: int  # steps so far, parts of cut steps counted each
+    cell_forces: CellForces
+    inertia: Inertia
+    inelastic: list[InelasticBeams]
+    solver: Solver  # Newton's method
+    controllers: Any  # `Controllers` of the simulation
+
+    @property
+    @abstractmethod
+    def q(self) -> Array:
+        """Configuration at the local degrees of freedom."""
+
+    @property
+    @abstractmethod
+    def q_before(self) -> Array:
+        """That at the beginning of the last step."""
+
+    @property
+    def asked(self) -> dict[Connector, float]:
+        """Forces of controllers, and limits of friction; N or N m."""
+        numbers: Any = self.controllers.numbers
+        return dict(zip(self.controllers.at, numbers.tolist(), strict=True))
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations so far."""
+        return int(self.solver.c.total)
+
+    @property
+    def snes(self) -> Any:
+        """SNES that solves the steps, of petsc4py; it takes monitors, histories and other methods.
+
+        From when it is asked for, steps are solved by PETSc's ``newtonls``, also in the compiled
+        path, where an equivalent method in C is faster for few cells.  Its norms add forces (N),
+        moments (N m) and what connectors miss; convergence is judged by :class:`Newton`'s ``rtol``.
+        Monitors are also called in line searches and along paths.
+
+        Example:
+            >>> simulation, norms = ub.Simulation(scene, ub.Midpoint()), []
+            >>> simulation.snes.setMonitor(lambda snes, iteration, norm: norms.append(norm))
+            >>> simulation.step_to(0.05)
+            >>> len(norms) == simulation.iterations + 1
+            True
+        """
+        return self.solver.snes
+
+    def velocities(self) -> list[Array]:
+        """Velocities at the local degrees of freedom; none in statics."""
+        return [self.inertia.v] if has_inertia(self.scheme) else []
 
     @property
     def may_break(self) -> bool:

@@ -16,8 +16,10 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
 from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import SceneError, require_number
-from ufl_beam.model.bodies import Anchor, Member, Place
+from ufl_beam.model.bodies import Anchor, Member, Place, Spot, arm
+from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.functions import nearest, parameter_step, tangent
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
@@ -29,10 +31,8 @@ from ufl_beam.output.postprocessing import (
     JointHistory,
     Material,
     links_of,
-    motion_of,
-    of_joint,
-    position_of,
     turned,
+    values_at,
     velocity_of,
 )
 from ufl_beam.output.state_rows import (
@@ -254,7 +254,10 @@ class States:
         Raises:
             SceneError: The beam of the place is not in the scene.
         """
-        return motion_of(self.grid, place, self.column("q"))
+        motion = values_at(self.grid, place, self.column("q"))
+        if isinstance(place, Spot):
+            motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
+        return motion
 
     def velocity(self, place: Anchor) -> Array:
         """Velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
@@ -268,7 +271,10 @@ class States:
 
     def position(self, place: Anchor) -> Array:
         """Coordinates of a place; (n+1, 2); m."""
-        return position_of(self.grid, place, self.column("q"))
+        if isinstance(place, Spot):
+            return np.asarray(place.point + self.displacement(place)[:, :2])
+        nodes, weights = self.grid.weights(place)
+        return np.asarray(weights @ self.grid.points[nodes] + self.displacement(place)[:, :2])
 
     def shape(self, beam: Member, n: int = -1) -> Array:
         """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
@@ -291,8 +297,45 @@ class States:
         Raises:
             SceneError: It is not in the scene.
         """
-        forces = self.column("connectors")[:, :, FORCE]
-        return of_joint(self.grid, joint, self.column("q"), forces)
+        numbers, (a, b, *_) = links_of(self.scene, joint), joint.places
+        if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
+            raise SceneError(
+                f"{joint}: {a} and {b} share unknowns, so that the force between them is not "
+                "known; make it with measured=True"
+            )
+        turns = [self.displacement(place)[:, 2] for place in (a, b)]
+        between = self.position(b) - self.position(a)
+        apart = np.subtract(b.point, a.point)
+        motion = np.column_stack([turned(between, -turns[0]) - apart, turns[1] - turns[0]])
+        force, moment = np.zeros((len(self), 2)), np.zeros(len(self))
+        if 2 in joint.shared:
+            moment[:] = np.nan
+        forces = self.column("connectors")[:, numbers, FORCE].T
+        for k, holder in enumerate(joint.holders):
+            if {holder.a, holder.b} != {a, b}:
+                continue
+            λ = forces[k] if holder.b == b else -forces[k]
+            if holder.turns:
+                moment -= λ
+            else:
+                force -= λ[:, None] * self._direction(holder, turns[0])
+        in_a, in_b = (turned(force, -turn) for turn in turns)
+        return JointHistory(motion, force, in_a, in_b, moment)
+
+    def _direction(self, holder: Connector, turn: Array) -> Array:
+        """Unit vectors in the plane along which a motion grows; (n+1, 2)."""
+        if holder.stretches:
+            between = self.position(holder.b) - self.position(holder.a)
+            return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
+        if isinstance(holder.law, Guide):
+            curve, s, size, normals = holder.law.curve, 0.0, self.scene.size, []
+            for point in self.position(holder.b):
+                step = parameter_step(curve, s, size)
+                s = nearest(curve, point, s, step, size)
+                x, y = tangent(curve, s, step)
+                normals.append((-y, x))
+            return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
+        return turned(holder.axis, turn if holder.follows_a else np.zeros_like(turn))
 
     def reaction(self, support: Support) -> Array:
         """Force and moment of a support on the scene; (n+1, 3); N, N, N m.

@@ -19,7 +19,6 @@ from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import nearest, parameter_step, tangent
 from ufl_beam.model.scene import Scene, spots_of
-from ufl_beam.output.postprocessing import motion_of
 from ufl_beam.output.states import States
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
@@ -135,9 +134,9 @@ class Stage:
         grid, kept = self._solution.grid, len(self._solution.times)
         if not -kept <= n < kept:
             raise SceneError(f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}")
-        q = self._solution.q[n]
-        nodes = grid.points + self.magnify * q[grid.dofs[:, :2]]
-        return Pose(self, lambda anchor: motion_of(grid, anchor, q[None])[0], nodes)
+        state = self._solution.part(n % kept, n % kept + 1)
+        nodes = grid.points + self.magnify * state.q[0, grid.dofs[:, :2]]
+        return Pose(self, lambda anchor: state.displacement(anchor)[0], nodes)
 
     def poses(self) -> Iterator[Pose]:
         """Iterate over the undeformed pose and all that are shown."""

@@ -19,19 +19,18 @@ from petsc4py import PETSc
 import numpy as np
 from scipy.sparse import csr_array
 
-from ufl_beam.arrays import Array, State
+from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.errors import SceneError, StepFailed
+from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia, nodal_step
-from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connector_laws import Controller, Coulomb, rubs
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.constraint_checks import friction_repeats
-from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import RotatingFrame
-from ufl_beam.model.supports import Support
-from ufl_beam.output.postprocessing import links_of, motion_of, velocity_of
-from ufl_beam.output.state_rows import BEFORE, FORCES, Connection
+from ufl_beam.output.postprocessing import turned
+from ufl_beam.output.recorders import PresentState
+from ufl_beam.output.state_rows import BEFORE, FORCES, Block, Columns
+from ufl_beam.output.states import States
 from ufl_beam.reference.beams import (
     ElasticBeams,
     Inertia,
@@ -76,7 +75,7 @@ MISSED = 1e-9
 REASONS = PETSc.SNES.ConvergedReason
 
 
-class Solver:
+class Solver(PresentState):
     """State of a scene, and the step to the next; controllers see it as the running simulation.
 
     Args:
@@ -540,23 +539,6 @@ class Solver:
 
     # -- the state, by objects of the scene ------------------------------------------------------
 
-    def displacement(self, place: Anchor) -> Array:
-        """Displacement and rotation (u, v, ψ) of a place; (3,); m, m, rad."""
-        return np.asarray(motion_of(self.grid, place, self.q[None])[0])
-
-    def velocity(self, place: Anchor) -> Array:
-        """Velocity (du/dt, dv/dt, dψ/dt) of a place; (3,); m/s, m/s, rad/s.
-
-        Raises:
-            SceneError: The run is static.
-        """
-        if self.inertia is None:
-            raise SceneError(
-                f"velocity of {place}: the run is static; there is none. A controller for both "
-                "kinds of runs can ask now.scheme.dynamic"
-            )
-        return np.asarray(velocity_of(self.grid, place, self.q[None], self.inertia.v[None])[0])
-
     def connections(self) -> Array:
         """Columns of ``Connection`` for all links; (num_links, 5)."""
         table = np.zeros((len(self.scene.links), 5))
@@ -564,33 +546,12 @@ class Solver:
             table[one.numbers] = one.kept(self.q)
         return table
 
-    def connector(self, connector: Connector) -> Connection:
-        """Motion, force, work and rate of a connector at the end of the last step.
-
-        Raises:
-            SceneError: It is not in the scene.
-        """
-        (number,) = links_of(self.scene, connector)
-        return Connection(*self.connections()[number].tolist())
-
-    def press(self, joint: Joint | Support) -> float:
-        """Size of the force of a joint or a support at the end of the last step; N.
-
-        Raises:
-            SceneError: The joint shares its displacement; make it with ``measured=True``.
-        """
-        if isinstance(joint, Support):
-            force = self.supports.forces()[self.scene.supports.index(joint)]
-            return float(np.linalg.norm(force[:2]))
-        links = self.scene.links
-        numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
-        return float(np.linalg.norm(self.connections()[numbers, 1]))
-
-    def snapshot(self) -> State:
-        """The state now, by the names of the columns of solutions."""
-        reactions = self.supports.forces()
-        if self.parts == 0 and self.inertia is not None:
-            reactions = np.full_like(reactions, np.nan)  # nobody knows them
+    @property
+    def now(self) -> States:
+        """The state now, read as a solution; at first reactions are those of the scene at rest."""
+        reactions = np.array(self.supports.forces())
+        for k, support in enumerate(self.scene.supports):  # in its axes
+            reactions[k, :2] = turned(reactions[k, :2], np.full(1, -support.angle))[0]
         rows = np.concatenate([np.zeros((0, 7)), *(one.material() for one in self.yielding)])
         state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
         if self.inertia is not None:
@@ -601,5 +562,11 @@ class Solver:
             "connectors": self.connections(), "material": rows[np.argsort(rows[:, 0]), 1:],
             FORCES: np.zeros((9, len(self.grid.cells))) + self.on_nodes,
         }  # fmt: skip
-        over_step = float(self.scheme.average(0.0, 1.0)) < 1
-        return {**state, BEFORE: self.q_before} if over_step else state
+        between = float(self.scheme.average(0.0, 1.0))
+        if between < 1:
+            state[BEFORE] = self.q_before
+        columns = Columns({name: np.shape(values) for name, values in state.items()})
+        row = np.concatenate([np.ravel(values) for values in state.values()])
+        now = States(self.grid, None, Block(columns, row[None], 1))
+        now.between, now.begun = between, between < 1
+        return now

@@ -13,8 +13,6 @@ from typing import Any, cast
 
 from mpi4py import MPI
 
-import numpy as np
-
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import (
     ConvergenceError,
@@ -30,9 +28,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Output, reserved
-from ufl_beam.output.postprocessing import turned
 from ufl_beam.output.recorders import Recorder, recorders_of
-from ufl_beam.output.state_rows import Columns
 from ufl_beam.parallel import communicator, progress_bar, say
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
@@ -329,12 +325,10 @@ def simulate_by_reference(
     solution.every, solution.building = every, time.perf_counter() - begin
 
     def keep() -> None:
-        state = solver.snapshot()
-        forces = state["reactions"][:, :2]
-        for k, support in enumerate(scene.supports):
-            forces[k] = turned(forces[k], np.full(1, -support.angle))[0]  # in its axes
-        columns = Columns({name: np.shape(values) for name, values in state.items()})
-        solution.append(columns, *map(np.ravel, state.values()))
+        columns, row = solver.now.row(0)
+        if solver.parts == 0 and has_inertia(scheme):
+            columns.of_rows("reactions", row).fill(math.nan)  # nobody knows them
+        solution.append(columns, row)
         solution.count(solver.parts, solver.iterations)
 
     keep()
