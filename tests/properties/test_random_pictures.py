@@ -23,7 +23,7 @@ def machine(seed):
 def amount(scene):
     """Number of strokes, labels and words of a picture; and whether all numbers are finite."""
     sheet = draw(Subject(scene), scene.size / 300.0)
-    strokes = list(sheet.everything())
+    strokes = [stroke for group in sheet.strokes.values() for stroke in group]
     assert all(np.isfinite(stroke.points).all() for stroke in strokes)
     badges = [load for load in scene.loads if any(badge(load))]
     return len(strokes) + len(sheet.labels) + len(badges) + len(notes_of(scene))

@@ -11,7 +11,7 @@ import scenes
 from matplotlib.collections import LineCollection, PolyCollection
 
 import ufl_beam as ub
-from ufl_beam.plotting.labels import Label, Spot, areas_covered, crossings, lengths_inside, place
+from ufl_beam.plotting.layout import Label, Spot, areas_covered, crossings, lengths_inside, place
 from ufl_beam.plotting.style import GREEN, RED
 
 STEEL = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)

@@ -12,34 +12,19 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
-from ufl_beam.plotting import style, symbols
+from ufl_beam.plotting import layout, style, symbols
 from ufl_beam.plotting.inelastic import circle, dissipated_per_length, draw_damage, open_hinges
-from ufl_beam.plotting.labels import Label, Spot, place
 from ufl_beam.plotting.layout import (
+    Label,
     Pose,
+    Spot,
     Stage,
-    directions,
     joined,
     left_of,
     segments,
     unit_vectors,
 )
-from ufl_beam.plotting.style import (
-    BLUE,
-    GREY,
-    INK,
-    POINTS,
-    RED,
-    RESULTANTS,
-    figure_of,
-    font_size,
-    half_size,
-    make_room,
-    number,
-    require_axes,
-    shade,
-    size_of,
-)
+from ufl_beam.plotting.style import BLUE, GREY, INK, POINTS, RED, RESULTANTS, font_size, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
 
@@ -99,8 +84,8 @@ def plane_stage(
     if ax is None:
         room = np.subtract(size, (0.9, 0.9))  # but for numbers and words
     else:
-        require_axes(ax)
-        room = size_of(ax) / POINTS
+        style.require_axes(ax)
+        room = style.size_of(ax) / POINTS
     scale = float(np.max((1.12, 1.20) * extent / room)) / POINTS
     return Stage.at_scale(solution, magnify, scale, shown), size
 
@@ -146,15 +131,17 @@ def draw_frame(
 
     The damage is that of the n-th kept time.  The unit stands between both parts of the title.
     """
-    largest = max((float(np.abs(values).max()) for _, values in diagrams), default=0.0)
-    factor, prefix = style.decimal_prefix(largest)
+    sizes = np.array([np.abs(values).max() for _, values in diagrams])
+    factor, prefix = style.decimal_prefix(float(sizes.max(initial=0.0)))
+    sections = [beam.section for beam, _ in diagrams]
+    stiffness = [{"N": s.EA, "V": s.GA, "M": s.EI / s.depth}[what] for s in sections]
     name, when = title
     unit = f"({prefix}{RESULTANTS[what][1]}) " if diagrams else ""
     with style.panel(ax, MOST) as axes:
         style.plane_axes(axes, f"{name} {unit}{when}")
         draw_undeformed(axes, solution, pose.stage)
         peaks: list[Peak] = []
-        if _is_loaded(what, diagrams):
+        if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # not of rounding and iterations
             rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
             peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MANY else 1.0)
         draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
@@ -173,17 +160,7 @@ def draw_frame(
                 ncols=1 if len(named) <= 2 else 2, fontsize=font_size(11.0),
             )  # fmt: skip
         _arrange(axes, peaks, own=ax is None)
-    return figure_of(axes)
-
-
-def _is_loaded(what: str, diagrams: Sequence[Values]) -> bool:
-    """Return whether a section force is more than what rounding and iterations leave behind."""
-    for beam, values in diagrams:
-        section = beam.section
-        stiffness = {"N": section.EA, "V": section.GA, "M": section.EI / section.depth}[what]
-        if np.abs(values).max() > LEAST_STRAIN * stiffness:
-            return True
-    return False
+    return style.figure_of(axes)
 
 
 def _draw_diagrams(
@@ -246,7 +223,7 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
     extremes = [k for sign, k in ends if sign * values[k] > 0.0]
     large: list[int] = [*map(int, np.flatnonzero(np.abs(values) > least * np.abs(values).max()))]
-    numbers = {k: number(values[k] / unit) for k in {*extremes, *large}}
+    numbers = {k: style.number(values[k] / unit) for k in {*extremes, *large}}
     places = np.round(axis / (1e-3 * math.hypot(*np.ptp(axis, axis=0)) or 1.0))
     chosen: dict[tuple[object, ...], int] = {}
     for k in [*extremes, *large]:
@@ -393,7 +370,7 @@ def _arrange(axes: Axes, peaks: Sequence[Peak], *, own: bool) -> None:
             text.remove()
         written = _write(axes, peaks)
         axes.dataLim.set(without_texts)
-        make_room(axes)
+        style.make_room(axes)
     _fit(axes, own)
 
 
@@ -405,7 +382,7 @@ def _fit(axes: Axes, own: bool) -> None:
     axes.autoscale_view()
     if not own:
         return
-    figure = figure_of(axes)
+    figure = style.figure_of(axes)
     figure.draw_without_rendering()
     wide, high = 0.0, 0.0
     for legend in figure.legends:
@@ -419,14 +396,14 @@ def _fit(axes: Axes, own: bool) -> None:
 
 def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     """Write peaks beside areas and lines; those without room are left out but for extremes."""
-    figure = figure_of(axes)
+    figure = style.figure_of(axes)
     figure.draw_without_rendering()
     looks: tuple[dict[str, Any], ...] = (
         {"size": font_size(10.0), "weight": "normal"},
         {"size": font_size(13.0), "weight": "bold"},
     )
-    halves = [half_size(axes, peak.text, **looks[peak.extreme]) for peak in peaks]
-    crowded = 4 * sum(map(np.prod, halves)) > CROWDED * np.prod(size_of(axes))
+    halves = [style.half_size(axes, peak.text, **looks[peak.extreme]) for peak in peaks]
+    crowded = 4 * sum(map(np.prod, halves)) > CROWDED * np.prod(style.size_of(axes))
     chosen = [k for k, peak in enumerate(peaks) if peak.extreme or not crowded]
     if not chosen:
         return []
@@ -439,11 +416,11 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
         # Straight away from the axis first, then more and more aside
         turns = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
         x, y = peaks[k].outward
-        at, ways = in_points(peaks[k].tip), directions(math.atan2(y, x) + turns)
+        at, ways = in_points(peaks[k].tip), layout.directions(math.atan2(y, x) + turns)
         spots = tuple(Spot(at, way) for way in ways)
         labels.append(Label(peaks[k].text, peaks[k].color, k, spots))
     written = []
-    for one in place(labels, [halves[k] for k in chosen], _lines(axes, in_points)):
+    for one in layout.place(labels, [halves[k] for k in chosen], _lines(axes, in_points)):
         text, color, k, _ = one.label
         (x, y), (right, up), arrow = peaks[k].tip, one.center - one.spot, None
         if len(one.leader):

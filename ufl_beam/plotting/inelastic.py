@@ -15,19 +15,7 @@ from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_laws import HingeLaw
 from ufl_beam.model.connectors import law_of, place_of
 from ufl_beam.plotting import style
-from ufl_beam.plotting.style import (
-    BLUE,
-    GREEN,
-    GREY,
-    INK,
-    ORANGE,
-    PINK,
-    RED,
-    SKY,
-    WHITE,
-    shade,
-    with_unit,
-)
+from ufl_beam.plotting.style import BLUE, GREY, INK, ORANGE, RED, WHITE, shade, with_unit
 from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
@@ -164,7 +152,11 @@ def plot_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
         raise SceneError(f"plot_hinge: neither {place} nor the cell there has a hinge")
     M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
-        for part in _monotone(jump):
+        # Pieces in which the jump only grows or only falls; neighbours share a point
+        moves = np.flatnonzero(np.diff(jump))
+        turns = moves[1:][np.diff(np.sign(np.diff(jump)[moves])) != 0]
+        for first, last in pairwise([0, *turns, len(jump) - 1]):
+            part = slice(first, last + 1)
             axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
         _draw_path(axes, solution, jump, M)
         style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
@@ -205,7 +197,7 @@ def plot_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     with style.panel(ax, (8.0, 5.0)) as axes:
         style.time_axes(axes)
         # Blue is the energy in the scene; colours come again after the last.
-        colors = [(color, 0.75) for color in (ORANGE, RED, GREEN, PINK, SKY)]
+        colors = [(color, 0.75) for color in (ORANGE, RED, style.GREEN, style.PINK, style.SKY)]
         labels = [f"lost: {name}" for name in energy.lost]
         axes.stackplot(t, *energy.lost.values(), labels=labels, colors=colors)
         label = "at the start, and supplied" if start else "supplied"
@@ -218,15 +210,6 @@ def plot_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left")
         style.draw_legend(axes, ax, loc="outside upper left", ncols=3)
     return style.figure_of(axes)
-
-
-def _monotone(x: Array) -> list[slice]:
-    """Pieces of a path in which x only grows or only falls; neighbours share a point."""
-    steps = np.diff(x)
-    moves = np.flatnonzero(steps)
-    turns = moves[1:][np.diff(np.sign(steps[moves])) != 0]
-    ends = [0, *(int(turn) for turn in turns), len(x) - 1]
-    return [slice(a, b + 1) for a, b in pairwise(ends)]
 
 
 def _prefix(axis: Axis, values: Array, quantity: str, unit: str) -> None:

@@ -6,6 +6,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from functools import cache, partial
+from itertools import chain
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,10 +17,9 @@ from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.loads import Gravity, Load, Rayleigh, RotatingFrame
 from ufl_beam.model.scene import Scene, spots_of
-from ufl_beam.plotting import notebook
+from ufl_beam.plotting import notebook, style
 from ufl_beam.plotting.diagrams import plot_state
-from ufl_beam.plotting.labels import Placed, place
-from ufl_beam.plotting.layout import segments
+from ufl_beam.plotting.layout import Placed, place, segments
 from ufl_beam.plotting.model_sheet import (
     CAPTIONS,
     MOST_LABELS,
@@ -29,19 +29,7 @@ from ufl_beam.plotting.model_sheet import (
     draw,
     in_time,
 )
-from ufl_beam.plotting.style import (
-    POINTS,
-    RED,
-    TEXT,
-    WHITE,
-    figure_of,
-    font_size,
-    half_size,
-    panel,
-    shade,
-    size_of,
-    with_unit,
-)
+from ufl_beam.plotting.style import POINTS, RED, TEXT, WHITE, font_size, shade, with_unit
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
 
@@ -115,8 +103,8 @@ def plot(
     cells = (subject.cells, "cell", "cells")
     beams, bodies = (len(shown.beams), "beam", "beams"), (len(shown.bodies), "body", "bodies")
     title = f"model: {counted(beams, cells, bodies)}"
-    with panel(ax, MOST) as axes:
-        measure: Measure = cache(lambda text: half_size(axes, text, font_size(LABEL_SIZE)))
+    with style.panel(ax, MOST) as axes:
+        measure: Measure = cache(lambda text: style.half_size(axes, text, font_size(LABEL_SIZE)))
         note = font_size(NOTE)
         axes.set(xlabel="x (m)", ylabel="y (m)")
         pad = 8.0 + note * len(notes)
@@ -128,7 +116,7 @@ def plot(
                 gid="notes",
             )  # fmt: skip
         if ax is None:
-            figure_of(axes).set_layout_engine("none")
+            style.figure_of(axes).set_layout_engine("none")
             around = LEFT + RIGHT, font_size(BELOW + ABOVE + NOTE * len(notes))
             least, most = (POINTS * np.array(size) - around for size in (LEAST, MOST))
             # At least as wide as the words above
@@ -137,7 +125,7 @@ def plot(
             above = max([first, *(2 * measure(words)[0] for words in notes)])
             least[0] = min(max(least[0], above), most[0])
         else:
-            least = most = size_of(axes)
+            least = most = style.size_of(axes)
         sheet, placed, frame = _planned(subject, measure, least, most)
         _fit(axes, sheet.scale, frame, len(notes) if ax is None else None)
         draw_strokes(axes, sheet.strokes)
@@ -151,7 +139,7 @@ def plot(
                     fontsize=font_size(size), rotation=turn, gid="badges", annotation_clip=False,
                 )  # fmt: skip
                 x -= 2 * float(measure(text)[0]) + 6.0 if words is text else BADGE
-    return figure_of(axes)
+    return style.figure_of(axes)
 
 
 @html_of.register
@@ -212,7 +200,7 @@ def _planned(
     for _ in range(2):
         sheet = draw(subject, scale)
         placed = _arrange(sheet, measure, frame)
-        points = [stroke.points / scale for stroke in sheet.everything()]
+        points = [stroke.points / scale for stroke in chain(*sheet.strokes.values())]
         points += [one.center + sign * one.half[None] for one in placed for sign in (-1, 1)]
         everything = np.concatenate(points)
         below = low / scale - everything.min(axis=0) + 8.0
@@ -238,7 +226,7 @@ def _arrange(sheet: Sheet, measure: Measure, frame: Array) -> list[Placed]:
         )
         for label in labels[:MOST_LABELS]
     ]
-    lines = np.concatenate([segments(stroke.points) for stroke in sheet.everything()])
+    lines = np.concatenate([segments(stroke.points) for stroke in chain(*sheet.strokes.values())])
     halves = [measure(label.text) for label in in_points]
     placed = place(in_points, halves, lines / sheet.scale, frame)
     return [one for one in placed if one.overlap < 0.1]
@@ -254,7 +242,8 @@ def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
         number = min(max(int(length / font_size(each)), 2), 9)
         line.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10]))
     if notes is not None:
-        figure, below, above = figure_of(axes), font_size(BELOW), font_size(ABOVE + NOTE * notes)
+        below, above = font_size(BELOW), font_size(ABOVE + NOTE * notes)
+        figure = style.figure_of(axes)
         left, width, height = LEFT, across + LEFT + RIGHT, up + below + above
         for _ in range(2):  # the second time with as much room as the numbers at the axis take
             figure.set_size_inches(width / POINTS, height / POINTS)

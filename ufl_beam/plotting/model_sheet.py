@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 
 import numpy as np
 
@@ -16,18 +16,8 @@ from ufl_beam.model.functions import TimeFunction, steady
 from ufl_beam.model.loads import FollowerLoad, LineLoad, PointLoad
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
-from ufl_beam.plotting import symbols
-from ufl_beam.plotting.labels import Label, Spot
-from ufl_beam.plotting.layout import (
-    SYMBOL,
-    Stage,
-    directions,
-    in_frame,
-    left_of,
-    lengths_along,
-    points_along,
-    unit_vectors,
-)
+from ufl_beam.plotting import layout, symbols
+from ufl_beam.plotting.layout import Spot, directions, left_of, points_along, unit_vectors
 from ufl_beam.plotting.style import GREEN, INK, RED, TEXT, WHITE, number, with_unit
 from ufl_beam.plotting.symbols import FRONT, Stroke, disc
 
@@ -88,7 +78,7 @@ class Subject:
         """Return the points at which velocities are shown: ends and middle of a beam; (n, 2)."""
         if isinstance(part, Body):
             return np.array([part.center])
-        return _at_parts(self.axes[part], [0.0, 0.5, 1.0])
+        return points_along(self.axes[part], [0.0, 0.5, 1.0])
 
 
 class Sheet:
@@ -96,21 +86,16 @@ class Sheet:
 
     def __init__(self, subject: Subject, scale: float) -> None:
         self.subject, self.scale = subject, scale  # the scale is the length of a point
-        self.pose = Stage.at_scale(subject.scene, 1.0, scale).undeformed
+        self.pose = layout.Stage.at_scale(subject.scene, 1.0, scale).undeformed
         self.unit, self.outside = self.pose.stage.unit, self.pose.stage.outside
         self.strokes: defaultdict[str, list[Stroke]] = defaultdict(list)
-        self.labels: list[Label] = []
+        self.labels: list[layout.Label] = []
         self.stacks: defaultdict[object, float] = defaultdict(float)
         """Heights of the symbols that stand at a place in a direction."""
 
     def write(self, text: str, color: str, rank: int, spots: Iterable[Spot]) -> None:
         """Add a label with the places where it may stand."""
-        self.labels.append(Label(text, color, rank, tuple(spots)))
-
-    def everything(self) -> Iterator[Stroke]:
-        """Iterate over the strokes of all groups."""
-        for group in self.strokes.values():
-            yield from group
+        self.labels.append(layout.Label(text, color, rank, tuple(spots)))
 
     def stack(self, key: object, height: float) -> float:
         """Put a symbol onto those at a place; return the height at which it begins."""
@@ -128,16 +113,11 @@ class Sheet:
         return tuple(Spot(at, s * left, gap) for at, left in _normals(axis) for s in (1.0, -1.0))
 
 
-def _at_parts(axis: Array, parts: Sequence[float] | Array) -> Array:
-    """Points of a line at parts of its length; (n, 2)."""
-    return points_along(axis, np.multiply(parts, lengths_along(axis)[-1]))
-
-
 def _normals(axis: Array) -> list[tuple[Array, Array]]:
     """Points along a line and the unit vector to its left there, from the middle outwards."""
     parts = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9])
-    way = _at_parts(axis, parts + 0.01) - _at_parts(axis, parts - 0.01)
-    return list(zip(_at_parts(axis, parts), left_of(unit_vectors(way)), strict=True))
+    way = points_along(axis, parts + 0.01) - points_along(axis, parts - 0.01)
+    return list(zip(points_along(axis, parts), left_of(unit_vectors(way)), strict=True))
 
 
 def draw(subject: Subject, scale: float) -> Sheet:
@@ -166,7 +146,7 @@ def draw(subject: Subject, scale: float) -> Sheet:
 def _draw_beams(sheet: Sheet) -> None:
     """Axes, names, marks between cells and where hinges may form if these are few; hinges."""
     subject, scale, unit = sheet.subject, sheet.scale, sheet.unit
-    weight = 2.8 * unit / scale / SYMBOL
+    weight = 2.8 * unit / scale / layout.SYMBOL
     sheet.strokes["beams"] += (Stroke(x, INK, weight, layer=4.0) for x in subject.axes.values())
     for beam, axis in subject.axes.items():
         if subject.cells <= MOST_CELLS:
@@ -229,10 +209,10 @@ def _arrow(
     line: Array, color: str, unit: float, *, hollow: bool = False, size: float = 1.0
 ) -> list[Stroke]:
     """An arrow along a line; ``size`` is a factor on its head and the width of the line."""
-    lengths = lengths_along(line)
-    head = min(size * HEAD * unit, lengths[-1] / 3)
-    shaft = points_along(line, lengths * (1.0 - head / lengths[-1]))
-    tip = in_frame([(0, 0), (-1, 0.36), (-1, -0.36), (0, 0)], line[-1], line[-1] - shaft[-1])
+    lengths = layout.lengths_along(line)
+    head = min(size * HEAD * unit / lengths[-1], 1.0 / 3.0)
+    shaft = points_along(line, lengths / lengths[-1] * (1.0 - head))
+    tip = layout.in_frame([(0, 0), (-1, 0.36), (-1, -0.36), (0, 0)], line[-1], line[-1] - shaft[-1])
     return [
         Stroke(shaft, color, size * SHAFT, layer=FRONT),
         Stroke(tip, color, 1.0, WHITE if hollow else color, FRONT),
@@ -306,9 +286,9 @@ def _draw_line_load(sheet: Sheet, load: LineLoad) -> None:
 
     def spaced(distance: float, *, ends: bool = False) -> Array:
         """Equally spaced points, about as far apart as said; (n, 2); m."""
-        number = max(1, round(lengths_along(axis)[-1] / distance))
+        number = max(1, round(layout.lengths_along(axis)[-1] / distance))
         steps = np.arange(number + 1) if ends else np.arange(number) + 0.5
-        return _at_parts(axis, steps / number)
+        return points_along(axis, steps / number)
 
     if size > 0.0:
         way, chord = np.array(load.force) / size, axis[-1] - axis[0]

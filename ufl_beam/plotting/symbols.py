@@ -22,15 +22,8 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.supports import Support
-from ufl_beam.plotting.layout import (
-    Pose,
-    directions,
-    in_frame,
-    left_of,
-    lengths_along,
-    points_along,
-    unit_vectors,
-)
+from ufl_beam.plotting import layout
+from ufl_beam.plotting.layout import Pose, directions, in_frame, left_of, unit_vectors
 from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, with_unit
 
 if TYPE_CHECKING:
@@ -135,7 +128,12 @@ def footings(pose: Pose) -> Iterator[Footing]:
     for places, turns in held_by:
         for spot in places:
             if isinstance(spot, Spot) and spot.body is GROUND:
-                inward = _towards(spot, next(p for p in places if p != spot))
+                other = next(place for place in places if place != spot)
+                (x, y), (X, Y) = spot.point, other.point
+                if (x, y) == (X, Y) and isinstance(other, Spot):
+                    X, Y = other.body.center
+                away = (x, y) != (X, Y)
+                inward = math.atan2(Y - y, X - x) if away else _inward(other)
                 known, before = grounds.get(spot, (inward, True))
                 grounds[spot] = known, before and turns
     for spot, (inward, turns) in grounds.items():
@@ -174,21 +172,13 @@ def _inward(anchor: Anchor) -> float:
     return math.atan2(Y - y, X - x)
 
 
-def _towards(spot: Spot, other: Anchor) -> float:
-    """Direction in which what is attached to the ground lies; rad."""
-    (x, y), (X, Y) = spot.point, other.point
-    if (x, y) == (X, Y) and isinstance(other, Spot):
-        X, Y = other.body.center
-    return _inward(other) if (x, y) == (X, Y) else math.atan2(Y - y, X - x)
-
-
 def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
     """The mark of the ground along a line, to its right."""
-    lengths = lengths_along(line)
+    lengths = layout.lengths_along(line)
     at = np.arange(0.3 * unit, lengths[-1], 0.55 * unit)
     step = np.minimum(np.searchsorted(lengths, at), len(line) - 1) - 1
     ahead = unit_vectors(np.diff(line, axis=0)[step])
-    tops = points_along(line, at)
+    tops = layout.points_along(line, at / lengths[-1])
     for ends in np.stack([tops, tops - 0.4 * unit * (ahead + left_of(ahead))], axis=1):
         yield Stroke(ends, STEEL, 1.0, layer=BACK)
 
@@ -323,15 +313,12 @@ def pins(pose: Pose) -> Iterator[Pin]:
 # -2 at its place a to 2 at its place b, its body from -1 to 1; t is across.
 
 
-def _name_of(law: Any, *units: str) -> str:
-    return type(law).__name__.lower()
-
-
 class Glyph(NamedTuple):
     """Symbol of a connector law, and words on its size."""
 
     straight: list[Stroke]
-    words: Callable[[Any, str, str], str] = _name_of  # of a law, and units of force and motion
+    words: Callable[[Any, str, str], str] = lambda law, force, way: type(law).__name__.lower()
+    """Words on the size of a law, of the law and the units of force and motion."""
     turning: list[Stroke] | None = None  # around a pin; by default the straight one with spokes
     sweep: float = math.pi + 1.0  # angle from place a to place b in the undeformed scene; rad
     spins: bool = False  # turns with b as a whole; others begin at a and end at b
@@ -362,11 +349,6 @@ _STATED = [
 ]
 
 
-def _spring_in_words(law: laws.Spring, force: str, way: str) -> str:
-    words = [with_unit(law.stiffness, f"{force}/{way}")]
-    return ", ".join([*words, *["yields"] * bool(law.law), *["breaks"] * bool(law.softening)])
-
-
 def _stop_in_words(law: laws.Stop, force: str, way: str) -> str:
     ends = [end for end in (law.low, law.high) if math.isfinite(end)]
     words = [with_unit(x, way) if way == "m" else f"{number(x)} {way}" for x in ends]
@@ -382,7 +364,9 @@ def _friction_in_words(law: laws.Coulomb, force: str, way: str) -> str:
 
 LAWS: dict[type, Glyph] = {  # what drives is orange, filled if its motion is given
     laws.Spring: Glyph(
-        [_line((-2, 0), (-1, 0), *_TEETH, (1, 0), (2, 0))], _spring_in_words,
+        [_line((-2, 0), (-1, 0), *_TEETH, (1, 0), (2, 0))],
+        lambda law, force, way: with_unit(law.stiffness, f"{force}/{way}")
+        + ", yields" * bool(law.law) + ", breaks" * bool(law.softening),
         [_line((2, CENTRE), (2, -2.1), (-2, 0))], sweep=4.3 * math.pi,
     ),
     laws.Damper: Glyph(
