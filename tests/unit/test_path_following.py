@@ -10,7 +10,7 @@ import pytest
 import ufl
 
 import ufl_beam as ub
-from ufl_beam.analysis.critical_points import Candidate, Direction
+from ufl_beam.analysis.critical_points import Candidate
 from ufl_beam.analysis.path_following import PathStepper
 from ufl_beam.parallel import active_comm
 from ufl_beam.plotting.layout import evenly
@@ -544,18 +544,17 @@ class Turns(PathStepper):
     """A path of one unknown whose load factor turns at 0.4, where it may leap to another branch."""
 
     def __init__(self, leap):
-        self._corrector = SimpleNamespace(
-            start=Direction(np.zeros(1), 0.0), direction=Direction(np.ones(1), 1.0),
-            length=lambda way: math.hypot(*way.q, way.t),
-        )  # fmt: skip
+        self.corrector = SimpleNamespace(
+            start=np.zeros(2), direction=np.ones(2), length=lambda way: math.hypot(*way)
+        )
         self._leap = leap
 
     def _seek(self, part):
         beyond = part > 0.4
-        q, way = np.array([part + self._leap * beyond]), Direction(np.ones(1), 0.4 - part)
-        stiffness = SimpleNamespace(passed=lambda other: False)
+        q, way = np.array([part + self._leap * beyond]), np.array([1.0, 0.4 - part])
+        stiffness = SimpleNamespace(negative=0, symmetric=True)
         trial = SimpleNamespace(q1=q, step=SimpleNamespace(t1=0.0))
-        return Candidate(trial, stiffness, way, slope=abs(way.t))
+        return Candidate(trial, stiffness, way, slope=abs(way[-1]))
 
 
 @pytest.mark.parametrize("leap", [0.0, 0.5])

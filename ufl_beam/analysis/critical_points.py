@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Critical points of static paths: tangent stiffness of the whole scene, its signs and modes."""
+"""Critical points of static paths: tangent stiffness of the whole scene, its signs and modes.
+
+Points and directions of a path are arrays: the configuration at the local degrees of freedom (m, m,
+rad), or a change of it, and behind it the load factor.
+"""
 
 from __future__ import annotations
 
@@ -22,26 +26,6 @@ from ufl_beam.solvers.factorization import Factorisation
 
 INVERSE_ITERATIONS = 50  # inverse iterations in which a mode is sought
 MODE_TOLERANCE = 1e-8  # its change in the last one; the square is the error of the eigenvalue
-
-
-@dataclass(frozen=True, eq=False)
-class Direction:
-    """Direction of a path: change of the configuration (m, m, rad) and of the load factor."""
-
-    q: Array
-    t: float
-
-    def __neg__(self) -> Direction:
-        return Direction(-self.q, -self.t)
-
-    def __add__(self, other: Direction) -> Direction:
-        return Direction(self.q + other.q, self.t + other.t)
-
-    def __rmul__(self, factor: float) -> Direction:
-        return Direction(factor * self.q, factor * self.t)
-
-    def __truediv__(self, divisor: float) -> Direction:
-        return Direction(np.asarray(self.q / divisor), self.t / divisor)
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,24 +96,18 @@ class CriticalPoint:
         return f"{self.kind} point at factor {self.factor:.6g}"
 
 
-def metric(share: Share) -> Array:
-    """Return the weights of squares whose sum is the mean square of a step; (share.size,).
-
-    Displacements count as parts of the size of the scene, forces of connectors do not count.  Only
-    what a process owns does, so that sums over the processes are right.
-    """
-    grid = share.grid
-    weights = grid.scales[share.dofs] ** 2
-    weights[share.num_owned :] = 0.0
-    return np.asarray(weights / (grid.size - len(grid.multipliers)))
-
-
 class Stiffness:
     """Tangent stiffness of the whole scene, factored by every process; StepFailed if singular.
 
     Each process gives its part A of the tangent, the local degrees of freedom ``held`` by supports,
     and its part ``rate`` of the derivative of the residual by the load factor.  ``weights`` are
-    those of the :func:`metric` at all degrees of freedom.
+    those of squares in the length of a direction, at all degrees of freedom.
+
+    A symmetric form of the tangent is factored.  A connector has the gradient g of its motion in
+    its column, and α g and β in its row.  The row is divided by α.  Where β is not zero, the unit
+    of the force is such that ±1 stands on the diagonal, so a law whose force does not answer the
+    motion (α = 0) is no exception.  Each force brings one negative eigenvalue if it holds a motion
+    or resists its growth, and none if it falls when the motion grows.
 
     Attributes:
         negative: Number of negative eigenvalues, the forces of connectors eliminated; where it is
@@ -146,27 +124,14 @@ class Stiffness:
         free = np.setdiff1d(np.arange(grid.size), fixed)
         shape = (grid.size, grid.size)
         self._K = csr_array(coo_array((data, (rows, columns)), shape=shape))[free][:, free]
-        forces = np.bincount(dofs, weights=rates, minlength=grid.size)[free]
+        self._forces = np.bincount(dofs, weights=rates, minlength=grid.size)[free]
         self._free, self._size, self._weights = free, grid.size, weights[free]
-        self._motions = len(free) - len(grid.multipliers)
-        self._factor()
-        self._forces = forces
-        self.flow = self._spread(-self._solve(forces))
+        self._motions = n = len(free) - len(grid.multipliers)
 
-    def _factor(self) -> None:
-        """Factor a symmetric form of the tangent.
-
-        A connector has the gradient g of its motion in its column, and α g and β in its row.  The
-        row is divided by α.  Where β is not zero, the unit of the force is such that ±1 stands on
-        the diagonal, so a law whose force does not answer the motion (α = 0) is no exception.
-        Each force brings one negative eigenvalue if it holds a motion or resists its growth, and
-        none if it falls when the motion grows.
-        """
-        n = self._motions
-        K, G, rows = self._K[:n, :n], self._K[:n, n:], self._K[n:, :n]
+        K, G, of_forces = self._K[:n, :n], self._K[:n, n:], self._K[n:, :n]
         β = self._K.diagonal()[n:]
         squares = np.asarray(G.multiply(G).sum(axis=0)).ravel()
-        products = np.asarray(G.multiply(rows.T).sum(axis=0)).ravel()
+        products = np.asarray(G.multiply(of_forces.T).sum(axis=0)).ravel()
         α = products / np.where(squares > 0, squares, 1.0)
         holds = β == 0.0
         slope = α / np.where(holds, 1.0, β)
@@ -175,8 +140,8 @@ class Stiffness:
         self._β, self._G = np.where(holds, np.inf, β), G
         negative = holds | (slope < 0.0)
         diagonal = np.where(holds, 0.0, np.where(negative, -1.0, 1.0))
-        of_forces = diags_array(self._of_row) @ rows
-        blocks = [[K, G @ diags_array(self._unit)], [of_forces, diags_array(diagonal)]]
+        lower = [diags_array(self._of_row) @ of_forces, diags_array(diagonal)]
+        blocks = [[K, G @ diags_array(self._unit)], lower]
         try:
             self._factors = Factorisation(csr_array(block_array(blocks)))
         except np.linalg.LinAlgError:
@@ -185,6 +150,7 @@ class Stiffness:
         self.negative = self._factors.negative - int(negative.sum())
         if not self.symmetric:
             self.negative %= 2
+        self.flow = self._spread(-self._solve(self._forces))
 
     def _solve(self, b: Array) -> Array:
         """The solution of the tangent for one right-hand side."""
@@ -202,11 +168,6 @@ class Stiffness:
         moving = units > 0.0
         forces = np.abs(self._forces[moving]) / units[moving]
         return float(forces.sum() * np.abs(self.softest[1][self._free] * units).max())
-
-    def passed(self, other: Stiffness) -> bool:
-        """Return whether an eigenvalue has passed zero on the way from another state."""
-        change = self.negative - other.negative
-        return bool(change if self.symmetric and other.symmetric else change % 2)
 
     def _spread(self, of_free: Array) -> Array:
         values = np.zeros(self._size)
@@ -237,7 +198,7 @@ class Candidate(NamedTuple):
 
     trial: Trial
     stiffness: Stiffness
-    way: Direction
+    way: Array
     #: Change of the load factor along the path over that of the configuration.  As K q' = f t', a
     #: slope of zero means that the direction of the path is a critical one, and that the load f
     #: does work on it.  At a bifurcation it does none on the critical direction.
@@ -259,11 +220,14 @@ class Candidate(NamedTuple):
         return self.softness / self.slope if self.slope else math.inf
 
     @property
-    def end(self) -> Direction:
+    def end(self) -> Array:
         """State and load factor."""
-        return Direction(self.trial.q1, self.trial.step.t1)
+        return np.append(self.trial.q1, self.trial.step.t1)
 
     def passed(self, before: Candidate) -> bool:
         """Return whether an eigenvalue passed zero, or the load factor turned, since ``before``."""
-        turned = (self.way.t < 0) != (before.way.t < 0)
-        return turned or self.stiffness.passed(before.stiffness)
+        turned = (self.way[-1] < 0) != (before.way[-1] < 0)
+        now, then = self.stiffness, before.stiffness
+        change = now.negative - then.negative
+        even = not (now.symmetric and then.symmetric) and change % 2 == 0
+        return bool(turned or (change and not even))

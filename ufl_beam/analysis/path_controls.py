@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ufl_beam.analysis.critical_points import Direction, Stiffness, metric
+from ufl_beam.analysis.critical_points import Stiffness
 from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
 from ufl_beam.mechanics.time_schemes import Step
@@ -29,46 +29,6 @@ from ufl_beam.terms.base import Term
 MOST_DOUBLINGS = 30  # doublings of a step until something dissipates in it
 ONSET_PART = 1e-6  # part of the dissipated energy of a step at which its onset is looked at
 CONTROL_TOLERANCE = 1e-9  # part of a step by which its end may miss the equation of the control
-LEAST_REST = 1e-3  # least part of a step of arc length that is left beyond a kink
-
-
-@dataclass(frozen=True)
-class Plane:
-    """Linear constraint: a step ends at a distance ``reach`` along a normal from ``start``."""
-
-    corrector: PathCorrector
-    normal: Direction
-    reach: float
-    start: Direction
-
-    def residual(self, q: Array, t: float) -> float:
-        """Missing part of the reach."""
-        return self.derivative(q, Direction(q - self.start.q, t - self.start.t)) - 1.0
-
-    def derivative(self, q: Array, way: Direction) -> float:
-        """Derivative of the equation along a direction; it is the same at any state."""
-        return self.corrector.along(self.normal, way) / self.reach
-
-
-@dataclass(frozen=True)
-class DissipatedEnergy:
-    """Constraint of the energy (J) that is dissipated in a step."""
-
-    corrector: PathCorrector
-    energy: float
-
-    def residual(self, q: Array, t: float) -> float:
-        """Missing part of the energy."""
-        return self.corrector.dissipation(q) / self.energy - 1.0
-
-    def derivative(self, q: Array, way: Direction) -> float:
-        """Derivative of the equation, by a central difference over a small part of the step."""
-        size = self.corrector.size(way)
-        gone = self.corrector.size(Direction(q - self.corrector.simulation.q, 0.0))
-        if size == 0.0:
-            return 0.0
-        ε = 1e-3 * gone / size
-        return (self.residual(q + ε * way.q, 0.0) - self.residual(q - ε * way.q, 0.0)) / (2 * ε)
 
 
 class Crossing(NamedTuple):
@@ -80,7 +40,7 @@ class Crossing(NamedTuple):
     axes of supports.
     """
 
-    predicted: Direction
+    predicted: Array
     mode: Array
     speed: float
 
@@ -90,48 +50,58 @@ class PathCorrector:
 
     A change ``factor`` of the load factor counts as much as a unit of displacement.  Steps are
     predicted and corrected by ``crossing``, where there is one.
+
+    Attributes:
+        weights: Weights of squares whose sum is the square of a length: the mean square of
+            displacements as parts of the size of the scene and of rotations, and the square of the
+            load factor over ``factor``.  Only what a process owns counts, so that sums over the
+            processes are right.
+        of_factor: Gradient of the load factor.
+        direction: Direction of the path at the beginning of the step.
+        sought: The step that was predicted.
     """
 
     def __init__(self, simulation: Simulation, factor: float) -> None:
         self.simulation, self.factor = simulation, factor
-        self.share = simulation.share
-        self.weights = metric(self.share)
-        self._all_weights = self.share.gather(self.weights)
+        self.share = share = simulation.share
+        grid = share.grid
+        squares = np.full(share.size, 1 / grid.scene.size**2)
+        squares[share.rotations] = 1.0
+        squares[share.multipliers] = squares[share.num_owned :] = 0.0
+        squares /= grid.size - len(grid.multipliers)
+        self._all_weights = share.gather(squares)
+        self.of_factor = np.append(0.0 * squares, share.comm.rank == 0)
+        self.weights = np.append(squares, 0.0) + self.of_factor / factor**2
         self.t = simulation.t
         self.dissipates = False
         self.crossing: Crossing | None = None
         self._driven: list[Term] = [*simulation.loads, *simulation.couplings]
-        self.direction: Direction = Direction(np.zeros(self.share.size), 0.0)
-        self.sought = self.direction
+        self.direction = self.sought = 0.0 * self.weights
 
     @property
-    def start(self) -> Direction:
+    def start(self) -> Array:
         """State and load factor at the beginning of the step."""
-        return Direction(self.simulation.q, self.simulation.t)
+        return np.append(self.simulation.q, self.simulation.t)
 
     # -- measures ------------------------------------------------------------------------------
 
-    def product(self, a: Direction, b: Direction) -> float:
-        """Return the inner product of two directions; dimensionless."""
-        return self.share.total(float((self.weights * a.q) @ b.q)) + a.t * b.t / self.factor**2
-
-    def along(self, normal: Direction, way: Direction) -> float:
+    def along(self, normal: Array, way: Array) -> float:
         """Return the derivative along ``way`` of a linear quantity with the gradient ``normal``."""
-        return self.share.total(float(normal.q @ way.q)) + normal.t * way.t
+        return self.share.total(float(normal @ way))
 
-    def length(self, way: Direction) -> float:
+    def length(self, way: Array) -> float:
         """Return the length of a direction, however small; dimensionless."""
-        along = abs(way.t) / self.factor
-        largest = max(self.share.largest(float(np.abs(way.q).max(initial=0.0))), along)
+        largest = self.share.largest(float(np.abs(way[:-1]).max(initial=0.0)))
+        largest = max(largest, abs(way[-1]) / self.factor)
         if largest == 0.0 or not math.isfinite(largest):
             return largest
         # Squares of what is below 1e-154 would be nothing.
-        unit = way / largest
-        return largest * math.sqrt(self.product(unit, unit))
+        unit = np.asarray(way / largest)
+        return largest * math.sqrt(self.along(self.weights * unit, unit))
 
-    def size(self, way: Direction) -> float:
-        """Return the length of a direction's part in the configuration; dimensionless."""
-        return self.length(Direction(way.q, 0.0))
+    def size(self, motion: Array) -> float:
+        """Return the length of a change of the configuration; dimensionless."""
+        return self.length(np.append(motion, 0.0))
 
     def dissipation(self, q: Array) -> float:
         """Return the energy that beams and springs dissipate in the step to ``q``; J."""
@@ -139,40 +109,50 @@ class PathCorrector:
         here = sum((one.dissipation(q) for one in self.simulation.couplings), in_cells)
         return self.share.total(here)
 
-    def predict_dissipation(self, energy: float) -> Direction:
+    def dissipation_side(self, q: Array, way: Array) -> float:
+        """Positive where more dissipates in a direction from ``q``, negative where against it."""
+        motion = way[:-1]
+        now, size = self.dissipation(q), self.size(motion)
+        here = any(one.response.way.any() for one in self.simulation.couplings)
+        flows = self.share.total(float(here))
+        for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
+            δ = 1e-9 * 2**doubled / size
+            more = self.dissipation(q + δ * motion) - self.dissipation(q - δ * motion)
+            if abs(more) > now:
+                return more
+        return 0.0
+
+    def predict_dissipation(self, energy: float) -> Array:
         """Predict a step that dissipates so much energy (J); :class:`StepFailed` if none does.
 
         Where nothing dissipated before, the direction changes as soon as something does.
         """
-        way = self.direction
         self.begin()
-        gone = Direction(np.zeros(self.share.size), 0.0)
-        if not self.dissipates:
-            gone = self._until(ONSET_PART * energy, gone, way)
-            way = self._beyond(gone)
-        return self._until(energy, gone, way)
+        step = self._until(energy, 0.0 * self.direction, self.direction)
+        kink = self.kink(step)
+        return step if kink is None else self._until(energy, *kink)
 
-    def kink(self, length: float) -> tuple[Direction, Direction] | None:
-        """Find the step to where dissipation begins within a length, and the direction beyond."""
-        way, q = self.direction, self.simulation.q
+    def kink(self, step: Array) -> tuple[Array, Array] | None:
+        """Find the part of a step before dissipation begins, and the direction of the path there.
+
+        None if nothing begins to dissipate in it.
+        """
+        q, motion = self.simulation.q, step[:-1]
         self.begin()
-        if self.dissipates or not self.dissipation(q + length * way.q) > 0:
+        if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:
             return None
-        begun = bisect(lambda part: self.dissipation(q + part * way.q) > 0, 0.0, length, 40)
-        gone = begun * way
-        return gone, self._beyond(gone)
+        onset = ONSET_PART * whole
+        gone = bisect(lambda p: self.dissipation(q + p * motion) > onset, 0.0, 1.0, 40) * step
+        q, t = q + gone[:-1], self.simulation.t + gone[-1]
+        _, way = self.direction_at(q, t)
+        return gone, -way if self.dissipation_side(q, way) < 0 else way
 
-    def _beyond(self, gone: Direction) -> Direction:
-        """Direction of the path where something has just begun to dissipate."""
-        self.t, q = self.simulation.t + gone.t, self.simulation.q + gone.q
-        way = self.direction_of(self.stiffness_at(q))
-        return -way if self.dissipation_side(q, way) < 0 else way
-
-    def _until(self, energy: float, gone: Direction, way: Direction) -> Direction:
+    def _until(self, energy: float, gone: Array, way: Array) -> Array:
         """Extend the step so far along a direction until it dissipates an energy; J."""
+        q = self.simulation.q + gone[:-1]
 
         def enough(length: float) -> bool:
-            return self.dissipation(self.simulation.q + gone.q + length * way.q) >= energy
+            return self.dissipation(q + length * way[:-1]) >= energy
 
         low, high = 0.0, 1e-6 / self.length(way)
         for _ in range(MOST_DOUBLINGS):
@@ -183,31 +163,11 @@ class PathCorrector:
             raise StepFailed("nothing dissipates in the direction of the path")
         return gone + bisect(enough, low, high, 12) * way
 
-    def dissipation_side(self, q: Array, way: Direction) -> float:
-        """Positive where more dissipates in a direction from ``q``, negative where against it."""
-        now, size = self.dissipation(q), self.size(way)
-        here = any(one.response.way.any() for one in self.simulation.couplings)
-        flows = self.share.total(float(here))
-        for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
-            δ = 1e-9 * 2**doubled / size
-            more = self.dissipation(q + δ * way.q) - self.dissipation(q - δ * way.q)
-            if abs(more) > now:
-                return more
-        return 0.0
-
     # -- the border ----------------------------------------------------------------------------
 
     def step_at(self, t: float) -> Step:
         """Return an infinitely slow step to a load factor: rates and viscous forces vanish."""
         return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, fraction=1.0)
-
-    def _driven_forces(self, q: Array, t: float) -> Array:
-        """Forces of all that depends on the load factor, which is t from now on."""
-        self.simulation.equation.begin(self.step_at(t), self._driven)
-        forces = np.zeros(self.share.size)
-        for term in self._driven:
-            term.add_residual(q, forces)
-        return forces
 
     def _moved(self, t: float) -> Array:
         """Return the prescribed motions at the degrees of freedom of supports; zero elsewhere."""
@@ -224,9 +184,12 @@ class PathCorrector:
         """Fill the matrix, and the derivative by the load factor, exact for linear functions."""
         simulation, t = self.simulation, self.t
         q, ε = simulation.supports.in_plane(x), 1e-6 * max(1.0, abs(t))
-        for sign in (1, -1):
-            r += sign / (2 * ε) * self._driven_forces(q, t + sign * ε)
-        self._driven_forces(q, t)
+        for δ, weight in ((ε, 0.5 / ε), (-ε, -0.5 / ε), (0.0, 0.0)):  # last where the tangent is
+            simulation.equation.begin(self.step_at(t + δ), self._driven)
+            forces = np.zeros(self.share.size)
+            for term in self._driven:
+                term.add_residual(q, forces)
+            r += weight * forces
         simulation.supports.enter(r)
         self._rates = np.asarray((self._moved(t + ε) - self._moved(t - ε)) / (2 * ε), dtype=float)
         self._A = simulation.equation.tangent_at(x, self._rates, r)
@@ -237,40 +200,59 @@ class PathCorrector:
         if len(moving):
             z = z - self._rates
         if self.crossing is not None:
-            mode = Direction(self.crossing.mode, 0.0)
-            y -= self.product(Direction(y, 0.0), mode) * mode.q
-            along = self.product(Direction(z, 0.0), mode) + self.crossing.speed
-            z = z - along * mode.q
-        q = supports.in_plane(self._x)
-        residual = self._constraint.residual(q, self.t)
-        by_y = self._constraint.derivative(q, Direction(supports.in_plane(y), 0.0))
-        by_z = self._constraint.derivative(q, Direction(supports.in_plane(z), -1.0))
-        change = (residual - by_y) / by_z if by_z else math.nan
+            _, mode, speed = self.crossing
+            of_mode = self.weights[:-1] * mode
+            y -= self.along(of_mode, y) * mode
+            z = z - (self.along(of_mode, z) + speed) * mode
+        by_y = self._derivative(np.append(supports.in_plane(y), 0.0))
+        by_z = self._derivative(np.append(supports.in_plane(z), -1.0))
+        change = (self._missing(supports.in_plane(self._x)) - by_y) / by_z if by_z else math.nan
         y += change * z
         self.t += change
         y[moving] = self._x[moving] - self._moved(self.t)[moving]
 
     def met(self) -> bool:
         """Return whether the equation of the control is fulfilled."""
-        q = self.simulation.supports.in_plane(self._x)
-        return abs(self._constraint.residual(q, self.t)) <= CONTROL_TOLERANCE
+        return abs(self._missing(self.simulation.supports.in_plane(self._x))) <= CONTROL_TOLERANCE
+
+    def _missing(self, q: Array) -> float:
+        """Error of the equation of the control at ``q``, as a part of its reach."""
+        if self._normal is None:
+            return self.dissipation(q) / self._reach - 1.0
+        return self.along(self._normal, np.append(q, self.t) - self._end) / self._reach
+
+    def _derivative(self, way: Array) -> float:
+        """Derivative of the error; of an energy by a central difference."""
+        if self._normal is not None:
+            return self.along(self._normal, way) / self._reach
+        q, size = self.simulation.supports.in_plane(self._x), self.size(way[:-1])
+        if size == 0.0:
+            return 0.0
+        ε = 1e-3 * self.size(q - self.simulation.q) / size
+        return (self._missing(q + ε * way[:-1]) - self._missing(q - ε * way[:-1])) / (2 * ε)
 
     # -- a step --------------------------------------------------------------------------------
 
     def attempt(
-        self, predicted: Direction, constraint: Plane | DissipatedEnergy, *, hold: bool = True
+        self, predicted: Array, normal: Array | None, reach: float, *, hold: bool = True
     ) -> Trial:
-        """Solve for an equilibrium under a constraint, beginning with a predicted step.
+        """Solve for an equilibrium on the plane across a normal through a predicted step.
 
-        Closed openings that do not flow are held closed if they can be, see material_points.py,
-        unless ``hold`` is false, as in a direction in which they open.
+        Or without a normal, for one up to which the energy ``reach`` (J) dissipates.  Closed
+        openings that do not flow are held closed if they can be, see material_points.py, unless
+        ``hold`` is false, as in a direction in which they open.
+
+        Args:
+            predicted: Predicted step.
+            normal: Gradient of the quantity that the control sets.
+            reach: Change of it in the step, which errors of it are compared with.
+            hold: Whether closed openings are held.
         """
-        if self.crossing is not None:
-            predicted = self.crossing.predicted
-        self._constraint, self.sought = constraint, predicted
         simulation = self.simulation
-        self.t = simulation.t + predicted.t
-        step, guess = self.step_at(self.t), simulation.q + predicted.q
+        self._end, self._normal, self._reach = self.start + predicted, normal, reach
+        self.sought = predicted = predicted if self.crossing is None else self.crossing.predicted
+        self.t = simulation.t + predicted[-1]
+        step, guess = self.step_at(self.t), simulation.q + predicted[:-1]
         simulation.supports.enter(guess)
         simulation.together(simulation.supports.move, guess, guess, step)
         trial = simulation.attempt_along(step, guess, self, hold=hold)
@@ -281,26 +263,23 @@ class PathCorrector:
         simulation = self.simulation
         simulation.together(simulation.equation.begin, self.step_at(simulation.t))
 
-    def stiffness_at(self, q: Array) -> Stiffness:
-        """Return the tangent stiffness at a state."""
-        supports = self.simulation.supports
+    def direction_at(self, q: Array, t: float) -> tuple[Stiffness, Array]:
+        """Return the tangent stiffness of a state, and the direction in which its factor grows."""
+        self.t, supports = t, self.simulation.supports
         for _ in range(2):  # the first tangent of a step is that of the forces before it
             rate = np.zeros(self.share.size)
             self.simulation.together(self.tangent, supports.in_axes(q), rate)
-        return Stiffness(self.share, self._A, supports.dofs, rate, self._all_weights)
-
-    def direction_of(self, stiffness: Stiffness) -> Direction:
-        """Return the direction of the path in which the load factor grows."""
-        q = stiffness.flow[self.share.dofs] + self._rates
-        self.simulation.supports.leave(q)
-        way = Direction(q, 1.0)
+        stiffness = Stiffness(self.share, self._A, supports.dofs, rate, self._all_weights)
+        motion = stiffness.flow[self.share.dofs] + self._rates
+        supports.leave(motion)
+        way = np.append(motion, 1.0)
         size = self.length(way)
-        if not math.isfinite(size) or not self.size(way) > 0:
+        if not math.isfinite(size) or not self.size(motion) > 0:
             raise StepFailed(
                 "nothing moves with the load factor here; let a load or a motion go on to change, "
                 "as with time=lambda t: t"
             )
-        return way / size
+        return stiffness, way / size
 
 
 def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
@@ -312,29 +291,69 @@ def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: 
 
 
 class Control(ABC):
-    """Base class of path controls, which set the lengths of steps."""
+    """Base class of path controls, which set the lengths of steps.
+
+    A step changes a quantity by ``step``, or by a part of that.
+    """
+
+    step: float
+    least_rest = 0.0  # least part of a step that is left beyond a kink
+
+    def __post_init__(self) -> None:
+        require_number(self.step, f"{type(self).__name__}: step")
+        if self.step == 0:
+            raise SceneError(f"{type(self).__name__}: step = 0 leads nowhere")
 
     @property
-    @abstractmethod
     def factor(self) -> float:
         """Change of the load factor that counts as much as a unit of displacement."""
+        return 1.0
+
+    @property
+    def quantity(self) -> str:
+        """The quantity in words, if it may turn back along a path."""
+        return ""
 
     def require(self, scene: Scene) -> None:
         """Raise :class:`SceneError` if the control does not fit the scene."""
 
     @abstractmethod
-    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
+    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+        """Gradient of the quantity, in a step along a direction; its change is positive."""
+
+    def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
         """Positive if a path that came by ``gone``, or begins (None), goes on along ``way``."""
+        return corrector.along(self.normal(corrector, way), way)
 
-    @abstractmethod
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
-        """Solve for the end of a step, or of a part of it; :class:`StepFailed` if there is none."""
+        """Solve for the end of a part of a step; :class:`StepFailed` if there is none.
 
-
-def _require_step(step: float, what: str) -> None:
-    require_number(step, f"{what}: step")
-    if step == 0:
-        raise SceneError(f"{what}: step = 0 leads nowhere")
+        Where that fails and something begins to dissipate, the direction changes there.
+        """
+        reach, gone, way = abs(self.step) * part, 0.0 * corrector.direction, corrector.direction
+        rest, hold = reach, True
+        while True:
+            normal = self.normal(corrector, way)
+            speed = corrector.along(normal, way)
+            if not speed > 0:
+                raise StepFailed(
+                    f"{self.quantity} turns back, where this control cannot follow; take ArcLength"
+                )
+            step = gone + rest / speed * way
+            try:
+                return corrector.attempt(step, normal, reach, hold=hold)
+            except StepFailed as failure:
+                kink = corrector.kink(step) if hold else None
+                if kink is None and hold and self.quantity:
+                    raise failure.saying(
+                        f"{failure}; perhaps {self.quantity} turns back here, where this control "
+                        "cannot follow: take ArcLength"
+                    ) from None
+                if kink is None:
+                    raise
+            gone, way = kink
+            rest = max(reach - corrector.along(normal, gone), self.least_rest * reach)
+            hold = False
 
 
 @dataclass(frozen=True)
@@ -365,89 +384,26 @@ class ArcLength(Control):
     step: float
     _: KW_ONLY
     factor: float = 1.0
+    least_rest = 1e-3
 
     def __post_init__(self) -> None:
-        _require_step(self.step, "ArcLength")
+        super().__post_init__()
         require_number(self.factor, "ArcLength: factor", positive=True)
 
-    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
+    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+        """Across the direction."""
+        return np.asarray(corrector.weights * way / corrector.length(way))
+
+    def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
         """First the sign of the step, later that of flow and openings, else by turns below π/2."""
         if gone is None:
-            return self.step * way.t
-        side = corrector.dissipation_side(corrector.simulation.q + gone.q, way)
-        return side or corrector.product(gone, way)
-
-    def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
-        """Solve on the plane across the direction of the path."""
-        reach, way = abs(self.step) * part, corrector.direction
-        size = corrector.length(way)
-        unit = way / size
-        try:
-            plane = Plane(corrector, self._across(corrector, unit), reach, corrector.start)
-            return corrector.attempt(reach * unit, plane)
-        except StepFailed:
-            if (kink := corrector.kink(reach / size)) is None:
-                raise
-        gone, way = kink
-        unit = way / corrector.length(way)
-        rest = max(reach - corrector.length(gone), LEAST_REST * reach)
-        plane = Plane(corrector, self._across(corrector, unit), rest, corrector.start + gone)
-        return corrector.attempt(gone + rest * unit, plane, hold=False)
-
-    def _across(self, corrector: PathCorrector, unit: Direction) -> Direction:
-        """Normal of the plane across a direction."""
-        return Direction(np.asarray(corrector.weights * unit.q), unit.t / self.factor**2)
-
-
-class _QuantityControl(Control):
-    """Control of a quantity that is linear in the configuration and the load factor."""
-
-    step: float
-
-    @abstractmethod
-    def _normal(self, corrector: PathCorrector) -> Direction:
-        """Gradient of the quantity."""
-
-    @property
-    @abstractmethod
-    def _quantity(self) -> str:
-        """The quantity in words."""
-
-    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
-        """Positive if the quantity changes along ``way`` as ``step`` says."""
-        return self.step * corrector.along(self._normal(corrector), way)
-
-    def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
-        """Solve at the next value of the quantity."""
-        reach, what, normal = self.step * part, self._quantity, self._normal(corrector)
-
-        def length(rest: float, way: Direction) -> float:
-            """Return the length of the step along a direction."""
-            speed = corrector.along(normal, way)
-            if not speed * reach > 0:
-                raise StepFailed(
-                    f"{what} turns back, where this control cannot follow; take ArcLength"
-                )
-            return rest / speed
-
-        plane = Plane(corrector, normal, reach, corrector.start)
-        size = length(reach, corrector.direction)
-        try:
-            return corrector.attempt(size * corrector.direction, plane)
-        except StepFailed as failure:
-            if (kink := corrector.kink(size)) is None:
-                raise StepFailed(
-                    f"{failure}; perhaps {what} turns back here, where this control cannot "
-                    "follow: take ArcLength",
-                    failure.residuals,
-                ) from None
-        gone, way = kink
-        rest = length(reach - corrector.along(normal, gone), way)
-        return corrector.attempt(gone + rest * way, plane, hold=False)
+            return self.step * float(way[-1])
+        side = corrector.dissipation_side(corrector.simulation.q + gone[:-1], way)
+        return side or corrector.along(corrector.weights * gone, way)
 
 
 @dataclass(frozen=True)
-class LoadControl(_QuantityControl):
+class LoadControl(Control):
     """Load control: equal steps of the load factor, up to the limit load.
 
     Args:
@@ -463,18 +419,15 @@ class LoadControl(_QuantityControl):
     """
 
     step: float
-    factor = 1.0
-    _quantity = "the load factor"
+    quantity = "the load factor"
 
-    def __post_init__(self) -> None:
-        _require_step(self.step, "LoadControl")
-
-    def _normal(self, corrector: PathCorrector) -> Direction:
-        return Direction(np.zeros(corrector.share.size), 1.0)
+    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+        """The load factor, or its fall."""
+        return math.copysign(1.0, self.step) * corrector.of_factor
 
 
 @dataclass(frozen=True)
-class DisplacementControl(_QuantityControl):
+class DisplacementControl(Control):
     """Displacement control of one component at a place: passes limit points of loads.
 
     Args:
@@ -504,7 +457,7 @@ class DisplacementControl(_QuantityControl):
                 f"DisplacementControl: component = {self.component!r} must be one of "
                 f"{', '.join(COMPONENTS)}"
             )
-        _require_step(self.step, "DisplacementControl")
+        super().__post_init__()
 
     def require(self, scene: Scene) -> None:
         """Raise :class:`SceneError` unless the beam of the place is in the scene."""
@@ -513,17 +466,19 @@ class DisplacementControl(_QuantityControl):
                 f"DisplacementControl of {self.place}: {self.place.beam.name} is not in the scene"
             )
 
-    def _normal(self, corrector: PathCorrector) -> Direction:
+    @property
+    def quantity(self) -> str:
+        """The component and the place."""
+        return f"{self.component} of {self.place}"
+
+    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+        """The component, or its fall."""
         share, normal = corrector.share, np.zeros(corrector.share.grid.size)
         nodes, weights = share.grid.weights(self.place)
         normal[share.grid.dofs[nodes, COMPONENTS.index(self.component)]] += weights
-        local = normal[share.dofs]
+        local = normal[share.dofs] * math.copysign(1.0, self.step)
         local[share.num_owned :] = 0.0
-        return Direction(local, 0.0)
-
-    @property
-    def _quantity(self) -> str:
-        return f"{self.component} of {self.place}"
+        return np.append(local, 0.0)
 
 
 @dataclass(frozen=True)
@@ -559,23 +514,27 @@ class DissipationControl(Control):
         """Factor of the arc length."""
         return self.otherwise.factor
 
-    def sense(self, corrector: PathCorrector, way: Direction, gone: Direction | None) -> float:
+    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+        """That of the arc length."""
+        return self.otherwise.normal(corrector, way)
+
+    def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
         """That of the arc length."""
         return self.otherwise.sense(corrector, way, gone)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
         """Solve at the next dissipated energy, unless a step of arc length dissipates nothing."""
-        if corrector.dissipates:
+        if not corrector.dissipates:
             with suppress(StepFailed):
-                return self._dissipate(corrector, part)
-            return self.otherwise.solve_step(corrector, part)
-        with suppress(StepFailed):
-            trial = self.otherwise.solve_step(corrector, part)
-            if corrector.dissipation(trial.q1) == 0.0:
-                return trial
-        return self._dissipate(corrector, part)
-
-    def _dissipate(self, corrector: PathCorrector, part: float) -> Trial:
+                trial = self.otherwise.solve_step(corrector, part)
+                if corrector.dissipation(trial.q1) == 0.0:
+                    return trial
         energy = self.step * part
-        predicted = corrector.predict_dissipation(energy)
-        return corrector.attempt(predicted, DissipatedEnergy(corrector, energy), hold=False)
+        try:
+            return corrector.attempt(
+                corrector.predict_dissipation(energy), None, energy, hold=False
+            )
+        except StepFailed:
+            if not corrector.dissipates:
+                raise
+        return self.otherwise.solve_step(corrector, part)

@@ -14,8 +14,8 @@ from mpi4py import MPI
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from ufl_beam.analysis.critical_points import Branch, Candidate, CriticalPoint, Direction
-from ufl_beam.analysis.path_controls import Control, Crossing, PathCorrector, Plane
+from ufl_beam.analysis.critical_points import Branch, Candidate, CriticalPoint, Stiffness
+from ufl_beam.analysis.path_controls import Control, Crossing, PathCorrector
 from ufl_beam.arrays import Array
 from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
@@ -196,7 +196,8 @@ def follow(
             bar = progress_bar(progress, comm, total=steps, unit="step")
             take_steps(simulation, stepper, recorders, bar, until=until)
         except StepFailed as failure:
-            simulation.give_up(failure, stepper.tried, ADVICE)
+            end = simulation.t + float(stepper.corrector.sought[-1])
+            simulation.give_up(failure, end, ADVICE)
     return path
 
 
@@ -232,8 +233,10 @@ class PathStepper:
 
     def __init__(self, simulation: Simulation, control: Control, most: int) -> None:
         self._simulation, self._control = simulation, control
-        self.steps, self._most, self.error = 0, most, math.nan
-        self._corrector = PathCorrector(simulation, control.factor)
+        self._most, self.error = most, math.nan
+        self.steps = self.progress = 0
+        self.finished = False
+        self.corrector = PathCorrector(simulation, control.factor)
         self.critical: list[CriticalPoint] = []
         self._part = 1.0
         self._before: Candidate | None = None
@@ -241,40 +244,20 @@ class PathStepper:
 
     def begin(self, branch: Branch | None, *, fresh: bool) -> None:
         """Find the direction in which the path begins; if fresh, its first equilibrium too."""
-        corrector, simulation = self._corrector, self._simulation
+        corrector, simulation = self.corrector, self._simulation
         if branch is not None:
-            corrector.direction = Direction(branch.mode[corrector.share.dofs], 0.0)
+            corrector.direction = np.append(branch.mode[corrector.share.dofs], 0.0)
             return
         if fresh:
-            none = np.zeros(corrector.share.size)
-            still, factor = Direction(none, 0.0), Direction(none, 1.0)
-            # The load factor is given: it ends where it is, 1 beyond one that is smaller by 1.
-            given = Plane(corrector, factor, 1.0, corrector.start + -factor)
-            simulation.accept(corrector.attempt(still, given))
+            factor = corrector.of_factor  # it is given, and stays as it is
+            simulation.accept(corrector.attempt(0.0 * factor, factor, 1.0))
         corrector.begin()
-        stiffness = corrector.stiffness_at(simulation.q)
-        way = corrector.direction_of(stiffness)
+        stiffness, way = corrector.direction_at(simulation.q, simulation.t)
         corrector.direction = way if self._control.sense(corrector, way, None) > 0 else -way
         here = Trial(corrector.step_at(simulation.t), simulation.q, np.zeros(corrector.share.size))
         # A run that ended at a critical point may go on from there.
-        way = corrector.direction
-        slope = abs(way.t) / corrector.size(way)
-        self._before, self._landed = Candidate(here, stiffness, way, slope), not fresh
-
-    @property
-    def tried(self) -> float:
-        """Load factor at which the latest attempt began."""
-        return self._simulation.t + self._corrector.sought.t
-
-    @property
-    def finished(self) -> bool:
-        """True if all steps are done."""
-        return self.steps == self._most
-
-    @property
-    def progress(self) -> int:
-        """Number of steps that are done."""
-        return self.steps
+        self._before = self._candidate(here, stiffness, corrector.direction)
+        self._landed = not fresh
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
         """Take a step, a shorter one where it fails, only up to a critical point in it; keep it.
@@ -294,13 +277,14 @@ class PathStepper:
         count, part = self._simulation.iterations - iterations, self._part
         self._part = min(1.0, part * min(2.0, TARGET_ITERATIONS / max(count, 1)))
         self._accept(found, part)
-        self.steps += 1
+        self.steps = self.progress = self.steps + 1
+        self.finished = self.steps == self._most
         if keep:
             self._simulation.keep()
 
     def _accept(self, found: Candidate, part: float) -> None:
         """Go to the end of a step, or to a critical point before it."""
-        corrector, before = self._corrector, self._before
+        corrector, before = self.corrector, self._before
         if before is None or not found.passed(before):
             self._landed = False
             self._take(found)
@@ -334,7 +318,7 @@ class PathStepper:
 
     def _pass_kink(self, after: Candidate, last: float, part: float, limit: bool) -> None:
         """Go to the last state in which nothing dissipates, if the load factor turns there."""
-        before, n = self._corrector.direction, len(self._simulation.solution)
+        before, n = self.corrector.direction, len(self._simulation.solution)
         if limit and last > 0:
             self._take(self._seek(last))
             self._note(after, before, n, limit)
@@ -345,25 +329,31 @@ class PathStepper:
         self._take(self._seek(part))
 
     def _take(self, found: Candidate) -> None:
-        corrector = self._corrector
+        corrector = self.corrector
         corrector.dissipates = corrector.dissipation(found.trial.q1) > 0.0
         self._simulation.accept(found.trial)
         corrector.direction, self._before = found.way, found
 
+    def _candidate(
+        self, trial: Trial, stiffness: Stiffness, way: Array, mode: Array | None = None
+    ) -> Candidate:
+        slope = abs(way[-1]) / self.corrector.size(way[:-1])
+        return Candidate(trial, stiffness, way, slope, mode)
+
     def _seek(self, part: float) -> Candidate:
-        corrector, simulation = self._corrector, self._simulation
+        """Solve for the end of a part of a step; refuse one that left the direction of the path."""
+        corrector = self.corrector
         trial = self._control.solve_step(corrector, part)
-        corrector.t = trial.step.t1
-        stiffness = corrector.stiffness_at(trial.q1)
-        way = corrector.direction_of(stiffness)
-        gone = Direction(trial.q1 - simulation.q, trial.step.t1 - simulation.t)
+        stiffness, way = corrector.direction_at(trial.q1, trial.step.t1)
+        gone = np.append(trial.q1, trial.step.t1) - corrector.start
         size, sought = (corrector.length(one) for one in (gone, corrector.sought))
-        aligned = corrector.product(gone, corrector.sought) >= LEAST_COSINE * size * sought
-        if part > UNCHECKED_PART and not (aligned and size <= LARGEST_LENGTH_RATIO * sought):
+        aligned = corrector.along(corrector.weights * gone, corrector.sought)
+        turns = aligned < LEAST_COSINE * size * sought or size > LARGEST_LENGTH_RATIO * sought
+        if part > UNCHECKED_PART and turns:
             raise StepFailed("the path turns too sharply, or the step leaps to another branch")
         if self._control.sense(corrector, way, gone) < 0:
             way = -way
-        return Candidate(trial, stiffness, way, abs(way.t) / corrector.size(way))
+        return self._candidate(trial, stiffness, way)
 
     def _locate(self, before: Candidate, after: Candidate, part: float) -> tuple[Candidate, float]:
         """The first state whose signs have changed, and the part of the step that leads there.
@@ -411,9 +401,9 @@ class PathStepper:
             else:
                 weight_high *= 0.5 if side > 0 else 1.0
                 low, first, weight_low, side = middle, found, 1.0, 1
-        found, start = self._seek(high), self._corrector.start
+        found, start = self._seek(high), self.corrector.start
         below = start if low == 0.0 else first.end
-        leap, whole = (self._corrector.length(found.end + -one) for one in (below, start))
+        leap, whole = (self.corrector.length(found.end - one) for one in (below, start))
         if low > 0 and leap > LEAP_PART * whole:
             self._part = (part - low) / 2
             return self._seek(low), low
@@ -435,23 +425,23 @@ class PathStepper:
         Raises:
             StepFailed: It is no bifurcation point, or was not found.
         """
-        corrector, leave = self._corrector, self._simulation.supports.leave
+        corrector, leave = self.corrector, self._simulation.supports.leave
         (first, last), (before, after) = near, ends
-        whole, stiffness = last.end + -first.end, last.stiffness
-        if not whole.t * first.way.t * last.way.t:
+        whole, stiffness = last.end - first.end, last.stiffness
+        if not whole[-1] * first.way[-1] * last.way[-1]:
             raise StepFailed("the load factor turns here")
-        speeds = [whole.t / one.way.t * one.way.q for one in near]
-        path = CubicHermiteSpline([0.0, 1.0], [first.end.q, last.end.q], speeds)
+        speeds = [whole[-1] / one.way[-1] * one.way for one in near]
+        path = CubicHermiteSpline([0.0, 1.0], [first.end, last.end], speeds)
         (x0, λ0), (x, λ) = ((float(k), one.stiffness.softest[0]) for k, one in enumerate(near))
         for _ in range(MOST_CROSSING_STEPS):
             x0, x = x, (x0 * λ - x * λ0) / (λ - λ0) if λ != λ0 else math.nan
             if not 0.0 <= x <= 1.0:
                 break
-            end, way = Direction(path(x), first.end.t + x * whole.t), Direction(path(x, 1), whole.t)
+            end, way = path(x), path(x, 1)  # the load factor is linear
             mode = np.array(stiffness.softest[1][corrector.share.dofs])
             leave(seen := mode.copy())
-            speed = corrector.product(way, Direction(seen, 0.0)) / way.t
-            corrector.crossing = Crossing(end + -corrector.start, mode, speed)
+            speed = corrector.along(corrector.weights[:-1] * seen, way[:-1]) / way[-1]
+            corrector.crossing = Crossing(end - corrector.start, mode, speed)
             reached = (1 - x) * parts[0] + x * parts[1]
             try:
                 found = self._seek(reached)
@@ -465,31 +455,29 @@ class PathStepper:
             # Where it falls no more, the eigenvalue is round-off.
             if not _soft(found, first, last) or not _idle(found, before, after):
                 break
-            way = (1.0 if way.t * first.way.t > 0 else -1.0) / corrector.length(way) * way
+            way = (1.0 if way[-1] * first.way[-1] > 0 else -1.0) / corrector.length(way) * way
             leave(mode := np.array(stiffness.softest[1][corrector.share.dofs]))
-            slope = abs(way.t) / corrector.size(way)
-            return Candidate(found.trial, last.stiffness, way, slope, mode), reached
+            return self._candidate(found.trial, last.stiffness, way, mode), reached
         raise StepFailed("no bifurcation point was found")
 
     def _turned(self, found: Candidate) -> bool:
         """Return whether the load factor goes the other way than before the step."""
-        return found.way.t * self._corrector.direction.t < 0
+        return bool(found.way[-1] * self.corrector.direction[-1] < 0)
 
-    def _note(self, found: Candidate, before: Direction, n: int, limit: bool) -> None:
+    def _note(self, found: Candidate, before: Array, n: int, limit: bool) -> None:
         """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
-        corrector, simulation, way = self._corrector, self._simulation, found.way
+        corrector, simulation, way = self.corrector, self._simulation, found.way
         if limit:
             # At a limit point the path goes along the mode.
-            mode = np.asarray(way.q / corrector.size(way), dtype=np.float64)
+            mode = np.asarray(way[:-1] / corrector.size(way[:-1]))
         elif found.mode is not None:
             mode = found.mode
         else:
             mode = np.array(found.stiffness.softest[1][corrector.share.dofs])
             simulation.supports.leave(mode)
             # What the path goes along the mode is lost in a singular stiffness.
-            strayed = Direction(way.q - before.q, 0.0)
-            along = corrector.product(strayed, Direction(mode, 0.0))
-            corrector.direction = Direction(way.q - along * mode, way.t)
+            along = corrector.along(corrector.weights[:-1] * mode, (way - before)[:-1])
+            corrector.direction = way - along * np.append(mode, 0.0)
         kind = "limit" if limit else "bifurcation"
         state = simulation.snapshot()
         mode = corrector.share.gather(mode)
