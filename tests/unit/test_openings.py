@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
+from ufl_beam.discretization.state_io import Memory
 
 LENGTH, EI, STIFF = 2.0, 1000.0, 1e6  # m, N m², N
 LAWS = [ub.Softening, ub.LinearSoftening]
@@ -152,10 +153,11 @@ def test_what_flows_is_part_of_the_state():
     for n, t in enumerate(ends):
         one.step_to(t)
         if n == 40:
-            state, flows = one.state(), [x.points["flows"].copy() for x in one.inelastic]
+            one.remember(memory := Memory(one.share))
+            state, flows = memory.state(), [x.points["flows"].copy() for x in one.inelastic]
     assert one.comm.allreduce(sum(int((x == 1).sum()) for x in flows)) > 0
     other = ub.Simulation(scene, ub.Midpoint())
-    other.resume(state)
+    other.remember(Memory(other.share, state))
     for here, there in zip(other.inelastic, flows, strict=True):
         np.testing.assert_array_equal(here.points["flows"], there)
     for t in ends[41:]:

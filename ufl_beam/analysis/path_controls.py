@@ -65,9 +65,8 @@ class PathCorrector:
         self.simulation, self.factor = simulation, factor
         self.share = share = simulation.share
         grid = share.grid
-        squares = np.full(share.size, 1 / grid.scene.size**2)
-        squares[share.rotations] = 1.0
-        squares[share.multipliers] = squares[share.num_owned :] = 0.0
+        squares = grid.scales[share.dofs] ** 2
+        squares[share.num_owned :] = 0.0
         squares /= grid.size - len(grid.multipliers)
         self._all_weights = share.gather(squares)
         self.of_factor = np.append(0.0 * squares, share.comm.rank == 0)
@@ -345,9 +344,10 @@ class Control(ABC):
             except StepFailed as failure:
                 kink = corrector.kink(step) if hold else None
                 if kink is None and hold and self.quantity:
-                    raise failure.saying(
+                    raise StepFailed(
                         f"{failure}; perhaps {self.quantity} turns back here, where this control "
-                        "cannot follow: take ArcLength"
+                        "cannot follow: take ArcLength",
+                        failure.residuals,
                     ) from None
                 if kink is None:
                     raise

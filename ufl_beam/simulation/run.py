@@ -13,6 +13,8 @@ from typing import Any, cast
 
 from mpi4py import MPI
 
+import numpy as np
+
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import (
     ConvergenceError,
