@@ -391,7 +391,7 @@ class ArcLength(Control):
         require_number(self.factor, "ArcLength: factor", positive=True)
 
     def normal(self, corrector: PathCorrector, way: Array) -> Array:
-        """Across the direction."""
+        """Direction of the path, by the weights of its length."""
         return np.asarray(corrector.weights * way / corrector.length(way))
 
     def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
