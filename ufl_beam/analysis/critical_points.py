@@ -101,7 +101,7 @@ class Stiffness:
 
     Each process gives its part A of the tangent, the local degrees of freedom ``held`` by supports,
     and its part ``rate`` of the derivative of the residual by the load factor.  ``weights`` are
-    those of squares in the length of a direction, at all degrees of freedom.
+    the weights of the norm of a direction, at all degrees of freedom of the scene.
 
     A symmetric form of the tangent is factored.  A connector has the gradient g of its motion in
     its column, and α g and β in its row.  The row is divided by α.  Where β is not zero, the unit

@@ -52,10 +52,10 @@ class PathCorrector:
     predicted and corrected by ``crossing``, where there is one.
 
     Attributes:
-        weights: Weights of squares whose sum is the square of a length: the mean square of
-            displacements as parts of the size of the scene and of rotations, and the square of the
-            load factor over ``factor``.  Only what a process owns counts, so that sums over the
-            processes are right.
+        weights: Weights of the squares in the norm of a direction.  Displacements are divided by
+            the size of the scene, the load factor by ``factor``; displacements and rotations enter
+            with their mean square.  Degrees of freedom that another process owns have the weight
+            zero, so that processes add their sums.
         of_factor: Gradient of the load factor.
         direction: Direction of the path at the beginning of the step.
         sought: The step that was predicted.
@@ -391,7 +391,7 @@ class ArcLength(Control):
         require_number(self.factor, "ArcLength: factor", positive=True)
 
     def normal(self, corrector: PathCorrector, way: Array) -> Array:
-        """Direction of the path, by the weights of its length."""
+        """Gradient of the arc length, in a step along the direction of the path."""
         return np.asarray(corrector.weights * way / corrector.length(way))
 
     def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
@@ -515,11 +515,11 @@ class DissipationControl(Control):
         return self.otherwise.factor
 
     def normal(self, corrector: PathCorrector, way: Array) -> Array:
-        """That of the arc length."""
+        """Gradient of the arc length; used where nothing dissipates."""
         return self.otherwise.normal(corrector, way)
 
     def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
-        """That of the arc length."""
+        """Sense of the arc length; used where nothing dissipates."""
         return self.otherwise.sense(corrector, way, gone)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:

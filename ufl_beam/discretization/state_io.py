@@ -22,9 +22,10 @@ of the scene."""
 
 
 class Memory:
-    """What a process remembers: without a ``state`` it is written down, with one it is given back.
+    """Storage of the state of a process, for restart and ``start=``.
 
-    Methods return the values that they get, or those of the state.
+    Without a ``state``, methods save the values that they get and return them.  With a ``state``,
+    they return the saved values instead.
     """
 
     def __init__(self, share: Share, state: State | None = None) -> None:
@@ -67,9 +68,10 @@ class Memory:
         return np.asarray(here)
 
     def rows(self, name: str, numbers: Index, rows: Array, *, known: bool = False) -> Array:
-        """Rows of numbered things, each on one process only, or all of them ``known`` to all.
+        """Save or restore rows by number; each is on one process, or all are ``known`` to all.
 
-        Those of one name may have different lengths.  Rows that a state does not have stay.
+        Rows of one name may have different lengths.  A number that is not in the state keeps its
+        present row.
         """
         columns = rows.shape[1]
         table_of = f"{name}, {columns}"

@@ -196,7 +196,7 @@ class Mesh:
         refine: Factor on the number of cells between any two places of a beam; a whole number
             divides each cell, ``Fraction(1, 2)`` joins two and two.
         degree: Polynomial degree of displacements and rotations in a cell, 1, 2 or 3, integrated
-            with as many points; more than 1 for elastic beams only.
+            with as many points.  Degrees 2 and 3 are for elastic beams only.
         lumped: Take the lumped mass matrix of the beams: diagonal, with the row sums of the
             consistent one.
 
@@ -263,7 +263,7 @@ class Mesh:
         return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
     def vertices(self, beam: Member, attached: Sequence[float]) -> list[float]:
-        """Parameters of the vertices of a beam: ends, corners and what is ``attached`` among them.
+        """Parameters of the vertices of a beam, with its ends, corners and ``attached`` places.
 
         Raises:
             SceneError: Between two of those there are too few cells to be joined.

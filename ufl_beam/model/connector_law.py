@@ -118,7 +118,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
     def sliding(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
         """Size of the force against sliding, the limit by default; N or N m.
 
-        Arguments are those of :meth:`resistance`.
+        It has the arguments of :meth:`resistance`.
         """
         return self.limit(state)
 

@@ -229,7 +229,7 @@ def plastic_hinges(
 ) -> tuple[Connector, ...]:
     """Plastic hinges of zero length, as connectors of both sides; motions are jumps of rotation.
 
-    A beam has those of its ``hinges``, and one at each end if its section has a hinge.  There is
+    A beam has its ``hinges``, and a hinge at each end if its section has one.  There is
     none at an end that bears no moment, nor at one where nothing but a load is: the load acts on
     the member, as nothing beyond a hinge could bear it.  Where two members meet and nothing else
     bears a moment, both have the same moment; then only the weaker one has a hinge, as the other

@@ -258,8 +258,8 @@ def _constraints(
 ) -> csr_array:
     """Matrix of constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
 
-    Its rows are those of joints, supports, connectors that ``acts`` selects, components of motion
-    in ``also``, and of beams on which works of the user act: they may hold them.
+    Joints, supports, connectors that ``acts`` selects and components of motion in ``also`` have
+    rows.  So have beams on which works of the user act, because a work may hold them.
     """
     unit = np.eye(3)
     rows: list[Row] = [

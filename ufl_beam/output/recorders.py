@@ -127,7 +127,7 @@ class StateView(PresentState):
     @property
     @abstractmethod
     def q_before(self) -> Array:
-        """That at the beginning of the last step."""
+        """Configuration at the beginning of the last step."""
 
     @property
     def asked(self) -> dict[Connector, float]:

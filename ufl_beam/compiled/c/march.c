@@ -617,7 +617,7 @@ int springs_dissipate(void *self, const double *q1)
 /* Root mean square of the motions in a step, as a part of the size of the scene. */
 static const double FAR = 1. / 8;
 
-/* Whether a step is as long as the last one, but for last digits of the times at its ends. */
+/* Return 1 if a step is as long as the last one. Differences of times have fewer digits than the times. */
 static int as_last(const prediction *p, double dt)
 {
   return fabs(dt - p->dt) <= 1e-6 * dt;
