@@ -255,18 +255,17 @@ def require_law(law: object, what: str) -> None:
 def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -> None:
     """Raise :class:`SceneError` unless a law is a frozen dataclass whose fields have free names.
 
-    Names of the base are taken, ``but`` some.
+    A field cannot have the name of a member of the base, except those in ``but``.
     """
     parameters = getattr(type(law), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen or not parameters.eq:
         raise SceneError(f"{what} must be a dataclass: @dataclass(frozen=True)")
     reserved = {*vars(base), *base.__annotations__} - {*but}
     if taken := sorted(reserved & {field.name for field in fields(law)}):
-        means = ": C is the elastic stiffness at the point, the others are its methods and "
+        used = ": C is the elastic stiffness at the point, the others are its methods and attributes"
         raise SceneError(
             f"{what}: a field cannot have the name {' or '.join(taken)}, which every "
-            f"{base.__name__} gives to something else"
-            f"{f'{means}attributes' if base is MaterialLaw else ''}"
+            f"{base.__name__} gives to something else{used if base is MaterialLaw else ''}"
         )
 
 
