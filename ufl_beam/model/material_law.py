@@ -262,7 +262,7 @@ def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -
         raise SceneError(f"{what} must be a dataclass: @dataclass(frozen=True)")
     reserved = {*vars(base), *base.__annotations__} - {*but}
     if taken := sorted(reserved & {field.name for field in fields(law)}):
-        used = ": C is the elastic stiffness at the point, the others are its methods and attributes"
+        used = ": C is the elastic stiffness at the point, others are its methods and attributes"
         raise SceneError(
             f"{what}: a field cannot have the name {' or '.join(taken)}, which every "
             f"{base.__name__} gives to something else{used if base is MaterialLaw else ''}"
