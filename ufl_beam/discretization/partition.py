@@ -65,13 +65,10 @@ class Share:
         self.grid = grid
         self.comm, self.alone = comm, comm.size == 1
         rank_of_cell = bisected(grid.points[grid.cells].mean(axis=1), comm.size)
-        self._cells_by_rank = np.argsort(rank_of_cell, kind="stable").astype(np.int32)
-        ends = np.searchsorted(rank_of_cell[self._cells_by_rank], np.arange(comm.size + 1))
         owner = np.full(grid.size, comm.size, dtype=np.int32)
         for rank in reversed(range(comm.size)):  # the first of those that have it
-            cells = self._cells_by_rank[ends[rank] : ends[rank + 1]]
-            owner[grid.dofs[grid.nodes_of_cells[cells]]] = rank
-        self.cells = self._cells_by_rank[ends[comm.rank] : ends[comm.rank + 1]]
+            owner[grid.dofs[grid.nodes_of_cells[rank_of_cell == rank]]] = rank
+        self.cells = np.flatnonzero(rank_of_cell == comm.rank).astype(np.int32)
         of_cell = grid.dofs[grid.nodes_of_cells[self.cells]].transpose(0, 2, 1)
         of_cell = of_cell.reshape(len(self.cells), 3 * (grid.mesh.degree + 1))
         of_hinge, cell_of_hinge = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
@@ -182,15 +179,6 @@ class Share:
         sums[self.dofs] = values
         self.comm.Allreduce(MPI.IN_PLACE, sums)
         return np.asarray(sums[self.dofs])
-
-    def gather_cells(self, values: Array) -> Array:
-        """Values of all cells, in the order of the grid, on every process."""
-        if self.alone:
-            return values.copy()
-        parts = np.concatenate(self.comm.allgather(values))
-        result = np.empty_like(parts)
-        result[self._cells_by_rank] = parts
-        return np.asarray(result)
 
     def total(self, value: float) -> float:
         """Sum over the processes."""

@@ -284,16 +284,30 @@ class Simulation(Stepper):
         """``cell_number`` of loops.h of all cells after so many steps, which are the present."""
         if parts != self.parts:
             raise SceneError("section forces of an earlier state: ask for simulation.now again")
-        numbers = self.cell_forces(self.q, self.q_before).T
-        return np.ascontiguousarray(self.share.gather_cells(numbers).T)
+        forces = self._put_forces(np.empty((lib.CELL_NUMBERS, len(self.grid.cells))))
+        if not self.share.alone:
+            self.share.comm.Allreduce(MPI.IN_PLACE, forces)
+        return forces
+
+    def _put_forces(self, out: Array) -> Array:
+        """Put the forces of the cells of this process among zeros; sums over processes are all."""
+        out.fill(0.0)
+        out[:, self.share.cells] = self.cell_forces(self.q, self.q_before)
+        return out
 
     def keep(self, solution: Solution | None = None) -> None:
         """Append the state to the solution, or to another one; all processes call it together."""
         solution = self.solution if solution is None else solution
-        columns = self._writer.columns
+        columns, alone = self._writer.columns, self.share.alone
         follows = not solution.begun or solution.parts_of_last == self.parts - 1
-        if self.parts and follows and not self._gathers:
-            self._writer.write(solution.room(columns))
+        if self.parts and follows and not (alone and self._gathers):
+            if not alone:
+                shape = int(lib.CELL_NUMBERS), len(self.grid.cells)
+                columns = columns.plus(FORCES, shape, without=RECORD)
+            (row,) = solution.room(columns)
+            if not alone:
+                self._put_forces(columns.of_rows(FORCES, row))
+            self._writer.write(row)
             solution.grow()
         else:
             _, row = self.now.row(0)
