@@ -99,7 +99,7 @@ class Probe:
     @staticmethod
     def in_motion(simulation, random):
         """Random velocities and whatever else schemes keep, as after a step."""
-        rates = simulation.inertia.rates
+        rates = simulation.inertia
         rates.take(*random.uniform(-1, 1, (2, len(rates.v))), last_dt=0.2)
         rates.keep(*random.uniform(-1, 1, (len(simulation.scheme.kept), len(rates.v))))
         numerical = (one for one in simulation.terms if isinstance(one, SecondDifferences))

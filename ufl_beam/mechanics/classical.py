@@ -30,17 +30,14 @@ class PlainStep:
         return w
 
 
-class InParts:
-    """Base of static schemes, in which time is the load parameter."""
-
-    dynamic = False
-    advice = (
-        "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
-        "a hinge, half of it if softening is linear, above the stiffness that drives it), there is "
-        "no equilibrium nearby: follow the path with ub.follow(scene, ub.ArcLength(...)) or "
-        "ub.DissipationControl(...), prescribe a displacement in the place of the load, or run "
-        "dynamics"
-    )
+STATIC_ADVICE = (
+    "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
+    "a hinge, half of it if softening is linear, above the stiffness that drives it), there is "
+    "no equilibrium nearby: follow the path with ub.follow(scene, ub.ArcLength(...)) or "
+    "ub.DissipationControl(...), prescribe a displacement in the place of the load, or run "
+    "dynamics"
+)
+"""Where a static step, in which time is the load parameter, finds no equilibrium."""
 
 
 class _AtEnd(PlainStep):
@@ -73,7 +70,7 @@ class _AtEnd(PlainStep):
 
 
 @dataclass(frozen=True)
-class Static(InParts, _AtEnd):
+class Static(_AtEnd):
     """Static equilibrium at the end of each step; time is the load parameter.
 
     What is viscous acts at the mean rates of the step, in real time: dampers, :class:`KelvinVoigt`,
@@ -89,6 +86,8 @@ class Static(InParts, _AtEnd):
         [100000. 200000.]
     """
 
+    dynamic = False
+    advice = STATIC_ADVICE
     slack = 0.05
 
 

@@ -14,7 +14,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.errors import require_number
 from ufl_beam.mechanics import functional, kinematics
-from ufl_beam.mechanics.classical import InParts, PlainStep
+from ufl_beam.mechanics.classical import STATIC_ADVICE, PlainStep
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Coefficients, Constant
 from ufl_beam.model.law_functions import Values
@@ -83,7 +83,7 @@ class ExactStep(_OverStep):
 
 
 @dataclass(frozen=True)
-class ExactStatic(InParts, ExactStep):
+class ExactStatic(ExactStep):
     """Static equilibrium with an exact ledger: works are exact increments of energy.
 
     :class:`Static` is in equilibrium at the ends of steps and counts works by the trapezoidal rule;
@@ -112,6 +112,8 @@ class ExactStatic(InParts, ExactStep):
 
     theta: float = 1.0
 
+    dynamic = False
+    advice = STATIC_ADVICE
     slack = math.inf
 
     def __post_init__(self) -> None:

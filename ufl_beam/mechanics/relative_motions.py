@@ -1,22 +1,28 @@
 # SPDX-License-Identifier: MIT
-"""Relative motions of two frames, and their variation over a time step, in UFL.
+"""Relative motions of two frames, their variation over a step, and forms of connectors, in UFL.
 
-A frame is a configuration (u_x, u_y, ψ).  Each motion is stated once, as a value, which is zero in
-the undeformed scene, and as a variation.  With the step of the nodes (Δu, 2 tan(Δψ/2)) in the place
-of the virtual motions, the variation is the increment of the value: so what a joint holds does no
+A frame is a configuration (u_x, u_y, ψ).  Each motion is a function of the frames at both ends of a
+step, and of virtual motions of them.  It returns the motion at the end, which is zero in the
+undeformed scene, and its variation.  With the step of the nodes (Δu, 2 tan(Δψ/2)) in the place of
+the virtual motions, the variation is the increment of the motion: so what a joint holds does no
 work, and what a spring is given it stores.  All variations vanish for rigid motions of both frames.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
+from itertools import product
 from typing import NamedTuple
 
+import basix.ufl
 import ufl
 from ufl.core.expr import Expr
 
+from ufl_beam.dolfinx_compat import fem
+from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.kinematics import frame, split, turn
 from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.memory import stated
 
 
 class Numbers(NamedTuple):
@@ -67,63 +73,107 @@ def _virtually_between(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) 
     return of_point(q0.b, q1.b, w.b, n.arm_b) - of_point(q0.a, q1.a, w.a, n.arm_a)
 
 
-class Motion(NamedTuple):
-    """A relative motion, m or rad; its variation is from the pairs at both ends of a step."""
-
-    value: Callable[[Pair, Numbers], Expr]
-    variation: Callable[[Pair, Pair, Pair, Numbers, Scheme], Expr]
-
-
-def _turning(q: Pair, n: Numbers) -> Expr:
-    return q.b[2] - q.a[2]
-
-
-def _virtual_turning(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
-    turn_a, turn_b = (now[2] - before[2] for before, now in zip(q0, q1, strict=True))
-    return scheme.virtual_turn(turn_a, turn_b, w.b[2] - w.a[2])
-
-
 def _length(d: Expr) -> Expr:
     return ufl.sqrt(ufl.dot(d, d))
 
 
-def _stretching(q: Pair, n: Numbers) -> Expr:
+def turning(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
+    """Rotation of b relative to a; rad."""
+    turn_a, turn_b = (now[2] - before[2] for before, now in zip(q0, q1, strict=True))
+    return q1.b[2] - q1.a[2], scheme.virtual_turn(turn_a, turn_b, w.b[2] - w.a[2])
+
+
+def stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
+    """Growth of the distance of the points; m."""
     # (d·d - d0·d0) / (|d| + |d0|) with d = d0 + moved; a difference of lengths would lose digits.
-    moved = _moved(q, n)
-    return ufl.dot(n.apart + n.apart + moved, moved) / (_length(_between(q, n)) + _length(n.apart))
-
-
-def _virtual_stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
-    before, now = _between(q0, n), _between(q1, n)
+    moved, before, now = _moved(q1, n), _between(q0, n), _between(q1, n)
+    value = ufl.dot(n.apart + n.apart + moved, moved) / (_length(now) + _length(n.apart))
     along = scheme.average(before, now) / scheme.average(_length(before), _length(now))
-    return ufl.dot(along, _virtually_between(q0, q1, w, n, scheme))
+    return value, ufl.dot(along, _virtually_between(q0, q1, w, n, scheme))
 
 
-def _parting(q: Pair, n: Numbers) -> Expr:
-    return ufl.dot(n.axis, _moved(q, n))
+def parting(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
+    """Way of point b relative to a along an axis of the plane; m."""
+    virtual = _virtually_between(q0, q1, w, n, scheme)
+    return ufl.dot(n.axis, _moved(q1, n)), ufl.dot(n.axis, virtual)
 
 
-def _virtual_parting(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
-    return ufl.dot(n.axis, _virtually_between(q0, q1, w, n, scheme))
-
-
-def _sliding(q: Pair, n: Numbers) -> Expr:
-    by_turning = _by_turning(n.axis, q.a[2])
-    return ufl.dot(by_turning, _between(q, n)) + ufl.dot(n.axis, _moved(q, n))
-
-
-def _virtual_sliding(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
+def sliding(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
+    """The same along an axis that turns with a; m."""
+    by_turning = _by_turning(n.axis, q1.a[2])
+    value = ufl.dot(by_turning, _between(q1, n)) + ufl.dot(n.axis, _moved(q1, n))
     axis = scheme.average(_turned(n.axis, q0.a[2]), _turned(n.axis, q1.a[2]))
     between = scheme.average(_between(q0, n), _between(q1, n))
     virtual = _virtually_between(q0, q1, w, n, scheme)
-    return ufl.dot(axis, virtual) + w.a[2] * ufl.dot(turn(axis), between)
+    return value, ufl.dot(axis, virtual) + w.a[2] * ufl.dot(turn(axis), between)
 
 
-MOTIONS = {
-    "turning": Motion(_turning, _virtual_turning),
-    "stretching": Motion(_stretching, _virtual_stretching),
-    "parting": Motion(_parting, _virtual_parting),
-    "sliding": Motion(_sliding, _virtual_sliding),
-}
-"""Rotation of b relative to a; distance of the points; their way along an axis of the plane; and
-along an axis that turns with a."""
+MOTIONS = {one.__name__: one for one in (turning, stretching, parting, sliding)}
+"""Relative motions by name."""
+
+
+# -- forms of connectors ---------------------------------------------------------------------------
+
+
+class ConnectorForms(NamedTuple):
+    """Forms of connectors with the coefficients that they are written in."""
+
+    work: ufl.Form  # virtual work, and a row ``row[:n]·e + row[n] λ - row[n + 1]`` of each motion
+    tangent: ufl.Form  # its derivative by the configuration
+    motion: ufl.Form  # the n relative motions e by cell
+    rate: ufl.Form  # their derivatives along ``u``
+    change: ufl.Form  # derivative of the tangent along ``u``; ``bend`` is that of row[:n] by e
+    numbers: fem.Function  # see :class:`Numbers`; of each motion
+    row: fem.Function
+    q0: fem.Function
+    q1: fem.Function
+    bend: fem.Function
+    u: fem.Function
+
+
+@stated
+def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
+    """Forms on cells of unit length, from one node of a connector to the other."""
+    n = len(motions)
+    line = basix.ufl.element("Lagrange", "interval", 1)
+    point = basix.ufl.element("DG", "interval", 0)
+    space = fem.functionspace(cell, basix.ufl.mixed_element([line, line, line, *n * [point]]))
+    numbers, row, bend, of_cell = (
+        fem.Function(fem.functionspace(cell, ("DG", 0, (size,))))
+        for size in (8 * n, n * (n + 2), n**3, n)
+    )
+    q0, q1, u = (fem.Function(space) for _ in range(3))
+    (before, _), (now, λ), (w, w_λ) = map(_split, (q0, q1, ufl.TestFunction(space)))
+    dx = ufl.Measure("dx", domain=cell, metadata={"quadrature_degree": 1})
+    dq, z = ufl.TrialFunction(space), ufl.TestFunction(of_cell.function_space)
+    e, e_w = [], []
+    for k, motion in enumerate(motions):
+        at = range(8 * k, 8 * k + 8, 2)
+        mine = Numbers(*(ufl.as_vector([numbers[i], numbers[i + 1]]) for i in at))
+        value, variation = MOTIONS[motion](before, now, w, mine, scheme)
+        e.append(value)
+        e_w.append(variation)
+    de, du = ([ufl.derivative(one, q1, along) for one in e] for along in (dq, u))
+    density, of_rows, of_motions = 0, 0, 0
+    for i in range(n):
+        first = i * (n + 2)
+        law = sum(row[first + j] * e[j] for j in range(n))
+        density += λ[i] * e_w[i] + w_λ[i] * (law + row[first + n] * λ[i] - row[first + n + 1])
+        of_motions += e[i] * z[i]
+        for j, k in product(range(n), repeat=2):
+            of_rows += w_λ[i] * bend[n * (n * i + j) + k] * du[k] * de[j]
+    work, by_cell = density * dx, of_motions * dx
+    tangent = ufl.derivative(work, q1, dq)
+    change = ufl.derivative(tangent, q1, u) + of_rows * dx
+    rate = ufl.derivative(by_cell, q1, u)
+    return ConnectorForms(work, tangent, by_cell, rate, change, numbers, row, q0, q1, bend, u)
+
+
+def _split(q: Expr) -> tuple[Pair, Sequence[Expr]]:
+    """Split coefficients into both configurations, values at the ends of a cell, and the forces."""
+    parts = ufl.split(q)
+
+    def at(end: float) -> Expr:
+        return ufl.as_vector([x + end / 2 * ufl.grad(x)[0] for x in parts[:3]])
+
+    return Pair(at(-1.0), at(1.0)), parts[3:]

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, Protocol, TypeGuard
+from typing import Any, NamedTuple, Protocol, TypeGuard
 
 import numpy as np
 from ufl.core.expr import Expr
@@ -105,22 +105,6 @@ class Scheme(Protocol):
 
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """Variation of a relative rotation whose virtual motion is ``w``."""
-
-
-class Rates(Protocol):
-    """Velocities, and accelerations if a scheme has them, at the beginning of a step."""
-
-    @property
-    def v(self) -> Array:
-        """Velocities at the beginning of the step; m/s, rad/s."""
-
-    @property
-    def v_before(self) -> Array:
-        """Velocities at the beginning of the step before."""
-
-    @property
-    def more(self) -> tuple[Array, ...]:
-        """Rates kept besides, as many as are known of :attr:`DynamicScheme.kept`."""
 
 
 CHANGE, V, V_BEFORE, MORE = range(4)
@@ -219,7 +203,11 @@ def way_to_rest(scheme: Scheme, dt: float) -> float:
     return -of_velocity / of_step
 
 
-def combined(row: Sequence[float], s: Array, rates: Rates) -> Array:
-    """Sum of a row of :class:`Coefficients` for the step ``s`` of the nodes."""
-    known = s, rates.v, rates.v_before, *rates.more
+def combined(row: Sequence[float], s: Array, rates: Any) -> Array:
+    """Sum of a row of :class:`Coefficients` for the step ``s`` of the nodes.
+
+    ``rates`` are those at the beginning of the step: ``v``, ``v_before`` and ``more``, as many as
+    are known of :attr:`DynamicScheme.kept`.
+    """
+    known: tuple[Array, ...] = (s, rates.v, rates.v_before, *rates.more)
     return sum(c * x for c, x in zip(row, known, strict=True) if c) + np.zeros(len(s))

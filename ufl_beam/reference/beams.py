@@ -224,7 +224,7 @@ class MatrixForce(Force):
 
 
 class Inertia(MatrixForce):
-    """Inertia, and the velocities of the accepted state; satisfies :class:`Rates`.
+    """Inertia, and the velocities of the accepted state.
 
     Attributes:
         v: Velocities; (size,).

@@ -17,7 +17,7 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import NoNumber, SceneError, require_returned
-from ufl_beam.mechanics.slips import Slip, numbers, slip
+from ufl_beam.mechanics.connector_equations import Slip, numbers, slip
 from ufl_beam.mechanics.time_schemes import Step, way_to_rest
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_law import ConnectorLaw

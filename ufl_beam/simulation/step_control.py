@@ -190,14 +190,14 @@ class AdaptiveSteps:
         if self._fresh:
             # Nothing to compare with: half of a step is compared with the whole.
             whole = simulation.attempt(simulation.t + dt)
-            before, between = (inertia.velocities(whole.s, whole.step.dt) - inertia.v) / dt, -dt / 4
+            before, between = (inertia.after(whole.s, whole.step.dt)[0] - inertia.v) / dt, -dt / 4
             dt /= 2
         else:
-            before = (inertia.v - inertia.rates.v_before) / simulation.prediction.c.dt
+            before = (inertia.v - inertia.v_before) / simulation.prediction.c.dt
             between = (dt + simulation.prediction.c.dt) / 2
         trial = simulation.attempt(stop if dt == left else simulation.t + dt)
         dt = trial.step.dt
-        a = (inertia.velocities(trial.s, dt) - inertia.v) / dt
+        a = (inertia.after(trial.s, dt)[0] - inertia.v) / dt
         jerk = (a - before) / between
         c2, c3 = inertia.scheme.error_weights()
         error = c2 * dt**2 * a + c3 * dt**3 * jerk

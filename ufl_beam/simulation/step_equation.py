@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.arrays import Array
+from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
 from ufl_beam.discretization.function_spaces import Fields
@@ -33,12 +33,11 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inertia_and_damping import (
     BEFORE,
     Inertia,
-    RatesInC,
     SecondDifferences,
     damping_forces,
 )
 from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces, LoadTerm
-from ufl_beam.terms.material_points import SearchFlags, expect_entries
+from ufl_beam.terms.material_points import expect_entries
 from ufl_beam.terms.supports import Supports
 from ufl_beam.terms.works import Works
 
@@ -74,7 +73,8 @@ class StepEquation:
         self, share: Share, scheme: Scheme, t0: float, v: Array, together: Agreement
     ) -> None:
         self.share, self.scheme, self.weights = share, scheme, share.weights()
-        scene, search = share.grid.scene, SearchFlags()
+        scene = share.grid.scene
+        search, switched = np.zeros(lib.SEARCH_FLAGS, np.int32), np.zeros(1, np.int32)
         self.ledger, self.fields = ledger, fields = Ledger(), Fields(share)
         self.A = A = fields.matrix()
         setting = (scheme, A, ledger)
@@ -101,10 +101,11 @@ class StepEquation:
                 others.append(SecondDifferences(scheme, on_part, A, ledger))
 
         self.controllers = Controllers(share)
-        self._rates = rates = RatesInC(scheme, v) if has_inertia(scheme) else None
+        inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
+        self.inertia = inertia
         connectors = Setting(
-            self.controllers.place, None if rates is None else rates.c, scene.size, scheme, ledger,
-            friction_repeats(scene), search,
+            self.controllers.place, None if inertia is None else inertia.c, scene.size, scheme,
+            ledger, friction_repeats(scene), search, switched,
         )  # fmt: skip
         self.couplings = together(couplings, share, connectors, A)
 
@@ -120,25 +121,26 @@ class StepEquation:
             self.loads.append(FollowerLoads(followers, share, scheme, ledger, A))
         if scene.works:
             self.loads.append(together(Works, fields, scheme, ledger, A, t0))
-        self.supports, self.inertia = Supports(share, scheme, ledger, A), None
-        if rates is not None and has_inertia(scheme):
+        self.supports = Supports(share, scheme, ledger, A)
+        if inertia is not None:
             self.supports.stop(v)
-            rates.take(v, v, math.inf)
-            self.inertia = Inertia(fields, scheme, A, ledger, rates)
-            others.append(self.inertia)
+            inertia.take(v, v, math.inf)
+            if inertia.slips:
+                ledger.lost["numerical"] += 0.0
+            others.append(inertia)
         for damping in scene.damping:
-            others += damping_forces(damping, fields, *setting, rates)
+            others += damping_forces(damping, fields, *setting, inertia)
         if scene.beams:
             ledger.state["stored"] += 0.0
         self.inner: list[Term] = [*self.beams, *self.couplings]
         self.others: list[Term] = [*self.loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]
-        self._give_to_c(search)
+        self._give_to_c(search, switched)
         in_cells = [part for term in self.terms for part in term.in_cells]
         in_c = [term.loads_in_cells() for term in self.loads if isinstance(term, DeadLoads)]
         self.cell_forces = CellForces(share, in_cells, *in_c)
 
-    def _give_to_c(self, search: SearchFlags) -> None:
+    def _give_to_c(self, search: Index, switched: Index) -> None:
         """Fill ``equation`` of loops.h, and let terms state their phases."""
         share, A, supports = self.share, self.A, self.supports
         self.c = struct("equation", size=A.size, owned=share.num_owned, weight=self.weights)
@@ -157,7 +159,7 @@ class StepEquation:
         product, cells = take("add_step_tangent"), take("add_cells")
         demands = [one.demand for one in self.inner if one.demand is not None]
         demanding = share.largest(float(bool(demands)))
-        predicted = [one.predicted.c for one in self.beams if one.predicted is not None]
+        predicted = [one.predicted for one in self.beams if one.predicted is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -172,7 +174,7 @@ class StepEquation:
             plane=np.zeros(share.size if supports.turned else 0),
             demands=len(demands), demand=ffi.new("demand[]", demands), demanding=int(demanding),
             predictions=len(predicted), predicted=ffi.new("predicted_strains *[]", predicted),
-            search=search.flags, switched=search.switched,
+            search=search, switched=switched,
         )  # fmt: skip
         self._alive = loops, demands, predicted
         # Where nothing has inertia, the work of the internal forces is compared with energies.
@@ -194,7 +196,7 @@ class StepEquation:
         if self.inertia is None or self.supports.work or slips:
             self.supports.carry_on(memory, q)
         if self.inertia is not None:
-            self.inertia.carry_on(memory, len(self.inertia.rates.more))
+            self.inertia.carry_on(memory, len(self.inertia.more))
             self._pass_on_step(memory, q)
         for load in self.loads:
             load.pass_on(memory)
@@ -232,8 +234,8 @@ class StepEquation:
         some = self.terms if terms is None else terms
         before = step.q0 if step.q_before is None else step.q_before
         q0, q_before = (np.ascontiguousarray(q) for q in (step.q0, before))
-        if self._rates is not None and any(one.kind in MOVING for one in some):
-            lib.find_numbers(self._rates.c, step.dt)
+        if self.inertia is not None and any(one.kind in MOVING for one in some):
+            lib.find_numbers(self.inertia.c, step.dt)
         c = ffi.new("time_step *", {
             "t0": step.t0, "t1": step.t1, "dt": step.dt, "load_time": step.load_time,
             "motion_time": step.motion_time, "fraction": step.fraction, "at": step.at,
@@ -246,7 +248,7 @@ class StepEquation:
                     begin(data, c, ffi.NULL, ffi.NULL)
         for one in self.beams:
             if one in some and one.predicted is not None:
-                of = one.predicted.c
+                of = one.predicted
                 of.begins, of.stale, of.exact = 0, 1, 1
 
     def inner_forces(self, q: Array, t: float | None = None) -> Array:
@@ -364,7 +366,7 @@ class StepEquation:
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))
             works[0, i, j] = sum(one.tangent_work(q, x, y) for one in self.beams)
-            works[1, i, j] = sum(one.work_of_change(q, u, x, y) for one in self.beams)
+            works[1, i, j] = sum(one.tangent_work(q, x, y, u) for one in self.beams)
         for k, work in enumerate(works):
             self.A.data.fill(0.0)
             for one in (*self.couplings, *self.loads):

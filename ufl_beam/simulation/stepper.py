@@ -215,7 +215,7 @@ class Stepper(StateView):
             for name in ("begin", "accept", "add_state")
         }
         if self.equation.inertia is not None:
-            fill(c, rates=self.inertia.rates.c, prepare=lib.run_in_python)
+            fill(c, rates=self.inertia.c, prepare=lib.run_in_python)
             c.handle = callbacks.handle(self._prepare)
         if controllers.sampled:
             c.stop = lib.time_in_python
@@ -247,7 +247,8 @@ class Stepper(StateView):
     def _prepare(self) -> None:
         """Take from a trial step what the scheme keeps besides the velocities."""
         c = self.march
-        self.inertia.prepare(self._copy(c.s), c.step.dt)
+        _, *more = self.inertia.after(self._copy(c.s), c.step.dt)
+        self.inertia.keep(*more)
         self.supports.take()
         q1 = self._copy(c.x)
         for one in self.couplings:

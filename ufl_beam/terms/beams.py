@@ -28,7 +28,7 @@ from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.fibres import Layout
 from ufl_beam.terms.base import Callbacks, InCells, Phases, Term, beginning, entering
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.material_points import Points, SearchFlags
+from ufl_beam.terms.material_points import Points
 
 
 class OfForms(Term):
@@ -72,36 +72,29 @@ def _linear_strains(of: Element) -> tuple[ufl.Form, fem.Function]:
     return of.sampled(e_about + ufl.derivative(e_about, about, of.q1)), about
 
 
-class PredictedStrains:
-    """Strains that an iteration of a static step predicts, by linear kinematics.
+def predicted_strains(fields: Fields) -> Any:
+    """``predicted_strains`` of loops.h: those that an iteration of a static step predicts.
 
-    Displacements that solve a linear equation strain slender beams along their axes by nothing but
-    the error of the linearisation, and forces from that send the next iteration astray.  The
-    equation was about forces as well, which strains that are linear in the displacements predict
-    without that error: they belong into the tangent, while the residual remains that of the
-    displacements.  That is Newton's method for displacements and forces as independent unknowns, as
-    the functional has them, with the forces eliminated; it converges in few iterations, whatever
-    the slenderness.  The first guess of a step strains beams in the same way, so cells that yield
-    extrapolate strains of states.
+    They follow by linear kinematics.  Displacements that solve a linear equation strain slender
+    beams along their axes by nothing but the error of the linearisation, and forces from that send
+    the next iteration astray.  The equation was about forces as well, which strains that are linear
+    in the displacements predict without that error: they belong into the tangent, while the
+    residual remains that of the displacements.  That is Newton's method for displacements and
+    forces as independent unknowns, as the functional has them, with the forces eliminated; it
+    converges in few iterations, whatever the slenderness.  The first guess of a step strains beams
+    in the same way, so cells that yield extrapolate strains of states.
 
     Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
-
-    Attributes:
-        c: ``predicted_strains`` of loops.h, with the state of the iteration.
-        beginning: The phase that begins a step.
     """
-
-    def __init__(self, fields: Fields) -> None:
-        form, about = _linear_strains(fields.element)
-        self._form = fields.kernel(form, fields.element.q1)
-        weights = fields.share.grid.mesh.point_weights.repeat(3)
-        last, change = np.zeros((2, fields.share.size))
-        self.c = struct(
-            "predicted_strains", size=len(change), of_cell=len(weights), weight=weights,
-            about=last, change=change, e=np.zeros((len(fields.order), len(weights))),
-            strains=self._form.cells, at_about=self._form.position(about),
-        )  # fmt: skip
-        self.beginning = loop("begin_predicted_strains", self.c)
+    form, about = _linear_strains(fields.element)
+    kernel = fields.kernel(form, fields.element.q1)
+    weights = fields.share.grid.mesh.point_weights.repeat(3)
+    last, change = np.zeros((2, fields.share.size))
+    return struct(
+        "predicted_strains", size=len(change), of_cell=len(weights), weight=weights,
+        about=last, change=change, e=np.zeros((len(fields.order), len(weights))),
+        strains=kernel.cells, at_about=kernel.position(about),
+    )  # fmt: skip
 
 
 # -- works of tangents -----------------------------------------------------------------------------
@@ -128,8 +121,8 @@ class Cells(Term):
     _work_form: ufl.Form
     _q1: fem.Function
     _fields: Fields
-    predicted: PredictedStrains | None = None
-    """In statics, the strains whose forces tangents have."""
+    predicted: Any = None
+    """In statics, the :func:`predicted_strains` whose forces tangents have."""
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         """Values in the cells, at ``q1``, of what the virtual work depends on besides."""
@@ -158,12 +151,10 @@ class Cells(Term):
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         self._at(q1, "matrix", u=u).add(q1, self._A.data)
 
-    def tangent_work(self, q1: Array, x: Array, y: Array) -> float:
-        """Return the work of the tangent for the motion x on y; J."""
-        return self._at(q1, "tangent", x=x, y=y).value(q1)
-
-    def work_of_change(self, q1: Array, u: Array, x: Array, y: Array) -> float:
-        """Return the work of the derivative of the tangent along u, for x on y; J."""
+    def tangent_work(self, q1: Array, x: Array, y: Array, u: Array | None = None) -> float:
+        """Return the work of the tangent, or of its derivative along u, for motions x on y; J."""
+        if u is None:
+            return self._at(q1, "tangent", x=x, y=y).value(q1)
         return self._at(q1, "change", u=u, x=x, y=y).value(q1)
 
 
@@ -206,7 +197,7 @@ def _static_tangent(of: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function
 class ElasticBeams(OfForms, Cells):
     """Resultants of elastic cells working on the virtual strains, P(12).
 
-    In statics the tangent has the forces of the :class:`PredictedStrains`.
+    In statics the tangent has the forces of the :func:`predicted_strains`.
     """
 
     kind, _entry = "beams", "numerical"
@@ -215,10 +206,10 @@ class ElasticBeams(OfForms, Cells):
         forms, q1, tangent = elastic_forms(fields.element, scheme), fields.element.q1, None
         if not has_inertia(scheme):
             form, e = _static_tangent(fields.element, scheme)
-            tangent, self.predicted = fields.kernel(form, q1), PredictedStrains(fields)
+            tangent, self.predicted = fields.kernel(form, q1), predicted_strains(fields)
             tangent.place(A)
             self._static = struct(
-                "static_tangent", predicted=self.predicted.c, tangent=tangent.cells,
+                "static_tangent", predicted=self.predicted, tangent=tangent.cells,
                 at_e=tangent.position(e),
             )  # fmt: skip
         super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
@@ -281,11 +272,11 @@ class InelasticBeams(Cells):
 
     def __init__(
         self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger,
-        search: SearchFlags,
+        search: Index,
     ) -> None:  # fmt: skip
         self._A, self._ledger = A, ledger
         self.kept_factors = np.ones(6) if layout.hinges else KEPT_WITHOUT_JUMP
-        self.predicted = None if has_inertia(scheme) else PredictedStrains(fields)
+        self.predicted = None if has_inertia(scheme) else predicted_strains(fields)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
         share, lengths = fields.share, fields.share.grid.lengths(self._cells)
@@ -312,7 +303,7 @@ class InelasticBeams(Cells):
         if self.predicted is not None:
             forces, last_b, last_D = np.zeros((3, len(lengths), 9))
             of_tangent = {"forces": forces, "last_b": last_b, "last_D": last_D}
-            fill(self._in_c, predicted=self.predicted.c, **of_tangent)
+            fill(self._in_c, predicted=self.predicted, **of_tangent)
         names, force = ("add_inelastic_force", "add_inelastic_tangent"), self._force
         self.loops = loop(names[0], self._in_c), loop(names[1], self._in_c)
         self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
@@ -326,7 +317,7 @@ class InelasticBeams(Cells):
         c = struct("inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger))
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
         if self.predicted is not None:
-            begin.append(self.predicted.beginning)
+            begin.append(loop("begin_predicted_strains", self.predicted))
         ends = [loop("accept_inelastic", c)], [loop("add_energy_of_points", c)]
         opens = {"cells": self._in_c} if self.points.softens else None
         change = loop("change_of_points", c)

@@ -21,7 +21,7 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
-from ufl_beam.mechanics.slips import numbers, slip
+from ufl_beam.mechanics.connector_equations import numbers, slip
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import (
@@ -43,7 +43,7 @@ from ufl_beam.model.material_laws import Hardening
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.base import Callbacks
 from ufl_beam.terms.energy_ledger import Account, Ledger
-from ufl_beam.terms.material_points import NOTHING, SPENT, Points, SearchFlags, expect_entries
+from ufl_beam.terms.material_points import NOTHING, SPENT, Points, expect_entries
 
 CREEP = 1e-12
 """Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
@@ -61,7 +61,8 @@ class Setting(NamedTuple):
     scheme: Scheme
     ledger: Ledger
     friction_repeats: bool  # True if places that stick may hold what is held already
-    search: SearchFlags  # of all points of the scene
+    search: Index  # flags that all points and connectors share, see loops.h
+    switched: Index  # whether a row is not about the motion or force that it was about; (1,)
 
 
 class Response:
@@ -119,10 +120,10 @@ class Response:
             "friction", number=n, limit=ffi.new("double *[]", limits), slip=self._slip,
             accepted=self._accepted, way=way, creep=creep, softness=softness * self._lengths,
             tiny=1e-14 * self._lengths, sticks=self.sticks, against=against,
-            switched=setting.search.switched, force=np.zeros(n), rows=np.zeros((n, 3)), **of_laws,
+            switched=setting.switched, force=np.zeros(n), rows=np.zeros((n, 3)), **of_laws,
         )  # fmt: skip
         if self.opens:
-            search, free = setting.search.flags, np.zeros(n, dtype=np.int32)
+            search, free = setting.search, np.zeros(n, dtype=np.int32)
             fill(friction, search=search, free=free, excess=np.zeros(n))
         if setting.rates is not None:
             fill(friction, rates=setting.rates)
@@ -394,7 +395,7 @@ class RigidPlasticLaws(Response):
         self._forms = _slip_forms(kind, scheme)
         self._c = struct(
             "rigid_plastic", number=n, width=len(inputs), w=self._storage,
-            force=self._forms.force, end=self._forms.end, search=setting.search.flags,
+            force=self._forms.force, end=self._forms.end, search=setting.search,
             limit=self._limit, back_force=back_force, dissipated=dissipated,
             slope=np.array([_slope(link, setting.size) for link in links]), excess=excess,
             slipped=self._slipped, way=self.way, rows=np.zeros((n, 3)),

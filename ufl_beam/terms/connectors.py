@@ -23,8 +23,7 @@ from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import NoNumber
-from ufl_beam.mechanics.connector_forms import connector_forms
-from ufl_beam.mechanics.relative_motions import MOTIONS
+from ufl_beam.mechanics.relative_motions import MOTIONS, connector_forms
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import HELD, ForceLaw, Guide, Law, RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector

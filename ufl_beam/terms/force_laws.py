@@ -22,7 +22,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
 from ufl_beam.errors import NoNumber, SceneError, require_returned, shorten
-from ufl_beam.mechanics.connector_steps import law_step
+from ufl_beam.mechanics.connector_equations import law_step
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, stated_at
 from ufl_beam.model.connectors import Connector

@@ -51,83 +51,6 @@ BEFORE = "velocity before"
 """Name of the velocities at the beginning of the last step, in what is saved."""
 
 
-class RatesInC:
-    """Velocities of a scene, those before the last step, and what else a scheme keeps; all in C.
-
-    They satisfy :class:`Rates`; arrays are copies.
-
-    Attributes:
-        c: ``rates`` of loops.h; also has the length of the last step, infinite before the first.
-        slips: True if the scheme loses energy by the rates.
-
-    Raises:
-        SceneError: The scheme states no such coefficients as :class:`Coefficients` describes.
-    """
-
-    def __init__(self, scheme: DynamicScheme, v: Array) -> None:
-        size, number = len(v), MORE + len(scheme.kept)
-        self.slips = checked_coefficients(scheme).slip is not None
-        self._scheme = scheme
-        # Changes are elsewhere; of velocities before the last ones new ones are not computed, and
-        # new velocities take their place where nothing asks for them.
-        asks = self.slips or scheme.looks_back
-        self._now = np.zeros((number - V, size))
-        self._next = np.zeros((number - V_BEFORE - (not asks), size))
-        self._slip = np.zeros(size if self.slips else 0)
-        handle = ffi.new_handle((scheme, number))
-        find = lib.numbers_in_python
-        self.c = struct("rates", size=size, number=number, find=find, handle=handle)
-        self.c.after_any = not scheme.looks_back
-        first, *more = self._next if asks else (self._now[1], *self._next)
-        for k, (rate, new) in enumerate(
-            zip(self._now, (first, self._slip, *more), strict=True), start=V
-        ):
-            self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
-        self.take(v, v, math.inf)
-        self.keep()
-
-    def _rate(self, k: int) -> Array:
-        """A rate as C has it; a view."""
-        return np.frombuffer(ffi.buffer(self.c.rate[k], 8 * self.c.size))
-
-    @property
-    def v(self) -> Array:
-        """Velocities of the accepted state."""
-        return self._rate(V).copy()
-
-    @property
-    def v_before(self) -> Array:
-        """Velocities before the last step."""
-        return self._rate(V_BEFORE).copy()
-
-    @property
-    def more(self) -> tuple[Array, ...]:
-        """Rates that the scheme keeps besides, as many as are known."""
-        return tuple(self._rate(MORE + k).copy() for k in range(self.c.more))
-
-    def keep(self, *more: Array) -> None:
-        """Set what else the scheme keeps; a step can begin if that is anything."""
-        for k, rate in enumerate(more):
-            self._rate(MORE + k)[:] = rate
-        self.c.more, self.c.ready = len(more), bool(more) or not self._scheme.kept
-
-    def take(self, v: Array, v_before: Array, last_dt: float) -> None:
-        """Set velocities, those before the last step, and its length."""
-        self._rate(V)[:], self._rate(V_BEFORE)[:], self.c.last_dt = v, v_before, last_dt
-
-    def after(self, s: Array, dt: float) -> list[Array]:
-        """Velocities after a step ``s`` of the nodes, and what the scheme keeps besides."""
-        known: Any = self._scheme
-        rows = _coefficients(known, dt, self.c.last_dt, self.c.more).rates
-        return [combined(row, s, self) for row in rows]
-
-    def times(self, product: StepProduct, **entries: Any) -> Any:
-        """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
-        v, momentum = np.zeros(self.c.size), np.zeros(len(self._slip))
-        of = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **entries)
-        return fill(of, rates=self.c)
-
-
 @lru_cache(maxsize=1024)  # steps of one size have some ten lengths, as times are rounded
 def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coefficients:
     """Coefficients of a step, as lists of numbers."""
@@ -174,72 +97,125 @@ def numbers_in_python(handle: Any, numbers: Any) -> int:
 
 
 class Inertia(Term):
-    """Inertia of beams and point masses: a constant matrix, P(18).
+    """Inertia of beams and point masses: a constant matrix, P(18); and the rates of a scheme, in C.
+
+    Rates are velocities, those before the last step, and what else the scheme keeps; arrays of them
+    are copies.
 
     Attributes:
-        rates: Velocities, and what else the scheme keeps.
+        scheme: The time scheme.
+        c: ``rates`` of loops.h; also has the length of the last step, infinite before the first.
+        slips: True if the scheme loses energy by the rates.
+
+    Raises:
+        SceneError: The scheme states no such coefficients as :class:`Coefficients` describes.
     """
 
     kind = "inertia"
 
     def __init__(
-        self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, rates: RatesInC
+        self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
     ) -> None:
         rotations = with_half_tangents(scheme, fields.share.rotations)
         self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
         self.loops, at = self._times.loops, (fields.order, self._times.rate)
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at)]
-        self._ledger, self._A, self.scheme, self.rates = ledger, A, scheme, rates
-        if rates.slips:
-            ledger.lost["numerical"] += 0.0
+        self._ledger, self._A, self.scheme = ledger, A, scheme
+        size, number = len(v), MORE + len(scheme.kept)
+        self.slips = checked_coefficients(scheme).slip is not None
+        # Changes are elsewhere; of velocities before the last ones new ones are not computed, and
+        # new velocities take their place where nothing asks for them.
+        asks = self.slips or scheme.looks_back
+        self._now = np.zeros((number - V, size))
+        self._next = np.zeros((number - V_BEFORE - (not asks), size))
+        self._slip = np.zeros(size if self.slips else 0)
+        handle = ffi.new_handle((scheme, number))
+        find = lib.numbers_in_python
+        self.c = struct("rates", size=size, number=number, find=find, handle=handle)
+        self.c.after_any = not scheme.looks_back
+        first, *more = self._next if asks else (self._now[1], *self._next)
+        for k, (rate, new) in enumerate(
+            zip(self._now, (first, self._slip, *more), strict=True), start=V
+        ):
+            self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
+        self.take(v, v, math.inf)
+        self.keep()
 
     @property
     def M(self) -> Csr:
         """The mass matrix; a new one."""
         return self._times.matrix()
 
-    @property
-    def v(self) -> Array:
-        """Velocities in the accepted state; a copy."""
-        return self.rates.v
-
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the matrix and the velocities."""
-        lost = self._ledger.lost.pointer("numerical") if self.rates.slips else ffi.NULL
+        lost = self._ledger.lost.pointer("numerical") if self.slips else ffi.NULL
         kinetic = self._ledger.state.pointer("kinetic")
-        of = self.rates.times(self._times, kept=kinetic, lost=lost)
+        of = self.times(self._times, kept=kinetic, lost=lost)
         begin, accept = loop("begin_inertia", of), loop("accept_inertia", of)
         return Phases([begin], [accept], [loop("add_kinetic_energy", of)])
 
+    # -- the rates -----------------------------------------------------------------------------
+
+    def _rate(self, k: int) -> Array:
+        """A rate as C has it; a view."""
+        return np.frombuffer(ffi.buffer(self.c.rate[k], 8 * self.c.size))
+
+    @property
+    def v(self) -> Array:
+        """Velocities of the accepted state."""
+        return self._rate(V).copy()
+
+    @property
+    def v_before(self) -> Array:
+        """Velocities before the last step."""
+        return self._rate(V_BEFORE).copy()
+
+    @property
+    def more(self) -> tuple[Array, ...]:
+        """Rates that the scheme keeps besides, as many as are known."""
+        return tuple(self._rate(MORE + k).copy() for k in range(self.c.more))
+
+    def keep(self, *more: Array) -> None:
+        """Set what else the scheme keeps; a step can begin if that is anything."""
+        for k, rate in enumerate(more):
+            self._rate(MORE + k)[:] = rate
+        self.c.more, self.c.ready = len(more), bool(more) or not self.scheme.kept
+
+    def take(self, v: Array, v_before: Array, last_dt: float) -> None:
+        """Set velocities, those before the last step, and its length."""
+        self._rate(V)[:], self._rate(V_BEFORE)[:], self.c.last_dt = v, v_before, last_dt
+
+    def after(self, s: Array, dt: float) -> list[Array]:
+        """Velocities after a step ``s`` of the nodes, and what the scheme keeps besides."""
+        known: Any = self.scheme
+        rows = _coefficients(known, dt, self.c.last_dt, self.c.more).rates
+        return [combined(row, s, self) for row in rows]
+
+    def times(self, product: StepProduct, **entries: Any) -> Any:
+        """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
+        v, momentum = np.zeros(self.c.size), np.zeros(len(self._slip))
+        of = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **entries)
+        return fill(of, rates=self.c)
+
+    # -- in files ------------------------------------------------------------------------------
+
     def carry_on(self, memory: Memory, known: int) -> None:
         """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""
-        rates = self.rates
-        more = rates.more or (rates.v,) * known
-        rates.keep(*map(memory.at_dofs, self.scheme.kept[:known], more))
+        more = self.more or (self.v,) * known
+        self.keep(*map(memory.at_dofs, self.scheme.kept[:known], more))
 
     def pass_on_step(self, memory: Memory) -> None:
         """State the velocities before the last step, and its length, at each degree of freedom."""
-        rates = self.rates
-        v_before = memory.at_dofs(BEFORE, rates.v_before)
-        lengths = memory.at_dofs("last step", np.full(rates.c.size, rates.c.last_dt))
-        rates.take(rates.v, v_before, float(lengths[0]) if len(lengths) else rates.c.last_dt)
-
-    def velocities(self, s: Array, dt: float) -> Array:
-        """Velocities at the end of a step ``s`` of the nodes, of the length ``dt`` (s)."""
-        return self.rates.after(s, dt)[0]
-
-    def prepare(self, s: Array, dt: float) -> None:
-        """Take from a trial step ``s`` what the scheme keeps besides the velocities."""
-        _, *more = self.rates.after(s, dt)
-        self.rates.keep(*more)
+        v_before = memory.at_dofs(BEFORE, self.v_before)
+        lengths = memory.at_dofs("last step", np.full(self.c.size, self.c.last_dt))
+        self.take(self.v, v_before, float(lengths[0]) if len(lengths) else self.c.last_dt)
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore velocities and the last step."""
-        rates = self.rates
-        v = memory.at_dofs("velocity", rates.v)
-        v_before = memory.at_dofs(BEFORE, rates.v_before)
-        rates.take(v, v_before, memory.number("step of velocity", rates.c.last_dt))
-        self.carry_on(memory, int(memory.number("further rates", len(rates.more))))
+        v = memory.at_dofs("velocity", self.v)
+        v_before = memory.at_dofs(BEFORE, self.v_before)
+        self.take(v, v_before, memory.number("step of velocity", self.c.last_dt))
+        self.carry_on(memory, int(memory.number("further rates", len(self.more))))
 
 
 # -- damping ---------------------------------------------------------------------------------------
@@ -298,7 +274,7 @@ class RayleighForces(Term):
 
     def __init__(
         self, damping: Rayleigh, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
-        rates: RatesInC,
+        rates: Inertia,
     ) -> None:  # fmt: skip
         C, M, form = fields.matrix(), mass_matrix(fields), _reference_stiffness(fields.element)
         K = fields.assembled(form)
@@ -325,7 +301,7 @@ class RayleighForces(Term):
 
 def damping_forces(
     of: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
-    rates: RatesInC | None,
+    rates: Inertia | None,
 ) -> list[Term]:  # fmt: skip
     """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
     ledger.lost["damping"] += 0.0

@@ -60,22 +60,6 @@ SPENT, NOTHING = 1e-6, 1e-30
 """Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
 
 
-class SearchFlags:
-    """Flags that all points and connectors of a scene share in a step.
-
-    Attributes:
-        flags: Of the present search for an equilibrium; (4,), int32.  OPENED: a point has opened.
-            STIFF: points that do not open answer elastically.  HOLD: points that do not flow stay
-            closed.  OVER: one of them has borne more than its limit.
-        switched: Whether the row of a connector was about its motion in the latest tangent and is
-            about its force now, or the other way round; (1,), int32.
-    """
-
-    def __init__(self) -> None:
-        self.switched: Index = np.zeros(1, dtype=np.int32)
-        self.flags: Index = np.zeros(lib.SEARCH_FLAGS, dtype=np.int32)
-
-
 def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
     """Make the entries of the ledger that points of a layout write, on whatever process."""
     if layout.yields:
@@ -171,7 +155,8 @@ class Points:
         keys: See :meth:`Layout.numbers`.
         length: Of the cells; (cells,); m.
         scheme: The time scheme.
-        search: Shared by all points of a scene.
+        search: Flags of the present search for an equilibrium, see loops.h, which all points and
+            connectors of a scene share; (SEARCH_FLAGS,).
         predicts: Let tangents predict stresses where points yield, see follow_prediction in C.
 
     Attributes:
@@ -196,11 +181,11 @@ class Points:
         keys: list[tuple[int, int]],
         length: Array,
         scheme: Scheme,
-        search: SearchFlags | None = None,
+        search: Index | None = None,
         *,
         predicts: bool = False,
     ) -> None:
-        self._search = search or SearchFlags()
+        self._search: Index = np.zeros(lib.SEARCH_FLAGS, np.int32) if search is None else search
         self._layout, self._alpha = layout, scheme.alpha
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._releases = releases(layout, scheme)
@@ -248,7 +233,7 @@ class Points:
             components=self._components, variables=len(law.variables),
             strain=self.names.index(rows(law, "strain")[0]),
             e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.kept, sum=self.sums,
-            own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search.flags,
+            own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search,
         )  # fmt: skip
         if predicts and self._components == 1 and self._yields:
             lines = np.zeros((2, cells, of_cell, int(lib.LINE)))
@@ -304,7 +289,7 @@ class Points:
 
         Shapes (cells, 3) and (cells, 9).
         """
-        arrays = self._storage, self.strains, self.r, self.D, self._search.flags
+        arrays = self._storage, self.strains, self.r, self.D, self._search
         before = [array.copy() for array in arrays]
         try:
             return self._e0.copy(), self.respond(self._e0)[1].copy()

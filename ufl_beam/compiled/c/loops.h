@@ -50,7 +50,7 @@ struct cells {
   double *each; /* entries of all cells in the latest evaluation, in batches; or none */
 };
 
-/* Strains whose forces the tangents of a static step have, see PredictedStrains in beams.py. */
+/* Strains whose forces the tangents of a static step have, see predicted_strains in beams.py. */
 typedef struct {
   const cells *strains;           /* linear about a configuration */
   int at_about;                   /* where they have it */
@@ -209,7 +209,9 @@ extern const double NO_ENERGY; /* dissipation that is none, as a part of its siz
 
 enum { LINE = 3 }; /* strain, stress and slope: what a tangent knows of a point */
 
-/* Flags that all points of a scene share in a step; see SearchFlags in material_points.py. */
+/* Flags that all points and connectors of a scene share in the present search for an equilibrium. OPENED: a
+ * point has opened. STIFF: points that do not open answer elastically. HOLD: points that do not flow stay closed.
+ * OVER: one of them has borne more than its limit. */
 enum search { OPENED, STIFF, HOLD, OVER, SEARCH_FLAGS };
 
 /* Points in cells, `of_cell` in each, with `width` numbers of each in w; see material_points.py. */
@@ -499,7 +501,7 @@ enum agreement { TOTAL, HYPOT, LARGEST };
 /* What a function of a user has raised: a failure of the step, or something else, which ends the run. */
 enum raised { NOTHING, STEP_FAILED, OTHER };
 
-/* Whose forces tangents of static steps have, see PredictedStrains in beams.py: first those before the step, then
+/* Whose forces tangents of static steps have, see predicted_strains in beams.py: first those before the step, then
  * those that the last iteration predicted, or those at the iterate; or always these. */
 enum tangents { PREDICTED, FIRST, EXACT };
 
@@ -552,7 +554,7 @@ typedef struct {
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
   int demands, demanding; /* demanding: whether there are any on any process */
   const demand *demand; /* of connectors and points */
-  int32_t *switched;    /* a row of a connector is not about what it was in the tangent; see material_points.py */
+  int32_t *switched;    /* a row of a connector is not about what it was in the tangent */
   double last, best;                  /* residuals of the iterate before; least so far */
   int near, slow, patience; /* near: the tangent is kept in the next iteration */
   int iterations, reason, total;      /* of the latest solution, and of all */

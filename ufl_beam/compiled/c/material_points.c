@@ -404,7 +404,7 @@ static void take_tangent(const inelastic *m)
 
 /* Forces for the tangent of a static step: first those before it, or of points that have lines those at
  * the extrapolated strains; then those that the latest tangent predicts for the strains that it
- * predicts; see PredictedStrains in beams.py. Stiff points are no prediction. */
+ * predicts; see predicted_strains in beams.py. Stiff points are no prediction. */
 static const double *predict_forces(const inelastic *m, const double *q)
 {
   const points *p = m->points;

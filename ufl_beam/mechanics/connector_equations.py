@@ -1,22 +1,30 @@
 # SPDX-License-Identifier: MIT
-"""Equations of a law of a connector over a step, in UFL.
+"""Equations of laws of connectors over a step: energy and resistance, and rigid-plastic slip.
 
-The law holds at t_n+θ: its variables there are those after a backward-Euler step of the length
-θ dt, and grow on in proportion to the end of the step.  Its elastic force acts where loads do.
+A law of energy and resistance holds at t_n+θ: its variables there are those after a backward-Euler
+step of the length θ dt, and grow on in proportion to the end of the step.  Its elastic force acts
+where loads do.  A rigid-plastic law is a function of the slip that grows in the step; it is stated
+once for UFL and for numbers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
+import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw
+from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import State
+from ufl_beam.model.material_laws import Hardening
+from ufl_beam.model.softening_laws import SofteningLaw
+
+# -- energy and resistance -------------------------------------------------------------------------
 
 SMOOTH = 1e-7
 """Difference of Gauss's rule with four points and Simpson's rule, as a part of the forces, up to
@@ -127,3 +135,50 @@ def _elastic_forces(
             exact += [means[i] + factor * ways[i] for i in group]
     over_step = [ufl.conditional(smooth, *both) for both in zip(means, exact, strict=True)]
     return [x + (2 * part - 1) * (end - x) for x, end in zip(over_step, ends, strict=True)]
+
+
+# -- rigid-plastic laws ----------------------------------------------------------------------------
+
+
+class Slip(NamedTuple):
+    """A law of slip over a step; J, forces in N or N m."""
+
+    force: Values  # that acts in the step, in the direction of the motion
+    dissipated: Values  # in the step
+    lost: Values  # numerically by backward Euler, over ``2 alpha`` of the scheme
+    stored: Values  # at the end
+    limit: Values  # force beyond the back force up to which the motion is held after the step
+    back_force: Values  # force about which the limit lies after the step
+
+
+def numbers(law: SofteningLaw | Hardening) -> dict[str, Any]:
+    """Numbers of a law of slip by the names that :func:`slip` has for them."""
+    of_law = law.numbers() if isinstance(law, SofteningLaw) else law.numbers(np.ones(()))
+    return {f"number {name}": value for name, value in of_law.items()}
+
+
+def slip(law: SofteningLaw | Hardening, at: Mapping[str, Values], scheme: Scheme) -> Slip:
+    """Slip by a law; numbers of ``law`` itself do not matter.
+
+    They are by name: the slip of the step and its direction (1 or -1); accumulated slip (slipped)
+    and motion (start) at its beginning; θ and dt; numbers of the law, see :func:`numbers`.
+    """
+    a, ξ, s, none = at["slip"], at["slipped"], at["direction"], 0 * at["slip"]
+    of_law = {n.removeprefix("number "): x for n, x in at.items() if n.startswith("number ")}
+    if isinstance(law, SofteningLaw):
+        law = law.of(of_law)
+        force = s * scheme.resistance(law, ξ, a)
+        return Slip(force, a * law.mean_traction(ξ, a), none, none, law.traction(ξ + a), none)
+    e, θ, dt = (at[name] for name in ("start", "θ", "dt"))
+    change = State({"plastic": a, "accumulated": a})
+    limit, H, B = (of_law[name] for name in ("limit", "modulus", "kinematic"))
+    bulk = law.of(np.inf, of_law)
+    resistance = limit + H * (ξ + θ * a) + of_law["viscosity"] * a / dt
+    return Slip(
+        s * resistance + B * (e + θ * s * a),
+        bulk.dissipation(s * a, change, change, dt),
+        bulk.hardening_energy(change),
+        bulk.hardening_energy(State({"plastic": e + s * a, "accumulated": ξ + a})),
+        limit + H * (ξ + a),
+        B * (e + s * a),
+    )
