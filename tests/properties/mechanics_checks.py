@@ -163,10 +163,18 @@ def modes(case):
     scene, t0 = names["scene"], state.times[-1]
     held = [
         load if isinstance(load, ub.RotatingFrame)
-        else replace(load, time=lambda t, load=load: load.time(t0))
+        else replace(load, time=lambda t, load=load, end=t0: load.time(end))
         for load in scene.loads
     ]  # fmt: skip
     still = replace(scene, loads=held)
+    creep = [one.time for one in scene.damping if isinstance(one, ub.KelvinVoigt)]
+    if creep:  # until nothing moves
+        t1 = t0 + 1000 * max(creep)
+        state = ub.simulate(
+            still, ub.Static(), t=(t0, t1), dt=(t1 - t0) / 10, start=state, progress=False,
+            comm=case.comm, newton=ub.Newton(rtol=DIGITS), mesh=names["mesh"],
+        )  # fmt: skip
+        t0 = t1
     shapes = ub.modes(still, 20, at=state)
     period = 2 * math.pi / shapes.omega[0]
     places = [b.at(s) for b in scene.beams for s in ((0.5, 1.0) if b.cells % 2 == 0 else (1.0,))]

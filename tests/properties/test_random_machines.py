@@ -10,10 +10,10 @@ from random_machines import STEPS, round_off, script
 
 import ufl_beam as ub
 
-SAMPLE = [*(seed for seed in range(27) if seed not in (2, 13)), 91, 337]
-"""Seeds of the default run without two of thousands of iterations; the slow one takes all.
+SAMPLE = [*range(27), 91, 337]
+"""Seeds of the default run; the slow one takes all.
 
-In 91 a solution of KLU finds that the tangent is singular, within a careful search.
+In 2 iterates lose a guide curve before others, of the same step, find an equilibrium; in 91 a solution of KLU finds that the tangent is singular, within a careful search.
 """
 
 ALL = range(500)

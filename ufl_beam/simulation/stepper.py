@@ -348,6 +348,8 @@ class Stepper(StateView):
         """Raise why the latest step failed; all processes call it together."""
         c, callbacks = self.march, self.equation.callbacks
         error, callbacks.error = callbacks.error, None
+        if not self.equation.c.raised:  # at an iterate that was left
+            error = None
         failure, c.failure = c.failure, lib.SUCCEEDS
         if failure == lib.RAISED:
             self.together.settle(error)

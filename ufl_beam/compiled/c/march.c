@@ -182,6 +182,7 @@ void begin_frame(void *self, const time_step *step, const double *q1, const doub
   const double growth = step->fraction * (1 - f->grown);
   f->growth = f->grown + step->at * growth, f->grown_at_end = f->grown + growth;
   f->q0 = step->q0, f->dt = step->dt;
+  memcpy(f->force, f->before, f->size * sizeof *f->force); /* iterates of a failed step may be far away */
 }
 
 void accept_frame(void *self, const time_step *step, const double *q1, const double *s)
@@ -708,6 +709,14 @@ static void guess(march *m)
   }
 }
 
+/* Begin the step, at a guess of its end; whether no function of a user has raised anything. */
+static int begin_at_guess(march *m)
+{
+  run(&m->begin, &m->step, 0, 0);
+  guess(m);
+  return raised_anywhere(m->equation) == NOTHING;
+}
+
 /* Size of the loads in the step, on all processes. */
 static double size_of_loads(const march *m)
 {
@@ -890,13 +899,11 @@ int attempt_step(march *m, double t1, double end)
   e->raised = NOTHING;
   if (m->rates && m->prepare && !m->rates->ready) {
     const double first = m->t + FIRST_TRIAL * (t1 - m->t);
-    if (!set_step(m, first, t1) || !begin_terms(m)) return fails(m, RAISED);
-    guess(m);
+    if (!set_step(m, first, t1) || !begin_at_guess(m)) return fails(m, RAISED);
     if (!solve_step(m, 1)) return 0;
     m->prepare(m->handle);
   }
-  if (!set_step(m, t1, end) || !begin_terms(m)) return fails(m, RAISED);
-  guess(m);
+  if (!set_step(m, t1, end) || !begin_at_guess(m)) return fails(m, RAISED);
   return solve_step(m, 1);
 }
 
@@ -938,13 +945,13 @@ static void watch_forces(force_watch *w, const march *m)
   }
 }
 
-/* Take the end of the step for the state; whether no function of a user has raised anything. */
+/* Take the end of the step for the state; whether no function of a user has raised anything. If one has, the
+ * step is taken all the same: part of the terms have accepted it. */
 int accept_step(march *m)
 {
   equation *e = m->equation;
   prediction *p = m->prediction;
   run(&m->accept, &m->step, m->x, m->s);
-  if (raised_anywhere(e)) return fails(m, RAISED);
   if (m->path) memcpy(m->path->force, e->inner_force, m->size * sizeof *m->path->force);
   accept_cell_forces(m->cell_forces);
   accept_supports(m);

@@ -495,6 +495,7 @@ static int iterate(equation *e, int patience, int careful)
   const int by_petsc = e->monitored && !e->border && !(careful && e->searches);
   e->last = e->best = INFINITY;
   e->near = e->slow = 0;
+  if (e->raised == STEP_FAILED) e->raised = NOTHING; /* at an iterate that is left */
   e->patience = patience;
   e->careful = careful && !by_petsc;
   const int error = by_petsc || !e->monitored ? petsc.SNESSolve(e->snes, 0, e->x) : newton(e, e->unknowns);
