@@ -13,7 +13,8 @@ import ufl_beam as ub
 SAMPLE = [*range(27), 91, 337]
 """Seeds of the default run; the slow one takes all.
 
-In 2 iterates lose a guide curve before others, of the same step, find an equilibrium; in 91 a solution of KLU finds that the tangent is singular, within a careful search.
+In 2 iterates lose a guide curve before others, of the same step, find an equilibrium; in 91 a
+solution of KLU finds that the tangent is singular, within a careful search.
 """
 
 ALL = range(500)

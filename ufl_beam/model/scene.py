@@ -39,7 +39,6 @@ from ufl_beam.model.loads import (
     Damping,
     FollowerLoad,
     KelvinVoigt,
-    LineLoad,
     Load,
     LoadAtPlace,
     PointLoad,
@@ -229,8 +228,8 @@ class Scene(Record, Rich):
         for load in self.loads:
             if isinstance(load, LoadAtPlace):
                 yield load, load.place
-            elif isinstance(load, LineLoad):
-                yield load, load.beam.start
+            elif beam := getattr(load, "beam", None):
+                yield load, beam.start
         for velocity in self.initial:
             for one in velocity.beams:
                 yield "Velocity", one.middle if isinstance(one, Body) else one.start

@@ -143,7 +143,7 @@ Far below round-off; but numbers that underflow would be forces and stiffnesses 
 
 @dataclass(frozen=True)
 class _OfLimitAndEnergy(Record, SofteningLaw):
-    """Base of the laws of two numbers, whose means are closed forms."""
+    """Base of laws of two numbers that fall by limit²/energy or less; others state `steepest`."""
 
     limit: FromZero
     energy: Positive

@@ -56,7 +56,7 @@ class PresentState(ABC):
         return tuple({name: numbers[at] for name, at in of.items()} for of in columns.ledger)
 
     def connections(self) -> Array:
-        """Columns of :class:`Connection` for all links of the scene; (num_links, 5)."""
+        """Columns of :class:`Connection` for all links of the scene; (num_links, columns)."""
         return np.asarray(self.now.column("connectors")[0,])
 
     def connector(self, connector: Connector) -> Connection:

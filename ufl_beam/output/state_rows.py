@@ -60,7 +60,7 @@ class Connection(NamedTuple):
 
 
 def connection(numbers: Array) -> Connection:
-    """History of the columns of k components, of which works are added; (..., k, 5)."""
+    """History of the columns of k components, of which works are added; (..., k, columns)."""
     if numbers.shape[-2] == 1:
         columns = np.moveaxis(numbers[..., 0, :], -1, 0)
         return Connection(*(x if x.ndim else float(x) for x in columns))
@@ -100,7 +100,7 @@ class Columns:
 
     @classmethod
     def of(cls, grid: Grid, *, moving: bool, ledger: Iterable[str], record: int | None) -> Columns:
-        """Table of a scene; a line of it is all that a quantity of connectors or cells needs.
+        """Table of a scene; a number of connectors is a field of :class:`Connection`.
 
         Args:
             grid: Its numbering.

@@ -170,7 +170,7 @@ class Connectors(Linked):
         return total
 
     def kept(self, q: Array) -> Array:
-        """Columns of ``Connection`` of each; (num_links, 5)."""
+        """Columns of ``Connection`` of each; (num_links, columns)."""
         each = zip(self.laws, self._of_each(self._e0), strict=True)
         e = np.ravel([law.z.get("start", e) for law, e in each])
         dissipated = np.zeros(len(self.links))

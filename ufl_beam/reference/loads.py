@@ -99,6 +99,8 @@ class DeadLoad(LoadForce):
             of_beams[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
             for dofs, mass, _ in lumps(grid):
                 np.add.at(self._vector, dofs[:2], mass * np.array(load.acceleration))
+        elif not isinstance(load, PointLoad):
+            raise TypeError(f"{type(load).__name__} is not a dead load")
         cells, (first, *between, last) = np.arange(len(grid.cells)), grid.mesh.parts
         total = of_beams[grid.beam_of_cell] * grid.lengths(cells)[:, None]
         along = total[:, :, None] * np.array([first, last, *between])  # (num_cells, 3, nodes)

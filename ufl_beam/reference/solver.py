@@ -29,7 +29,7 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.output.postprocessing import turned
 from ufl_beam.output.recorders import PresentState
-from ufl_beam.output.state_rows import BEFORE, FORCES, Block, Columns
+from ufl_beam.output.state_rows import BEFORE, FORCES, Block, Columns, Connection
 from ufl_beam.output.states import States
 from ufl_beam.reference.beams import (
     ElasticBeams,
@@ -540,8 +540,8 @@ class Solver(PresentState):
     # -- the state, by objects of the scene ------------------------------------------------------
 
     def connections(self) -> Array:
-        """Columns of ``Connection`` for all links; (num_links, 5)."""
-        table = np.zeros((len(self.scene.links), 5))
+        """Columns of ``Connection`` for all links; (num_links, columns)."""
+        table = np.zeros((len(self.scene.links), len(Connection._fields)))
         for one in self.connectors:
             table[one.numbers] = one.kept(self.q)
         return table

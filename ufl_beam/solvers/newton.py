@@ -70,7 +70,7 @@ class Solver:
 
     Args:
         equation: The :class:`StepEquation` of the steps.
-        least: Iterations at least.
+        least: Iterations before which a residual must be far below the tolerance.
 
     Attributes:
         c: ``equation`` of loops.h.
