@@ -54,7 +54,7 @@ NUMBERS = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 10.0}
 
 def pushed(beams, **parts):
     """Beams that a force and a small moment push at the start of the first one."""
-    load = ub.PointLoad(beams[0].start, force=(8, 0), moment=-4, time=lambda t: float(t < 2.5))
+    load = ub.PointLoad(beams[0].start, force=(8, 0), moment=-4, amplitude=lambda t: float(t < 2.5))
     return ub.Scene(beams, loads=[load], **parts)
 
 
@@ -72,15 +72,15 @@ def swing(cells):
         joints=[ub.Revolute(link.start, end) for link, end in zip(links, ends, strict=True)],
         supports=[ub.Pinned(link.end) for link in links],
         masses=[ub.PointMass(beam.at(0.5), 0.5)],
-        loads=[ub.PointLoad(beam.at(0.5), force=(2, 0), time=push)],
+        loads=[ub.PointLoad(beam.at(0.5), force=(2, 0), amplitude=push)],
     )
 
 
 def hinged_beam(cells):
     """A flying beam that yields, with a hinge in every cell, of which some open."""
     laws = {
-        "bending": ub.Hardening(limit=0.5, kinematic=50.0),
-        "hinge": ub.Softening(limit=1.0, energy=500.0),
+        "bending": ub.ElastoPlastic(yield_limit=0.5, kinematic=50.0),
+        "hinge": ub.Softening(limit=1.0, fracture_energy=500.0),
     }
     return pushed([ub.Beam((6, 0), (0, 8), ub.Section(**NUMBERS, **laws), cells=cells)])
 
@@ -89,7 +89,7 @@ def jointed_beams(cells):
     """Beams of four cells with revolute joints; springs that yield and plastic hinges in turn."""
     section, ends = ub.Section(**NUMBERS, depth=1e-3), np.linspace((6, 0), (0, 8), cells // 4 + 1)
     beams = [ub.Beam(a, b, section, cells=4) for a, b in pairwise(ends)]
-    law = ub.Hardening(0.5, modulus=100.0)
+    law = ub.ElastoPlastic(0.5, isotropic=100.0)
     laws = cycle([ub.Spring(1e3, law=law), ub.RigidPlastic(law)])
     return pushed(
         beams,

@@ -29,7 +29,7 @@ def measure(case, budget, repeat):
     found = ub.tradeoff(
         scene,
         {case.name: lambda solution: solution.position(place)[-1]},
-        scheme=ub.Midpoint(),
+        scheme=ub.EnergyMomentum(),
         t=(0.0, case.end),
         dt=case.end / case.steps,
         budget=budget,

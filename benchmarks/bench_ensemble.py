@@ -46,7 +46,7 @@ def elastic(number, cells=8):
 
 def hinged(number):
     """The same with a hinge of zero length that opens."""
-    law = ub.Softening(limit=190.0 + 0.01 * number, energy=1e3)  # N m, J
+    law = ub.Softening(limit=190.0 + 0.01 * number, fracture_energy=1e3)  # N m, J
     return cantilever(12, 100.0, 2e11 + 1e8 * number, hinges={0.0: law})
 
 
@@ -59,7 +59,7 @@ def member(make, steps):
     def run(number):
         scene = make(number)
         times = {"t": (0.0, DT * steps), "dt": DT, "progress": False}
-        solution = ub.simulate(scene, ub.Midpoint(), **times)
+        solution = ub.simulate(scene, ub.EnergyMomentum(), **times)
         return {"end": solution.displacement(scene.beams[0].end)[-1]}
 
     return run
@@ -75,7 +75,7 @@ def timed(action):
 def parts(make, steps, number):
     """Seconds of the parts of a member."""
     scene, making = timed(lambda: make(number))
-    simulation, building = timed(lambda: ub.Simulation(scene, ub.Midpoint()))
+    simulation, building = timed(lambda: ub.Simulation(scene, ub.EnergyMomentum()))
 
     def go():
         for n in range(1, steps + 1):

@@ -25,14 +25,14 @@ import ufl_beam as ub
 def flying_beam(cells, **laws):
     section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=10.0, **laws)
     beam = ub.Beam((6, 0), (0, 8), section, cells=cells)
-    load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, time=lambda t: float(t < 2.5))
+    load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, amplitude=lambda t: float(t < 2.5))
     return ub.Scene([beam], loads=[load])
 
 
 def frame(limit):
     """A steel portal of 50 cells under a blow; one cell can hinge, if there is a limit."""
     section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
-    hinges = {1.0: ub.Softening(limit=limit, energy=2e3)} if limit else {}
+    hinges = {1.0: ub.Softening(limit=limit, fracture_energy=2e3)} if limit else {}
     left = ub.Beam((0, 0), (0, 3), section, cells=15)
     roof = ub.Beam((0, 3), (4, 3), section, cells=20, hinges=hinges)
     right = ub.Beam((4, 3), (4, 0), section, cells=15)
@@ -40,7 +40,7 @@ def frame(limit):
         [left, roof, right],
         joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
-        loads=[ub.PointLoad(left.end, force=(200e3, 0), time=lambda t: float(t < 0.02))],
+        loads=[ub.PointLoad(left.end, force=(200e3, 0), amplitude=lambda t: float(t < 0.02))],
     )
 
 
@@ -48,12 +48,12 @@ def cantilever(**section):
     """A steel cantilever of 100 cells that is thrown far beyond its yield moment."""
     section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0, **section)
     beam = ub.Beam((0, 0), (3, 0), section, cells=100)
-    load = ub.PointLoad(beam.end, force=(0, -200e3), time=lambda t: float(t < 0.02))
+    load = ub.PointLoad(beam.end, force=(0, -200e3), amplitude=lambda t: float(t < 0.02))
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
 
 
-LAW = ub.Hardening(limit=1.0, kinematic=10.0)
-FIBRES = ub.Fibres(ub.Hardening(250e6, kinematic=2e9), number=200)
+LAW = ub.ElastoPlastic(yield_limit=1.0, kinematic=10.0)
+FIBRES = ub.Fibres(ub.ElastoPlastic(250e6, kinematic=2e9), number=200)
 PAIRS = {  # name: (scene without, scene with, steps, dt)
     "8 cells, all yield": (flying_beam(8), flying_beam(8, bending=LAW), 500, 0.01),
     "512 cells, all yield": (flying_beam(512), flying_beam(512, bending=LAW), 60, 0.01),
@@ -62,7 +62,7 @@ PAIRS = {  # name: (scene without, scene with, steps, dt)
     "1 of 50 cells can hinge, stays closed": (frame(0), frame(1e9), 300, 1e-3),
     "1 of 50 cells can hinge, opens": (frame(1e9), frame(50e3), 300, 1e-3),
     "100 cells of 200 fibres beside resultants": (
-        cantilever(bending=ub.Hardening(limit=250e6 * 0.1 * 0.2**2 / 4, kinematic=1e5)),
+        cantilever(bending=ub.ElastoPlastic(yield_limit=250e6 * 0.1 * 0.2**2 / 4, kinematic=1e5)),
         cantilever(fibres=FIBRES),
         100,
         1e-3,
@@ -74,7 +74,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--repeat", type=int, default=7, help="alternations of each pair")
     options = parser.parse_args()
-    print(f"Midpoint(), medians of {options.repeat} alternations; {machine()}")
+    print(f"EnergyMomentum(), medians of {options.repeat} alternations; {machine()}")
     print(f"{'':42s} {'µs per':>10} {'without':>8} {'with':>9} {'ratio':>6}")
     for name, (*scenes, steps, dt) in PAIRS.items():
         for scene in scenes:

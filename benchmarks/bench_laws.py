@@ -120,9 +120,9 @@ def drag(v, w, c):
 
 CASES = {
     "`Spring`": (slide(ub.Spring(1e4)), None),
-    "`Spring` that yields": (slide(ub.Spring(1e4, ub.Hardening(5.0, modulus=1e3))), None),
+    "`Spring` that yields": (slide(ub.Spring(1e4, ub.ElastoPlastic(5.0, isotropic=1e3))), None),
     "`Damper`": (slide(ub.Damper(10.0)), None),
-    "`Actuator`": (slide(ub.Actuator(lambda t: 5.0 * np.sin(30 * t))), None),
+    "`PrescribedForce`": (slide(ub.PrescribedForce(lambda t: 5.0 * np.sin(30 * t))), None),
     "`Stop`": (slide(ub.Stop(1e5, low=-0.005)), None),
     "`Coulomb`": (slide(ub.Coulomb(2.0)), None),
     "`ConnectorLaw`": (slide(Cubic(1e4)), None),
@@ -132,8 +132,8 @@ CASES = {
     "`Clearance` with friction": (
         bushing(ub.Clearance(1e5, gap=0.005, damping=0.1, friction=0.2, radius=0.02)), None,
     ),
-    "`RigidPlastic`": (turn(ub.RigidPlastic(ub.Hardening(15.0, modulus=10.0))), pinned),
-    "`Motor`": (turn(ub.Motor(lambda t: 0.2 * np.sin(5 * t))), pinned),
+    "`RigidPlastic`": (turn(ub.RigidPlastic(ub.ElastoPlastic(15.0, isotropic=10.0))), pinned),
+    "`PrescribedMotion`": (turn(ub.PrescribedMotion(lambda t: 0.2 * np.sin(5 * t))), pinned),
     "`ForceLaw`": (slide(ub.ForceLaw(lambda e, de: 1e4 * e + 1e6 * e**3)), None),
     "`Controller`": (slide(ub.Controller(lambda now: 1e3 * float(now.t))), None),
     "`Guided`": (
@@ -154,7 +154,7 @@ CASES = {
 
 def stepped(make):
     """Microseconds of CPU time a step, and iterations a step."""
-    simulation = ub.Simulation(make, ub.Midpoint())
+    simulation = ub.Simulation(make, ub.EnergyMomentum())
     simulation.step_to(DT)
     ends, begin = DT * np.arange(2, STEPS + 2), time.process_time()
     before = simulation.iterations

@@ -33,21 +33,24 @@ def beam(hinge=None, damping=(), joint=False, **law):
         joints=joints,
         connectors=[ub.Turn(left.end, right.start, ub.Spring(1e3))] if joint else [],
         supports=[ub.Clamped(left.start)],
-        loads=[ub.PointLoad(right.end, force=(0.0, -1.0), time=ub.ramp(10.0))],
+        loads=[ub.PointLoad(right.end, force=(0.0, -1.0), amplitude=ub.ramp(10.0))],
         damping=damping,
     )
 
 
-CLOSED = ub.Softening(limit=1e6, energy=1.0)
+CLOSED = ub.Softening(limit=1e6, fracture_energy=1.0)
 SCENES = {
     "static, elastic": (beam(), ub.Static()),
     "static, one hinge": (beam(hinge=CLOSED), ub.Static()),
-    "elastic": (beam(), ub.Midpoint()),
-    "one hinge, closed": (beam(hinge=CLOSED), ub.Midpoint()),
-    "all cells can yield": (beam(bending=ub.Hardening(limit=1e6, modulus=1.0)), ub.Midpoint()),
-    "a joint with a spring": (beam(joint=True), ub.Midpoint()),
-    "viscous": (beam(damping=[ub.KelvinVoigt(time=1e-3)]), ub.Midpoint()),
-    "losing energy": (beam(), ub.Midpoint(alpha=0.01, beta=0.01)),
+    "elastic": (beam(), ub.EnergyMomentum()),
+    "one hinge, closed": (beam(hinge=CLOSED), ub.EnergyMomentum()),
+    "all cells can yield": (
+        beam(bending=ub.ElastoPlastic(yield_limit=1e6, isotropic=1.0)),
+        ub.EnergyMomentum(),
+    ),
+    "a joint with a spring": (beam(joint=True), ub.EnergyMomentum()),
+    "viscous": (beam(damping=[ub.KelvinVoigt(retardation_time=1e-3)]), ub.EnergyMomentum()),
+    "losing energy": (beam(), ub.EnergyMomentum(alpha=0.01, beta=0.01)),
 }
 
 

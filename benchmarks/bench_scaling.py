@@ -65,7 +65,10 @@ def lattice(cells, bays):
         supports=[ub.Clamped(ends[i, 0][0]) for i in range(bays + 1)],
         # Weight moves all parts from the start: where a wave fades out, numbers are below the least
         # normal one, and arithmetic with them takes several times as long.
-        loads=[ub.PointLoad(ends[0, height][0], force=(20e3, 0.0), time=blow), ub.Gravity()],  # N
+        loads=[
+            ub.PointLoad(ends[0, height][0], force=(20e3, 0.0), amplitude=blow),
+            ub.Gravity(),
+        ],  # N
     )
 
 
@@ -75,7 +78,7 @@ def measure(cells, bays, steps):
     one_process_below.SMALLEST_SHARE = 1
     begin = time.perf_counter()
     scene = lattice(cells, bays)
-    simulation = ub.Simulation(scene, ub.Midpoint())
+    simulation = ub.Simulation(scene, ub.EnergyMomentum())
     built = time.perf_counter() - begin
     dt = 1e-3  # s
     simulation.step_to(dt)  # what PETSc does in the first factorisation only

@@ -28,13 +28,13 @@ CASES = ((8, 1000), (64, 500), (512, 200), (4096, 50), (100_000, 10))  # cells, 
 def flying_beam(cells):
     section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=10.0)
     beam = ub.Beam((6, 0), (0, 8), section, cells=cells)
-    load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, time=lambda t: float(t < 2.5))
+    load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, amplitude=lambda t: float(t < 2.5))
     return ub.Scene([beam], loads=[load])
 
 
 def time_loop(scene, steps, dt):
     """Seconds of the time loop, its iterations, and the simulation at its end."""
-    simulation = ub.Simulation(scene, ub.Midpoint())
+    simulation = ub.Simulation(scene, ub.EnergyMomentum())
     begin = time.perf_counter()
     for n in range(1, steps + 1):
         simulation.step_to(n * dt)

@@ -46,7 +46,7 @@ class Question:
 
     @property
     def scheme(self):
-        return ub.Midpoint() if self.case.dynamic else ub.Static()
+        return ub.EnergyMomentum() if self.case.dynamic else ub.Static()
 
     def ask(self):
         """The scene, its quantity and the arguments of a run."""
@@ -76,7 +76,7 @@ def elastic_frame():
 
 def yielding_frame():
     """A hinge at the foot that is struck, which flows at 50 kN m and hardens."""
-    scene = scenes.struck_portal(hinges={0.0: ub.Hardening(limit=50e3, modulus=2e5)})
+    scene = scenes.struck_portal(hinges={0.0: ub.ElastoPlastic(yield_limit=50e3, isotropic=2e5)})
     return scene, scene.beams[0].end
 
 

@@ -19,11 +19,11 @@ import ufl_beam as ub
 
 PAGE = Path(__file__).parents[1] / "docs" / "schemes.md"
 SCHEMES = [
-    ub.Midpoint(),
-    ub.Midpoint(0.05, 0.05),
-    ub.DecayingMidpoint(0.8),
-    ub.DecayingMidpoint(0.5),
-    ub.PrintedMidpoint(),
+    ub.EnergyMomentum(),
+    ub.EnergyMomentum(0.05, 0.05),
+    ub.EnergyMomentumDecaying(0.8),
+    ub.EnergyMomentumDecaying(0.5),
+    ub.EnergyMomentumPrinted(),
     ub.Newmark(),
     ub.GeneralizedAlpha(0.8),
     ub.GeneralizedAlpha(0.0),
@@ -46,7 +46,7 @@ def thrown(time, *, EI=100.0, rhoI=10.0, moment=-80.0):
     """The scene."""
     section = ub.Section(EA=1e4, GA=1e4, EI=EI, rhoA=1.0, rhoI=rhoI)
     beam = ub.Beam((6, 0), (0, 8), section, cells=8)
-    load = ub.PointLoad(beam.start, force=(8, 0), moment=moment, time=time)
+    load = ub.PointLoad(beam.start, force=(8, 0), moment=moment, amplitude=time)
     return ub.Scene([beam], loads=[load])
 
 
@@ -76,7 +76,7 @@ def name(scheme):
 
 def rows(make):
     """Lines of a table."""
-    exact = ends(run(make, ub.Midpoint(), FINE))
+    exact = ends(run(make, ub.EnergyMomentum(), FINE))
     for scheme in SCHEMES:
         runs = [run(make, scheme, dt) for dt in STEPS]
         errors = [np.linalg.norm(ends(one) - exact, axis=1).max() for one in runs]
@@ -97,16 +97,16 @@ def table(make):
     return "\n".join([f"| {' | '.join(columns)} |", "|---" * len(columns) + "|", *rows(make)])
 
 
-STATICS = [ub.Static(), ub.ExactStatic(), ub.ExactStatic(0.5)]
+STATICS = [ub.Static(), ub.EnergyMomentumStatic(), ub.EnergyMomentumStatic(0.5)]
 STEPS_A_SECOND = [16, 32, 64, 128, 256]
 
 
 def plastic_work(scheme, steps):
     """Plastic work of a force that goes to and fro, 1.4 times what yields at first; J."""
-    law = ub.Hardening(limit=5.0, modulus=10.0)
+    law = ub.ElastoPlastic(yield_limit=5.0, isotropic=10.0)
     section = ub.Section(EA=1e6, GA=1e6 / 3, EI=100.0, bending=law)
     beam = ub.Beam((0, 0), (1, 0), section, cells=8)
-    load = ub.PointLoad(beam.end, force=(0, -7.0), time=ub.Table([0, 1, 3, 5], [0, 1, -1, 1]))
+    load = ub.PointLoad(beam.end, force=(0, -7.0), amplitude=ub.Table([0, 1, 3, 5], [0, 1, -1, 1]))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     run = ub.simulate(scene, scheme, t=(0, 5), dt=1 / steps, progress=False)
     return run.energy["plastic"][-1]

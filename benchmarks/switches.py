@@ -91,7 +91,7 @@ class Variant(NamedTuple):
     def simulation(self, scene):
         """A simulation of a scene."""
         with self.switched():
-            return ub.Simulation(scene, ub.Midpoint(), newton=ub.Newton(**self.newton))
+            return ub.Simulation(scene, ub.EnergyMomentum(), newton=ub.Newton(**self.newton))
 
 
 CELL_BY_CELL = (compiled_forms, "in_lanes", nothing)

@@ -52,7 +52,7 @@ def swing(connectors=()):
         joints=[ub.Revolute(left.end, beam.start), ub.Revolute(right.end, beam.end)],
         supports=[ub.Pinned(left.start), ub.Pinned(right.start)],
         masses=[ub.PointMass(middle, 0.5)],  # kg
-        loads=[ub.PointLoad(middle, force=(1, 0), time=push)],
+        loads=[ub.PointLoad(middle, force=(1, 0), amplitude=push)],
         connectors=connectors,
     )
 
@@ -73,7 +73,7 @@ def places(solution):
 
 def run(dt):
     """The swing until it is taut."""
-    return ub.simulate(swing(), ub.Midpoint(), t=(0.0, END), dt=dt)
+    return ub.simulate(swing(), ub.EnergyMomentum(), t=(0.0, END), dt=dt)
 
 
 tolerances = [1e-4, 1e-5, 1e-6, 1e-7]
@@ -87,15 +87,15 @@ def error(solution):
     return float(np.linalg.norm(places(solution) - exact, axis=1).max())
 
 
-ub.say("tolerance     steps   shortest s    longest s      error m   sum of estimates m")
+ub.print_once("tolerance     steps   shortest s    longest s      error m   sum of estimates m")
 for tolerance, one in zip(tolerances, adaptive, strict=True):
     dt = np.diff(one.times)
     sum_of_estimates = one.time_error * one.scene.size
     numbers = f"{dt.min():12.2e} {dt.max():12.2e} {error(one):12.2e} {sum_of_estimates:20.2e}"
-    ub.say(f"{tolerance:9.0e} {one.parts:9d} {numbers}")
+    ub.print_once(f"{tolerance:9.0e} {one.parts:9d} {numbers}")
 for one in equal:
     dt = END / one.parts
-    ub.say(f"    equal {one.parts:9d} {dt:12.2e} {dt:12.2e} {error(one):12.2e}")
+    ub.print_once(f"    equal {one.parts:9d} {dt:12.2e} {dt:12.2e} {error(one):12.2e}")
 
 chosen = adaptive[2]
 assert error(chosen) < min(error(one) for one in equal if one.parts < 5 * chosen.parts)
@@ -116,10 +116,10 @@ for kink in push.times[1:]:
 stop = ub.Slide(ub.ground(0.36, -0.36), middle, ub.Stop(1e5, high=0.12), axis=(1, 0))
 events = ub.Events()
 hitting = ub.simulate(
-    swing([stop]), ub.Midpoint(), t=(0.0, 0.6), dt=ub.Adaptive(1e-6), record=events
+    swing([stop]), ub.EnergyMomentum(), t=(0.0, 0.6), dt=ub.Adaptive(1e-6), record=events
 )
-ub.say("\na stop at 0.12 m\n" + "\n".join(map(str, events.found[:8])))
-ub.say(hitting)
+ub.print_once("\na stop at 0.12 m\n" + "\n".join(map(str, events.found[:8])))
+ub.print_once(hitting)
 assert events.found[0].what == "touches"
 assert hitting.energy.worst < 1e-9
 
@@ -157,6 +157,7 @@ if MPI.COMM_WORLD.rank == 0:
 # %% [markdown]
 # ## Try this
 #
-# * `Midpoint(0.05, 0.05)`: dissipation of the scheme counts as an error, so steps are shorter.
-# * A pulse without a table, `time=lambda t: 2.0 * (0.1 < t < 0.2)`: the steps find the jumps at
-#   some cost; `ub.Adaptive(1e-6, stops=[0.1, 0.2])` avoids it.
+# * `EnergyMomentum(0.05, 0.05)`: dissipation of the scheme counts as an error, so steps are
+#   shorter.
+# * A pulse without a table, `amplitude=lambda t: 2.0 * (0.1 < t < 0.2)`: the steps find the jumps
+#   at some cost; `ub.Adaptive(1e-6, stops=[0.1, 0.2])` avoids it.

@@ -56,9 +56,9 @@ def hub(t):
 def run(hinges, record=()):
     """The arm, its drive, and its motion for 1.3 s."""
     arm = ub.Beam((0, 0), (L, 0), tube, cells=20, hinges=hinges, name="arm")
-    drive = ub.Prescribed(arm.start, u=0, v=0, psi=hub)
+    drive = ub.PrescribedDisplacement(arm.start, u=0, v=0, psi=hub)
     scene = ub.Scene([arm], supports=[drive], masses=[ub.PointMass(arm.end, payload)])
-    scheme = ub.Midpoint(alpha=0.02)
+    scheme = ub.EnergyMomentum(alpha=0.02)
     return arm, ub.simulate(scene, scheme, t=(0.0, 1.3), dt=1e-3, record=record, progress=False)
 
 
@@ -82,9 +82,9 @@ complete = int(np.argmax(dissipated > (1 - 1e-9) * G_f))
 half = int(np.argmax(dissipated > G_f / 2))
 free = t >= t[complete]
 
-ub.say("with the breaking joint\n" + str(saved))
-ub.say("\nwithout\n" + str(bent))
-ub.say(
+ub.print_once("with the breaking joint\n" + str(saved))
+ub.print_once("\nwithout\n" + str(bent))
+ub.print_once(
     f"\nmoment at the hub: {np.abs(M[t < t_brake]).max():.0f} N m to get up to speed; in the stop "
     f"{np.abs(M_without).max():.0f} N m without\nthe joint (the tube yields at {M_yield:.0f} N m) "
     f"and {np.abs(M).max():.0f} N m with it"
@@ -164,8 +164,10 @@ with ub.picture((13, 10.5)) as figure:
     handles, labels = rows[2, 1].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside lower center", ncols=5)
 figure.savefig(output / "emergency_stop.png")
-ub.plot_hinge(saved, arm.start).savefig(output / "emergency_stop_hinge.png")
-ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("emergency*")), sep="\n  ")
+ub.plot(saved, "hinge", arm.start).savefig(output / "emergency_stop_hinge.png")
+ub.print_once(
+    "\npictures and data:", *sorted(str(p) for p in output.glob("emergency*")), sep="\n  "
+)
 
 # %% [markdown]
 # ## Verification
@@ -187,7 +189,9 @@ assert abs(dissipated[-1] / G_f - 1) < 1e-9
 assert dissipated[-1] - dissipated[complete] < 1e-9 * G_f
 assert np.abs(M[free]).max() < 1e-8 * M_u
 momentum = saved.momentum()[free, 2]
-ub.say(f"\nangular momentum afterwards: {momentum.mean():.3f} N m s, within {np.ptp(momentum):.0e}")
+ub.print_once(
+    f"\nangular momentum afterwards: {momentum.mean():.3f} N m s, within {np.ptp(momentum):.0e}"
+)
 assert np.ptp(momentum) < 1e-2 * momentum.mean()
 
 # %% [markdown]
@@ -195,4 +199,5 @@ assert np.ptp(momentum) < 1e-2 * momentum.mean()
 #
 # * `LinearSoftening(M_u, G_f)`: the joint is open after 2 G_f/M_u = 0.13 rad, and then entirely,
 # * `G_f = 60.0`: more than the energy of the arm; where does it stop?
-# * `tube` with `bending=ub.Hardening(M_yield, modulus=...)`: how far does the arm bend without?
+# * `tube` with `bending=ub.ElastoPlastic(M_yield, isotropic=...)`: how far does the arm bend
+#   without?

@@ -9,7 +9,7 @@
 # * `Fatigue`: rainflow cycles of the stress at named places, counted while the run goes on,
 # * `SNCurve.eurocode`, Miner's sum, the life that is left; other curves afterwards,
 # * `Extremes`: the envelope of the moments, each step included,
-# * `most=`: solution and files that do not grow, however long the storm lasts.
+# * `max_states=`, `max_rows=`: solution and files that do not grow, however long the storm lasts.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -84,7 +84,7 @@ def frame(wind, damping=()):
         supports=[ub.Clamped(left.start), ub.Clamped(right.start)],
         masses=[tank],
         damping=damping,
-        loads=[ub.Gravity(), ub.PointLoad(upper.at(0.5), force=(1.0, 0.0), time=wind)],
+        loads=[ub.Gravity(), ub.PointLoad(upper.at(0.5), force=(1.0, 0.0), amplitude=wind)],
     )
 
 
@@ -118,25 +118,25 @@ table = output / "fatigue.csv"
 duration = 600.0  # s
 storm = ub.simulate(
     frame(pressure, damping=[ub.Rayleigh(mass=0.15)]),  # 1/s: 1 % of critical at 1.2 Hz
-    ub.Midpoint(),
+    ub.EnergyMomentum(),
     t=(0.0, duration),
     dt=0.04,
     start=calm,
-    record=[fatigue, extremes, ub.History(table, [upper.at(0.5)], most=2000)],
-    most=2000,
+    record=[fatigue, extremes, ub.History(table, [upper.at(0.5)], max_rows=2000)],
+    max_states=2000,
     progress=False,
 )
-ub.say(storm)
+ub.print_once(storm)
 hours = 3600.0  # s
-ub.say("\nplace            cycles  largest range      damage   life in such a storm")
+ub.print_once("\nplace            cycles  largest range      damage   life in such a storm")
 for name, spot in spots.items():
     cycles = fatigue.cycles(spot)
-    ub.say(
+    ub.print_once(
         f"{name:15s} {cycles.count.sum():7.0f} {1e-6 * cycles.range.max():10.1f} MPa"
         f" {fatigue.damage(spot):13.2e} {fatigue.life(spot) / hours:13.0f} h"
     )
 first = min(spots, key=lambda name: fatigue.life(spots[name]))
-ub.say(f"the {first} cracks first")
+ub.print_once(f"the {first} cracks first")
 
 # %% [markdown]
 # Other curves need no other run.  A better weld; and a parent material whose strength the mean
@@ -152,14 +152,14 @@ curves = {
     ),
 }
 for name, curve in curves.items():
-    ub.say(f"{first}, {name}: life {duration / cycles.damage(curve) / hours:.0f} h")
+    ub.print_once(f"{first}, {name}: life {duration / cycles.damage(curve) / hours:.0f} h")
 
 # %% [markdown]
 # ## Pictures
 
 # %%
-ub.plot_cycles(fatigue, spots[first]).savefig(output / "fatigue_cycles.png")
-ub.plot_extremes(storm, extremes, "M").savefig(output / "fatigue_envelope.png")
+ub.plot(fatigue, "cycles", spots[first]).savefig(output / "fatigue_cycles.png")
+ub.plot(extremes, "M").savefig(output / "fatigue_envelope.png")
 
 blue, red = "#0072B2", "#D55E00"
 t, sway = storm.times, 1e3 * storm.displacement(upper.at(0.5))[:, 0]
@@ -197,16 +197,18 @@ stress = foot.stress(moments[:, 0], moments[:, 1], moments[:, 2])
 counted = fatigue.cycles(foot)
 narrow = counted.count.sum() * (2 * math.sqrt(2) * σ / 71e6) ** 3 * math.gamma(2.5) / 2e6
 ratio = counted.damage(slope_3) / narrow
-ub.say(f"\nstandard deviation at the foot {1e-6 * σ:.2f} MPa, damage {ratio:.3f} of narrow-band")
+ub.print_once(
+    f"\nstandard deviation at the foot {1e-6 * σ:.2f} MPa, damage {ratio:.3f} of narrow-band"
+)
 peak = (extremes.section_forces(left).high[0, 2] - moments[:, 2].mean()) / moments[:, 2].std()
 least = (moments[:, 2].mean() - extremes.section_forces(left).low[0, 2]) / moments[:, 2].std()
 expected = math.sqrt(2 * math.log(counted.count.sum()))
-ub.say(
+ub.print_once(
     f"moment at the foot: at most {max(peak, least):.2f} standard deviations from its mean; "
     f"of {counted.count.sum():.0f} Gaussian peaks {expected:.2f} are expected"
 )
 rows = len(table.read_text().splitlines()) - 1
-ub.say(f"kept of 15 000 steps: {len(storm)} states, {rows} rows")
+ub.print_once(f"kept of 15 000 steps: {len(storm)} states, {rows} rows")
 
 assert 0.6 < ratio < 1.0
 # A peak of so many scatters by about a third of a standard deviation; the wind enters squared
@@ -215,7 +217,7 @@ assert first == "lower girder"
 assert storm.energy.worst < 1e-9
 assert len(storm) <= 2002
 assert rows <= 2001
-ub.say("pictures:", *sorted(str(p) for p in output.glob("fatigue*.png")), sep="\n  ")
+ub.print_once("pictures:", *sorted(str(p) for p in output.glob("fatigue*.png")), sep="\n  ")
 
 # %% [markdown]
 # ## Try this

@@ -9,7 +9,8 @@
 #
 # This demo shows
 #
-# * a section of fibres, each with a yield stress of its own, `Hardening(limit=Normal(...))`,
+# * a section of fibres, each with a yield stress of its own,
+#   `ElastoPlastic(yield_limit=Normal(...))`,
 # * free vibration from an initial velocity under the scheme that conserves energy exactly,
 # * which law the decay obeys, decided by `fit_decay`,
 # * Rayleigh damping with the fitted ratio, for comparison.
@@ -65,7 +66,7 @@ def bar(section, damping=()):
         beams=[rod],
         bodies=[block],
         joints=[ub.Rigid(rod.end, block.middle)],
-        supports=[ub.Clamped(rod.start), ub.Prescribed(rod.end, v=0.0, psi=0.0)],
+        supports=[ub.Clamped(rod.start), ub.PrescribedDisplacement(rod.end, v=0.0, psi=0.0)],
         initial=[ub.Velocity([block], linear=(speed, 0))],
         damping=damping,
     )
@@ -76,20 +77,20 @@ def vibrate(scene, record=()):
     five = ub.Newton(max_iterations=5)
     end = 1.2 * (PERIODS + 1) * period
     return ub.simulate(
-        scene, ub.Midpoint(), t=(0.0, end), dt=period / 100, newton=five, record=record
+        scene, ub.EnergyMomentum(), t=(0.0, end), dt=period / 100, newton=five, record=record
     )
 
 
 def fibres(τ):
     """The section, with this deviation in MPa."""
-    law = ub.Hardening(ub.Normal(mean, τ * 1e6, seed=1), kinematic=4 * E)
+    law = ub.ElastoPlastic(ub.Normal(mean, τ * 1e6, seed=1), kinematic=4 * E)
     return ub.Section.rectangle(b=side, h=side, E=E, nu=0.2, fibres=ub.Fibres(law, number=400))
 
 
 deviations = (0.01, 0.35, 0.55, 1.06)  # MPa
 files = ub.XDMF(output / "fibre_damping.xdmf", every=20)
 runs = {τ: vibrate(bar(fibres(τ)), files if τ == 1.06 else ()) for τ in deviations}
-ub.say(f"τ = {deviations[-1]} MPa\n{runs[deviations[-1]]}\n")
+ub.print_once(f"τ = {deviations[-1]} MPa\n{runs[deviations[-1]]}\n")
 
 # %% [markdown]
 # ## Which law
@@ -108,19 +109,19 @@ def decay_of(solution):
 
 
 decays = {τ: decay_of(solution) for τ, solution in runs.items()}
-ub.say("τ (MPa)  first, last amplitude (µm)    rms of the fit, part of the first     decay")
-ub.say(
+ub.print_once("τ (MPa)  first, last amplitude (µm)    rms of the fit, part of the first     decay")
+ub.print_once(
     "                                       linear  exponential                           evidence"
 )
 for τ, d in decays.items():
     first, last = 1e6 * d.amplitudes[[0, -1]]
     linear, exponential = (law.rms / d.amplitudes[0] for law in (d.linear, d.exponential))
-    ub.say(
+    ub.print_once(
         f"{τ:7.2f}  {first:14.1f} {last:7.1f}      {linear:13.4f}  {exponential:9.4f}"
         f"        {d.better if d.evidence > 20 else 'neither':12s}  {d.evidence:9.1e}"
     )
 smooth, scattered = decays[0.01], decays[1.06]
-ub.say(f"\nτ = 0.01 MPa\n{smooth}\n\nτ = 1.06 MPa\n{scattered}")
+ub.print_once(f"\nτ = 0.01 MPa\n{smooth}\n\nτ = 1.06 MPa\n{scattered}")
 
 # %% [markdown]
 # ## Rayleigh's damper in its place
@@ -135,7 +136,7 @@ tuned = ub.Section.rectangle(b=side, h=side, E=E_tuned, nu=0.2)
 damper = ub.Rayleigh(stiffness=2 * ζ * np.sqrt(1 - ζ**2) / ω_d)
 viscous = vibrate(bar(tuned, damping=[damper]))
 of_damper = decay_of(viscous)
-ub.say(f"\nRayleigh damping, ζ = {ζ:.4f}: computed {of_damper.fitted_ratio:.4f}")
+ub.print_once(f"\nRayleigh damping, ζ = {ζ:.4f}: computed {of_damper.fitted_ratio:.4f}")
 
 # %% [markdown]
 # ## Pictures
@@ -219,7 +220,7 @@ with ub.picture((9, 4.8)) as loops:
 for name, figure in {"histories": histories, "laws": laws, "loops": loops}.items():
     figure.savefig(output / f"fibre_damping_{name}.png")
 names = sorted(str(path) for path in output.glob("fibre_damping*"))
-ub.say("\npictures and data:", *names, sep="\n  ")
+ub.print_once("\npictures and data:", *names, sep="\n  ")
 
 # %% [markdown]
 # ## Verification
@@ -246,7 +247,7 @@ for solution in (*runs.values(), viscous):
     assert solution.energy.worst < 1e-9
     assert solution.parts == len(solution.times) - 1
 assert abs(of_damper.fitted_ratio / ζ - 1) < 0.01
-ub.say("linear and exponential decay told apart")
+ub.print_once("linear and exponential decay told apart")
 
 # %% [markdown]
 # ## Try this

@@ -7,7 +7,7 @@
 #
 # This demo shows
 #
-# * exact conservation of all three by `Midpoint()`, at small and at absurdly large steps,
+# * exact conservation of all three by `EnergyMomentum()`, at small and at absurdly large steps,
 # * second order in the step, measured,
 # * the effect of `alpha` and `beta` on them.
 #
@@ -35,7 +35,7 @@ def jump(t):
 def fly(dt, scheme, push=jump, end=10.0, record=()):
     """The beam from (6, 0) to (0, 8) m, pushed at its lower end until t = 2.5 s."""
     beam = ub.Beam((6, 0), (0, 8), section, cells=16, name="beam")
-    load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, time=push)  # N, N m
+    load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, amplitude=push)  # N, N m
     scene = ub.Scene([beam], loads=[load])
     tight = ub.Newton(rtol=1e-13)
     solution = ub.simulate(
@@ -51,7 +51,7 @@ def fly(dt, scheme, push=jump, end=10.0, record=()):
 
 # %%
 steps = (0.01, 0.1, 0.2)
-flights = {dt: fly(dt, ub.Midpoint()) for dt in steps}
+flights = {dt: fly(dt, ub.EnergyMomentum()) for dt in steps}
 
 
 def drifts(solution):
@@ -64,14 +64,14 @@ def drifts(solution):
     return changes
 
 
-ub.say("dt (s)  steps  drift of energy  drift of angular momentum")
+ub.print_once("dt (s)  steps  drift of energy  drift of angular momentum")
 for dt, (_, solution) in flights.items():
     energy, momentum = drifts(solution)
-    ub.say(f"{dt:6g}  {solution.parts:5d}  {energy:15.1e}  {momentum:25.1e}")
+    ub.print_once(f"{dt:6g}  {solution.parts:5d}  {energy:15.1e}  {momentum:25.1e}")
     assert energy < 1e-10
     assert momentum < 1e-10
-ub.say()
-ub.say("dt = 0.01 s\n" + str(flights[0.01][1]))
+ub.print_once()
+ub.print_once("dt = 0.01 s\n" + str(flights[0.01][1]))
 
 # %% [markdown]
 # ## Dissipation
@@ -80,11 +80,13 @@ ub.say("dt = 0.01 s\n" + str(flights[0.01][1]))
 # energy, and changes the angular momentum.
 
 # %%
-with_alpha = fly(0.1, ub.Midpoint(alpha=0.1))[1]
-with_beta = fly(0.1, ub.Midpoint(beta=0.1))[1]
+with_alpha = fly(0.1, ub.EnergyMomentum(alpha=0.1))[1]
+with_beta = fly(0.1, ub.EnergyMomentum(beta=0.1))[1]
 for name, solution in (("alpha", with_alpha), ("beta", with_beta)):
     energy, momentum = drifts(solution)
-    ub.say(f"{name} = 0.1, dt = 0.1 s: energy changes by {energy:.1e}, momentum by {momentum:.1e}")
+    ub.print_once(
+        f"{name} = 0.1, dt = 0.1 s: energy changes by {energy:.1e}, momentum by {momentum:.1e}"
+    )
 assert drifts(with_alpha)[1] < 1e-10 < drifts(with_beta)[1]
 
 # %% [markdown]
@@ -102,23 +104,23 @@ def pulse(t):
 
 
 steps = np.array([1 / 10, 1 / 20, 1 / 40, 1 / 80])
-fine_beam, fine = fly(1 / 640, ub.Midpoint(), push=pulse, end=5.0)
+fine_beam, fine = fly(1 / 640, ub.EnergyMomentum(), push=pulse, end=5.0)
 reference = fine.position(fine_beam.end)[-1]
-ends = [fly(dt, ub.Midpoint(), push=pulse, end=5.0) for dt in steps]
+ends = [fly(dt, ub.EnergyMomentum(), push=pulse, end=5.0) for dt in steps]
 errors = np.array([np.hypot(*(s.position(beam.end)[-1] - reference)) for beam, s in ends])
 orders = np.log2(errors[:-1] / errors[1:])
-ub.say("\ndt (s)     error (m)  order")
+ub.print_once("\ndt (s)     error (m)  order")
 for dt, error, order in zip(steps, errors, ["", *(f"{o:.2f}" for o in orders)], strict=True):
-    ub.say(f"{dt:<9g}  {error:.2e}   {order}")
+    ub.print_once(f"{dt:<9g}  {error:.2e}   {order}")
 assert np.all(np.abs(orders[1:] - 2) < 0.15)
 
 # %% [markdown]
 # ## Pictures
 
 # %%
-beam, flight = fly(0.05, ub.Midpoint(), record=ub.XDMF(output / "flying_beam.xdmf"))
-ub.plot_shapes(flight, count=17).savefig(output / "flying_beam_shapes.png")
-ub.plot_energy(flight).savefig(output / "flying_beam_energy.png")
+beam, flight = fly(0.05, ub.EnergyMomentum(), record=ub.XDMF(output / "flying_beam.xdmf"))
+ub.plot(flight, "shapes", count=17).savefig(output / "flying_beam_shapes.png")
+ub.plot(flight, "energy").savefig(output / "flying_beam_energy.png")
 
 with ub.picture((7, 4.5)) as figure:
     ax = figure.subplots()
@@ -129,8 +131,8 @@ with ub.picture((7, 4.5)) as figure:
     ax.set_ylabel("error (m)")
     ax.legend(frameon=False)
 figure.savefig(output / "flying_beam_order.png")
-ub.animate(flight, output / "flying_beam.gif", seconds=5, color="M")
-ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("flying*")), sep="\n  ")
+ub.animate(flight, output / "flying_beam.gif", seconds=5, quantity="M")
+ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("flying*")), sep="\n  ")
 
 # %% [markdown]
 # ## Try this

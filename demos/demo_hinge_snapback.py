@@ -38,9 +38,9 @@ def broken(ratio, cells=16):
     energy = M_u**2 / (ratio * 3 * EI / L)  # J
     beam = ub.Beam(
         (0, 0), (L, 0), section, cells=cells,
-        hinges={0.0: ub.Softening(limit=M_u, energy=energy)},
+        hinges={0.0: ub.Softening(limit=M_u, fracture_energy=energy)},
     )  # fmt: skip
-    load = ub.PointLoad(beam.end, force=(0, M_u / L), time=lambda t: t)
+    load = ub.PointLoad(beam.end, force=(0, M_u / L), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     path = ub.follow(
         scene,
@@ -59,8 +59,10 @@ def broken(ratio, cells=16):
 
 # %%
 paths = {ratio: broken(ratio) for ratio in steepness}
-ub.say("M_u²/G_f   G_f     peak     states  dissipated  worst difference from the closed form")
-ub.say(" / 3EI/L   (J)     F (kN)                                F        δ")
+ub.print_once(
+    "M_u²/G_f   G_f     peak     states  dissipated  worst difference from the closed form"
+)
+ub.print_once(" / 3EI/L   (J)     F (kN)                                F        δ")
 worst = []
 for ratio, (beam, energy, path) in paths.items():
     α = path.material_at(beam.start).jump
@@ -75,7 +77,7 @@ for ratio, (beam, energy, path) in paths.items():
     )
     worst.append(errors)
     lost = path.energy.lost["hinges"][-1] / energy
-    ub.say(
+    ub.print_once(
         f"{ratio:8.1f} {energy:6.1f} {F[path.critical[0].n] / 1e3:10.4f} {len(F):9d} {lost:11.4f}"
         f"       {errors[0]:.1e}  {errors[1]:.1e}"
     )
@@ -94,10 +96,10 @@ inside = np.flatnonzero(δ[peak:] < δ[peak]) + peak
 back = np.append(inside, inside[-1] + 1)
 jumped = trapezoid(δ[peak] - δ[back], -F[back])
 held = F[peak] * δ[peak] / 2
-ub.say(
+ub.print_once(
     f"\n{energy:.2f} J of fracture energy: a drop of the load at constant displacement sets free"
 )
-ub.say(f"{jumped:.2f} J of the {held:.2f} J that the beam holds at the peak")
+ub.print_once(f"{jumped:.2f} J of the {held:.2f} J that the beam holds at the peak")
 
 # %% [markdown]
 # ## Pictures
@@ -128,7 +130,7 @@ with ub.picture((12, 5)) as figure:
     right.set_ylabel("load (kN)")
     right.set_ylim(0, 5.6)
 figure.savefig(output / "hinge_snapback.png")
-ub.say("\npicture:", output / "hinge_snapback.png")
+ub.print_once("\npicture:", output / "hinge_snapback.png")
 
 # %% [markdown]
 # ## Verification

@@ -86,13 +86,15 @@ wall = ub.Scene(
     supports=[ub.Clamped(ends[i, 0][0]) for i in range(bays + 1)],
     loads=[
         ub.PointLoad(
-            corner, force=(300e3, -150e3), time=ub.Table([0, duration / 2, duration], [0, 1, 0])
+            corner,
+            force=(300e3, -150e3),
+            amplitude=ub.Table([0, duration / 2, duration], [0, 1, 0]),
         )  # N
     ],
 )
-simulation = ub.Simulation(wall, ub.Midpoint())  # conserves energy exactly
+simulation = ub.Simulation(wall, ub.EnergyMomentum())  # conserves energy exactly
 built = time.perf_counter() - begin
-ub.say(
+ub.print_once(
     f"{len(wall.beams)} beams, {len(wall.joints)} joints, {len(simulation.grid.cells)} cells, "
     f"{simulation.grid.size} unknowns; built in {built:.1f} s"
 )
@@ -124,11 +126,11 @@ files.close()
 simulation.close()
 
 memory = MPI.COMM_WORLD.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
-ub.say(f"{steps} steps of {1e3 * end / steps:.2f} ms, {simulation.iterations} iterations")
-ub.say(f"{np.median(seconds):.2f} s a step on {MPI.COMM_WORLD.size} process(es)")
+ub.print_once(f"{steps} steps of {1e3 * end / steps:.2f} ms, {simulation.iterations} iterations")
+ub.print_once(f"{np.median(seconds):.2f} s a step on {MPI.COMM_WORLD.size} process(es)")
 if MPI.COMM_WORLD.rank == 0:
-    ub.say("largest memory:", *(f"{megabytes:.0f} MB" for megabytes in memory))
-ub.say(solution.energy)
+    ub.print_once("largest memory:", *(f"{megabytes:.0f} MB" for megabytes in memory))
+ub.print_once(solution.energy)
 
 # %% [markdown]
 # ## Pictures
@@ -158,7 +160,7 @@ with ub.picture((12, 3.3)) as waves:
         ax.set_title(f"{1e3 * t:.1f} ms", fontsize="medium")
     waves.colorbar(lines, ax=waves.axes, label="speed (m/s)", shrink=0.8, pad=0.01)
 waves.savefig(output / "lattice_waves.png")
-ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("lattice*")), sep="\n  ")
+ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("lattice*")), sep="\n  ")
 
 # %% [markdown]
 # ## Verification
@@ -174,7 +176,7 @@ for t, speed in zip(solution.times[1:], speeds, strict=True):
     ahead = distance > sound * (t + 4 * end / steps)
     if ahead.any():
         assert speed[ahead].max() < 0.01 * speed.max()
-ub.say("the ledger closes, and nothing overtakes sound")
+ub.print_once("the ledger closes, and nothing overtakes sound")
 
 # %% [markdown]
 # ## Try this

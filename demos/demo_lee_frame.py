@@ -35,8 +35,8 @@ def frame(cells, moved=False):
     column = ub.Beam((0, 0), (0, L), section, cells=cells, name="column")
     girder = ub.Beam((0, L), (L, L), section, cells=cells, name="girder")
     place = girder.at(0.2)
-    load = ub.PointLoad(place, force=(0, -1e3), time=lambda t: t)  # N
-    push = ub.Prescribed(place, v=lambda t: -t)  # m
+    load = ub.PointLoad(place, force=(0, -1e3), amplitude=lambda t: t)  # N
+    push = ub.PrescribedDisplacement(place, v=lambda t: -t)  # m
     pins = [ub.Pinned(column.start), ub.Pinned(girder.end)]
     scene = ub.Scene(
         [column, girder],
@@ -62,13 +62,13 @@ path = ub.follow(
     steps=400,
     record=ub.XDMF(output / "lee_frame.xdmf"),
 )
-ub.say("Lee's frame\n" + str(path))
+ub.print_once("Lee's frame\n" + str(path))
 u, v, _ = 100 * path.displacement(place).T  # cm
 P = path.factor  # kN
 
-ub.say("\n            P (kN)   v (cm)   u (cm)")
+ub.print_once("\n            P (kN)   v (cm)   u (cm)")
 for point in path.critical:
-    ub.say(f"{point.kind:10s} {P[point.n]:7.4f}  {-v[point.n]:7.3f}  {u[point.n]:7.3f}")
+    ub.print_once(f"{point.kind:10s} {P[point.n]:7.4f}  {-v[point.n]:7.3f}  {u[point.n]:7.3f}")
 
 # %% [markdown]
 # Where the loaded point turns back, its prescribed motion has limit points.
@@ -80,7 +80,7 @@ turns = [point.n for point in turning.critical]
 P_turns = -turning.reaction(push)[turns, 1] / 1e3  # kN
 v_turns = 100 * turning.factor[turns]  # cm
 for P_turn, v_turn in zip(P_turns, v_turns, strict=True):
-    ub.say(f"v turns    {P_turn:7.4f}  {v_turn:7.3f}")
+    ub.print_once(f"v turns    {P_turn:7.4f}  {v_turn:7.3f}")
 
 # %% [markdown]
 # ## Pictures
@@ -123,7 +123,7 @@ with ub.picture((12, 5.2)) as figure:
     right.plot([0, 100 * L], [0, 100 * L], "^", color=INK, ms=11, zorder=0)
     right.legend(loc="lower right")
 figure.savefig(output / "lee_frame.png")
-ub.say("\npicture:", output / "lee_frame.png")
+ub.print_once("\npicture:", output / "lee_frame.png")
 
 # %% [markdown]
 # ## Verification

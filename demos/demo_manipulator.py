@@ -91,14 +91,14 @@ class Manipulator:
         joint = ub.Rigid if hinge else ub.Revolute
         parts["joints"] = [joint(self.elbow, self.root)]
 
-        held = ub.Prescribed(self.shoulder, u=0, v=0, psi=0)
-        bending = ub.Scene(**parts, supports=[held, ub.Prescribed(self.tip, psi=bend)])
+        held = ub.PrescribedDisplacement(self.shoulder, u=0, v=0, psi=0)
+        bending = ub.Scene(**parts, supports=[held, ub.PrescribedDisplacement(self.tip, psi=bend)])
         self.softening = ub.simulate(
-            bending, ub.ExactStatic(theta=0.6), t=(0.0, t_joint), dt=dt, progress=False
+            bending, ub.EnergyMomentumStatic(theta=0.6), t=(0.0, t_joint), dt=dt, progress=False
         )
-        turning = ub.Prescribed(self.shoulder, u=0, v=0, psi=drive)
+        turning = ub.PrescribedDisplacement(self.shoulder, u=0, v=0, psi=drive)
         self.motion = ub.simulate(
-            ub.Scene(**parts, supports=[turning]), ub.Midpoint(), t=(t_joint, t_end), dt=dt,
+            ub.Scene(**parts, supports=[turning]), ub.EnergyMomentum(), t=(t_joint, t_end), dt=dt,
             start=self.softening, record=record, progress=False,
         )  # fmt: skip
         self.path = self.motion.position(self.tip)
@@ -127,30 +127,30 @@ with warnings.catch_warnings():
     by_stiffness = {r: Manipulator(stiffer=r) if r != 1e3 else hinged for r in (1e3, 1e4, 1e8)}
 body = Manipulator(stiffer=math.inf)
 
-ub.say("hinge, while it softens\n" + str(hinged.softening))
-ub.say("\nhinge, in motion\n" + str(hinged.motion))
-ub.say("\nrevolute joint, in motion\n" + str(revolute.motion))
+ub.print_once("hinge, while it softens\n" + str(hinged.softening))
+ub.print_once("\nhinge, in motion\n" + str(hinged.motion))
+ub.print_once("\nrevolute joint, in motion\n" + str(revolute.motion))
 
 apart = {cell: other.away(revolute) for cell, other in by_length.items()}
-ub.say("\ntip of the hinged arm from that of the jointed one, at most")
+ub.print_once("\ntip of the hinged arm from that of the jointed one, at most")
 for cell, distance in apart.items():
-    ub.say(f"  hinge beside a cell of {1e3 * cell:3.0f} mm: {1e6 * distance:6.1f} µm")
+    ub.print_once(f"  hinge beside a cell of {1e3 * cell:3.0f} mm: {1e6 * distance:6.1f} µm")
 coarse = {n: other.away(by_cells[8]) for n, other in by_cells.items() if n < 8}
-ub.say("tip from that with 8 cells, at most")
+ub.print_once("tip from that with 8 cells, at most")
 for cells, distance in coarse.items():
-    ub.say(f"  {cells} cell{'s'[: cells > 1]:1s}: {1e3 * distance:6.2f} mm")
+    ub.print_once(f"  {cells} cell{'s'[: cells > 1]:1s}: {1e3 * distance:6.2f} mm")
 
 
 def line(name, one):
     """A row of the table: the rigid arm one way."""
     run = one.motion
-    ub.say(
+    ub.print_once(
         f"  {name:15s} {1e3 * one.away(body):11.1e} mm  {run.iterations / run.parts:10.2f}"
         f"  {run.seconds:8.2f} s  {run.energy.worst:9.1e}"
     )
 
 
-ub.say("rigid arm        tip from body's  iterations  wall time  imbalance")
+ub.print_once("rigid arm        tip from body's  iterations  wall time  imbalance")
 for ratio, one in by_stiffness.items():
     line(f"beam, {ratio:.0e} EI", one)
 line("body", body)
@@ -252,7 +252,9 @@ with ub.picture((13, 12)) as figure:
     differences.set_yticks([50, 100, 200], ["50", "100", "200"])
     differences.minorticks_off()
 figure.savefig(output / "manipulator.png")
-ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("manipulator*")), sep="\n  ")
+ub.print_once(
+    "\npictures and data:", *sorted(str(p) for p in output.glob("manipulator*")), sep="\n  "
+)
 
 # %% [markdown]
 # ## Verification
@@ -289,7 +291,7 @@ assert max(coarse.values()) < 1e-3 * reach
 ratios = [one.away(body) for one in by_stiffness.values()]
 assert abs(ratios[0] / ratios[1] / 10 - 1) < 0.1
 assert ratios[2] < 1e-2 * ratios[1]
-ub.say("a softened hinge is a revolute joint, and dissipates nothing")
+ub.print_once("a softened hinge is a revolute joint, and dissipates nothing")
 
 # %% [markdown]
 # ## Try this

@@ -11,7 +11,7 @@
 #
 # * `ub.study`, which calls one function for many cases: one after the other here, several at a time
 #   under `mpirun`, with the same results to the last bit,
-# * random yield stresses of fibres, `Hardening(limit=TruncatedNormal(..., seed=))`,
+# * random yield stresses of fibres, `ElastoPlastic(yield_limit=TruncatedNormal(..., seed=))`,
 # * one file for all members, from which an interrupted study continues,
 # * the 95 % interval of the mean over the number of members.
 
@@ -46,7 +46,7 @@ end, dt = 1.2, 4e-3  # s
 
 def portal(strength):
     """The frame, and the corner that is struck."""
-    law = ub.Hardening(strength, kinematic=steel["E"] / 100)
+    law = ub.ElastoPlastic(strength, kinematic=steel["E"] / 100)
     fibres = ub.Fibres(law, number=10)
     column = ub.Section.rectangle(b=0.10, h=0.20, **steel, fibres=fibres)  # m
     girder = ub.Section.rectangle(b=0.10, h=0.30, **steel)
@@ -58,7 +58,7 @@ def portal(strength):
         joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
         masses=[ub.PointMass(roof.start, 2000.0), ub.PointMass(roof.end, 2000.0)],  # kg
-        loads=[ub.PointLoad(left.end, force=(800e3, 0), time=blow)],  # N
+        loads=[ub.PointLoad(left.end, force=(800e3, 0), amplitude=blow)],  # N
     )
     return scene, left.end
 
@@ -75,7 +75,7 @@ def struck(seed, record=()):
     """One frame; without a seed all fibres have the mean strength."""
     random = ub.TruncatedNormal(mean, deviation, seed=seed or 0)
     scene, corner = portal(mean if seed is None else random)
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0.0, end), dt=dt, record=record)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, end), dt=dt, record=record)
     t, u = solution.times, solution.displacement(corner)[:, 0]
     highest, _ = ub.peaks(t, u, prominence=0.2)
     last = (t > highest[-4]) & (t <= highest[-1])
@@ -92,7 +92,7 @@ def struck(seed, record=()):
 seeds = range(1, 49)
 cases = [{"seed": None}, *({"seed": seed} for seed in seeds)]
 study = ub.study(struck, cases, path=output / "monte_carlo.study", anew=True)
-ub.say(f"{len(study)} members, {len(study.failed)} failed\n")
+ub.print_once(f"{len(study)} members, {len(study.failed)} failed\n")
 
 # %% [markdown]
 # ## Statistics
@@ -115,14 +115,16 @@ units = {
     "residual drift": (1e3, "mm"),
     "dissipated energy": (1e-3, "kJ"),
 }
-ub.say("                          mean strength      random strengths")
-ub.say("                                             mean ± 95 %      5 % to 95 % of members")
+ub.print_once("                          mean strength      random strengths")
+ub.print_once(
+    "                                             mean ± 95 %      5 % to 95 % of members"
+)
 for name, (scale, unit) in units.items():
     alone, members = scale * study[name][0], scale * study[name][1:]
     members = members[np.isfinite(members)]  # a failed member is NaN
     _, means, halves = mean_95(members)
     low, high = np.percentile(members, (5, 95))
-    ub.say(
+    ub.print_once(
         f"{name:21s} ({unit}) {alone:13.2f}  {means[-1]:13.2f} ± {halves[-1]:.2f}"
         f"  {low:14.2f} to {high:.2f}"
     )
@@ -130,8 +132,8 @@ drift = 1e3 * study["residual drift"][1:]
 drift = drift[np.isfinite(drift)]
 usual = 1e3 * study["residual drift"][0]
 more = np.mean(study["dissipated energy"][1:] > study["dissipated energy"][0])
-ub.say(f"\n{100 * more:.0f} % of the members dissipate more than the frame of mean strength")
-ub.say(f"the first five drift by {', '.join(f'{x:.1f}' for x in drift[:5])} mm")
+ub.print_once(f"\n{100 * more:.0f} % of the members dissipate more than the frame of mean strength")
+ub.print_once(f"the first five drift by {', '.join(f'{x:.1f}' for x in drift[:5])} mm")
 
 # %% [markdown]
 # ## What the numbers mean
@@ -153,7 +155,9 @@ ub.say(f"the first five drift by {', '.join(f'{x:.1f}' for x in drift[:5])} mm")
 # %%
 worst = int(np.nanargmax(study["residual drift"]))
 again = struck(**study.cases[worst], record=ub.XDMF(output / "monte_carlo.xdmf", every=2))
-ub.say(f"the most: {1e3 * again['residual drift']:.2f} mm with seed {study.cases[worst]['seed']}")
+ub.print_once(
+    f"the most: {1e3 * again['residual drift']:.2f} mm with seed {study.cases[worst]['seed']}"
+)
 
 # %% [markdown]
 # ## Pictures
@@ -203,7 +207,7 @@ with ub.picture((9, 7.2)) as figure:
 
 figure.savefig(output / "monte_carlo.png")
 names = sorted(str(path) for path in output.glob("monte_carlo*"))
-ub.say("\npictures and data:", *names, sep="\n  ")
+ub.print_once("\npictures and data:", *names, sep="\n  ")
 
 # %% [markdown]
 # ## Verification
@@ -227,7 +231,7 @@ assert abs(means[-1] - 1) < halves[-1]
 low, high = np.percentile(drift, (5, 95))
 assert high - low > 0.4 * drift.mean()
 assert all((np.asarray(again[name]) == study[name][worst]).all() for name in again)
-ub.say("drift uncertain, dissipated energy larger than that of the frame of mean strength")
+ub.print_once("drift uncertain, dissipated energy larger than that of the frame of mean strength")
 
 # %% [markdown]
 # ## Try this

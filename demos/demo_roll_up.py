@@ -32,7 +32,9 @@ turns = 2.0
 def roll_up(cells, steps=16):
     """The cantilever under a moment that grows to two full circles."""
     beam = ub.Beam((0, 0), (L, 0), section, cells=cells, name="cantilever")
-    moment = ub.PointLoad(beam.end, moment=turns * 2 * np.pi * section.EI / L, time=ub.ramp(1.0))
+    moment = ub.PointLoad(
+        beam.end, moment=turns * 2 * np.pi * section.EI / L, amplitude=ub.ramp(1.0)
+    )
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[moment])
     return beam, ub.simulate(scene, ub.Static(), t=(0.0, 1.0), dt=1 / steps, progress=False)
 
@@ -44,7 +46,7 @@ def roll_up(cells, steps=16):
 
 # %%
 beam, solution = roll_up(cells=32)
-ub.say("cantilever rolled up twice\n" + str(solution))
+ub.print_once("cantilever rolled up twice\n" + str(solution))
 
 ψ = solution.displacement(beam.end)[:, 2]
 assert np.allclose(ψ, solution.times * turns * 2 * np.pi, atol=1e-9)
@@ -69,15 +71,15 @@ errors = np.array(errors)
 half_angle = np.pi / (2 * meshes)
 exact_errors = 2 * L / np.pi * (half_angle / np.sin(half_angle) - 1)
 orders = np.log2(errors[:-1] / errors[1:])
-ub.say("\ncells  tip error (m)  order")
+ub.print_once("\ncells  tip error (m)  order")
 for cells, error, order in zip(meshes, errors, ["", *(f"{o:.3f}" for o in orders)], strict=True):
-    ub.say(f"{cells:5d}  {error:.6e}   {order}")
+    ub.print_once(f"{cells:5d}  {error:.6e}   {order}")
 
 # %% [markdown]
 # ## Pictures
 
 # %%
-shapes = ub.plot_shapes(solution, count=9)
+shapes = ub.plot(solution, "shapes", count=9)
 shapes.savefig(output / "roll_up_shapes.png")
 
 with ub.picture((7, 4.5)) as figure:
@@ -88,7 +90,7 @@ with ub.picture((7, 4.5)) as figure:
     ax.set_ylabel("error of the tip after half a circle (m)")
     ax.legend(frameon=False)
 figure.savefig(output / "roll_up_error.png")
-ub.say("\npictures:", *sorted(str(p) for p in output.glob("roll_up*")), sep="\n  ")
+ub.print_once("\npictures:", *sorted(str(p) for p in output.glob("roll_up*")), sep="\n  ")
 
 # %% [markdown]
 # ## Verification

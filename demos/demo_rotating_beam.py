@@ -31,7 +31,7 @@ L = 2.0  # m
 section = ub.Section.rectangle(b=0.20, h=0.03, E=70e9, nu=0.33, rho=2700.0)
 blade = ub.Beam((0, 0), (L, 0), section, cells=40, name="blade")
 root = ub.Clamped(blade.start)
-inner = ub.KelvinVoigt(time=2e-5)  # s
+inner = ub.KelvinVoigt(retardation_time=2e-5)  # s
 
 
 def spinning(rate):
@@ -56,9 +56,9 @@ found = [modes_at(rate) for rate in rates]
 frequencies = np.array([modes.frequencies for modes, _ in found])  # Hz
 ratios = np.array([modes.damping for modes, _ in found])
 fast, steady = found[-1]
-ub.say(f"at rest:\n{found[0][0]}\nat {rpm[-1]:.0f} revolutions per minute:\n{fast}")
+ub.print_once(f"at rest:\n{found[0][0]}\nat {rpm[-1]:.0f} revolutions per minute:\n{fast}")
 pull = steady.section_forces(blade)[0, 0]
-ub.say(f"the root bears {pull / 1e3:.1f} kN, the tip moves out by "
+ub.print_once(f"the root bears {pull / 1e3:.1f} kN, the tip moves out by "
        f"{1e3 * steady.displacement(blade.end)[-1, 0]:.3f} mm")  # fmt: skip
 
 # %% [markdown]
@@ -77,7 +77,7 @@ for βL, f0 in zip((1.875104, 4.694091, 7.854757), frequencies[0], strict=True):
     dw = np.gradient(w, x, edge_order=2)
     k = np.trapezoid((1 - x**2) / 2 * dw**2, x) / np.trapezoid(w**2, x)
     bounds.append(np.sqrt(f0**2 + (k - 1) * (rpm / 60) ** 2))
-    ub.say(f"βL = {βL:.6f}: k = {k:.4f}")
+    ub.print_once(f"βL = {βL:.6f}: k = {k:.4f}")
 bounds = np.array(bounds).T
 
 # %% [markdown]
@@ -94,9 +94,9 @@ for order in orders:
         for i in np.flatnonzero(apart[:-1] * apart[1:] < 0):
             part = apart[i] / (apart[i] - apart[i + 1])
             crossings.append((order, mode, rpm[i] + part * (rpm[i + 1] - rpm[i])))
-ub.say("\norder  mode  speed (1/min)")
+ub.print_once("\norder  mode  speed (1/min)")
 for order, mode, speed in crossings:
-    ub.say(f"{order:4d}P  {mode:4d}  {speed:8.0f}")
+    ub.print_once(f"{order:4d}P  {mode:4d}  {speed:8.0f}")
 
 # %% [markdown]
 # ## Pictures
@@ -122,9 +122,9 @@ with ub.picture((8.5, 5.5)) as figure:
     figure.legend(loc="outside upper left", ncols=5)
 figure.savefig(output / "rotating_beam_campbell.png")
 
-ub.plot_modes(fast).savefig(output / "rotating_beam_modes.png")
+ub.plot(fast).savefig(output / "rotating_beam_modes.png")
 fast.write(output / "rotating_beam.xdmf")  # the k-th shape at time k, for ParaView
-ub.say("\npictures:", *sorted(str(p) for p in output.glob("rotating_beam*.png")), sep="\n  ")
+ub.print_once("\npictures:", *sorted(str(p) for p in output.glob("rotating_beam*.png")), sep="\n  ")
 
 # %% [markdown]
 # ## Verification

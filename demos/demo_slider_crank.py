@@ -8,9 +8,9 @@
 #
 # This demo shows
 #
-# * `Prismatic`, `Revolute(..., measured=True)` and the forces that they bear,
+# * `Prismatic`, `Revolute(..., multipliers=True)` and the forces that they bear,
 # * `Body` for what is rigid, `Turn`, `Slide` and `Stretch` for what acts between two places,
-# * `Motor` against `Controller`: a motion that is given, and one that is to be held,
+# * `PrescribedMotion` against `Controller`: a motion that is given, and one that is to be held,
 # * the ledger, with an entry for each source and sink.
 
 # %%
@@ -39,14 +39,14 @@ crank = ub.Beam(
 )
 rod = ub.Beam((r, 0), (r + l, 0), ub.Section.circle(d, E=E, nu=0, rho=rho), cells=8, name="rod")
 pivot = ub.Pinned(crank.start)
-elbow = ub.Revolute(crank.end, rod.start, measured=True)
+elbow = ub.Revolute(crank.end, rod.start, multipliers=True)
 guide = ub.Prismatic(ub.ground(0, 0), rod.end, axis=(1, 0), turning=True)
 moment, t_off = 0.01, 1.0  # N m, s
-turning = ub.PointLoad(crank.start, moment=moment, time=lambda t: float(t < t_off))
+turning = ub.PointLoad(crank.start, moment=moment, amplitude=lambda t: float(t < t_off))
 
 mechanism = ub.Scene([crank, rod], joints=[elbow, guide], supports=[pivot], loads=[turning])
-known = ub.simulate(mechanism, ub.Midpoint(), t=(0.0, 3.0), dt=2.5e-3, progress=False)
-ub.say("slider-crank with a flexible rod\n" + str(known))
+known = ub.simulate(mechanism, ub.EnergyMomentum(), t=(0.0, 3.0), dt=2.5e-3, progress=False)
+ub.print_once("slider-crank with a flexible rod\n" + str(known))
 
 # %% [markdown]
 # The reference values were computed with an independent program.  Their last digits are those of a
@@ -61,14 +61,14 @@ plateau = 0.038576  # J
 angle, x_slider = known.displacement(crank.start)[:, 2], known.position(rod.end)[:, 0]
 kinetic = known.energy["kinetic"]
 row = {t: int(np.argmin(np.abs(known.times - t))) for t in reference}
-ub.say("\n    t   angle of the crank  reference   slider    reference")
+ub.print_once("\n    t   angle of the crank  reference   slider    reference")
 for t, (angle_there, x_there) in reference.items():
-    ub.say(
+    ub.print_once(
         f"  {t:3.1f} s     {angle[row[t]]:9.5f} {angle_there:12g} {x_slider[row[t]]:11.5f} m"
         f" {x_there:8g} m"
     )
 free = known.times > t_off
-ub.say(f"kinetic energy after 1 s: {kinetic[free].mean():.6f} J; reference {plateau} J")
+ub.print_once(f"kinetic energy after 1 s: {kinetic[free].mean():.6f} J; reference {plateau} J")
 
 # %% [markdown]
 # ## The press
@@ -110,12 +110,16 @@ class Press:
         self.slider = ub.Body((x_start, 0), mass=2.0, inertia=2e-3, name="slider")
         self.rod = ub.Beam((0, radius), (x_start, 0), steel, cells=8, name="rod")
         self.pin = self.crank.at(0, radius)
-        self.bearing = ub.Revolute(here, self.crank.middle, measured=True)
-        self.elbow = ub.Revolute(self.pin, self.rod.start, measured=True)
-        self.wrist = ub.Revolute(self.rod.end, self.slider.middle, measured=True)
+        self.bearing = ub.Revolute(here, self.crank.middle, multipliers=True)
+        self.elbow = ub.Revolute(self.pin, self.rod.start, multipliers=True)
+        self.wrist = ub.Revolute(self.rod.end, self.slider.middle, multipliers=True)
         self.guide = ub.Prismatic(here, self.slider.middle, axis=(1, 0))
 
-        law = ub.Controller(self.control) if controlled else ub.Motor(lambda t: wanted(t)[0])
+        law = (
+            ub.Controller(self.control)
+            if controlled
+            else ub.PrescribedMotion(lambda t: wanted(t)[0])
+        )
         seal = ub.Coulomb(5.0, coefficient=0.2, joint=self.guide)  # N, 1
         contact = ub.Stop(2e6, high=gap)  # N/m, m
         self.motor = ub.Turn(here, self.crank.middle, law)
@@ -136,7 +140,7 @@ class Press:
         )
         self.run = ub.simulate(
             scene,
-            ub.Midpoint(alpha=0.05, beta=0.05),
+            ub.EnergyMomentum(alpha=0.05, beta=0.05),
             t=(0.0, 0.75),
             dt=5e-4,
             record=record,
@@ -154,8 +158,8 @@ class Press:
 
 driven = Press(controlled=False)
 controlled = Press(controlled=True, record=ub.XDMF(output / "slider_crank.xdmf", every=30))
-ub.say("\npress, motion given\n" + str(driven.run))
-ub.say("\npress, controlled\n" + str(controlled.run))
+ub.print_once("\npress, motion given\n" + str(driven.run))
+ub.print_once("\npress, controlled\n" + str(controlled.run))
 
 # %% [markdown]
 # What each element did.  The force of a connector resists its growth, so that of a motor which
@@ -169,7 +173,7 @@ for name, one in (("motion given", driven), ("controlled", controlled)):
     largest = {part: np.linalg.norm(force, axis=1).max() for part, force in bears.items()}
     T = -one.run.connector(one.motor).force
     hits = one.run.connector(one.workpiece)
-    ub.say(
+    ub.print_once(
         f"\n{name}: {one.speed[steady].min():.2f} to {one.speed[steady].max():.2f} rad/s, "
         f"torque {T.min():.1f} to {T.max():.1f} N m\n  workpiece at most {hits.force.max():.0f} N;"
         f" bears at most: elbow {largest['elbow']:.0f} N, wrist {largest['wrist']:.0f} N, guide "
@@ -262,10 +266,10 @@ with ub.picture((13, 10.5)) as figure:
     speeds.legend(loc="lower right")
 figure.savefig(output / "slider_crank_press.png")
 turn = 2 * math.pi / speed
-shapes = ub.plot_shapes(controlled.run, times=np.linspace(0.4, 0.4 + 0.5 * turn, 6))
+shapes = ub.plot(controlled.run, "shapes", times=np.linspace(0.4, 0.4 + 0.5 * turn, 6))
 shapes.savefig(output / "slider_crank_shapes.png")
 ub.animate(controlled.run, output / "slider_crank.gif", seconds=2, thickness=2, size=(640, 368))
-ub.say("\npictures and data:", *sorted(str(p) for p in output.glob("slider*")), sep="\n  ")
+ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("slider*")), sep="\n  ")
 
 # %% [markdown]
 # ## Verification
@@ -314,12 +318,15 @@ arm = (arm[1:] + arm[:-1]) / 2
 lever = arm[:, 0] * force[1:, 1] - arm[:, 1] * force[1:, 0]
 T = -driven.run.connector(driven.motor).force[1:]
 apart = np.abs(T - lever)[steady[1:]].max()
-ub.say(f"torque against the lever of the elbow's force: {apart:.1e} N m apart, of {T.max():.1f}")
-ub.say("reference values reproduced")
+ub.print_once(
+    f"torque against the lever of the elbow's force: {apart:.1e} N m apart, of {T.max():.1f}"
+)
+ub.print_once("reference values reproduced")
 
 # %% [markdown]
 # ## Try this
 #
 # * `gap` for 3 mm before the dead centre: can the controller still turn the press?
 # * `coefficient=0.8`: how much more power does it take?
-# * `Midpoint()` in the place of `alpha = beta = 0.05`: how long does the rod ring after a stroke?
+# * `EnergyMomentum()` in the place of `alpha = beta = 0.05`: how long does the rod ring after a
+#   stroke?

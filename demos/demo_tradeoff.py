@@ -45,7 +45,7 @@ def hub(t):
 arm = ub.Beam((0, 0), (L, 0), tube, cells=2, name="arm")
 scene = ub.Scene(
     [arm],
-    supports=[ub.Prescribed(arm.start, u=0, v=0, psi=hub)],
+    supports=[ub.PrescribedDisplacement(arm.start, u=0, v=0, psi=hub)],
     masses=[ub.PointMass(arm.end, payload)],
 )
 
@@ -84,13 +84,13 @@ quantities = {"place": place, "lag": lag}
 accurate = ub.tradeoff(
     scene,
     quantities,
-    scheme=[ub.Midpoint(), ub.GeneralizedAlpha()],
+    scheme=[ub.EnergyMomentum(), ub.GeneralizedAlpha()],
     t=(0.0, end),
     dt=0.02,
     newton=[ub.Newton(), ub.Newton(rtol=1e-6)],
     tolerance={"place": 1e-3, "lag": 2e-3},  # m, rad
 )
-ub.say(accurate)
+ub.print_once(accurate)
 
 # %% [markdown]
 # ## A budget
@@ -108,14 +108,14 @@ fast = ub.tradeoff(
     mesh=ub.Mesh(degree=winner["mesh"].degree),
     budget=2 * accurate.best.seconds,
 )
-ub.say("\n" + str(fast))
+ub.print_once("\n" + str(fast))
 
 # %% [markdown]
 # ## Pictures
 
 # %%
-ub.plot_tradeoff(accurate).savefig(output / "tradeoff_tolerance.png")
-ub.plot_tradeoff(fast).savefig(output / "tradeoff_budget.png")
+ub.plot(accurate).savefig(output / "tradeoff_tolerance.png")
+ub.plot(fast).savefig(output / "tradeoff_budget.png")
 
 # %% [markdown]
 # ## Verification
@@ -128,7 +128,7 @@ ub.plot_tradeoff(fast).savefig(output / "tradeoff_budget.png")
 best = ub.simulate(scene, **winner, progress=False)
 fine = ub.simulate(
     scene,
-    ub.Midpoint(),
+    ub.EnergyMomentum(),
     t=(0.0, end),
     dt=2e-4,
     mesh=ub.Mesh(refine=8, degree=2),
@@ -138,19 +138,25 @@ for name, tolerance in (("place", 1e-3), ("lag", 2e-3)):
     exact = quantities[name](fine)
     error = np.abs(quantities[name](best) - exact).max()
     apart = np.abs(accurate.limit[name] - exact).max()
-    ub.say(f"{name}: error {error:.1e} of {tolerance:.1e}, limit {apart:.1e} from the reference")
+    ub.print_once(
+        f"{name}: error {error:.1e} of {tolerance:.1e}, limit {apart:.1e} from the reference"
+    )
     assert error < tolerance
     assert apart < accurate.uncertainty[name] + 0.1 * tolerance
-ub.say(f"the steps of all runs took {accurate.effort:.0f} times those of the recommended one")
+ub.print_once(
+    f"the steps of all runs took {accurate.effort:.0f} times those of the recommended one"
+)
 
 # %% [markdown]
 # A quantity that has no limit is refused, with the numbers seen: here one that counts steps.
 
 # %%
 try:
-    ub.tradeoff(scene, {"steps": len}, scheme=ub.Midpoint(), t=(0.0, end), dt=0.04, tolerance=0.01)
+    ub.tradeoff(
+        scene, {"steps": len}, scheme=ub.EnergyMomentum(), t=(0.0, end), dt=0.04, tolerance=0.01
+    )
 except ub.TradeoffError as error:
-    ub.say("\nrefused:", error)
+    ub.print_once("\nrefused:", error)
 else:
     raise AssertionError("the number of steps has no limit")
 

@@ -61,7 +61,7 @@ def frame(factor):
         beams=[left, girder, right],
         joints=[ub.Rigid(left.end, girder.start), ub.Rigid(girder.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
-        loads=[ub.PointLoad(left.end, force=(peak, 0), time=impulse)],
+        loads=[ub.PointLoad(left.end, force=(peak, 0), amplitude=impulse)],
     )
     return scene, girder.end
 
@@ -69,7 +69,7 @@ def frame(factor):
 def swing(factor, end, record=()):
     """Let it swing; every fifth step is kept, 120 in a period."""
     scene, corner = frame(factor)
-    scheme = ub.Midpoint()  # conserves energy exactly: what is lost, the hinge has
+    scheme = ub.EnergyMomentum()  # conserves energy exactly: what is lost, the hinge has
     return ub.simulate(scene, scheme, t=(0.0, end), dt=1e-3, every=5, record=record), corner
 
 
@@ -83,7 +83,7 @@ def swing(factor, end, record=()):
 # %%
 elastic, corner = swing(0, 2.0)
 demand = np.abs(elastic.section_forces_at(corner)[:, 2]).max() / limit
-ub.say(f"without a hinge the moment at the corner reaches {demand:.3f} M_u\n")
+ub.print_once(f"without a hinge the moment at the corner reaches {demand:.3f} M_u\n")
 
 factors = (1, 1.2, 1.4, 1.6, 1.8, 2, 2.2, 10)
 files = ub.XDMF(output / "vibrating_frame.xdmf", every=100)
@@ -92,7 +92,7 @@ runs = {
     for factor in factors
 }
 for factor in (1, 10):
-    ub.say(f"G_f × {factor}\n{runs[factor][0]}\n")
+    ub.print_once(f"G_f × {factor}\n{runs[factor][0]}\n")
 
 # %% [markdown]
 # ## Decrement and damping ratio
@@ -141,21 +141,21 @@ printed = {  # Table 2 of the paper
 
 def row(name, values, digits):
     """A line of the table."""
-    ub.say(f"{name:38s}" + "".join(f"{value:>8.{digits}f}" for value in values))
+    ub.print_once(f"{name:38s}" + "".join(f"{value:>8.{digits}f}" for value in values))
 
 
-ub.say(f"{'fracture energy G_f':38s}" + "".join(f"{f'{f:g}x':>8s}" for f in factors))
+ub.print_once(f"{'fracture energy G_f':38s}" + "".join(f"{f'{f:g}x':>8s}" for f in factors))
 for direction, (name, (δ_paper, ζ_paper)) in enumerate(printed.items()):
     δ, ζ = ([getattr(decay[f][direction], x) for f in factors] for x in ("decrement", "ratio"))
-    ub.say(f"{name} displacement")
+    ub.print_once(f"{name} displacement")
     row("  logarithmic decrement δ", δ, 4)
     row("    printed in the paper, other frame", δ_paper, 3)
     row("  damping ratio ζ", ζ, 4)
     row("    printed in the paper, other frame", ζ_paper, 3)
 row("energy lost in 6.5 s, part of the work", [lost[f] for f in factors], 4)
-ub.say("\ndecrement of each of the first periods, horizontal displacement")
+ub.print_once("\ndecrement of each of the first periods, horizontal displacement")
 for f in (1, 1.4, 10):
-    ub.say(f"  {f:3g}x  " + "".join(f"{d:8.3f}" for d in decay[f][0].decrements))
+    ub.print_once(f"  {f:3g}x  " + "".join(f"{d:8.3f}" for d in decay[f][0].decrements))
 
 # %% [markdown]
 # ## What the numbers mean
@@ -242,10 +242,10 @@ with ub.picture((9, 4.6)) as hinge:
 pictures = {"histories": histories, "energy": energies, "hinge": hinge}
 for name, figure in pictures.items():
     figure.savefig(output / f"vibrating_frame_{name}.png")
-shapes = ub.plot_shapes(runs[1][0], times=np.arange(0.3, 2.1, 0.31))
+shapes = ub.plot(runs[1][0], "shapes", times=np.arange(0.3, 2.1, 0.31))
 shapes.savefig(output / "vibrating_frame_shapes.png")
 names = sorted(str(path) for path in output.glob("vibrating_frame*"))
-ub.say("\npictures and data:", *names, sep="\n  ")
+ub.print_once("\npictures and data:", *names, sep="\n  ")
 
 # %% [markdown]
 # ## Verification
@@ -262,7 +262,7 @@ assert np.allclose(vertical, horizontal, rtol=0.2)
 for solution, _ in runs.values():
     assert set(solution.energy.lost) == {"hinges"}
     assert solution.energy.worst < 1e-9
-ub.say("trend of Table 2 reproduced")
+ub.print_once("trend of Table 2 reproduced")
 
 # %% [markdown]
 # ## Try this

@@ -50,7 +50,7 @@ class Dashpot(ub.MaterialLaw):
 
 @dataclass(frozen=True)
 class SameHardening(ub.MaterialLaw):
-    """What `Hardening` is, stated by residuals."""
+    """What `ElastoPlastic` is, stated by residuals."""
 
     limit: float
     H: float

@@ -37,7 +37,7 @@ def cantilever(
         loads: Functions of the beam that give more loads, `lambda beam: ub.LineLoad(beam, ...)`.
     """
     beam = ub.Beam((0, 0), (length, 0), section, cells=cells)
-    at_end = [load(beam.end, force=force, moment=moment, time=time)]
+    at_end = [load(beam.end, force=force, moment=moment, amplitude=time)]
     return ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],
@@ -51,7 +51,7 @@ def quarter_circle(section=SLENDER, *, radius=1.0, cells=8, force=(0.0, 0.0), ti
     return ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=force, time=time)],
+        loads=[ub.PointLoad(beam.end, force=force, amplitude=time)],
     )
 
 
@@ -63,7 +63,7 @@ def beam_on_roller(
     return ub.Scene(
         [beam],
         supports=[ub.Pinned(beam.start), ub.Roller(beam.end, along=along)],
-        loads=[ub.PointLoad(beam.at(s), force=force, time=GROWING)],
+        loads=[ub.PointLoad(beam.at(s), force=force, amplitude=GROWING)],
     )
 
 
@@ -80,8 +80,8 @@ def portal(*, cells=4, H=20e3, V=-40e3, time=GROWING, feet=ub.Clamped):
         joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[feet(left.start), feet(right.end)],
         loads=[
-            ub.PointLoad(left.end, force=(H, 0), time=time),
-            ub.PointLoad(roof.at(0.5), force=(0, V), time=time),
+            ub.PointLoad(left.end, force=(H, 0), amplitude=time),
+            ub.PointLoad(roof.at(0.5), force=(0, V), amplitude=time),
         ],
     )
 
@@ -104,7 +104,7 @@ def struck_portal(*, hinges=None):
         [left, roof, right],
         joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
-        loads=[ub.PointLoad(left.end, force=(200e3, 0), time=blow)],
+        loads=[ub.PointLoad(left.end, force=(200e3, 0), amplitude=blow)],
     )
 
 
@@ -112,7 +112,9 @@ def flying_beam(*, cells=10, time=lambda t: 1.0 * (t < 2.5), mass=1.0):
     """Free beam, thrown by a force and a moment at its lower end (Simo and Vu-Quoc 1986)."""
     section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=mass, rhoI=10.0 * mass)
     beam = ub.Beam((6, 0), (0, 8), section, cells=cells)
-    return ub.Scene([beam], loads=[ub.PointLoad(beam.start, force=(8, 0), moment=-80, time=time)])
+    return ub.Scene(
+        [beam], loads=[ub.PointLoad(beam.start, force=(8, 0), moment=-80, amplitude=time)]
+    )
 
 
 SPIN_UP = {"omega": 6.0, "duration": 15.0}
@@ -131,7 +133,9 @@ def spin_up(*, cells=10):
     """Beam of length 10 along x that is turned at the origin (Simo and Vu-Quoc 1986)."""
     section = ub.Section(EA=2.8e7, GA=1e7, EI=1.4e4, rhoA=1.2, rhoI=6e-4)
     beam = ub.Beam((0, 0), (10, 0), section, cells=cells)
-    return ub.Scene([beam], supports=[ub.Prescribed(beam.start, u=0, v=0, psi=spin_up_angle)])
+    return ub.Scene(
+        [beam], supports=[ub.PrescribedDisplacement(beam.start, u=0, v=0, psi=spin_up_angle)]
+    )
 
 
 SWING_PULSE = ub.Table([0, 0.128, 0.256], [0, 2, 0])
@@ -156,7 +160,7 @@ def swing(*, cells=4, rigidity=1e4):
         joints=[ub.Revolute(left.end, beam.start), ub.Revolute(right.end, beam.end)],
         supports=[ub.Pinned(left.start), ub.Pinned(right.start)],
         masses=[ub.PointMass(beam.at(0.5), 0.5)],
-        loads=[ub.PointLoad(beam.at(0.5), force=(1, 0), time=SWING_PULSE)],
+        loads=[ub.PointLoad(beam.at(0.5), force=(1, 0), amplitude=SWING_PULSE)],
     )
 
 

@@ -89,7 +89,7 @@ class ConvergenceError(RuntimeError):
             found but refused.
 
     Example:
-        >>> pull = ub.PointLoad(weak.end, force=(0, -5e4), time=lambda t: t)
+        >>> pull = ub.PointLoad(weak.end, force=(0, -5e4), amplitude=lambda t: t)
         >>> pulled = ub.Scene([weak], supports=[ub.Clamped(weak.start)], loads=[pull])
         >>> try:
         ...     run = ub.simulate(pulled, ub.Static(), t=(0, 1), dt=0.1)
@@ -123,7 +123,7 @@ class CopiesDiffer(RuntimeError):
 
     Example:
         >>> try:
-        ...     run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
+        ...     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
         ... except ub.CopiesDiffer as error:
         ...     print("Does a function of the scene depend on the rank?", error)
     """

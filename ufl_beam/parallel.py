@@ -235,11 +235,11 @@ with suppress(ValueError):  # in a thread
 # -- output ----------------------------------------------------------------------------------------
 
 
-def say(*words: object, sep: str = " ") -> None:
+def print_once(*words: object, sep: str = " ") -> None:
     """Print from the first process only, as scripts do that may run under ``mpirun``.
 
     Example:
-        >>> ub.say("steps:", len(solution.times) - 1)  # once, on any number of processes
+        >>> ub.print_once("steps:", len(solution.times) - 1)  # once, on any number of processes
         steps: 20
     """
     if active_comm().rank == 0:

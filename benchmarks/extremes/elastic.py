@@ -27,7 +27,7 @@ def rolled(sections, lengths, cells, moment):
         beams,
         joints=joints,
         supports=[ub.Clamped(beams[0].start)],
-        loads=[ub.PointLoad(beams[-1].end, moment=moment, time=ub.ramp(1.0))],
+        loads=[ub.PointLoad(beams[-1].end, moment=moment, amplitude=ub.ramp(1.0))],
     )
     return ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
 
@@ -87,7 +87,7 @@ def rigid_in_flight(ratio):
         joints=[ub.Revolute(one.end, two.start)],
         initial=[ub.Velocity([one, two], linear=(1.0, 2.0), angular=3.0)],
     )
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 3.5), dt=0.035)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 3.5), dt=0.035)
     # An axial strain of last digits stores EA/h EPS² and changes what is stored by its force.
     stored = float(solution.energy["stored"].max())
     floor = 2 * math.sqrt(stored * 1e4 * ratio) * EPS * 4 / solution.energy.throughput
@@ -171,7 +171,7 @@ def flight(cells, *, steps, dt, spin=3.0, linear=(1.0, 2.0), every=1):
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
     start = ub.Velocity([beam], linear=linear, angular=spin)
     scene = ub.Scene([beam], initial=[start])
-    return ub.simulate(scene, ub.Midpoint(), t=(0, steps * dt), dt=dt, every=every)
+    return ub.simulate(scene, ub.EnergyMomentum(), t=(0, steps * dt), dt=dt, every=every)
 
 
 @row(
@@ -192,7 +192,7 @@ def oscillator(ratio):
     )
     ω, steps = 10.0, 1000
     dt = ratio * 2 * math.pi / ω
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, steps * dt), dt=dt)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, steps * dt), dt=dt)
     n = np.arange(steps + 1)
     expected = 0.01 * (1 - np.cos(n * 2 * math.atan(ω * dt / 2)))
     error = np.abs(solution.displacement(bar.end)[:, 0] - expected).max() / 0.02
@@ -225,7 +225,7 @@ def tiny_steps(dt):
     section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-4)
     beam = ub.Beam((0, 0), (1, 0), section, cells=2)
     scene = ub.Scene([beam], initial=[ub.Velocity([beam], linear=(1.0, 2.0), angular=3.0)])
-    solution = ub.simulate(scene, ub.Midpoint(), t=(1.0, 1.0 + max(3 * dt, 4e-16)), dt=dt)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(1.0, 1.0 + max(3 * dt, 4e-16)), dt=dt)
     # Velocities are differences of positions of order one over Δt.
     return outcome(solution, conserved(solution), LEDGER + 10 * EPS / dt)
 
@@ -242,7 +242,7 @@ def body_turns(turns):
     start = ub.Velocity([body], angular=2 * math.pi, about=body.center)
     scene = ub.Scene(bodies=[body], initial=[start])
     dt, steps = 0.05, int(20 * turns)
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, steps * dt), dt=dt, every=steps)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, steps * dt), dt=dt, every=steps)
     angle = steps * 2 * math.atan(math.pi * dt)
     error = abs(solution.displacement(body.middle)[-1, 2] - angle) / angle
     return outcome(solution, error, LEDGER)
@@ -271,14 +271,14 @@ def motor_turns(turns):
     section = ub.Section(EA=1e6, GA=1e6, EI=1e3, rhoA=1.0, rhoI=1e-3)
     arm = ub.Beam((0, 0), (1, 0), section, cells=2)
     # From rest within the first second: φ = π t², then steadily
-    motor = ub.Motor(lambda t: math.pi * t**2 if t < 1 else 2 * math.pi * (t - 0.5))
+    motor = ub.PrescribedMotion(lambda t: math.pi * t**2 if t < 1 else 2 * math.pi * (t - 0.5))
     scene = ub.Scene(
         [arm],
         joints=[ub.Revolute(arm.start, ub.ground(0, 0))],
         connectors=[ub.Turn(ub.ground(0, 0), arm.start, motor)],
     )
     steps = int(20 * (turns + 2))
-    solution = ub.simulate(scene, ub.Midpoint(0.2), t=(0, turns + 2), dt=1 / 20, every=steps)
+    solution = ub.simulate(scene, ub.EnergyMomentum(0.2), t=(0, turns + 2), dt=1 / 20, every=steps)
     φ = 2 * math.pi * (turns + 1.5)
     u, v, _ = solution.displacement(arm.end)[-1]
     place = np.array([1 + u, v]) - np.array([math.cos(φ), math.sin(φ)])
@@ -319,7 +319,7 @@ def masses(ratio):
         loads=[ub.PointLoad(bar.end, force=(1.0, 0.0))],
     )
     dt, steps = 0.1, 200
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, steps * dt), dt=dt)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, steps * dt), dt=dt)
     got = np.array([solution.displacement(p)[:, 0] for p in places]).T
     K = 100.0 * (np.diag([2.0, 2.0, 1.0]) - np.diag([1.0, 1.0], 1) - np.diag([1.0, 1.0], -1))
     M, f = np.diag(sizes), np.array([0.0, 0.0, 1.0])
@@ -346,8 +346,10 @@ def impulses(size):
     section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-4)
     beam = ub.Beam((0, 0), (1, 0), section, cells=4)
     dt = 2.0**-10
-    hit = ub.PointLoad(beam.end, force=(0.0, size / dt), time=lambda t: float(t < dt))
-    solution = ub.simulate(ub.Scene([beam], loads=[hit]), ub.Midpoint(), t=(0, 100 * dt), dt=dt)
+    hit = ub.PointLoad(beam.end, force=(0.0, size / dt), amplitude=lambda t: float(t < dt))
+    solution = ub.simulate(
+        ub.Scene([beam], loads=[hit]), ub.EnergyMomentum(), t=(0, 100 * dt), dt=dt
+    )
     gained = solution.momentum()[1:, 1]
     error = float(np.abs(gained / size - 1).max())
     return outcome(solution, error, 1e-9)
@@ -371,7 +373,7 @@ def toggle(angle):
         supports=[
             ub.Pinned(left.start),
             ub.Pinned(right.start),
-            ub.Prescribed(left.end, u=0, v=lambda t: -2 * y * t),
+            ub.PrescribedDisplacement(left.end, u=0, v=lambda t: -2 * y * t),
         ],
     )
     steps = 16
@@ -403,8 +405,8 @@ def buckling(distance):
     critical = 4 / h**2 * math.tan(math.pi / (4 * n)) ** 2
     # P of the undeformed length; compressed by P/EA = 2.5e-8, the shear adds as much.
     beam = ub.Beam((0, 0), (1, 0), section, cells=n)
-    push = ub.PointLoad(beam.end, force=(-critical * (1 - distance), 0), time=ub.ramp(1.0))
-    side = ub.PointLoad(beam.end, force=(0, 1e-9), time=ub.ramp(1.0))
+    push = ub.PointLoad(beam.end, force=(-critical * (1 - distance), 0), amplitude=ub.ramp(1.0))
+    side = ub.PointLoad(beam.end, force=(0, 1e-9), amplitude=ub.ramp(1.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push, side])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
     expected = _discrete_deflection(n, critical * (1 - distance), 1e-9)
@@ -441,7 +443,7 @@ def gravity(ratio):
     scene = ub.Scene(
         [bar],
         supports=[ub.Clamped(bar.start)],
-        loads=[ub.Gravity((0.0, -g), time=ub.ramp(1.0))],
+        loads=[ub.Gravity((0.0, -g), amplitude=ub.ramp(1.0))],
     )
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     expected = g / 2e9
@@ -465,10 +467,10 @@ def released(turns):
     scene = ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, moment=θ, time=lambda t: t if t <= 1 else 0.0)],
+        loads=[ub.PointLoad(beam.end, moment=θ, amplitude=lambda t: t if t <= 1 else 0.0)],
     )
     rolled_up = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / 32)
-    solution = ub.simulate(scene, ub.Midpoint(), t=(1, 1.4), dt=0.002, start=rolled_up)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(1, 1.4), dt=0.002, start=rolled_up)
     energy = solution.energy
     error = float(np.abs(energy.total - θ**2 / 2).max() / (θ**2 / 2))
     # The roll is in equilibrium to 1e-10.
@@ -492,14 +494,14 @@ def fast(ratio):
 def machine(metre, kilogram, second):
     """A softening frame with a body, a spring, a damper, in other units; places to compare."""
     N, J = kilogram * metre / second**2, kilogram * metre**2 / second**2
-    hinge = ub.Softening(limit=2.0 * J, energy=0.5 * J)
+    hinge = ub.Softening(limit=2.0 * J, fracture_energy=0.5 * J)
     column = ub.Section(
         EA=1e4 * N, GA=4e3 * N, EI=10.0 * J * metre, rhoA=1.0 * kilogram / metre,
         rhoI=1e-3 * kilogram * metre, hinge=hinge,
     )  # fmt: skip
-    law = ub.Hardening(
-        limit=1.5 * J,
-        modulus=1.0 * J * metre,
+    law = ub.ElastoPlastic(
+        yield_limit=1.5 * J,
+        isotropic=1.0 * J * metre,
         viscosity=ub.Perzyna(0.1 * J * metre * second),
     )
     girder = ub.Section(
@@ -510,7 +512,7 @@ def machine(metre, kilogram, second):
     left = ub.Beam((0, 0), (0, 1 * m), column, cells=4)
     roof = ub.Beam((0, 1 * m), (1.5 * m, 1 * m), girder, cells=4)
     body = ub.Body((1.6 * m, 0.9 * m), mass=0.5 * kilogram, inertia=0.01 * kilogram * m**2)
-    push = ub.PointLoad(left.end, force=(30.0 * N, 0.0), time=ub.ramp(0.2 * second))
+    push = ub.PointLoad(left.end, force=(30.0 * N, 0.0), amplitude=ub.ramp(0.2 * second))
     spring = ub.Stretch(ub.ground(1.5 * m, 0), roof.end, ub.Spring(50.0 * N / m))
     damper = ub.Stretch(ub.ground(2 * m, 0), body.middle, ub.Damper(2.0 * N * second / m))
     return ub.Scene(
@@ -538,7 +540,9 @@ def units(unit):
 
     def run(metre, kilogram, second):
         scene = machine(metre, kilogram, second)
-        return ub.simulate(scene, ub.Midpoint(0.1, 0.1), t=(0, 0.6 * second), dt=0.01 * second)
+        return ub.simulate(
+            scene, ub.EnergyMomentum(0.1, 0.1), t=(0, 0.6 * second), dt=0.01 * second
+        )
 
     si, other = run(1.0, 1.0, 1.0), run(metre, scale["kg"], second)
     parts = []

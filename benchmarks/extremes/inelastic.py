@@ -15,10 +15,10 @@ STEPS = 400
 
 def pulled(viscosity):
     """A bar of 1 m, C = 1 N, limit 0.5 N, hardening 0.25 N, stretched by 1 in 1 s; statics."""
-    law = ub.Hardening(limit=0.5, modulus=0.25, viscosity=viscosity)
+    law = ub.ElastoPlastic(yield_limit=0.5, isotropic=0.25, viscosity=viscosity)
     section = ub.Section(EA=1.0, GA=1.0, EI=1.0, axial=law)
     bar = ub.Beam((0, 0), (1, 0), section, cells=1)
-    pull = ub.Prescribed(bar.end, u=lambda t: t, v=0, psi=0)
+    pull = ub.PrescribedDisplacement(bar.end, u=lambda t: t, v=0, psi=0)
     scene = ub.Scene([bar], supports=[ub.Clamped(bar.start), pull])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / STEPS)
     return solution, solution.reaction(pull)[1:, 0]
@@ -85,7 +85,7 @@ def bent(hinge, scheme=None, cells=1):
     """A cantilever, EI/L = 1 N m, a hinge in its first cell, its end turned by 1 rad."""
     section = ub.Section(EA=1e4, GA=1e4, EI=1.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells, hinges={0.0: hinge})
-    turn = ub.Prescribed(beam.end, psi=lambda t: t)
+    turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
     solution = ub.simulate(scene, scheme or ub.Static(), t=(0, 1), dt=1 / 50)
     return solution, solution.reaction(turn)[1:, 2]
@@ -108,7 +108,7 @@ def softened(limit, energy, ψ):
 def fracture(ratio):
     """Limit 0.5 N m at EI/L = 1 N m."""
     energy = 0.25 * ratio * 1.001
-    solution, got = bent(ub.Softening(limit=0.5, energy=energy))
+    solution, got = bent(ub.Softening(limit=0.5, fracture_energy=energy))
     expected = [softened(0.5, energy, t) for t in solution.times[1:]]
     error = float(np.abs(got - expected).max())
     # 1e-10 of forces; at the limit of snap-back the tangent is a thousandth of EI/L.
@@ -124,7 +124,7 @@ def fracture(ratio):
 )
 def fracture_in_motion(ratio):
     """A cantilever with a mass, hit so that it breaks; 200 steps."""
-    hinge = ub.Softening(limit=0.5, energy=0.25 * ratio)
+    hinge = ub.Softening(limit=0.5, fracture_energy=0.25 * ratio)
     solution = struck(hinge, cells=4)
     return ledger_of_hinges(solution, 0.25 * ratio, 4)
 
@@ -133,14 +133,14 @@ def struck(hinge, cells, steps=200):
     """A cantilever with a hinge in every cell and a mass at its end, hit."""
     section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=0.1, rhoI=1e-4, hinge=hinge)
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
-    hit = ub.PointLoad(beam.end, force=(0.0, 10.0), time=lambda t: float(t < 0.1))
+    hit = ub.PointLoad(beam.end, force=(0.0, 10.0), amplitude=lambda t: float(t < 0.1))
     scene = ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],
         masses=[ub.PointMass(beam.end, 1.0, 0.01)],
         loads=[hit],
     )
-    return ub.simulate(scene, ub.Midpoint(0.05, 0.05), t=(0, 0.005 * steps), dt=0.005)
+    return ub.simulate(scene, ub.EnergyMomentum(0.05, 0.05), t=(0, 0.005 * steps), dt=0.005)
 
 
 def ledger_of_hinges(solution, energy, hinges, note=""):
@@ -161,7 +161,7 @@ def ledger_of_hinges(solution, energy, hinges, note=""):
 )
 def limit(size):
     """Energy 10 J at EI/L = 1 N m; an infinite limit is an elastic beam."""
-    solution, got = bent(ub.Softening(limit=size, energy=10.0))
+    solution, got = bent(ub.Softening(limit=size, fracture_energy=10.0))
     expected = [softened(size, 10.0, t) for t in solution.times[1:]]
     return outcome(solution, float(np.abs(got - expected).max()), 1e-8)
 
@@ -175,7 +175,7 @@ def limit(size):
 )
 def limit_in_motion(size):
     """A cantilever with a mass, hit; four hinges of 1 J."""
-    return ledger_of_hinges(struck(ub.Softening(limit=size, energy=1.0), cells=4), 1.0, 4)
+    return ledger_of_hinges(struck(ub.Softening(limit=size, fracture_energy=1.0), cells=4), 1.0, 4)
 
 
 @row(
@@ -188,10 +188,13 @@ def perfect_joint(cells):
     """A beam clamped by a perfect hinge falls like one that is pinned; 100 steps."""
     section = ub.Section(EA=1e6, GA=1e6, EI=1e3, rhoA=1.0, rhoI=1e-3)
     ends = []
-    for hinges, held in (({0.0: ub.Softening(limit=0.0, energy=1.0)}, ub.Clamped), ({}, ub.Pinned)):
+    for hinges, held in (
+        ({0.0: ub.Softening(limit=0.0, fracture_energy=1.0)}, ub.Clamped),
+        ({}, ub.Pinned),
+    ):
         beam = ub.Beam((0, 0), (1, 0), section, cells=cells, hinges=hinges)
         scene = ub.Scene([beam], supports=[held(beam.start)], loads=[ub.Gravity()])
-        solution = ub.simulate(scene, ub.Midpoint(0.1, 0.1), t=(0, 1), dt=0.01)
+        solution = ub.simulate(scene, ub.EnergyMomentum(0.1, 0.1), t=(0, 1), dt=0.01)
         ends.append(solution.displacement(beam.end)[:, :2])
     error = float(np.abs(ends[0] - ends[1]).max())
     return outcome(solution, error, 1e-9)
@@ -208,13 +211,13 @@ def perfect_joint(cells):
 def every_cell(cells):
     """A free beam bent by moments at both ends, suddenly, far beyond the limit of all; 10 steps."""
     cells = int(cells)
-    hinge = ub.Softening(limit=1e-3, energy=1.0)
+    hinge = ub.Softening(limit=1e-3, fracture_energy=1.0)
     section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1.0, hinge=hinge)
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
     # Along the beam the moment load is such that all cells are bent alike: each rotates s.
     loads = [ub.PointLoad(beam.end, moment=1.0), ub.PointLoad(beam.start, moment=-1.0)]
     scene = ub.Scene([beam], loads=loads)
-    solution = ub.simulate(scene, ub.Midpoint(0.1, 0.1), t=(0, 0.02), dt=0.002)
+    solution = ub.simulate(scene, ub.EnergyMomentum(0.1, 0.1), t=(0, 0.02), dt=0.002)
     jumps = [solution.material_at(beam.at((i + 0.5) / cells)).jump[-1] for i in (0, cells // 2)]
     opened = int(np.count_nonzero(jumps))
     return ledger_of_hinges(solution, 1.0, cells, note=f"{opened} of 2 cells looked at opened")
@@ -231,16 +234,16 @@ def neighbours(ratio):
     """Two beams that yield, one at so many times the moment of the other, hit; 100 steps."""
     parts = []
     for k, size in enumerate((0.1, 0.1 * ratio)):
-        law = ub.Hardening(limit=size, modulus=0.1)
+        law = ub.ElastoPlastic(yield_limit=size, isotropic=0.1)
         section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-3, bending=law)
         parts.append(ub.Beam((k, 0), (k + 1, 0), section, cells=4))
     one, two = parts
-    hit = ub.PointLoad(two.end, force=(0.0, 10.0), time=lambda t: float(t < 0.1))
+    hit = ub.PointLoad(two.end, force=(0.0, 10.0), amplitude=lambda t: float(t < 0.1))
     scene = ub.Scene(
         parts,
         joints=[ub.Rigid(one.end, two.start)],
         supports=[ub.Clamped(one.start)],
         loads=[hit],
     )
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.5), dt=0.005)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.005)
     return outcome(solution, solution.energy.worst, LEDGER + 100 * EPS)

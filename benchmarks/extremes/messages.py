@@ -13,13 +13,13 @@ STEEL = {"EA": 1e4, "GA": 1e4, "EI": 1.0, "rhoA": 1.0, "rhoI": 1e-3}
 def cantilever(time=lambda t: 1.0, force=(0.0, 0.1), section=None, **more):
     """A cantilever of 1 m under a load at its end."""
     beam = ub.Beam((0, 0), (1, 0), section or ub.Section(**STEEL), cells=4)
-    load = ub.PointLoad(beam.end, force=force, time=time)
+    load = ub.PointLoad(beam.end, force=force, amplitude=time)
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
 
 
 def run(scene, scheme=None, t=(0.0, 0.1), dt=0.01):
     """Simulate."""
-    return ub.simulate(scene, scheme or ub.Midpoint(), t=t, dt=dt)
+    return ub.simulate(scene, scheme or ub.EnergyMomentum(), t=t, dt=dt)
 
 
 def _late(value):
@@ -48,7 +48,7 @@ def _no_mass():
 
 
 def _collapse():
-    hinge = ub.Softening(limit=0.01, energy=1e-3)
+    hinge = ub.Softening(limit=0.01, fracture_energy=1e-3)
     section = ub.Section(**STEEL, hinge=hinge)
     return run(cantilever(ub.ramp(0.1), (0.0, 1.0), section), ub.Static())
 
@@ -69,7 +69,11 @@ def _function_fails():
 
 def _motion(value):
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=4)
-    return run(ub.Scene([beam], supports=[ub.Prescribed(beam.start, u=0, v=0, psi=_late(value))]))
+    return run(
+        ub.Scene(
+            [beam], supports=[ub.PrescribedDisplacement(beam.start, u=0, v=0, psi=_late(value))]
+        )
+    )
 
 
 def _section(**numbers):
@@ -82,7 +86,10 @@ CASES = {
         "PointLoad",
     ),
     "a load is infinite from some time on": (lambda: run(cantilever(_late(math.inf))), "PointLoad"),
-    "a motion is not a number from some time on": (lambda: _motion(math.nan), "Prescribed"),
+    "a motion is not a number from some time on": (
+        lambda: _motion(math.nan),
+        "PrescribedDisplacement",
+    ),
     "a time function raises": (lambda: run(cantilever(_raises)), "a user's own error"),
     "the force of a Function is not a number": (_function_fails, "Slide"),
     "a beam of zero length": (lambda: ub.Beam((1, 1), (1, 1), ub.Section(**STEEL)), "zero length"),
@@ -145,12 +152,12 @@ def without_mass(inertia):
     one = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=4)
     section = ub.Section(**{**STEEL, "rhoA": rhoA, "rhoI": rhoI})
     two = ub.Beam((1, 0), (2, 0), section, cells=4)
-    hit = ub.PointLoad(two.at(0.5), force=(0.0, 1.0), time=lambda t: float(t < 0.1))
+    hit = ub.PointLoad(two.at(0.5), force=(0.0, 1.0), amplitude=lambda t: float(t < 0.1))
     scene = ub.Scene(
         [one, two],
         joints=[ub.Rigid(one.end, two.start)],
         supports=[ub.Clamped(one.start)],
         loads=[hit],
     )
-    solution = ub.simulate(scene, ub.Midpoint(0.01, 0.01), t=(0, 1), dt=0.01)
+    solution = ub.simulate(scene, ub.EnergyMomentum(0.01, 0.01), t=(0, 1), dt=0.01)
     return outcome(solution, solution.energy.worst, LEDGER)

@@ -42,8 +42,8 @@ FINE = 10_000
 SWING = {"end": 1.2}
 """How far the ladders of the swing go: all programs get there, with every scheme."""
 
-CONSERVING = ("Midpoint", {})
-DECAYING = ("decaying Midpoint", {"alpha": 0.01, "beta": 0.01})
+CONSERVING = ("EnergyMomentum", {})
+DECAYING = ("decaying EnergyMomentum", {"alpha": 0.01, "beta": 0.01})
 TRAPEZOIDAL = {"rho": "trapezoidal"}
 
 
@@ -129,7 +129,7 @@ def flying_ladder(cells, dt):
 
 def printed_ladder(cells, dt):
     """At large steps it errs less where rotary inertia is large, see docs/schemes.md."""
-    yield from ours(("PrintedMidpoint", {"scheme": "PrintedMidpoint"}))
+    yield from ours(("EnergyMomentumPrinted", {"scheme": "EnergyMomentumPrinted"}))
 
 
 def swing_ladder(cells, dt):
@@ -163,20 +163,20 @@ LADDERS = (  # problem, variants, what is common, cells for each step
         0.005: (128, 256),
     }),
     ("P2", printed_ladder, {}, {0.1: (16, 32), 0.05: (32, 64), 0.02: (64,)}),
-    ("P2", smooth("PrintedMidpoint"), {}, {
+    ("P2", smooth("EnergyMomentumPrinted"), {}, {
         0.1: (4, 8), 0.05: (4, 8), 0.02: (8, 16), 0.01: (16, 32), 0.005: (32,), 0.0025: (32, 64),
     }),
     ("P3", swing_ladder, SWING, {
         5e-3: (8, 16, 32), 2.5e-3: (16, 32, 64), 1e-3: (32, 64, 128), 5e-4: (128,),
     }),
-    ("P3", smooth("Midpoint"), SWING, {
+    ("P3", smooth("EnergyMomentum"), SWING, {
         1e-2: (4, 8), 5e-3: (4, 8), 2.5e-3: (8, 16), 1e-3: (16,), 5e-4: (16,),
     }),
     ("P4", portal_ladder, {}, {
         1e-2: (6, 12), 4e-3: (6, 12, 24), 2e-3: (6, 12, 24, 48), 1e-3: (24, 48, 96), 5e-4: (96,),
     }),
-    ("P4", smooth("Midpoint"), {}, {2e-2: (6,), 1e-2: (6,), 4e-3: (6, 12), 2e-3: (12,)}),
-    ("P4", smooth("Midpoint", ", lumped", lumped=True), {}, {
+    ("P4", smooth("EnergyMomentum"), {}, {2e-2: (6,), 1e-2: (6,), 4e-3: (6, 12), 2e-3: (12,)}),
+    ("P4", smooth("EnergyMomentum", ", lumped", lumped=True), {}, {
         2e-2: (6,), 1e-2: (6, 12), 4e-3: (6, 12), 2e-3: (12,),
     }),
 )  # fmt: skip

@@ -11,7 +11,7 @@ from ufl_beam.dolfinx_compat import dolfinx
 VERSION = f"DOLFINx {dolfinx.__version__}"
 
 
-def discretised(scheme="Midpoint", degree=1, lumped=False, **dials):
+def discretised(scheme="EnergyMomentum", degree=1, lumped=False, **dials):
     """A scheme by its name, with its arguments, a mesh, and how Newton's method runs."""
     mesh = ub.Mesh(degree=degree, lumped=lumped)
     return getattr(ub, scheme)(**dials), mesh, ub.Newton()
@@ -52,7 +52,7 @@ def energy(simulation):
 def roll_up(cells, turns):
     p = PROBLEMS["P1"]
     (beam,) = beams_of(p.chains(cells))
-    bend = ub.PointLoad(beam.end, moment=p.moment(turns), time=lambda t: t)
+    bend = ub.PointLoad(beam.end, moment=p.moment(turns), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[bend])
     now, _, result = run(scene, discretised("Static"), 1.0, p.steps)
     return result | {"values": {"tip": where(now, beam.end)}}
@@ -66,7 +66,7 @@ def flying_beam(cells, dt, steps=None, **dials):
     p = PROBLEMS["P2"]
     (beam,) = beams_of(p.chains(cells))
     push = ub.PointLoad(
-        beam.start, force=(p.force, 0), moment=p.moment, time=lambda t: float(t < p.until)
+        beam.start, force=(p.force, 0), moment=p.moment, amplitude=lambda t: float(t < p.until)
     )
     n = steps or round(p.end / dt)
     now, _, result = run(ub.Scene([beam], loads=[push]), discretised(**dials), n * dt, n)
@@ -82,7 +82,7 @@ def swing(cells, dt, end=None, **dials):
         joints=[ub.Revolute(left.start, beam.start), ub.Revolute(right.start, beam.end)],
         supports=[ub.Pinned(left.end), ub.Pinned(right.end)],
         masses=[ub.PointMass(middle, p.mass)],
-        loads=[ub.PointLoad(middle, force=(1, 0), time=p.push)],
+        loads=[ub.PointLoad(middle, force=(1, 0), amplitude=p.push)],
     )
 
     def sample(now):
@@ -98,14 +98,16 @@ def portal(cells, dt, **dials):
     p = PROBLEMS["P4"]
     left, girder, right = beams_of(p.chains(cells))
     kinematic = p.stiffness * p.ratio / (1 - p.ratio)
-    bilinear = ub.Spring(p.stiffness, law=ub.Hardening(limit=p.limit, kinematic=kinematic))
+    bilinear = ub.Spring(
+        p.stiffness, law=ub.ElastoPlastic(yield_limit=p.limit, kinematic=kinematic)
+    )
     hinge = ub.Turn(girder.end, right.start, bilinear)
     scene = ub.Scene(
         [left, girder, right],
         joints=[ub.Rigid(left.end, girder.start), ub.Revolute(girder.end, right.start)],
         connectors=[hinge],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
-        loads=[ub.PointLoad(left.end, force=(1, 0), time=p.push)],
+        loads=[ub.PointLoad(left.end, force=(1, 0), amplitude=p.push)],
     )
 
     def sample(now):
@@ -120,7 +122,7 @@ def portal(cells, dt, **dials):
 def cantilever(cells, dt, **dials):
     p = PROBLEMS["P5"]
     (beam,) = beams_of(p.chains(cells))
-    load = ub.PointLoad(beam.end, force=(0, 1), time=p.push)
+    load = ub.PointLoad(beam.end, force=(0, 1), amplitude=p.push)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     now, _, result = run(scene, discretised(**dials), p.end, round(p.end / dt))
     return result | {"values": {"tip": where(now, beam.end)}}

@@ -53,7 +53,7 @@ def flying_beam():
     def pulse(t):
         return math.sin(math.pi * t) ** 2 * (t < 1.0)
 
-    load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, time=pulse)
+    load = ub.PointLoad(beam.start, force=(8, 0), moment=-80, amplitude=pulse)
     return ub.Scene([beam], loads=[load]), beam.end
 
 
@@ -83,7 +83,7 @@ def swing():
         joints=[ub.Revolute(left.end, beam.start), ub.Revolute(right.end, beam.end)],
         supports=[ub.Pinned(left.start), ub.Pinned(right.start)],
         masses=[ub.PointMass(beam.at(0.5), 0.5)],
-        loads=[ub.PointLoad(beam.at(0.5), force=(1, 0), time=push)],
+        loads=[ub.PointLoad(beam.at(0.5), force=(1, 0), amplitude=push)],
     )
     return scene, beam.at(0.5)
 
@@ -95,17 +95,17 @@ def hit_cantilever():
     def blow(t):
         return math.sin(math.pi * t / 2e-3) if t < 2e-3 else 0.0
 
-    load = ub.PointLoad(beam.end, force=(0, 40e3), time=blow)
+    load = ub.PointLoad(beam.end, force=(0, 40e3), amplitude=blow)
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), beam.end
 
 
 def yielding_cantilever():
     """Of 2 m; pulled within 20 ms beyond its limit moment, it flows and vibrates."""
-    law = ub.Hardening(limit=40e3, modulus=1e5, viscosity=ub.Perzyna(1e3))
+    law = ub.ElastoPlastic(yield_limit=40e3, isotropic=1e5, viscosity=ub.Perzyna(1e3))
     section = ub.Section.rectangle(b=0.1, h=0.1, **STEEL, bending=law)
     beam = ub.Beam((0, 0), (2, 0), section, cells=4)
     grow = ub.Table([0, 0.02], [0, 1])
-    load = ub.PointLoad(beam.end, force=(0, -25e3), time=grow)
+    load = ub.PointLoad(beam.end, force=(0, -25e3), amplitude=grow)
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), beam.end
 
 
@@ -125,7 +125,7 @@ def breaking_arm():
 
     return ub.Scene(
         [arm],
-        supports=[ub.Prescribed(arm.start, u=0, v=0, psi=hub)],
+        supports=[ub.PrescribedDisplacement(arm.start, u=0, v=0, psi=hub)],
         masses=[ub.PointMass(arm.end, 2.0)],
         initial=[ub.Velocity([arm], angular=4.0)],
     ), arm.end
@@ -134,7 +134,7 @@ def breaking_arm():
 def bent_cantilever():
     section = ub.Section(EA=1e8, GA=1e8, EI=100.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=4)
-    load = ub.PointLoad(beam.end, force=(0, -600.0), time=ub.ramp(1.0))
+    load = ub.PointLoad(beam.end, force=(0, -600.0), amplitude=ub.ramp(1.0))
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), beam.end
 
 

@@ -12,16 +12,16 @@ from cases import Case
 import ufl_beam as ub
 
 SCHEMES: dict[str, ub.mechanics.time_schemes.Scheme] = {
-    "Midpoint": ub.Midpoint(),
-    "Midpoint, decaying": ub.Midpoint(alpha=0.05, beta=0.05),
-    "DecayingMidpoint": ub.DecayingMidpoint(),
-    "PrintedMidpoint": ub.PrintedMidpoint(),
+    "EnergyMomentum": ub.EnergyMomentum(),
+    "EnergyMomentum, decaying": ub.EnergyMomentum(alpha=0.05, beta=0.05),
+    "EnergyMomentumDecaying": ub.EnergyMomentumDecaying(),
+    "EnergyMomentumPrinted": ub.EnergyMomentumPrinted(),
     "Newmark": ub.Newmark(),
     "GeneralizedAlpha": ub.GeneralizedAlpha(),
 }
 STATIC: dict[str, ub.mechanics.time_schemes.Scheme] = {
     "Static": ub.Static(),
-    "ExactStatic": ub.ExactStatic(),
+    "EnergyMomentumStatic": ub.EnergyMomentumStatic(),
 }
 
 

@@ -36,7 +36,7 @@ def portal(foot=None):
         [left, roof, right],
         joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.end)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.start)],
-        loads=[ub.PointLoad(left.end, force=(120e3, 0), time=push)],  # N
+        loads=[ub.PointLoad(left.end, force=(120e3, 0), amplitude=push)],  # N
     )
 
 
@@ -56,13 +56,13 @@ modes
 # %% [markdown]
 # ## A run
 #
-# `Midpoint()` conserves energy at any step. The result has the motion of all places and the forces
-# in all cells at each step. Its picture has the shapes on the way; the ledger accounts for each
-# joule.
+# `EnergyMomentum()` conserves energy at any step. The result has the motion of all places and the
+# forces in all cells at each step. Its picture has the shapes on the way; the ledger accounts for
+# each joule.
 
 # %%
 period = 1 / modes.frequencies[0]  # s
-solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=period / 40)
+solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=period / 40)
 solution
 
 # %% [markdown]
@@ -78,10 +78,10 @@ print(f"largest drift {1e3 * drift[largest]:.1f} mm at t = {solution.times[large
 ub.plot(solution, "M", n=largest, magnify=5)
 
 # %%
-ub.plot_history(solution, [left.end, left.at(0.5)], component="u")
+ub.plot(solution, "history", [left.end, left.at(0.5)], component="u")
 
 # %%
-ub.plot_energy(solution)
+ub.plot(solution, "energy")
 
 # %% [markdown]
 # The whole motion as an animation, coloured by the bending moment:
@@ -97,13 +97,13 @@ ub.animate(solution, "first_steps.gif", fps=10, seconds=3, size=(640, 360), magn
 # joints, and the frame swings more slowly.
 
 # %%
-softening = ub.Softening(limit=150e3, energy=5e3)  # N m, J
+softening = ub.Softening(limit=150e3, fracture_energy=5e3)  # N m, J
 weak = portal(softening)
-damaged = ub.simulate(weak, ub.Midpoint(), t=(0, 1), dt=period / 40)
+damaged = ub.simulate(weak, ub.EnergyMomentum(), t=(0, 1), dt=period / 40)
 damaged
 
 # %%
-ub.plot_hinge(damaged, weak["left"].start)
+ub.plot(damaged, "hinge", weak["left"].start)
 
 # %% [markdown]
 # ## How fine is fine enough?
@@ -123,7 +123,7 @@ def drifts(run):
 found = ub.tradeoff(
     scene,
     {"drift": drifts},
-    scheme=ub.Midpoint(),
+    scheme=ub.EnergyMomentum(),
     t=(0, 1),
     dt=period / 20,
     tolerance={"drift": 1e-3},  # m

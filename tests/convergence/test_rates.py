@@ -27,7 +27,7 @@ def end_state(scene, dt, *, end, alpha=0.0, beta=0.0):
     tight = ub.Newton(rtol=1e-13)
     solution = ub.simulate(
         scene,
-        ub.Midpoint(alpha, beta),
+        ub.EnergyMomentum(alpha, beta),
         t=(0, end),
         dt=dt,
         newton=tight,

@@ -24,14 +24,14 @@ def pulse(t):
 
 def vibration(scheme, dt, viscosity):
     """Displacement, velocity and moment of the end state."""
-    law = ub.Hardening(0.0, kinematic=EI, viscosity=viscosity)
+    law = ub.ElastoPlastic(0.0, kinematic=EI, viscosity=viscosity)
     section = ub.Section(EA=1e4, GA=1e4, EI=EI, rhoA=1.0, rhoI=1e-3, bending=law)
     beam = ub.Beam((0, 0), (LENGTH, 0), section, cells=1)
     scene = ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],
         masses=[ub.PointMass(beam.end, 1.0)],
-        loads=[ub.PointLoad(beam.end, force=(0, 25.0), time=pulse)],
+        loads=[ub.PointLoad(beam.end, force=(0, 25.0), amplitude=pulse)],
     )
     solution = ub.simulate(
         scene, scheme, t=(0, DURATION), dt=dt, newton=ub.Newton(rtol=1e-12), progress=False
@@ -51,12 +51,12 @@ def vibration(scheme, dt, viscosity):
 @pytest.mark.parametrize("viscosity", [ub.Perzyna(2 * EI * RELAXATION), ub.DuvautLions(RELAXATION)])
 @pytest.mark.parametrize(("alpha", "order", "dt"), [(0.0, 2, 4e-3), (0.5, 1, 1e-3)])
 def test_order_in_time(alpha, order, dt, viscosity):
-    """Midpoint() is of second order, Midpoint(alpha=0.5), backward Euler, of first.
+    """EnergyMomentum() is of second order, EnergyMomentum(alpha=0.5), backward Euler, of first.
 
     Four step sizes; an order may differ by what the next term of the error makes, which falls with
     the step: 0.1 in the first pair, and a quarter of it, or half, in the second.
     """
-    runs = [vibration(ub.Midpoint(alpha=alpha), dt / 2**k, viscosity) for k in range(4)]
+    runs = [vibration(ub.EnergyMomentum(alpha=alpha), dt / 2**k, viscosity) for k in range(4)]
     for answer in zip(*runs, strict=True):  # displacements, then velocities, then the moment
         measured = self_convergence(answer)
         np.testing.assert_allclose(measured, order, rtol=0, atol=0.1)

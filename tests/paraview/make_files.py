@@ -11,7 +11,9 @@ import ufl_beam as ub
 
 folder = Path(sys.argv[1])
 steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
-column = ub.Section.rectangle(b=0.1, h=0.2, **steel, hinge=ub.Softening(limit=150e3, energy=60e3))
+column = ub.Section.rectangle(
+    b=0.1, h=0.2, **steel, hinge=ub.Softening(limit=150e3, fracture_energy=60e3)
+)
 girder = ub.Section.rectangle(b=0.1, h=0.25, **steel)
 left = ub.Beam((0, 0), (0, 4), column, cells=8, name="left")
 roof = ub.Beam((0, 4), (6, 4), girder, cells=12, name="roof")
@@ -29,14 +31,14 @@ frame = ub.Scene(
     supports=[ub.Clamped(left.start), ub.Pinned(right.end)],
     loads=[
         ub.PointLoad(
-            left.end, force=(140e3, 0.0), time=ub.Table([0, 0.05, 0.2, 0.21], [0, 1, 1, 0])
+            left.end, force=(140e3, 0.0), amplitude=ub.Table([0, 0.05, 0.2, 0.21], [0, 1, 1, 0])
         ),
         ub.Gravity(),
     ],
 )
 solution = ub.simulate(
     frame,
-    ub.Midpoint(alpha=0.05, beta=0.05),
+    ub.EnergyMomentum(alpha=0.05, beta=0.05),
     t=(0.0, 0.4),
     dt=1e-3,
     record=[ub.XDMF(folder / "frame.xdmf", every=10), ub.VTKHDF(folder / "frame.vtkhdf", every=10)],

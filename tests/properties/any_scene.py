@@ -123,12 +123,13 @@ class _Writer(Laws):
     def _scheme(self):
         a, b = self._some(0.01, 0.5), self._some(0, 0.5)
         if self._static:
-            theta = f"ExactStatic({self._some(0.5, 1):.2f})"
-            names = ["Static()", "Static()", "ExactStatic()", theta]
+            theta = f"EnergyMomentumStatic({self._some(0.5, 1):.2f})"
+            names = ["Static()", "Static()", "EnergyMomentumStatic()", theta]
         else:
             names = [
-                "Midpoint()", "Midpoint()", "Midpoint()", f"Midpoint({a:.2f}, {b:.2f})",
-                f"DecayingMidpoint({self._some(0.34, 1):.2f})", "PrintedMidpoint()",
+                "EnergyMomentum()", "EnergyMomentum()", "EnergyMomentum()",
+                f"EnergyMomentum({a:.2f}, {b:.2f})",
+                f"EnergyMomentumDecaying({self._some(0.34, 1):.2f})", "EnergyMomentumPrinted()",
                 "Newmark()", "Newmark(0.6, 0.35)", f"GeneralizedAlpha({self._some(0, 0.9):.2f})",
             ]  # fmt: skip
         self._name = self._one(names)
@@ -302,7 +303,7 @@ class _Writer(Laws):
         """A joint; in statics springs hold what it leaves free."""
         name = f"joint{len(self._lists['joints'])}"
         measured = self._chance(0.4) and self._may_hold and kind in ("Rigid", "Revolute")
-        more, axis = ", measured=True" if measured else "", self._polar(1.0)
+        more, axis = ", multipliers=True" if measured else "", self._polar(1.0)
         along, free = self._say.vector(axis), self._one(["N", "V", "M", "NM"])
         turning = self._chance(0.3)
         held = self._some(0, 1)
@@ -346,14 +347,14 @@ class _Writer(Laws):
         psi = f"psi={way.format(repr(turn))}"
         supports = {
             "Clamped": f"ub.Clamped({place})",
-            "Prescribed": f"ub.Prescribed({place}, u={u}, v={v}, psi=0)",
-            "Turned": f"ub.Prescribed({place}, u=0, v=0, {psi})",
+            "PrescribedDisplacement": f"ub.PrescribedDisplacement({place}, u={u}, v={v}, psi=0)",
+            "Turned": f"ub.PrescribedDisplacement({place}, u=0, v=0, {psi})",
             "Pinned": f"ub.Pinned({place})",
             "Roller": f"ub.Roller({place}, along={say.vector((math.cos(along), math.sin(along)))})",
         }
         kinds = ["Clamped", "Clamped", "Clamped"]
         if self._may_hold:
-            kinds += ["Prescribed", "Turned", "Rigid", "RigidLink"]
+            kinds += ["PrescribedDisplacement", "Turned", "Rigid", "RigidLink"]
         if not self._static:
             kinds += ["Pinned", "Pinned", "Roller", "free", "free"]
             if self._may_hold:
@@ -413,13 +414,13 @@ class _Writer(Laws):
         if place.is_end and not self._elastic:
             moment = 0.0  # it would turn what lies beyond a hinge there, which nothing resists
         moment = say.number(moment, "N m")
-        at = f"{place}, force={force}, moment={moment}, time={time}"
+        at = f"{place}, force={force}, moment={moment}, amplitude={time}"
         kinds = [
             f"ub.PointLoad({at})",
             f"ub.PointLoad({at})",
             f"ub.LineLoad({beam}, force={say.vector(line, 'N/m')}, "
-            f"moment={say.number(more, 'N')}, time={time})",
-            f"ub.Gravity({say.vector(weight, 'm/s2')}, time={time})",
+            f"moment={say.number(more, 'N')}, amplitude={time})",
+            f"ub.Gravity({say.vector(weight, 'm/s2')}, amplitude={time})",
         ]
         if place.part.startswith("beam") or place.text.endswith("middle"):
             kinds.append(f"ub.FollowerLoad({at})")

@@ -61,8 +61,11 @@ class Balance:
                     s = self.turn(load.place)
                 c, s = math.cos(s), math.sin(s)
                 x, y = load.force
-                force = self.factor(load.time) * np.array([c * x - s * y, s * x + c * y])
-                yield load.place, self.at(load.place, force, self.factor(load.time) * load.moment)
+                force = self.factor(load.amplitude) * np.array([c * x - s * y, s * x + c * y])
+                yield (
+                    load.place,
+                    self.at(load.place, force, self.factor(load.amplitude) * load.moment),
+                )
         for support in self.scene.supports:
             *force, moment = solution.reaction(support)[last]
             yield support.place, self.at(support.place, force, moment)
@@ -94,7 +97,7 @@ class Balance:
         g = np.zeros(2)
         for load in self.scene.loads:
             if isinstance(load, ub.Gravity):
-                g += self.factor(load.time) * np.array(load.acceleration)
+                g += self.factor(load.amplitude) * np.array(load.acceleration)
             if isinstance(load, ub.RotatingFrame):
                 g += load.rate**2 * np.subtract(x, load.about)
         return g
@@ -109,8 +112,8 @@ class Balance:
             force, moment = beam.section.rhoA * self.field(x), 0.0
             for load in self.scene.loads:
                 if isinstance(load, ub.LineLoad) and load.beam is beam:
-                    force = force + self.factor(load.time) * np.array(load.force)
-                    moment += self.factor(load.time) * load.moment
+                    force = force + self.factor(load.amplitude) * np.array(load.force)
+                    moment += self.factor(load.amplitude) * load.moment
             of_works = self._of_works(beam, place, (s0, s1), length)
             total += w / 2 * length * self.at(place, force + of_works[:2], moment + of_works[2])
         return total
@@ -142,7 +145,7 @@ class Balance:
     def cuts(self, beam):
         """Forces on the cells of a straight beam at their ends, from the diagram; pairs of (3,)."""
         diagram = self.solution.diagram(beam, points=2)
-        x, y = np.subtract(beam.b, beam.a) / math.dist(beam.a, beam.b)
+        x, y = np.subtract(*beam.ends[::-1]) / math.dist(*beam.ends)
         for k in range(0, len(diagram.s), 2):
             ends = []
             turns = self.solution.q[-1, self.solution.grid.dofs[self._nodes(beam, k // 2), 2]]

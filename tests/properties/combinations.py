@@ -18,18 +18,20 @@ import numpy as np
 from features import FEATURES, PLAIN, Feature
 from own_parts import CONNECTOR_LAWS, LAWS, SOFTENING
 
-STATICS = ("Static()", "ExactStatic()", "Static()", "ExactStatic(0.7)")
+STATICS = ("Static()", "EnergyMomentumStatic()", "Static()", "EnergyMomentumStatic(0.7)")
 DYNAMICS = (
-    "Midpoint()", "Midpoint(0.05, 0.1)", "DecayingMidpoint()", "PrintedMidpoint()", "Newmark()",
-    "Newmark(0.6, 0.36)", "GeneralizedAlpha(0.8)", "Weighted(0.55)", "Midpoint()",
+    "EnergyMomentum()", "EnergyMomentum(0.05, 0.1)", "EnergyMomentumDecaying()",
+    "EnergyMomentumPrinted()", "Newmark()",
+    "Newmark(0.6, 0.36)", "GeneralizedAlpha(0.8)", "Weighted(0.55)", "EnergyMomentum()",
 )  # fmt: skip
 SCHEMES = (*STATICS, *DYNAMICS)
 
-EXACT = ("ub.ExactStatic", "ub.Midpoint", "ub.DecayingMidpoint", "Weighted")
+EXACT = ("ub.EnergyMomentumStatic", "ub.EnergyMomentum", "ub.EnergyMomentumDecaying", "Weighted")
 
 HOLDING = (
-    "Link", "Prismatic", "measured=", "Guided", "Motor", "Release", "Coulomb", "Brake",
-    "RigidPlastic", "hinges=", "Prescribed", "Roller", "Body",
+    "Link", "Prismatic", "multipliers=", "Guided", "PrescribedMotion", "Release", "Coulomb",
+    "Brake",
+    "RigidPlastic", "hinges=", "PrescribedDisplacement", "Roller", "Body",
 )  # fmt: skip
 """Constraints, at which accelerations of undamped Newmark oscillate."""
 
@@ -224,7 +226,7 @@ class Combination:
 
     @property
     def static(self):
-        return self.has("scheme = ub.Static(", "scheme = ub.ExactStatic(")
+        return self.has("scheme = ub.Static(", "scheme = ub.EnergyMomentumStatic(")
 
     @property
     def has_exact_ledger(self):
@@ -239,7 +241,14 @@ class Combination:
         found |= {"law_functions", "MaterialLaw"} if self.has(*LAWS) else set()
         found |= {"law_functions", "SofteningLaw"} if self.has(*SOFTENING) else set()
         found |= {"ConnectorLaw"} if self.has(*CONNECTOR_LAWS) else set()
-        own = {"Coefficients", "ExactStep", "Midway", "Scheme", "DynamicScheme", "Step"}
+        own = {
+            "Coefficients",
+            "EnergyMomentumBase",
+            "MidpointLoads",
+            "Scheme",
+            "DynamicScheme",
+            "Step",
+        }
         return found | (own if self.has("Weighted") else set())
 
 
@@ -285,7 +294,7 @@ def _build(d, base):
     """Beams and the first load."""
     if base == "column":
         d.beam((0.0, 0.0), (1.0, 0.0), 6)
-        d.loads.append("ub.PointLoad(b0.end, force=(-1.0, 0.0), time=lambda t: t)")
+        d.loads.append("ub.PointLoad(b0.end, force=(-1.0, 0.0), amplitude=lambda t: t)")
         d.section(0, f"ub.Section({STIFF})")
         return
     if base == "portal":
@@ -299,7 +308,7 @@ def _build(d, base):
     if base == "chain":
         d.beam((1.0, 0.2), (1.8, -0.3), d.one([2, 3]))
     x, y = d.some(-25, 25), d.some(-25, 25)
-    d.loads.append(f"ub.PointLoad({d.last}.end, force=({x:.3f}, {y:.3f}), time={d.time()})")
+    d.loads.append(f"ub.PointLoad({d.last}.end, force=({x:.3f}, {y:.3f}), amplitude={d.time()})")
 
 
 def main(arguments=None):

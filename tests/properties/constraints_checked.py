@@ -7,7 +7,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from ufl_beam.model.bodies import GROUND, Body, Spot
-from ufl_beam.model.connector_laws import Guide, Motor
+from ufl_beam.model.connector_laws import Guide, PrescribedMotion
 from ufl_beam.model.supports import still
 
 COUPLES = {
@@ -38,7 +38,7 @@ def _misses(solution, one):
     kind, zero = one.kind, np.zeros(1)
     if hasattr(one, "held"):
         yield from _of_support(solution, one)
-    elif isinstance(getattr(one, "law", None), Motor):
+    elif isinstance(getattr(one, "law", None), PrescribedMotion):
         wanted = np.array([one.law.motion(t) for t in solution.times])
         # Motions begin where the undeformed scene is.
         motion = _relative(solution, one.motion, one.a, one.b, one.axis)

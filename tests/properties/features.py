@@ -50,9 +50,9 @@ def bulk_law(d, limit, stiffness):
     """A law that yields at about a limit."""
     k = stiffness * d.some(0.02, 0.2)
     return d.one([
-        f"ub.Hardening({limit:.4g}, modulus={k:.4g})",
-        f"ub.Hardening({limit:.4g}, kinematic={k:.4g})",
-        f"ub.Hardening({limit:.4g}, modulus={k:.4g}, kinematic={k:.4g})",
+        f"ub.ElastoPlastic({limit:.4g}, isotropic={k:.4g})",
+        f"ub.ElastoPlastic({limit:.4g}, kinematic={k:.4g})",
+        f"ub.ElastoPlastic({limit:.4g}, isotropic={k:.4g}, kinematic={k:.4g})",
     ])  # fmt: skip
 
 
@@ -94,13 +94,13 @@ def axial_and_shear(d):
 @feature("section", "any section", elastic=False)
 def perzyna(d):
     law = f"{d.some(3, 8):.4g}, kinematic=5.0, viscosity=ub.Perzyna({d.some(0.5, 5):.4g})"
-    d.yields(0, f"bending=ub.Hardening({law})")
+    d.yields(0, f"bending=ub.ElastoPlastic({law})")
 
 
 @feature("section", "any section", elastic=False)
 def duvaut_lions(d):
-    law = f"{d.some(3, 8):.4g}, modulus=5.0, viscosity=ub.DuvautLions({d.some(0.01, 0.1):.4g})"
-    d.yields(0, f"bending=ub.Hardening({law})")
+    law = f"{d.some(3, 8):.4g}, isotropic=5.0, viscosity=ub.DuvautLions({d.some(0.01, 0.1):.4g})"
+    d.yields(0, f"bending=ub.ElastoPlastic({law})")
 
 
 @feature("section", "any section", elastic=False)
@@ -148,7 +148,7 @@ def fibres(d):
         f"ub.Weibull({mean:.5g}, 6.0, seed=4)",
     ])  # fmt: skip
     crack = d.one(["", f", softening=ub.Softening({1.5 * mean:.5g}, {mean / 500:.5g})"])
-    law = f"ub.Fibres(ub.Hardening({limit}, modulus=6e6), number=4{crack})"
+    law = f"ub.Fibres(ub.ElastoPlastic({limit}, isotropic=6e6), number=4{crack})"
     shapes = [
         f"ub.Section.rectangle(0.01, 0.1, E=1.2e8, nu=0.3, rho=1e3, fibres={law})",
         f"ub.Section.of_fibres([-0.05, 0.0, 0.03, 0.06], [2e-4, 3e-4, 3e-4, 2e-4], E=8e7, "
@@ -163,7 +163,7 @@ def hinges(d):
     d.beams[0]["hinges"] = f"{{{place}: " + d.one([
         f"ub.Softening({M:.4g}, {d.some(1, 8):.4g})",
         f"ub.LinearSoftening({M:.4g}, {d.some(2, 9):.4g})",
-        f"ub.Hardening({M:.4g}, modulus={d.some(5, 30):.4g})",
+        f"ub.ElastoPlastic({M:.4g}, isotropic={d.some(5, 30):.4g})",
     ]) + "}"  # fmt: skip
 
 
@@ -183,15 +183,15 @@ def curved(d):
 @feature("joint")
 def revolute(d):
     d.need_beams(2)
-    measured = d.one(["", ", measured=True"])
-    d.joint = f"ub.Revolute({{a}}, {{b}}{measured})"
+    multipliers = d.one(["", ", multipliers=True"])
+    d.joint = f"ub.Revolute({{a}}, {{b}}{multipliers})"
     d.connectors.append(f"ub.Turn(b0.end, b1.start, ub.Spring({d.some(20, 100):.4g}))")
 
 
 @feature("joint")
-def measured(d):
+def multipliers(d):
     d.need_beams(2)
-    d.joint = "ub.Rigid({a}, {b}, measured=True)"
+    d.joint = "ub.Rigid({a}, {b}, multipliers=True)"
 
 
 @feature("joint")
@@ -222,7 +222,7 @@ def rigid_link(d):
 def release(d):
     d.need_beams(2)
     free = d.one(["N", "V", "M"])
-    d.joint = f"ub.Release({{a}}, {{b}}, free='{free}'{d.one(['', ', measured=True'])})"
+    d.joint = f"ub.Release({{a}}, {{b}}, free='{free}'{d.one(['', ', multipliers=True'])})"
     k = d.some(50, 300)
     if free == "M":
         d.connectors.append(f"ub.Turn(b0.end, b1.start, ub.Spring({k:.4g}))")
@@ -263,7 +263,7 @@ def moved_tip(d):
     way = f"ub.Table([0.0, {d.end / 2:.4g}, {d.end:.4g}], [0.0, {size}, {-size / 2}])"
     if not d.static:  # kinks of motions are blows, of which the energy does not converge
         way = f"lambda t: {size} * (1.0 - math.cos({d.some(2, 6) / d.end:.4g} * t))"
-    d.supports.append(f"ub.Prescribed({d.last}.end, {component}={way})")
+    d.supports.append(f"ub.PrescribedDisplacement({d.last}.end, {component}={way})")
 
 
 @feature("root")
@@ -276,7 +276,7 @@ def pinned(d):
 def shaken(d):
     ω = d.some(2, 6) / d.end
     motion = f"lambda t: 0.03 * (1.0 - math.cos({ω:.4g} * t))"
-    d.root = f"ub.Prescribed({{place}}, {d.one(['u', 'v', 'psi'])}={motion}, {{rest}})"
+    d.root = f"ub.PrescribedDisplacement({{place}}, {d.one(['u', 'v', 'psi'])}={motion}, {{rest}})"
 
 
 @feature("root", "tip", "free", statics=False)
@@ -299,4 +299,4 @@ def body(d):
     else:
         d.joints.append(f"ub.Revolute({d.last}.end, body.at({x!r}, {y!r}))")
         d.connectors.append(spring)
-    d.loads.append(f"ub.PointLoad(body.middle, force=(0.0, -5.0), time={d.time()})")
+    d.loads.append(f"ub.PointLoad(body.middle, force=(0.0, -5.0), amplitude={d.time()})")

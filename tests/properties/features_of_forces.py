@@ -77,7 +77,7 @@ def coulomb(d):
 @feature("rubs", "joint", statics=False, at_end=False, elastic=False)
 def rubbing_pin(d):
     d.need_beams(2)
-    d.joint = "ub.Revolute({a}, {b}, measured=True)"
+    d.joint = "ub.Revolute({a}, {b}, multipliers=True)"
     law = f"ub.Coulomb({d.some(0.05, 0.3):.4g}, coefficient=0.02, joint=joint)"
     d.connectors.append(f"ub.Turn(b0.end, b1.start, {law})")
 
@@ -87,13 +87,13 @@ def motor(d):
     d.need_beams(2)
     d.joint = "ub.Revolute({a}, {b})"
     ω = d.some(2, 6) / d.end
-    law = f"ub.Motor(lambda t: {d.some(0.05, 0.4):.3f} * (1.0 - math.cos({ω:.4g} * t)))"
+    law = f"ub.PrescribedMotion(lambda t: {d.some(0.05, 0.4):.3f} * (1.0 - math.cos({ω:.4g} * t)))"
     d.connectors.append(f"ub.Turn(b0.end, b1.start, {law})")
 
 
 @feature()
 def actuator(d):
-    _connect(d, f"ub.Actuator(lambda t: {d.some(2, 9):.3f} * math.sin({9 / d.end:.4g} * t))")
+    _connect(d, f"ub.PrescribedForce(lambda t: {d.some(2, 9):.3f} * math.sin({9 / d.end:.4g} * t))")
 
 
 @feature(elastic=False)
@@ -163,7 +163,7 @@ def brake(d):
 
 @feature(at_end=False, elastic=False)
 def rigid_plastic(d):
-    law = f"ub.RigidPlastic(ub.Hardening({d.some(1, 4):.4g}, modulus={d.some(50, 200):.4g}))"
+    law = f"ub.RigidPlastic(ub.ElastoPlastic({d.some(1, 4):.4g}, isotropic={d.some(50, 200):.4g}))"
     d.connectors.append(f"ub.Slide(ub.ground(0.2, 0.7), {d.last}.at(0.5), {law}, axis=(0.3, 1.0))")
 
 
@@ -174,13 +174,15 @@ def rigid_plastic(d):
 def follower(d):
     d.loads.append(
         f"ub.FollowerLoad({d.last}.end, force=({d.some(-15, 15):.3f}, {d.some(-15, 15):.3f}), "
-        f"moment={d.some(-2, 2):.3f}, time={d.time()})"
+        f"moment={d.some(-2, 2):.3f}, amplitude={d.time()})"
     )
 
 
 @feature()
 def moment(d):
-    d.loads.append(f"ub.PointLoad({d.last}.at(0.5), moment={d.some(-6, 6):.3f}, time={d.time()})")
+    d.loads.append(
+        f"ub.PointLoad({d.last}.at(0.5), moment={d.some(-6, 6):.3f}, amplitude={d.time()})"
+    )
 
 
 @feature()
@@ -188,13 +190,13 @@ def line_load(d):
     more = d.one(["", f", moment={d.some(-2, 2):.3f}"])
     d.loads.append(
         f"ub.LineLoad(b0, force=({d.some(-20, 20):.3f}, {d.some(-20, 20):.3f}){more}, "
-        f"time={d.time()})"
+        f"amplitude={d.time()})"
     )
 
 
 @feature()
 def gravity(d):
-    d.loads.append(f"ub.Gravity(({d.some(-5, 5):.3f}, -9.81), time={d.time()})")
+    d.loads.append(f"ub.Gravity(({d.some(-5, 5):.3f}, -9.81), amplitude={d.time()})")
 
 
 @feature("frame", at_end=False)
@@ -232,7 +234,7 @@ def potential(d):
 def point_mass(d):
     inertia = d.one(["", ", 0.02"])
     d.masses.append(f"ub.PointMass({d.last}.{d.one(['end', 'at(0.5)'])}, 0.8{inertia})")
-    d.loads.append(f"ub.Gravity(time={d.time()})")
+    d.loads.append(f"ub.Gravity(amplitude={d.time()})")
 
 
 @feature("damping", statics=False)

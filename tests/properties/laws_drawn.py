@@ -8,7 +8,7 @@ STRAINS = {"N m2": "1/m", "N": "1", "Pa": "1", "N/m": "m", "N m": "1"}
 
 INVERSE = {"1/m": "m", "1": "1", "m": "1/m"}
 
-CLASSES = ["Hardening", "Hardening", "RambergOsgood", "ArmstrongFrederick", "BoucWen"]
+CLASSES = ["ElastoPlastic", "ElastoPlastic", "RambergOsgood", "ArmstrongFrederick", "BoucWen"]
 
 
 class Laws:
@@ -25,18 +25,18 @@ class Laws:
         say, (of_stiffness, of_viscosity) = self._say, dimensions
         modulus, kinematic = (stiffness * self._size(-2, -0.5) for _ in range(2))
         time = self._end * self._size(-1, 1)
-        kind = self._one(["", "modulus", "kinematic", "both"])
+        kind = self._one(["", "isotropic", "kinematic", "both"])
         viscous = self._one(["", "", "Perzyna", "DuvautLions"])
-        more = [f"limit={limit}"]
-        if kind in ("modulus", "both"):
-            more.append(f"modulus={say.number(modulus, of_stiffness)}")
+        more = [f"yield_limit={limit}"]
+        if kind in ("isotropic", "both"):
+            more.append(f"isotropic={say.number(modulus, of_stiffness)}")
         if kind in ("kinematic", "both"):
             more.append(f"kinematic={say.number(kinematic, of_stiffness)}")
         if viscous == "Perzyna":
             more.append(f"viscosity=ub.Perzyna({say.number(time * stiffness, of_viscosity)})")
         if viscous == "DuvautLions":
             more.append(f"viscosity=ub.DuvautLions({say.number(time, 's')})")
-        return f"ub.Hardening({', '.join(more)})"
+        return f"ub.ElastoPlastic({', '.join(more)})"
 
     def _yielding(self, name, limit, size, stiffness, dimensions):
         """A law of a class that yields at about a limit, given as text and in SI.
@@ -54,7 +54,7 @@ class Laws:
         exponent, hardens, shape = some(1, 6), some(0, 0.3), some(0.5, 1)
         smooth = f"{hardens:.2f}, {exponent:.2f}, {shape:.2f}, {strength:.1f}"
         return {
-            "Hardening": hardening,
+            "ElastoPlastic": hardening,
             "RambergOsgood": f"ub.RambergOsgood({limit}, {offset}, {exponent:.2f})",
             "ArmstrongFrederick": f"ub.ArmstrongFrederick({limit}, {kinematic}, {recovery})",
             "BoucWen": f"ub.BoucWen({limit}, {smooth})",
@@ -64,7 +64,7 @@ class Laws:
         """A law that breaks; limit and energy in SI, and their dimensions."""
         kind = self._one(["Softening", "LinearSoftening"])
         limit, energy = map(self._say.number, (limit, energy), dimensions)
-        return f"ub.{kind}(limit={limit}, energy={energy})"
+        return f"ub.{kind}(limit={limit}, fracture_energy={energy})"
 
     # -- sections ------------------------------------------------------------------------------
 
@@ -204,10 +204,11 @@ class Laws:
             f"{say.number(0.0 if self._static else c, of_c)} * rate)",
             "Stop": f"ub.Stop({text}, low={say.number(-low, of_e)}, high={say.number(high, of_e)})",
             "Damper": f"ub.Damper({say.number(c, of_c)})",
-            "Actuator": f"ub.Actuator(lambda t: {of} * math.sin({ω} * t))",
+            "PrescribedForce": f"ub.PrescribedForce(lambda t: {of} * math.sin({ω} * t))",
             "Controller": f"ub.Controller(lambda simulation: {of} * math.sin({ω} * simulation.t))",
             "Coulomb": f"ub.Coulomb({of})",
-            "Motor": f"ub.Motor(lambda t: {say.number(high, of_e)} * (1.0 - math.cos({ω} * t)))",
+            "PrescribedMotion": "ub.PrescribedMotion(lambda t: "
+            f"{say.number(high, of_e)} * (1.0 - math.cos({ω} * t)))",
         }
         if joint is not None:
             size = say.number(self._L * 0.1 if of_e == "1" else 0.3, "m" if of_e == "1" else "1")
@@ -217,14 +218,14 @@ class Laws:
     def _kinds(self, *more):
         kinds = ["Spring", "yields", "breaks", "Function", *more]
         if not self._static:
-            kinds += ["Stop", "Damper", "Actuator", "Controller"]
+            kinds += ["Stop", "Damper", "PrescribedForce", "Controller"]
             kinds += ["Coulomb", "Coulomb"] if self._rubs else []
         return kinds
 
     def _turn(self, a, b, joint):
         """Something that resists or drives a rotation."""
         laws = self._laws(self._M, 3.0, self._M, ("N m", "1", "N m", "N m s"), joint)
-        kind = self._one(self._kinds(*(["Motor"] if self._may_hold else [])))
+        kind = self._one(self._kinds(*(["PrescribedMotion"] if self._may_hold else [])))
         if self._static and kind in ("breaks", "yields"):
             kind = "Spring"
         self._lists["connectors"].append(f"ub.Turn({a}, {b}, {laws[kind]})")
@@ -233,7 +234,7 @@ class Laws:
         """Something that resists or drives a sliding along an axis."""
         dimensions = ("N/m", "m", "N", "N s/m")
         laws = self._laws(self._F / self._L, self._L, self._F, dimensions, joint)
-        kind = self._one(self._kinds(*(["Motor"] if self._may_hold else [])))
+        kind = self._one(self._kinds(*(["PrescribedMotion"] if self._may_hold else [])))
         if self._static and kind in ("breaks", "yields"):
             kind = "Spring"
         self._lists["connectors"].append(f"ub.Slide({a}, {b}, {laws[kind]}, axis={along})")

@@ -94,7 +94,10 @@ def momentum(case):
     Tolerance: 1e-12 of the forces in each step, which are up to 1e3 times those of loads.
     """
     words = case.combination
-    only(words.has("ub.Midpoint", "ub.DecayingMidpoint", "Weighted"), "other means of forces")
+    only(
+        words.has("ub.EnergyMomentum", "ub.EnergyMomentumDecaying", "Weighted"),
+        "other means of forces",
+    )
     only(not words.has("VirtualWork", "Potential", "RotatingFrame", "Rayleigh", "Guided"), "field")
     only(not case.exact.failure, "a step fails")
     solution, scene = case.exact.solution, case.exact.names["scene"]
@@ -108,7 +111,7 @@ def momentum(case):
         force, size = force + values, max(size, np.abs(values).max(initial=0.0))
 
     for load in scene.loads:
-        factor = np.array([load.time(x) for x in middle])[:, None]
+        factor = np.array([load.amplitude(x) for x in middle])[:, None]
         if isinstance(load, ub.Gravity):
             mass = sum(_length(solution, beam) * beam.section.rhoA for beam in scene.beams)
             mass += sum(one.mass for one in (*scene.masses, *scene.bodies))
@@ -158,16 +161,25 @@ def modes(case):
     words = case.combination
     only(words.has("scheme = ub.Static(") and words.elastic, "not elastic, or no equilibrium at T")
     only(not case.exact.failure, "a step fails")
-    only(not words.has("Prescribed", "Motor", "Actuator", "VirtualWork", "'field'"), "driven")
+    only(
+        not words.has(
+            "PrescribedDisplacement",
+            "PrescribedMotion",
+            "PrescribedForce",
+            "VirtualWork",
+            "'field'",
+        ),
+        "driven",
+    )
     names, state = case.exact.names, case.exact.solution
     scene, t0 = names["scene"], state.times[-1]
     held = [
         load if isinstance(load, ub.RotatingFrame)
-        else replace(load, time=lambda t, load=load, end=t0: load.time(end))
+        else replace(load, amplitude=lambda t, load=load, end=t0: load.amplitude(end))
         for load in scene.loads
     ]  # fmt: skip
     still = replace(scene, loads=held)
-    creep = [one.time for one in scene.damping if isinstance(one, ub.KelvinVoigt)]
+    creep = [one.retardation_time for one in scene.damping if isinstance(one, ub.KelvinVoigt)]
     if creep:  # until nothing moves
         t1 = t0 + 1000 * max(creep)
         state = ub.simulate(
@@ -179,10 +191,10 @@ def modes(case):
     period = 2 * math.pi / shapes.omega[0]
     places = [b.at(s) for b in scene.beams for s in ((0.5, 1.0) if b.cells % 2 == 0 else (1.0,))]
     place = max(places, key=lambda p: _way(shapes, p))  # nodes, so that the mesh stays
-    push = ub.PointLoad(place, force=1e-5 * 100 * np.array([0.6, 0.8]), time=lambda t: 1.0)
+    push = ub.PointLoad(place, force=1e-5 * 100 * np.array([0.6, 0.8]), amplitude=lambda t: 1.0)
     arguments = {"t": (t0, t0 + 4 * period), "dt": period / 40, "mesh": names["mesh"]}
     run = ub.simulate(
-        replace(still, loads=[*held, push]), ub.Midpoint(), start=state, progress=False,
+        replace(still, loads=[*held, push]), ub.EnergyMomentum(), start=state, progress=False,
         comm=case.comm, newton=ub.Newton(rtol=DIGITS), **arguments,
     )  # fmt: skip
     moved = run.displacement(place)[:, :2]
@@ -277,13 +289,13 @@ def pictures_of(case):
     """Pictures by name; each draws what the scene has."""
     names, solution, beam = case.whole.names, case.whole.solution, case.whole.names["b0"]
     drawn = {
-        "model": lambda: ub.plot(names["scene"]), "shapes": lambda: ub.plot_shapes(solution),
-        "energy": lambda: ub.plot_energy(solution),
-        "history": lambda: ub.plot_history(solution, [beam.end]),
+        "model": lambda: ub.plot(names["scene"]), "shapes": lambda: ub.plot(solution, "shapes"),
+        "energy": lambda: ub.plot(solution, "energy"),
+        "history": lambda: ub.plot(solution, "history", [beam.end]),
     }  # fmt: skip
     if case.combination.has("bending=", "axial=", "fibres=", "hinge=", "interaction="):
-        drawn["dissipation"] = lambda: ub.plot_dissipation(solution)
-        drawn["curvature"] = lambda: ub.plot_moment_curvature(solution, beam.at(0.3))
+        drawn["dissipation"] = lambda: ub.plot(solution, "dissipation")
+        drawn["curvature"] = lambda: ub.plot(solution, "moment-curvature", beam.at(0.3))
     if case.combination.seed % 12 == 5:  # these take seconds
         drawn = {force: partial(ub.plot, solution, force) for force in "NVM"}
     return drawn

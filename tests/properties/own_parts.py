@@ -180,7 +180,7 @@ class Integral:
 
 
 @dataclass(frozen=True)
-class Weighted(ub.ExactStep, ub.Midway):
+class Weighted(ub.EnergyMomentumBase, ub.MidpointLoads):
     """Midpoint rule with one weight for resultants and velocities, as in docs/extending.md."""
 
     weight: float = 0.55

@@ -101,9 +101,9 @@ class _Writer:
 
     def _hardening(self, stiffness, limit):
         """A law of a resultant, a fibre or a spring; sizes of stiffness and force."""
-        more = [f"limit={limit}"]
+        more = [f"yield_limit={limit}"]
         if self._chance(0.5):
-            more.append(f"modulus={stiffness * self._size(-4, 0):.6g}")
+            more.append(f"isotropic={stiffness * self._size(-4, 0):.6g}")
         if self._chance(0.5):
             more.append(f"kinematic={stiffness * self._size(-4, 0):.6g}")
         time = self._one([0.0, math.inf, self._T * self._size(-6, 6)])
@@ -112,14 +112,14 @@ class _Writer:
             more.append(f"viscosity=ub.Perzyna({_number(time * stiffness)})")
         if viscous == "DuvautLions":
             more.append(f"viscosity=ub.DuvautLions({_number(time)})")
-        return f"ub.Hardening({', '.join(more)})"
+        return f"ub.ElastoPlastic({', '.join(more)})"
 
     def _softening(self, limit):
         """A law of a hinge; an energy from brittle to ductile."""
         kind = self._one(["Softening", "LinearSoftening"])
         energy = self._M * self._size(-4, 3)
         limit = self._one([0.0, limit, limit, limit, math.inf])
-        return f"ub.{kind}(limit={_number(limit)}, energy={energy:.6g})"
+        return f"ub.{kind}(limit={_number(limit)}, fracture_energy={energy:.6g})"
 
     def _section(self, i):
         kind = self._one(["elastic", "elastic", "resultants", "hinge", "both", "fibres"])
@@ -139,7 +139,8 @@ class _Writer:
             crack = ""
             if self._chance(0.3):
                 energy = strength * h * self._size(-3, 2)
-                crack = f", softening=ub.Softening(limit={3 * strength:.6g}, energy={energy:.6g})"
+                numbers = f"limit={3 * strength:.6g}, fracture_energy={energy:.6g}"
+                crack = f", softening=ub.Softening({numbers})"
             shape = self._one([f"rectangle(b={h:.6g}, h={h:.6g}", f"circle(d={h:.6g}"])
             text = (
                 f"ub.Section.{shape}, E={E:.6g}, nu=0.3, rho={rhoA / h**2:.6g}, "
@@ -217,7 +218,7 @@ class _Writer:
         more = ""
         name = f"joint{len(self._joints)}"
         if kind in ("Rigid", "Revolute") and (self._chance(0.3) or self._static):
-            more = ", measured=True"
+            more = ", multipliers=True"
         if kind == "Prismatic":
             more = f", axis={self._vector(1.0)}"
         if kind == "Release":
@@ -232,7 +233,7 @@ class _Writer:
 
     def _turn(self, a, b, joint):
         size = self._M * self._size(-2, 1)
-        laws = [self._spring(self._M, size), f"ub.Motor({self._swing(1.0)})"]
+        laws = [self._spring(self._M, size), f"ub.PrescribedMotion({self._swing(1.0)})"]
         if not self._static:
             laws += [
                 *self._resisting(self._M, 1.0, size),
@@ -275,7 +276,7 @@ class _Writer:
         return [
             f"ub.Stop({k:.6g}, low={-way:.6g}, high={way / 2:.6g})",
             f"ub.Damper({c:.6g})",
-            f"ub.Actuator(lambda t: {force:.6g} * math.sin({1 / time:.6g} * t))",
+            f"ub.PrescribedForce(lambda t: {force:.6g} * math.sin({1 / time:.6g} * t))",
             f"ub.ForceLaw(lambda e, rate: {k:.6g} * (e + {1 / length**2:.6g} * e**3) + "
             f"{c:.6g} * rate)",
         ]
@@ -298,8 +299,8 @@ class _Writer:
             return
         root = "beam0.at(0.0)"
         moved = [
-            f"ub.Prescribed({root}, u={self._swing(self._L)}, v=0, psi=0)",
-            f"ub.Prescribed({root}, u=0, v=0, psi={self._swing(3.0)})",
+            f"ub.PrescribedDisplacement({root}, u={self._swing(self._L)}, v=0, psi=0)",
+            f"ub.PrescribedDisplacement({root}, u=0, v=0, psi={self._swing(3.0)})",
         ]
         kinds = [f"ub.Clamped({root})", f"ub.Clamped({root})", *moved]
         if not self._static:
@@ -322,12 +323,12 @@ class _Writer:
         size = self._F * self._size(-4, 0)
         place = self._one(self._anchors)
         force, moment, time = self._vector(size), size * self._L * self._some(-1, 1), self._time()
-        kinds = [f"ub.PointLoad({place}, force={force}, moment={moment:.6g}, time={time})"]
+        kinds = [f"ub.PointLoad({place}, force={force}, moment={moment:.6g}, amplitude={time})"]
         if place.startswith("beam"):
-            kinds.append(f"ub.FollowerLoad({place}, force={force}, time={time})")
+            kinds.append(f"ub.FollowerLoad({place}, force={force}, amplitude={time})")
         line = self._vector(size / self._L)
-        kinds.append(f"ub.LineLoad({self._one(self._beams)}, force={line}, time={time})")
-        kinds.append(f"ub.Gravity({self._vector(size / self._rhoA / self._L)}, time={time})")
+        kinds.append(f"ub.LineLoad({self._one(self._beams)}, force={line}, amplitude={time})")
+        kinds.append(f"ub.Gravity({self._vector(size / self._rhoA / self._L)}, amplitude={time})")
         self._loads.append(self._one(kinds))
         if self._chance(0.3):
             mass = self._rhoA * self._L * self._size(-3, 3)
@@ -358,10 +359,15 @@ class _Writer:
                 self.lines.append("    ],")
         self.lines.append(")")
         if self._static:
-            schemes = ["Static()", "Static()", "ExactStatic()", "ExactStatic(0.5)"]
+            schemes = [
+                "Static()",
+                "Static()",
+                "EnergyMomentumStatic()",
+                "EnergyMomentumStatic(0.5)",
+            ]
         else:
             a, b = self._some(0.01, 0.5), self._some(0, 0.5)
-            schemes = ["Midpoint()", "Midpoint()", f"Midpoint({a:.3g}, {b:.3g})"]
+            schemes = ["EnergyMomentum()", "EnergyMomentum()", f"EnergyMomentum({a:.3g}, {b:.3g})"]
         self.lines.append(f"scheme = ub.{self._one(schemes)}")
         self.lines.append(f"dt = {self._dt:.6g}")
 
@@ -379,7 +385,7 @@ def round_off(solution):
     last = np.finfo(float).eps * scene.size
     least = 0.0
     for beam in scene.beams:
-        length = math.dist(beam.a, beam.b)
+        length = math.dist(*beam.ends)
         least += beam.section.EA * last**2 * beam.cells**2 / length
     most = float(np.max(solution.energy.total))
     # In some steps, over some nodes

@@ -174,7 +174,7 @@ class Built:
                 self.place(place),
                 force=self._turn(force, newton),
                 moment=moment * joule,
-                time=ub.ramp(duration * second),
+                amplitude=ub.ramp(duration * second),
             )
             for kind, place, force, moment, duration in draw.forces
         ]

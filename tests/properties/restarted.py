@@ -33,11 +33,13 @@ class Steering:
 def machine(dynamic=True):
     """Beams that yield, creep and break, fibres, bodies, joints, every law, loads, supports."""
     steel = {"EA": 1e5, "GA": 1e5, "EI": 40.0, "rhoA": 0.5, "rhoI": 0.01}
-    creep = ub.Hardening(limit=0.5, kinematic=3.0, viscosity=ub.Perzyna(0.05))
+    creep = ub.ElastoPlastic(yield_limit=0.5, kinematic=3.0, viscosity=ub.Perzyna(0.05))
     hinged = ub.Section(**steel, bending=creep)
     fibres = ub.Section.rectangle(
         b=0.02, h=0.05, E=1e8, nu=0.3, rho=500.0,
-        fibres=ub.Fibres(ub.Hardening(limit=ub.TruncatedNormal(1e5, 2e4, seed=7)), number=6),
+        fibres=ub.Fibres(
+            ub.ElastoPlastic(ub.TruncatedNormal(1e5, 2e4, seed=7)), number=6
+        ),
     )  # fmt: skip
     a = ub.Body((0, 0), mass=2.0, inertia=0.3, name="a")
     b = ub.Body((1, 0), mass=1.0, inertia=0.1, name="b")
@@ -45,7 +47,7 @@ def machine(dynamic=True):
     soft = ub.Softening(0.6, 0.02)
     right = ub.Beam((2.5, 0.2), (3.5, 0.2), hinged, cells=4, hinges={0.1: soft}, name="right")
     left = ub.Beam((-2, 0), (-0.5, 0), fibres, cells=5, name="left")
-    pin = ub.Revolute(left.end, a.at(-0.5, 0), measured=True)
+    pin = ub.Revolute(left.end, a.at(-0.5, 0), multipliers=True)
     joints = [
         ub.Prismatic(a.at(0.3, 0), b.middle, axis=(1, 0.3)),
         ub.Revolute(b.at(1.5, 0.1), c.at(1.5, 0.1)),
@@ -54,7 +56,7 @@ def machine(dynamic=True):
         ub.Guided(right.end, lambda s: (3.5 + s, 0.2 + 0.3 * np.sin(s))),
     ]
     random = np.random.default_rng(3)
-    yields = ub.Spring(20.0, ub.Hardening(limit=0.2, kinematic=2.0))
+    yields = ub.Spring(20.0, ub.ElastoPlastic(yield_limit=0.2, kinematic=2.0))
     connectors = [
         ub.Slide(a.middle, b.middle, yields),
         ub.Turn(b.middle, c.middle, ub.Spring(5.0)),
@@ -66,11 +68,11 @@ def machine(dynamic=True):
         ub.Turn(ub.ground(0, 0), b.middle, ub.Controller(lambda now: 0.01 * random.normal())),
     ]
     loads = [
-        ub.Gravity(time=ub.ramp(0.1)),
-        ub.PointLoad(c.at(2.5, 0.5), force=(3, 2), moment=1.0, time=ub.ramp(0.1)),
-        ub.FollowerLoad(left.at(0.5), force=(1.0, 0.3), time=ub.ramp(0.2)),
+        ub.Gravity(amplitude=ub.ramp(0.1)),
+        ub.PointLoad(c.at(2.5, 0.5), force=(3, 2), moment=1.0, amplitude=ub.ramp(0.1)),
+        ub.FollowerLoad(left.at(0.5), force=(1.0, 0.3), amplitude=ub.ramp(0.2)),
     ]
-    shaken = ub.Prescribed(left.start, u=lambda t: 0.1 * t, v=0.0)
+    shaken = ub.PrescribedDisplacement(left.start, u=lambda t: 0.1 * t, v=0.0)
     damping = [ub.KelvinVoigt(1e-4), *([ub.Rayleigh(mass=0.1)] if dynamic else [])]
     return ub.Scene(
         [right, left], joints=joints, connectors=connectors, bodies=[a, b, c], loads=loads,
@@ -81,15 +83,17 @@ def machine(dynamic=True):
 def bend(kind="hinge"):
     """A cantilever whose end goes up and down: statics of what yields and breaks."""
     law = {"hinge": ub.Softening(6.0, 1.5)} if kind == "hinge" else {}
-    yields = ub.Hardening(limit=5.0, modulus=10.0, kinematic=5.0)
+    yields = ub.ElastoPlastic(yield_limit=5.0, isotropic=10.0, kinematic=5.0)
     section = ub.Section(EA=1e4, GA=1e4, EI=50.0, rhoA=1.0, rhoI=0.1, bending=yields)
     beam = ub.Beam((0, 0), (1, 0), section, cells=6, hinges=dict.fromkeys((0.05,), *law.values()))
     wave = ub.Table([0, 1, 3, 5], [0, 0.15, -0.15, 0.2])
     return ub.Scene(
         [beam],
-        supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, v=wave)],
-        loads=[ub.FollowerLoad(beam.at(0.5), force=(-1.0, 0.5), time=wave)],
-        connectors=[ub.Stretch(ub.ground(1, 1), beam.end, ub.Spring(3.0, ub.Hardening(0.2, 1.0)))],
+        supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=wave)],
+        loads=[ub.FollowerLoad(beam.at(0.5), force=(-1.0, 0.5), amplitude=wave)],
+        connectors=[
+            ub.Stretch(ub.ground(1, 1), beam.end, ub.Spring(3.0, ub.ElastoPlastic(0.2, 1.0)))
+        ],
     )
 
 
@@ -105,13 +109,14 @@ def run(folder, *, steps=60, every=2, record=()):
     beam = scene.beams[0]
     files = [
         ub.History(folder / "run.csv", [beam.end], scene.connectors),
-        ub.History(folder / "few.csv", [beam.end], most=10),
+        ub.History(folder / "few.csv", [beam.end], max_rows=10),
         ub.XDMF(folder / "run.xdmf", every=7),
         ub.VTKHDF(folder / "run.vtkhdf", every=5),
     ]
     checkpoint = ub.Checkpoint(folder / "run.checkpoint", every=every)
     return ub.simulate(
-        scene, ub.Midpoint(0.05, 0.02), t=(0, 0.005 * steps), dt=0.005, every=3, progress=False,
+        scene, ub.EnergyMomentum(0.05, 0.02), t=(0, 0.005 * steps), dt=0.005, every=3,
+        progress=False,
         record=[*files, *record], checkpoint=checkpoint,
     )  # fmt: skip
 

@@ -19,7 +19,7 @@ CLOSED = 1e-9
 @pytest.mark.parametrize("step", SIZES)
 def test_energy(seed, step):
     """Work is the increment of kinetic and stored energy."""
-    energy = Built(draw(seed)).run(ub.Midpoint(), step=step).solution.energy
+    energy = Built(draw(seed)).run(ub.EnergyMomentum(), step=step).solution.energy
     assert energy.lost == {}
     work = energy["loads"]
     change = energy.total - energy.total[0]
@@ -29,7 +29,9 @@ def test_energy(seed, step):
 
 @pytest.mark.parametrize("step", SIZES)
 @pytest.mark.parametrize(
-    "scheme", [ub.Midpoint(0.1, 0.0), ub.Midpoint(0.0, 0.1), ub.Midpoint(0.2, 0.5)], ids=str
+    "scheme",
+    [ub.EnergyMomentum(0.1, 0.0), ub.EnergyMomentum(0.0, 0.1), ub.EnergyMomentum(0.2, 0.5)],
+    ids=str,
 )
 def test_numerical_loss(seed, step, scheme):
     """It closes the ledger, and never gives anything back."""
@@ -41,7 +43,7 @@ def test_numerical_loss(seed, step, scheme):
 
 def test_losses_converge_to_nothing(seed):
     """A loss of the scheme, not of the scene: it goes with the step."""
-    scheme = ub.Midpoint(0.1, 0.1)
+    scheme = ub.EnergyMomentum(0.1, 0.1)
     losses = [
         Built(draw(seed)).run(scheme, step=0.1 / n, steps=n).solution.energy["numerical"][-1]
         for n in (10, 80)
@@ -50,7 +52,7 @@ def test_losses_converge_to_nothing(seed):
 
 
 @pytest.mark.parametrize("step", SIZES)
-@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Midpoint(alpha=0.2)], ids=str)
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.2)], ids=str)
 def test_momenta_of_free_flight(seed, step, scheme):
     """Without loads linear and angular momentum are constant, also with `alpha`."""
     numbers = draw(seed, free=True, dead=True)
@@ -65,7 +67,9 @@ def test_momenta_of_free_flight(seed, step, scheme):
 
 @pytest.mark.parametrize("step", [0.005, 0.05])
 @pytest.mark.parametrize(
-    "scheme", [ub.Midpoint(), ub.Midpoint(alpha=0.2), ub.Midpoint(beta=0.2)], ids=str
+    "scheme",
+    [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.2), ub.EnergyMomentum(beta=0.2)],
+    ids=str,
 )
 def test_impulses(seed, step, scheme):
     """Momentum grows by the impulse, angular momentum by its moment unless `beta` > 0."""
@@ -78,7 +82,7 @@ def test_impulses(seed, step, scheme):
     middle = (t[1:] + t[:-1]) / 2
     expected = np.zeros((len(middle), 3))
     for load in built.scene.loads:
-        size = np.array([load.time(x) for x in middle])
+        size = np.array([load.amplitude(x) for x in middle])
         position = solution.position(load.place)
         x, y = ((position[1:] + position[:-1]) / 2).T
         f_x, f_y = load.force
@@ -105,6 +109,6 @@ def test_statics_is_the_slow_limit(seed):
     numbers = draw(seed, fixed=True, dead=True)
     numbers.forces = [(*f[:4], 1000.0) for f in numbers.forces]
     static = Built(numbers).run(ub.Static(), steps=20, step=50.0)
-    slow = Built(numbers).run(ub.Midpoint(0.5, 0.5), steps=120, step=10.0)
+    slow = Built(numbers).run(ub.EnergyMomentum(0.5, 0.5), steps=120, step=10.0)
     # Both to 1e-10 of the forces, which soft scenes multiply
     assert relative(static.motion()[:, -1], slow.motion()[:, -1]) < 1e-7

@@ -12,10 +12,12 @@ CHECKSUMS = {"q": "8.26542832", "energy": "1.02415037", "links": "1.02379385"}
 def everything():
     """Beams that yield and hinge, fibres, bodies, every joint and every law, across processes."""
     steel = {"EA": 1e5, "GA": 1e5, "EI": 40.0, "rhoA": 0.5, "rhoI": 0.01}
-    hinged = ub.Section(**steel, bending=ub.Hardening(limit=0.5, kinematic=3.0))
+    hinged = ub.Section(**steel, bending=ub.ElastoPlastic(yield_limit=0.5, kinematic=3.0))
     fibres = ub.Section.rectangle(
         b=0.02, h=0.05, E=1e8, nu=0.3, rho=500.0,
-        fibres=ub.Fibres(ub.Hardening(limit=ub.TruncatedNormal(1e5, 2e4, seed=7)), number=12),
+        fibres=ub.Fibres(
+            ub.ElastoPlastic(ub.TruncatedNormal(1e5, 2e4, seed=7)), number=12
+        ),
     )  # fmt: skip
     a = ub.Body((0, 0), mass=2.0, inertia=0.3, name="a")
     b = ub.Body((1, 0), mass=1.0, inertia=0.1, name="b")
@@ -26,7 +28,7 @@ def everything():
         ub.Prismatic(a.at(0.3, 0), b.middle, axis=(1, 0.3)),
         ub.Revolute(b.at(1.5, 0.1), c.at(1.5, 0.1)),
         ub.Rigid(c.at(2.5, 0.2), right.start),
-        ub.Revolute(left.end, a.at(-0.5, 0), measured=True),
+        ub.Revolute(left.end, a.at(-0.5, 0), multipliers=True),
         ub.Link(left.start, ub.ground(-2, -3)),
         ub.Guided(right.end, lambda s: (3.5 + s, 0.2 + 0.3 * np.sin(s))),
     ]
@@ -37,7 +39,9 @@ def everything():
 
     spring = ub.Turn(b.middle, c.middle, ub.Spring(5.0))
     connectors = [
-        ub.Slide(a.middle, b.middle, ub.Spring(20.0, ub.Hardening(limit=0.5, kinematic=2.0))),
+        ub.Slide(
+            a.middle, b.middle, ub.Spring(20.0, ub.ElastoPlastic(yield_limit=0.5, kinematic=2.0))
+        ),
         spring,
         ub.Turn(a.middle, left.end, ub.Damper(0.2)),
         ub.Stretch(left.at(0.4), right.at(0.5), ub.Stop(50.0, high=0.2)),
@@ -52,7 +56,7 @@ def everything():
 
 
 def test_checksum():
-    run = ub.simulate(everything(), ub.Midpoint(0.05), t=(0, 0.3), dt=0.005, progress=False)
+    run = ub.simulate(everything(), ub.EnergyMomentum(0.05), t=(0, 0.3), dt=0.005, progress=False)
     assert run.energy.worst < 1e-9
     for name, numbers in (
         ("q", run.q[-1]),

@@ -31,8 +31,7 @@ RECORDED = {
 
 CALLED = {
     "Checkpoint", "DolfinxView", "LoadControl", "Simulation", "buckling", "follow", "load",
-    "modes", "plot", "plot_energy", "plot_dissipation", "plot_history", "plot_moment_curvature",
-    "plot_shapes", "simulate",
+    "modes", "plot", "simulate",
 }  # fmt: skip
 """Other names that checks use."""
 
@@ -51,8 +50,7 @@ ELSEWHERE = {
     "many runs": {"Study", "Tradeoff", "TradeoffError", "study", "tradeoff"},
     "errors and words": {"ConvergenceError", "CopiesDiffer", "ModelWarning", "SceneError", "say"},
     "pictures of what is not in every combination, or of a second each": {
-        "Camera", "Film", "animate", "picture", "plot_cycles", "plot_damage", "plot_extremes",
-        "plot_hinge", "plot_modes", "plot_tradeoff", "render",
+        "Camera", "animate", "picture", "render",
     },
 }  # fmt: skip
 """Public names that are no part of a model or its run, and why combinations leave them out."""

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.filterwarnings("ignore:.*the hinge of the section:ufl_b
 
 SI = Units()
 KINDS = ["resultants", "hinges", "fibres", "cracks"]
-SCHEMES = [ub.Static(), ub.ExactStatic(), ub.Midpoint(0.05, 0.05)]
+SCHEMES = [ub.Static(), ub.EnergyMomentumStatic(), ub.EnergyMomentum(0.05, 0.05)]
 
 PLACES = [(beam, s) for beam in range(3) for s in (0.0, 0.25, 0.5, 0.75, 1.0)]
 CORNERS = [(0.0, 0.0), (0.0, 1.0), (1.5, 1.2), (1.5, 0.2)]
@@ -87,7 +87,7 @@ class Frame:
             x = size * growing(t)
             return self._vector((x, -(x**2) / 2)) * units.metre
 
-        drive = ub.Prescribed(top, u=lambda t: sway(t).real, v=lambda t: sway(t).imag)
+        drive = ub.PrescribedDisplacement(top, u=lambda t: sway(t).real, v=lambda t: sway(t).imag)
         self.supports = [
             ub.Clamped(self.place((0, 0.0))), ub.Pinned(self.place((2, 1.0))), drive
         ]  # fmt: skip
@@ -96,7 +96,7 @@ class Frame:
             [piece for i in order for piece in self._beams[i]],
             joints=joints,
             supports=self.supports,
-            loads=[ub.PointLoad(middle, force=(press.real, press.imag), time=growing)],
+            loads=[ub.PointLoad(middle, force=(press.real, press.imag), amplitude=growing)],
             masses=[ub.PointMass(middle, 0.5 * units.kilogram)],
         )
 
@@ -108,7 +108,7 @@ class Frame:
         N, J, m, s = u.newton, u.joule, u.metre, u.second
         if kind in ("fibres", "cracks") and i < 2:
             y = np.array([-0.05, -0.02, 0.01, 0.06]) * (-1 if i in self._reverse else 1)
-            law = ub.Hardening(
+            law = ub.ElastoPlastic(
                 2.5e5 * N / m**2,
                 1e6 * N / m**2,
                 2e6 * N / m**2,
@@ -121,14 +121,14 @@ class Frame:
             )  # fmt: skip
         laws = {}
         if kind == "resultants" and i < 2:
-            laws["axial"] = ub.Hardening(
+            laws["axial"] = ub.ElastoPlastic(
                 30.0 * N, 500.0 * N, viscosity=ub.Perzyna(20.0 * N * s * self._viscous)
             )
-            laws["bending"] = ub.Hardening(
+            laws["bending"] = ub.ElastoPlastic(
                 5.0 * J, 5.0 * J * m, 4.0 * J * m, ub.DuvautLions(0.02 * s * self._viscous)
             )
         if kind == "hinges" and i == 0:
-            laws["bending"] = ub.Hardening(5.0 * J, 9.0 * J * m)
+            laws["bending"] = ub.ElastoPlastic(5.0 * J, 9.0 * J * m)
             laws["hinge"] = self._softening(ub.Softening, 8.0, 10.0)
         return ub.Section(
             EA=1e4 * N, GA=1e4 * N, EI=60.0 * J * m,
@@ -293,11 +293,11 @@ def test_ranks(kind, scheme):
 def test_ranks_with_and_without_hinges(scheme, first):
     """Half of the cells yield and break, those of the first ranks or of the last ones."""
     plain = {"EA": 1e4, "GA": 1e4, "EI": 60.0, "rhoA": 1.0}
-    laws = {"bending": ub.Hardening(6.0, 9.0), "hinge": ub.Softening(8.0, 10.0)}
+    laws = {"bending": ub.ElastoPlastic(6.0, 9.0), "hinge": ub.Softening(8.0, 10.0)}
     sections = [ub.Section(**plain, **laws), ub.Section(**plain)][:: 1 if first else -1]
     a = ub.Beam((0, 0), (1, 0), sections[0], cells=6, name="a")
     b = ub.Beam((1, 0), (2, 0), sections[1], cells=6, name="b")
-    tip = ub.Prescribed(b.end, v=ub.Table([0, 1], [0, 0.6]))
+    tip = ub.PrescribedDisplacement(b.end, v=ub.Table([0, 1], [0, 0.6]))
     scene = ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)], supports=[ub.Clamped(a.start), tip])
     one, other = (
         ub.simulate(scene, scheme, t=(0, 1), dt=0.05, comm=comm)
@@ -351,7 +351,7 @@ def test_dynamics_from_plastic_statics_stays_at_rest(kind):
     frame = Frame(kind, viscous=False)
     static = ub.simulate(frame.scene, ub.Static(), t=(0, 1), dt=0.05)
     assert static.energy["plastic"][-1] > 0
-    solution = ub.simulate(frame.scene, ub.Midpoint(), t=(1, 1.2), dt=0.01, start=static)
+    solution = ub.simulate(frame.scene, ub.EnergyMomentum(), t=(1, 1.2), dt=0.01, start=static)
     still = np.abs(solution.q - static.q[-1]).max()
     # What Newton's method leaves, 1e-10 of 100 N, on some 10 N/m
     assert still < 1e-8

@@ -13,7 +13,7 @@ SAME = 1e-9
 """Part of the result.  Each step is solved to 1e-10 of the forces, by a method that squares its
 error and so mostly ends at round-off; 15 steps let that grow a little."""
 
-SCHEMES = [ub.Midpoint(), ub.Midpoint(0.05, 0.05)]
+SCHEMES = [ub.EnergyMomentum(), ub.EnergyMomentum(0.05, 0.05)]
 SCHEME = SCHEMES[1]
 """The one with all terms."""
 
@@ -113,7 +113,7 @@ def test_ranks_in_statics(seed):
 
 def test_something_happens(seed):
     """The scenes are no trivial ones: they move by a good part of their size, and turn."""
-    motion = Built(draw(seed)).run(ub.Midpoint()).motion()
+    motion = Built(draw(seed)).run(ub.EnergyMomentum()).motion()
     assert np.abs(motion).max() > 1e-3
 
 

@@ -33,7 +33,7 @@ class Mechanism:
 
         section = ub.Section(
             EA=1e4 * N, GA=4e3 * N, EI=20 * N * m**2, rhoA=0.5 * kg / m, rhoI=1e-3 * kg * m,
-            bending=ub.Hardening(limit=1.5 * N * m, kinematic=5 * N * m**2),
+            bending=ub.ElastoPlastic(yield_limit=1.5 * N * m, kinematic=5 * N * m**2),
         )  # fmt: skip
         crank = ub.Body(at(0.15, 0.1), mass=1.0 * kg, inertia=0.02 * kg * m**2, name="crank")
         slider = ub.Body(at(1.3, 0.0), mass=2.0 * kg, inertia=0.1 * kg * m**2, name="slider")
@@ -46,9 +46,11 @@ class Mechanism:
             ub.Revolute(rod.end, slider.middle),
             rail,
         ]
-        spring = ub.Spring(30 * N / m, ub.Hardening(limit=3 * N, modulus=2 * N / m))
+        spring = ub.Spring(30 * N / m, ub.ElastoPlastic(yield_limit=3 * N, isotropic=2 * N / m))
         self.connectors = [
-            ub.Turn(base, crank.middle, ub.Actuator(lambda t: -4 * N * m * math.cos(5 * t / s))),
+            ub.Turn(
+                base, crank.middle, ub.PrescribedForce(lambda t: -4 * N * m * math.cos(5 * t / s))
+            ),
             ub.Slide(far, slider.middle, spring, axis=(cos, sin)),
             ub.Slide(far, slider.middle, ub.Damper(0.5 * N * s / m), axis=(cos, sin)),
             ub.Slide(far, slider.middle, ub.Coulomb(0.3 * N, coefficient=0.1, joint=rail)),
@@ -60,10 +62,14 @@ class Mechanism:
         if reverse:
             bodies, joints, connectors = bodies[::-1], joints[::-1], connectors[::-1]
         self.scene = ub.Scene(
-            [rod], joints, bodies=bodies, connectors=connectors, loads=[ub.Gravity(tuple(g))]
+            [rod], joints=joints, bodies=bodies, connectors=connectors, loads=[ub.Gravity(tuple(g))]
         )
         run = self.run = ub.simulate(
-            self.scene, ub.Midpoint(0.05), t=(0, STEPS * STEP * s), dt=STEP * s, progress=False
+            self.scene,
+            ub.EnergyMomentum(0.05),
+            t=(0, STEPS * STEP * s),
+            dt=STEP * s,
+            progress=False,
         )
         back = np.array([[cos, sin], [-sin, cos]]) / m
         self.motion = np.array([run.position(p) @ back.T for p in (rod.at(0.5), slider.middle)])

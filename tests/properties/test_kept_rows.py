@@ -11,8 +11,9 @@ SEEDS = range(24)
 STEPS, DT = 40, 0.02  # s
 
 SCHEMES = (
-    ub.Midpoint(), ub.Midpoint(0.1, 0.05), ub.Newmark(0.6, 0.36), ub.GeneralizedAlpha(0.5),
-    ub.Static(), ub.ExactStatic(),
+    ub.EnergyMomentum(), ub.EnergyMomentum(0.1, 0.05), ub.Newmark(0.6, 0.36),
+    ub.GeneralizedAlpha(0.5),
+    ub.Static(), ub.EnergyMomentumStatic(),
 )  # fmt: skip
 
 pytestmark = [pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning"), pytest.mark.serial]
@@ -31,14 +32,14 @@ def draw(seed):
     def law():
         return one(
             ub.Softening(some(0.5, 5.0), some(2.0, 20.0)),
-            ub.Hardening(some(0.5, 5.0), kinematic=some(1.0, 20.0)),
-            ub.Hardening(some(0.5, 5.0), modulus=some(1.0, 20.0)),
+            ub.ElastoPlastic(some(0.5, 5.0), kinematic=some(1.0, 20.0)),
+            ub.ElastoPlastic(some(0.5, 5.0), isotropic=some(1.0, 20.0)),
         )
 
     def spring():
         stiffness, limit = some(10.0, 100.0), some(0.2, 2.0)
         yielding, breaking = (
-            ub.Hardening(limit, some(1.0, 10.0)),
+            ub.ElastoPlastic(limit, some(1.0, 10.0)),
             ub.Softening(limit, some(1.0, 9.0)),
         )
         return one(
@@ -52,7 +53,7 @@ def draw(seed):
         end = (start[0] + some(0.5, 2.0), start[1] + some(-1.0, 1.0))
         of_material = one(
             {},
-            {"bending": ub.Hardening(some(5.0, 20.0), kinematic=20.0)},
+            {"bending": ub.ElastoPlastic(some(5.0, 20.0), kinematic=20.0)},
             {"hinge": ub.Softening(some(5.0, 20.0), 20.0)},
         )
         section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0, **of_material)
@@ -61,14 +62,14 @@ def draw(seed):
         beam = ub.Beam(start, end, section, cells=2 * int(random.integers(1, 4)), hinges=hinges)
         if beams:
             join = one(ub.Rigid, ub.Revolute)
-            joints.append(join(beams[-1].end, beam.start, measured=one(True, False)))
+            joints.append(join(beams[-1].end, beam.start, multipliers=one(True, False)))
             connectors.append(ub.Turn(beams[-1].end, beam.start, spring()))
         if random.random() < 0.6:
             ground = ub.ground(end[0], end[1] - 1.0)
             connectors.append(ub.Stretch(ground, beam.at(one(0.5, 1.0)), spring()))
         beams.append(beam)
         start = end
-    moving = ub.Prescribed(beams[-1].end, v=lambda t: 0.2 * np.sin(4.0 * t))
+    moving = ub.PrescribedDisplacement(beams[-1].end, v=lambda t: 0.2 * np.sin(4.0 * t))
     return ub.Scene(
         beams,
         joints=joints,

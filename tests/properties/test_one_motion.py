@@ -24,7 +24,7 @@ def moves(solution, *places):
 
 
 def run(scene, scheme=None, **more):
-    return ub.simulate(scene, scheme or ub.Midpoint(), progress=False, **more)
+    return ub.simulate(scene, scheme or ub.EnergyMomentum(), progress=False, **more)
 
 
 # -- places ----------------------------------------------------------------------------------------
@@ -44,11 +44,11 @@ def guided(x=0.0, unit=1.0):
         [beam],
         joints=[ub.Guided(beam.end, curve)],
         supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(0, 5 * unit), time=ub.ramp(0.1))],
+        loads=[ub.PointLoad(beam.end, force=(0, 5 * unit), amplitude=ub.ramp(0.1))],
     )
 
 
-@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1), ub.Static()], ids=str)
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1), ub.Static()], ids=str)
 @pytest.mark.parametrize(("x", "unit"), [(1e3, 1.0), (0.0, 1e3), (0.0, 1e-3)])
 def test_guides_anywhere_and_in_any_unit(scheme, x, unit):
     """Tangents of the curve keep their digits: here kilograms m / s² are forces times the unit."""
@@ -125,7 +125,7 @@ def test_searches_do_not_depend_on_units():
     for m, kg, s in ((1.0, 1.0, 1.0), (1e3, 1e-3, 1e3)):
         N = kg * m / s**2
         h = 0.2584 * m
-        yields = ub.Hardening(limit=40310.66 * N / m**2, kinematic=1256329.4 * N / m**2)
+        yields = ub.ElastoPlastic(yield_limit=40310.66 * N / m**2, kinematic=1256329.4 * N / m**2)
         section = ub.Section.circle(
             h, E=6925805.65 * N / m**2, nu=0.2, rho=6.05 * kg / m**3,
             fibres=ub.Fibres(yields, number=6),
@@ -133,7 +133,9 @@ def test_searches_do_not_depend_on_units():
         beam = ub.Beam((0, 0), (-3.1057 * m, -2.8265 * m), section, cells=3)
         x, y = beam.at(0.5).point
         body = ub.Body((x, y), mass=1.8934 * kg, inertia=1.14344 * kg * m**2)
-        spring = ub.Spring(258.4 * N / m, ub.Hardening(limit=10.256 * N, modulus=6.95 * N / m))
+        spring = ub.Spring(
+            258.4 * N / m, ub.ElastoPlastic(yield_limit=10.256 * N, isotropic=6.95 * N / m)
+        )
         ground = ub.ground(-3.9954 * m, -1.2374 * m)
         scene = ub.Scene(
             [beam],
@@ -150,7 +152,7 @@ def test_searches_do_not_depend_on_units():
                 ub.Gravity((1.936 * m / s**2, -9.062 * m / s**2)),
                 ub.FollowerLoad(
                     beam.start, force=(30.49 * N, 16.36 * N), moment=109.5 * N * m,
-                    time=ub.ramp(0.3209 * s),
+                    amplitude=ub.ramp(0.3209 * s),
                 ),
             ],
         )  # fmt: skip
@@ -187,9 +189,9 @@ def cracked_arc(seed, backwards=False, digits=None):
     strength = E * 10 ** random.uniform(-4, -2.8)
     softening = getattr(ub, str(random.choice(["Softening", "LinearSoftening"])))
     limit = number(strength) if random.random() < 0.5 else math.inf
-    law = ub.Hardening(limit=limit, modulus=number(E * 0.05))
+    law = ub.ElastoPlastic(yield_limit=limit, isotropic=number(E * 0.05))
     energy = strength * h * 10 ** random.uniform(-4, -1)
-    crack = softening(limit=number(strength * random.uniform(1, 2)), energy=number(energy))
+    crack = softening(limit=number(strength * random.uniform(1, 2)), fracture_energy=number(energy))
     section = ub.Section.rectangle(
         number(h), number(h), E=number(E), nu=0.2, rho=number(1000.0),
         fibres=ub.Fibres(law, number=6, softening=crack),
@@ -215,11 +217,11 @@ def cracked_arc(seed, backwards=False, digits=None):
     pull = random.normal(size=2) * force * 10 ** random.uniform(0.5, 1.5)
     place = at(random.choice([0.5, 1.0, 0.25]))
     load = ub.PointLoad(
-        place, force=(number(pull[0]), number(pull[1])), time=lambda t: math.sin(ω * t)
+        place, force=(number(pull[0]), number(pull[1])), amplitude=lambda t: math.sin(ω * t)
     )
     supports = [ub.Clamped(at(0.0))] + ([ub.Pinned(at(1.0))] if random.random() < 0.5 else [])
     scene = ub.Scene([beam], supports=supports, loads=[load], connectors=[slide])
-    schemes = [ub.Midpoint(), ub.Midpoint(0.05, 0.05), ub.DecayingMidpoint()]
+    schemes = [ub.EnergyMomentum(), ub.EnergyMomentum(0.05, 0.05), ub.EnergyMomentumDecaying()]
     scheme = schemes[int(random.integers(0, 3))]
     dt = T * 10 ** random.uniform(-2.5, -1)
     solution = run(scene, scheme, t=(0, 60 * dt), dt=dt)
@@ -246,9 +248,9 @@ def test_attempts_leave_no_trace():
     body = ub.Body((1, 0), mass=1.0, inertia=1.0)
     rail = ub.Prismatic(ub.ground(0, 0), body.middle)
     rub = ub.Slide(ub.ground(0, 0), body.middle, ub.Coulomb(1.0))
-    push = ub.PointLoad(body.middle, force=(5.0, 0), time=ub.ramp(1.0))
+    push = ub.PointLoad(body.middle, force=(5.0, 0), amplitude=ub.ramp(1.0))
     scene = ub.Scene(bodies=[body], joints=[rail], connectors=[rub], loads=[push])
-    simulation = ub.Simulation(scene, ub.Midpoint())
+    simulation = ub.Simulation(scene, ub.EnergyMomentum())
     friction = simulation.couplings[[c.links == [rub] for c in simulation.couplings].index(True)]
     before = friction.response.state()
     assert simulation.attempt(1.0).q1.any()  # it slips

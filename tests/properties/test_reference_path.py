@@ -181,7 +181,7 @@ def dense(A):
 
 
 @pytest.mark.parametrize(
-    "scheme", [ub.Midpoint(0.1), ub.DecayingMidpoint(), ub.GeneralizedAlpha(0.6)]
+    "scheme", [ub.EnergyMomentum(0.1), ub.EnergyMomentumDecaying(), ub.GeneralizedAlpha(0.6)]
 )
 @pytest.mark.parametrize("first", [False, True])
 def test_a_run_begins_where_another_one_ends(scheme, first):
@@ -208,10 +208,12 @@ def test_a_guided_run_begins_where_another_one_ends(first):
     scene = ub.Scene([beam], joints=[guide], supports=supports, loads=[push])
     newton = {one: ub.Newton(rtol=1e-12, reference=one) for one in (False, True)}
     options = {"dt": 5e-3, "progress": False}
-    begun = ub.simulate(scene, ub.Midpoint(), t=(0, 0.2), newton=newton[first], **options)
+    begun = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), newton=newton[first], **options)
     assert begun.internal["guides, 6"][0, 3] > 0.1  # rad along the circle
     one, other = (
-        ub.simulate(scene, ub.Midpoint(), t=(0.2, 0.25), newton=newton[by], start=begun, **options)
+        ub.simulate(
+            scene, ub.EnergyMomentum(), t=(0.2, 0.25), newton=newton[by], start=begun, **options
+        )
         for by in (False, True)
     )
     assert max(differences(one, other).values()) < SAME
@@ -223,11 +225,13 @@ def test_what_it_does_not_compute():
     scene, newton = yielding(), ub.Newton(reference=True)
     times = {"t": (0, 0.1), "newton": newton, "progress": False}
     calls = {
-        "adaptive steps": lambda: ub.simulate(scene, ub.Midpoint(), dt=ub.Adaptive(1e-3), **times),
-        "recorders": lambda: ub.simulate(
-            scene, ub.Midpoint(), dt=0.01, record=ub.Extremes(), **times
+        "adaptive steps": lambda: ub.simulate(
+            scene, ub.EnergyMomentum(), dt=ub.Adaptive(1e-3), **times
         ),
-        "Simulation": lambda: ub.Simulation(scene, ub.Midpoint(), newton=newton),
+        "recorders": lambda: ub.simulate(
+            scene, ub.EnergyMomentum(), dt=0.01, record=ub.Extremes(), **times
+        ),
+        "Simulation": lambda: ub.Simulation(scene, ub.EnergyMomentum(), newton=newton),
         "follow": lambda: ub.follow(scene, ub.LoadControl(0.1), steps=1, newton=newton),
     }
     for what, call in calls.items():
@@ -237,9 +241,9 @@ def test_what_it_does_not_compute():
 
 def test_a_step_without_equilibrium():
     """The solution so far comes with the error, as that of a run does."""
-    section = ub.Section(EA=1e6, GA=4e5, EI=800.0, hinge=ub.Softening(40.0, energy=15.0))
+    section = ub.Section(EA=1e6, GA=4e5, EI=800.0, hinge=ub.Softening(40.0, fracture_energy=15.0))
     beam = ub.Beam((0, 0), (0, 1), section, cells=3)
-    push = ub.PointLoad(beam.end, force=(100.0, 0.0), time=lambda t: t)
+    push = ub.PointLoad(beam.end, force=(100.0, 0.0), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
     newton = ub.Newton(reference=True)
     with pytest.raises(ub.ConvergenceError, match="no equilibrium after t = 0") as failure:
@@ -335,33 +339,36 @@ MISTAKES = [
 def yielding():
     """A frame with fibres that crack, a hinge in cells, one of zero length, springs and a motor."""
     fibres = ub.Fibres(
-        ub.Hardening(2e5, modulus=1e7), number=4, softening=ub.Softening(2.5e5, energy=40.0)
+        ub.ElastoPlastic(2e5, isotropic=1e7),
+        number=4,
+        softening=ub.Softening(2.5e5, fracture_energy=40.0),
     )
     cracking = ub.Section.rectangle(0.1, 0.1, E=1e8, nu=0.2, rho=1e3, fibres=fibres)
     both = ub.Section(
-        EA=1e6, GA=4e5, EI=800.0, rhoA=10.0, rhoI=0.01, bending=ub.Hardening(30.0, modulus=80.0),
-        hinge=ub.Softening(40.0, energy=15.0),
+        EA=1e6, GA=4e5, EI=800.0, rhoA=10.0, rhoI=0.01,
+        bending=ub.ElastoPlastic(30.0, isotropic=80.0),
+        hinge=ub.Softening(40.0, fracture_energy=15.0),
     )  # fmt: skip
     left = ub.Beam((0, 0), (0, 1), cracking, cells=3)
     roof = ub.Beam((0, 1), (1, 1.2), both, cells=3)
     right = ub.Beam(
         (1, 1.2), (1.3, 0), ub.Section(EA=1e6, GA=4e5, EI=800.0, rhoA=10.0, rhoI=0.01), cells=2,
-        hinges={0.5: ub.Softening(20.0, energy=5.0)},
+        hinges={0.5: ub.Softening(20.0, fracture_energy=5.0)},
     )  # fmt: skip
-    spring = ub.Spring(3e3, law=ub.Hardening(40.0, modulus=100.0))
+    spring = ub.Spring(3e3, law=ub.ElastoPlastic(40.0, isotropic=100.0))
     return ub.Scene(
         [left, roof, right],
         joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
         connectors=[ub.Stretch(left.start, roof.end, spring)],
-        loads=[ub.PointLoad(roof.at(1 / 3), force=(900.0, -700.0), time=ub.ramp(0.1))],
+        loads=[ub.PointLoad(roof.at(1 / 3), force=(900.0, -700.0), amplitude=ub.ramp(0.1))],
     )
 
 
 @pytest.fixture(scope="module")
 def case():
     """The scene with everything that yields."""
-    return yielding(), ub.Midpoint(0.1), (0, 0.12), 2e-3, None
+    return yielding(), ub.EnergyMomentum(0.1), (0, 0.12), 2e-3, None
 
 
 @pytest.fixture(scope="module")

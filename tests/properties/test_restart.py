@@ -21,13 +21,13 @@ import ufl_beam as ub
 SCRIPT = Path(__file__).with_name("restarted.py")
 
 RUNS = {
-    "midpoint": (machine, ub.Midpoint(0.05, 0.02), 0.2, 0.005),
-    "adaptive": (machine, ub.Midpoint(0.05, 0.02), 0.1, ub.Adaptive(1e-4)),
-    "decaying": (bend, ub.DecayingMidpoint(), 5.0, 0.1),
+    "midpoint": (machine, ub.EnergyMomentum(0.05, 0.02), 0.2, 0.005),
+    "adaptive": (machine, ub.EnergyMomentum(0.05, 0.02), 0.1, ub.Adaptive(1e-4)),
+    "decaying": (bend, ub.EnergyMomentumDecaying(), 5.0, 0.1),
     "Newmark": (bend, ub.Newmark(0.6, 0.35), 5.0, 0.1),
     "generalised-alpha": (bend, ub.GeneralizedAlpha(), 5.0, 0.1),
     "static": (bend, ub.Static(), 5.0, 0.1),
-    "exact static": (bend, ub.ExactStatic(), 5.0, 0.1),
+    "exact static": (bend, ub.EnergyMomentumStatic(), 5.0, 0.1),
 }
 
 
@@ -138,7 +138,7 @@ def test_a_later_end_goes_on(shared_path):
     scene, path = machine(), shared_path / "run.checkpoint"
 
     def until(end, **more):
-        scheme = ub.Midpoint(0.05)
+        scheme = ub.EnergyMomentum(0.05)
         return ub.simulate(machine(), scheme, t=(0, end), dt=0.005, progress=False, **more)
 
     checkpoint = ub.Checkpoint(path, every=100)

@@ -68,7 +68,7 @@ def portal(stiffness=1e4, height=2.0, cells=4, hinge=None):
         supports=[ub.Clamped(left.start), ub.Pinned(roof.end)],
         loads=[ub.PointLoad(roof.at(0.5), force=(3.0, -20.0))],
     )
-    return ub.Simulation(scene, ub.Midpoint(), comm=MPI.COMM_SELF)
+    return ub.Simulation(scene, ub.EnergyMomentum(), comm=MPI.COMM_SELF)
 
 
 def test_the_pattern_is_shared_by_scenes_of_one_structure():
@@ -80,7 +80,9 @@ def test_the_pattern_is_shared_by_scenes_of_one_structure():
 
 
 @pytest.mark.parametrize(
-    "change", [{"cells": 5}, {"hinge": {0.0: ub.Softening(limit=50.0, energy=10.0)}}], ids=repr
+    "change",
+    [{"cells": 5}, {"hinge": {0.0: ub.Softening(limit=50.0, fracture_energy=10.0)}}],
+    ids=repr,
 )
 def test_another_structure_has_another_pattern(change):
     one, other = portal(), portal(**change)
@@ -89,7 +91,7 @@ def test_another_structure_has_another_pattern(change):
 
 
 def test_simulations_of_one_structure_do_not_disturb_each_other():
-    law = ub.Softening(limit=50.0, energy=10.0)
+    law = ub.Softening(limit=50.0, fracture_energy=10.0)
     numbers = [{"stiffness": 1e4}, {"stiffness": 3e4, "height": 1.5}]
     alone = []
     for number in numbers:

@@ -33,7 +33,7 @@ FUNCTIONS = {
 def scene_of(time):
     section = ub.Section(EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=1e-3)
     beam = ub.Beam((0, 0), (1, 0), section, cells=2)
-    push = ub.PointLoad(beam.end, force=(0, 10.0), time=time)
+    push = ub.PointLoad(beam.end, force=(0, 10.0), amplitude=time)
     return beam.end, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
 
 
@@ -45,7 +45,7 @@ def simulated(time, scheme, **more):
 
 def stepped(time):
     end, scene = scene_of(time)
-    simulation = ub.Simulation(scene, ub.Midpoint())
+    simulation = ub.Simulation(scene, ub.EnergyMomentum())
     try:
         for i in range(10):
             simulation.step_to((i + 1) / 10)
@@ -65,10 +65,10 @@ def followed(time):
 
 
 RUNS = {
-    "equal steps": lambda f: simulated(f, ub.Midpoint(), dt=0.1),
+    "equal steps": lambda f: simulated(f, ub.EnergyMomentum(), dt=0.1),
     "static": lambda f: simulated(f, ub.Static(), dt=0.1),
-    "adaptive": lambda f: simulated(f, ub.Midpoint(), dt=ub.Adaptive(1e-2)),
-    "recorded": lambda f: simulated(f, ub.Midpoint(), dt=0.1, record=ub.History(sys.argv[1])),
+    "adaptive": lambda f: simulated(f, ub.EnergyMomentum(), dt=ub.Adaptive(1e-2)),
+    "recorded": lambda f: simulated(f, ub.EnergyMomentum(), dt=0.1, record=ub.History(sys.argv[1])),
     "stepped": stepped,
     "followed": followed,
 }
@@ -84,5 +84,5 @@ for (function, make), (name, run) in itertools.product(FUNCTIONS.items(), RUNS.i
 if RANK == 0:
     # On its own a process may do what it likes
     end, scene = scene_of(lambda t: 1.0)
-    ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.1, comm=MPI.COMM_SELF)
+    ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, comm=MPI.COMM_SELF)
     print("end", flush=True)

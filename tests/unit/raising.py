@@ -78,11 +78,11 @@ def failure(rank, make):
 
 def run(scene, **more):
     more = {"t": (0, 0.05), "dt": 0.01, "progress": False, **more}
-    return ub.simulate(scene, more.pop("scheme", ub.Midpoint()), **more)
+    return ub.simulate(scene, more.pop("scheme", ub.EnergyMomentum()), **more)
 
 
 def scene(time=lambda t: 1.0, **more):
-    more.setdefault("loads", [ub.PointLoad(BEAM.end, force=(0, -1.0), time=time)])
+    more.setdefault("loads", [ub.PointLoad(BEAM.end, force=(0, -1.0), amplitude=time)])
     more.setdefault("supports", [ub.Clamped(BEAM.start)])
     return ub.Scene([BEAM], **more)
 
@@ -100,15 +100,15 @@ def load_in_statics(fail):
 
 
 def follower(fail):
-    run(scene(loads=[ub.FollowerLoad(BEAM.end, force=(0, 1.0), time=late(fail))]))
+    run(scene(loads=[ub.FollowerLoad(BEAM.end, force=(0, 1.0), amplitude=late(fail))]))
 
 
 def gravity(fail):
-    run(scene(loads=[ub.Gravity(time=late(fail))]), dt=ub.Adaptive(1e-3))
+    run(scene(loads=[ub.Gravity(amplitude=late(fail))]), dt=ub.Adaptive(1e-3))
 
 
 def prescribed(fail):
-    run(scene(supports=[ub.Clamped(BEAM.start), ub.Prescribed(BEAM.end, v=late(fail))]))
+    run(scene(supports=[ub.Clamped(BEAM.start), ub.PrescribedDisplacement(BEAM.end, v=late(fail))]))
 
 
 def connected(law):
@@ -116,11 +116,11 @@ def connected(law):
 
 
 def motor(fail):
-    connected(ub.Motor(late(fail)))
+    connected(ub.PrescribedMotion(late(fail)))
 
 
 def actuator(fail):
-    connected(ub.Actuator(late(fail)))
+    connected(ub.PrescribedForce(late(fail)))
 
 
 def controller(fail):
@@ -171,7 +171,7 @@ def checkpoint(fail):
 
 
 def path(fail):
-    moves = ub.Prescribed(BEAM.end, v=lambda t: fail() if t > 0.3 else 0.1 * t)
+    moves = ub.PrescribedDisplacement(BEAM.end, v=lambda t: fail() if t > 0.3 else 0.1 * t)
     ub.follow(scene(loads=[], supports=[ub.Clamped(BEAM.start), moves]), ub.LoadControl(0.1))
 
 
@@ -205,14 +205,14 @@ def together():
 
     for case in EVERYWHERE:
         for rank in (ALL, 0, 1):
-            ub.say(case.__name__, rank, outcomes(case, rank, user), sep="|")
+            ub.print_once(case.__name__, rank, outcomes(case, rank, user), sep="|")
     for case in SOMEWHERE:
-        ub.say(case.__name__, ALL, outcomes(case, ALL, user), sep="|")
+        ub.print_once(case.__name__, ALL, outcomes(case, ALL, user), sep="|")
     for kind in (KeyboardInterrupt, lambda: Unportable(7, "number"), lambda: SystemExit("exit")):
-        ub.say("kind", 1, outcomes(load, 1, kind), sep="|")
+        ub.print_once("kind", 1, outcomes(load, 1, kind), sep="|")
     for rank in (ALL, 0, 1):
-        ub.say("nan", rank, nothing_but_numbers(rank), sep="|")
-    ub.say("end")
+        ub.print_once("nan", rank, nothing_but_numbers(rank), sep="|")
+    ub.print_once("end")
 
 
 # -- where the processes cannot agree --------------------------------------------------------------

@@ -43,8 +43,8 @@ def test_a_place_says_where_it_is():
 
 def test_arc():
     beam = ub.Beam.arc((1, 1), 2.0, (0, math.pi / 2), SECTION, cells=3)
-    assert beam.a == pytest.approx((3, 1))
-    assert beam.b == pytest.approx((1, 3))
+    assert beam.ends[0] == pytest.approx((3, 1))
+    assert beam.ends[1] == pytest.approx((1, 3))
     half = 1 + 2 / math.sqrt(2)
     assert beam.at(0.5).point == pytest.approx((half, half))
 
@@ -72,7 +72,7 @@ def test_polyline_goes_by_length():
 
 def bent(beam):
     """End of a beam whose plastic hinge in the middle yields."""
-    push = ub.PointLoad(beam.end, force=(0, -3.0), time=lambda t: t)
+    push = ub.PointLoad(beam.end, force=(0, -3.0), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
     return solution.displacement(beam.end), solution.connector(scene.hinges[0]).motion
@@ -91,7 +91,7 @@ def bent(beam):
 )  # fmt: skip
 def test_hinges_of_curved_beams(make):
     """Their places are parameters along the whole beam; each of these beams is straight."""
-    hinges = {0.5: ub.Hardening(limit=1.0, modulus=100.0)}
+    hinges = {0.5: ub.ElastoPlastic(yield_limit=1.0, isotropic=100.0)}
     beam = make(cells=4, hinges=hinges)
     assert [place.s for place in beam.hinge_laws] == [0.5]
     end, jump = bent(beam)
@@ -105,7 +105,7 @@ def test_hinges_of_curved_beams(make):
 
 def test_hinges_of_curved_beams_are_checked():
     with pytest.raises(ub.SceneError, match=r"hinge at s = 2 must lie between 0 and 1"):
-        ub.Beam.arc((0, 0), 1.0, (0, 1), SECTION, hinges={2.0: ub.Hardening(1.0)})
+        ub.Beam.arc((0, 0), 1.0, (0, 1), SECTION, hinges={2.0: ub.ElastoPlastic(1.0)})
 
 
 def test_corners_are_vertices():
@@ -119,7 +119,7 @@ def test_corners_are_vertices():
 
 def test_any_curve():
     beam = ub.Beam.along(lambda s: (2 * s, s**2), SECTION, cells=4)
-    assert (beam.a, beam.b) == ((0, 0), (2, 1))
+    assert beam.ends == ((0, 0), (2, 1))
     assert Grid(ub.Scene([beam])).points[:, 1] == pytest.approx([0, 1 / 16, 1 / 4, 9 / 16, 1])
 
 

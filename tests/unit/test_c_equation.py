@@ -18,14 +18,14 @@ def elastic():
     beam = ub.Beam((0, 0), (4, 3), SECTION, cells=6)
     loads = [
         ub.PointLoad(beam.end, force=(3.0, 5.0)),
-        ub.FollowerLoad(beam.at(0.5), force=(0.0, 2.0), time=lambda t: t),
+        ub.FollowerLoad(beam.at(0.5), force=(0.0, 2.0), amplitude=lambda t: t),
     ]
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads)
 
 
 def inelastic():
-    hinge = {1.0: ub.Softening(limit=30.0, energy=5.0)}
-    law = ub.Hardening(limit=20.0, modulus=5.0, kinematic=3.0)
+    hinge = {1.0: ub.Softening(limit=30.0, fracture_energy=5.0)}
+    law = ub.ElastoPlastic(yield_limit=20.0, isotropic=5.0, kinematic=3.0)
     soft = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0, bending=law)
     left = ub.Beam((0, 0), (0, 3), soft, cells=4)
     roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4, hinges=hinge)
@@ -33,7 +33,7 @@ def inelastic():
         [left, roof],
         joints=[ub.Rigid(left.end, roof.start)],
         supports=[ub.Clamped(left.start), ub.Pinned(roof.end)],
-        loads=[ub.PointLoad(left.end, force=(40.0, -10.0), time=lambda t: min(t, 0.2))],
+        loads=[ub.PointLoad(left.end, force=(40.0, -10.0), amplitude=lambda t: min(t, 0.2))],
         damping=[ub.Rayleigh(mass=0.1, stiffness=1e-3)],
     )
 
@@ -43,7 +43,7 @@ def machine():
     crank = ub.Beam((0, 0), (1, 0), SECTION, cells=3)
     rod = ub.Beam((1, 0), (3, 0), SECTION, cells=4)
     ground = ub.ground(3.0, 0.5)
-    spring = ub.Spring(50.0, law=ub.Hardening(limit=5.0, kinematic=2.0))
+    spring = ub.Spring(50.0, law=ub.ElastoPlastic(yield_limit=5.0, kinematic=2.0))
     return ub.Scene(
         [crank, rod],
         joints=[ub.Revolute(crank.end, rod.start), ub.Guided(rod.end, lambda s: (3.0 + s, 0.0))],
@@ -58,7 +58,12 @@ def machine():
 
 def run(scene, newton=None, scheme=None, steps=20):
     return ub.simulate(
-        scene, scheme or ub.Midpoint(), t=(0, 0.02 * steps), dt=0.02, newton=newton, progress=False
+        scene,
+        scheme or ub.EnergyMomentum(),
+        t=(0, 0.02 * steps),
+        dt=0.02,
+        newton=newton,
+        progress=False,
     )
 
 
@@ -123,7 +128,7 @@ def test_an_interrupt_at_the_door_of_a_callback_is_not_lost(name):
             sys.settrace(None)
             raise KeyboardInterrupt
 
-    simulation, whole = (ub.Simulation(machine(), ub.Midpoint()) for _ in range(2))
+    simulation, whole = (ub.Simulation(machine(), ub.EnergyMomentum()) for _ in range(2))
     simulation.step_to(0.02)
     before = sys.gettrace()
     sys.settrace(interrupt)

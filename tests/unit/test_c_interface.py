@@ -26,7 +26,7 @@ from ufl_beam.terms import connector_laws
 pytestmark = pytest.mark.serial  # nothing here depends on the number of processes
 
 
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, bending=ub.Hardening(1.0))
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, bending=ub.ElastoPlastic(1.0))
 
 
 def test_inputs_of_points_are_where_c_has_them():
@@ -85,7 +85,7 @@ def simulation():
     # Joints with multipliers, more than fit into one front: KLU factors what the chains leave.
     places = [beam.at(s) for s in (0.25, 0.5, 0.75, 1.0)]
     braces = [ub.Beam((p.point[0], 0), p.point, section, cells=2) for p in places]
-    pins = [ub.Revolute(p, b.end, measured=True) for p, b in zip(places, braces, strict=True)]
+    pins = [ub.Revolute(p, b.end, multipliers=True) for p, b in zip(places, braces, strict=True)]
     clamps = [ub.Clamped(one.start) for one in (beam, *braces)]
     scene = ub.Scene([beam, *braces], joints=pins, supports=clamps, loads=loads)
     return ub.Simulation(scene, ub.Static())

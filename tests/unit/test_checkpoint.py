@@ -30,14 +30,14 @@ STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}
 def scene(EI=100.0, time=lambda t: math.sin(3 * t), x=1.0, **more):
     section = ub.Section(**{**STEEL, "EI": EI})
     beam = ub.Beam((0, 0), (x, 0), section, cells=2, name="left")
-    load = ub.PointLoad(beam.end, force=(0, -3), time=time)
+    load = ub.PointLoad(beam.end, force=(0, -3), amplitude=time)
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
 
 
 def run(path, frame=None, scheme=None, *, every=2, also=(), t=(0, 0.5), dt=0.1, **more):
     return ub.simulate(
         scene() if frame is None else frame,
-        ub.Midpoint() if scheme is None else scheme,
+        ub.EnergyMomentum() if scheme is None else scheme,
         t=t,
         dt=dt,
         checkpoint=ub.Checkpoint(path, every=every, also=also),
@@ -70,7 +70,7 @@ def test_bad_choices(arguments, message):
 
 def test_a_name_is_no_checkpoint(path):
     with pytest.raises(ub.SceneError, match="checkpoint = 'x' is not a Checkpoint"):
-        ub.simulate(scene(), ub.Midpoint(), t=(0, 1), dt=0.1, checkpoint="x")
+        ub.simulate(scene(), ub.EnergyMomentum(), t=(0, 1), dt=0.1, checkpoint="x")
     with pytest.raises(ub.SceneError, match="there is no directory"):
         run(path.parent / "nowhere" / "x")
 
@@ -79,14 +79,20 @@ STEADY = ub.Table((0, 1), (0, 1))
 OTHERS = {
     "section": ({"frame": scene(EI=200.0)}, r"'left'\.section\.EI is 200\.0, in the file 100\.0"),
     "place": ({"frame": scene(x=2.0)}, r"scene.beams\[0\] 'left'.* is 2.0, in the file 1.0"),
-    "function": ({"frame": scene(time=lambda t: math.cos(3 * t))}, r"loads\[0\].time has changed"),
-    "table": ({"frame": scene(time=STEADY)}, r"loads\[0\].time is Table, in the file function"),
+    "function": (
+        {"frame": scene(time=lambda t: math.cos(3 * t))},
+        r"loads\[0\].amplitude has changed",
+    ),
+    "table": (
+        {"frame": scene(time=STEADY)},
+        r"loads\[0\].amplitude is Table, in the file function",
+    ),
     "mass": (
         {"frame": scene(bodies=[ub.Body((3, 0), mass=1.0, inertia=1.0)])},
         "scene.bodies is 1 in a row, in the file 0 in a row",
     ),
-    "scheme": ({"scheme": ub.Midpoint(0.1)}, "scheme.alpha is 0.1, in the file 0.0"),
-    "statics": ({"scheme": ub.Static()}, "scheme is Static, in the file Midpoint"),
+    "scheme": ({"scheme": ub.EnergyMomentum(0.1)}, "scheme.alpha is 0.1, in the file 0.0"),
+    "statics": ({"scheme": ub.Static()}, "scheme is Static, in the file EnergyMomentum"),
     "dt": ({"dt": 0.05}, "dt is 0.05, in the file 0.1"),
     "adaptive": ({"dt": ub.Adaptive(1e-3)}, "t.1. is 0.5, in the file any|dt is Adaptive"),
     "beginning": ({"t": (0.1, 0.6)}, r"t\[0\] is 0.1, in the file 0.0"),
@@ -218,7 +224,7 @@ def scene_with(frame, *connectors):
 
 
 def test_what_a_controller_remembers_goes_on(path):
-    whole = ub.simulate(steered(Telling()), ub.Midpoint(), t=(0, 1), dt=0.1, progress=False)
+    whole = ub.simulate(steered(Telling()), ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False)
     run(path, steered(Telling()), t=(0, 0.5))
     force = Telling()
     longer = run(path, steered(force), t=(0, 1))
@@ -315,7 +321,7 @@ def test_a_history_that_is_gone(path, on_first_rank):
 def test_by_the_clock(path, on_first_rank):
     """Each step takes longer than no minutes."""
     ub.simulate(
-        scene(), ub.Midpoint(), t=(0, 0.5), dt=0.1, progress=False,
+        scene(), ub.EnergyMomentum(), t=(0, 0.5), dt=0.1, progress=False,
         checkpoint=ub.Checkpoint(path, minutes=0.0), record=Stop(path, 3),
     )  # fmt: skip
     assert on_first_rank(lambda: len(read(path)["history/q"])) == 6
@@ -389,7 +395,7 @@ def test_arrays_and_dicts():
 
 
 def test_a_state_is_that_of_all_processes():
-    simulation = ub.Simulation(scene(), ub.Midpoint())
+    simulation = ub.Simulation(scene(), ub.EnergyMomentum())
     share, grid = simulation.share, simulation.grid
     memory = Memory(share)
     memory.at_dofs("dofs", share.dofs.astype(float))
@@ -414,7 +420,7 @@ def test_a_state_is_that_of_all_processes():
 
 
 def test_signs_of_zeros_are_kept():
-    simulation = ub.Simulation(scene(), ub.Midpoint())
+    simulation = ub.Simulation(scene(), ub.EnergyMomentum())
     memory = Memory(simulation.share)
     memory.total("zero", -0.0)
     assert math.copysign(1.0, memory.state()["zero"][0]) == -1.0
@@ -424,7 +430,7 @@ def test_signs_of_zeros_are_kept():
 def test_the_last_step_of_cells_that_the_first_process_does_not_have():
     """Second differences are those of elastic cells, here the last ones of the scene."""
     numbers = {"EA": 1e4, "GA": 4e3, "EI": 10.0, "rhoA": 1.0, "rhoI": 0.01}
-    yielding = ub.Section(**numbers, bending=ub.Hardening(50.0))
+    yielding = ub.Section(**numbers, bending=ub.ElastoPlastic(50.0))
     first = ub.Beam((0, 0), (1, 0), yielding, cells=4)
     last = ub.Beam((1, 0), (2, 0), ub.Section(**numbers), cells=4)
     scene = ub.Scene(
@@ -433,7 +439,7 @@ def test_the_last_step_of_cells_that_the_first_process_does_not_have():
         supports=[ub.Clamped(first.start)],
         loads=[ub.PointLoad(last.end, force=(0, -5.0))],
     )
-    runs = [ub.Simulation(scene, ub.DecayingMidpoint()) for _ in range(2)]
+    runs = [ub.Simulation(scene, ub.EnergyMomentumDecaying()) for _ in range(2)]
     for n in range(1, 6):
         runs[0].step_to(0.01 * n)
     memory = Memory(runs[0].share)

@@ -24,7 +24,7 @@ def test_no_subclass_is_ignored(kind):
 
 
 @dataclass(frozen=True)
-class Saturating(ub.Hardening):
+class Saturating(ub.ElastoPlastic):
     """Hardening by a number of its own; linear, so that its stress is known."""
 
     more: float = 0.0
@@ -32,7 +32,7 @@ class Saturating(ub.Hardening):
     def increments(self, strain, state, dt):
         f = ub.law_functions
         trial = self.stress(strain, state)
-        over = f.positive(f.absolute(trial) - self.limit - self.more * state.accumulated)
+        over = f.positive(f.absolute(trial) - self.yield_limit - self.more * state.accumulated)
         γ = over / (self.C + self.more)
         return {"plastic": f.sign(trial) * γ, "accumulated": γ}
 
@@ -46,7 +46,7 @@ def test_a_subclass_of_hardening_is_followed(more, reference):
     """[closed] A bar of EA = 1000 beyond its limit of 1 has the slope EA H/(EA + H)."""
     section = ub.Section(EA=1e3, GA=1e3, EI=1.0, axial=Saturating(1.0, more=more))
     beam = ub.Beam((0, 0), (1, 0), section, cells=2)
-    pull = ub.Prescribed(beam.end, u=lambda t: 0.01 * t, v=0.0, psi=0.0)
+    pull = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.01 * t, v=0.0, psi=0.0)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
     newton = ub.Newton(reference=reference)
     run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, newton=newton, progress=False)
@@ -63,6 +63,8 @@ def test_a_subclass_of_hardening_is_followed(more, reference):
     ids=["hinge", "connector"],
 )
 def test_a_hinge_of_zero_length_refuses_it(make):
-    """Its equations are those of Hardening."""
-    with pytest.raises(ub.SceneError, match="Saturating is a subclass of Hardening, and a hinge"):
+    """Its equations are those of ElastoPlastic."""
+    with pytest.raises(
+        ub.SceneError, match="Saturating is a subclass of ElastoPlastic, and a hinge"
+    ):
         make(Saturating(1.0, more=1.0))

@@ -67,7 +67,9 @@ def everything():
 # -- one rule per form -------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(), ub.Midpoint(0.1, 0.1)], ids=str)
+@pytest.mark.parametrize(
+    "scheme", [ub.Static(), ub.EnergyMomentum(), ub.EnergyMomentum(0.1, 0.1)], ids=str
+)
 def test_forms_have_one_quadrature_rule(compiled, scheme):
     solution = ub.simulate(everything(), scheme, t=(0, 0.1), dt=0.1)
     solution.section_forces(solution.scene.beams[0])
@@ -125,7 +127,7 @@ def test_statics_has_no_inertia(compiled):
 
 
 def test_dynamics_adds_the_mass_and_nothing_else(compiled):
-    simulation = ub.Simulation(make(), ub.Midpoint())
+    simulation = ub.Simulation(make(), ub.EnergyMomentum())
     assert names_of(simulation) == ["ElasticBeams", "Inertia"]
     assert len(compiled) == 4
     assert [name for group in simulation.entries() for name in group] == ["stored", "kinetic"]
@@ -134,10 +136,10 @@ def test_dynamics_adds_the_mass_and_nothing_else(compiled):
 @pytest.mark.parametrize(
     ("scheme", "forms", "lost"),
     [
-        (ub.Midpoint(), 4, []),
-        (ub.Midpoint(alpha=0.1), 5, ["numerical"]),
-        (ub.Midpoint(beta=0.1), 4, ["numerical"]),  # the matrix tells what is lost
-        (ub.Midpoint(0.1, 0.1), 5, ["numerical"]),
+        (ub.EnergyMomentum(), 4, []),
+        (ub.EnergyMomentum(alpha=0.1), 5, ["numerical"]),
+        (ub.EnergyMomentum(beta=0.1), 4, ["numerical"]),  # the matrix tells what is lost
+        (ub.EnergyMomentum(0.1, 0.1), 5, ["numerical"]),
     ],
     ids=str,
 )
@@ -148,17 +150,17 @@ def test_numerical_loss_only_where_there_is_some(compiled, scheme, forms, lost):
 
 
 def test_no_load_no_term_and_no_entry(compiled):
-    simulation = ub.Simulation(make(), ub.Midpoint())
+    simulation = ub.Simulation(make(), ub.EnergyMomentum())
     assert simulation.loads == []
     assert list(simulation.ledger.supplied) == []
 
 
 def test_follower_loads_only_where_there_are_some(compiled):
-    dead = ub.Simulation(make(loads=[ub.Gravity()]), ub.Midpoint())
+    dead = ub.Simulation(make(loads=[ub.Gravity()]), ub.EnergyMomentum())
     beam = dead.scene.beams[0]
     follower = [ub.FollowerLoad(beam.end, force=(1, 0))]
-    both = ub.Simulation(ub.Scene([beam], loads=[ub.Gravity(), *follower]), ub.Midpoint())
-    alone = ub.Simulation(ub.Scene([beam], loads=follower), ub.Midpoint())
+    both = ub.Simulation(ub.Scene([beam], loads=[ub.Gravity(), *follower]), ub.EnergyMomentum())
+    alone = ub.Simulation(ub.Scene([beam], loads=follower), ub.EnergyMomentum())
     assert names_of(dead) == ["ElasticBeams", "DeadLoads", "Inertia"]
     assert names_of(both) == ["ElasticBeams", "DeadLoads", "FollowerLoads", "Inertia"]
     assert names_of(alone) == ["ElasticBeams", "FollowerLoads", "Inertia"]
@@ -167,10 +169,10 @@ def test_follower_loads_only_where_there_are_some(compiled):
 
 def test_supports_that_stand_still_do_no_work():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    still = [ub.Clamped(beam.start), ub.Prescribed(beam.end, u=0, v=0.0)]
-    moving = [ub.Clamped(beam.start), ub.Prescribed(beam.end, u=lambda t: 0.1 * t)]
+    still = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, u=0, v=0.0)]
+    moving = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, u=lambda t: 0.1 * t)]
     entries = [
-        list(ub.Simulation(ub.Scene([beam], supports=s), ub.Midpoint()).ledger.supplied)
+        list(ub.Simulation(ub.Scene([beam], supports=s), ub.EnergyMomentum()).ledger.supplied)
         for s in (still, moving)
     ]
     assert entries == [[], ["supports"]]
@@ -181,7 +183,7 @@ def test_turned_axes_only_at_inclined_rollers():
     count = [
         ub.Simulation(
             ub.Scene([beam], supports=[ub.Roller(beam.end, along=along)]),
-            ub.Midpoint(),
+            ub.EnergyMomentum(),
             comm=MPI.COMM_SELF,
         ).equation.c.turned
         for along in ((1, 0), (0, 1), (1, 1))
@@ -192,7 +194,7 @@ def test_turned_axes_only_at_inclined_rollers():
 def test_section_forces_are_compiled_when_asked_for(compiled):
     """Where processes share a scene, they add up forces of cells when states are kept."""
     scene = make()
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1, comm=MPI.COMM_SELF)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, comm=MPI.COMM_SELF)
     before = len(compiled)
     solution.section_forces(scene.beams[0])
     solution.section_forces_at(scene.beams[0].end)
@@ -215,7 +217,9 @@ def no_points(monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "scheme", [ub.Static(), ub.ExactStatic(0.5), ub.Midpoint(), ub.Midpoint(0.1, 0.1)], ids=str
+    "scheme",
+    [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentum(), ub.EnergyMomentum(0.1, 0.1)],
+    ids=str,
 )
 def test_an_elastic_scene_has_no_points(no_points, scheme):
     """Nor one with hinges that never open."""
@@ -234,7 +238,7 @@ def test_an_elastic_scene_has_no_points(no_points, scheme):
 
 def test_no_points_can_fail(no_points):
     """That the test above can fail."""
-    section = ub.Section(EA=60.0, GA=40.0, EI=30.0, bending=ub.Hardening(1.0))
+    section = ub.Section(EA=60.0, GA=40.0, EI=30.0, bending=ub.ElastoPlastic(1.0))
     beam = ub.Beam((0, 0), (1, 0), section, cells=4)
     with pytest.raises(AssertionError, match="elastic"):
         ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Static())
@@ -244,7 +248,7 @@ def test_changing_alpha_compiles_no_other_code(compiled):
     """Numbers of the scheme are constants: the same signature, so the same code."""
     for alpha in (0.1, 0.2):
         forget_forms()
-        ub.Simulation(make(), ub.Midpoint(alpha=alpha))
+        ub.Simulation(make(), ub.EnergyMomentum(alpha=alpha))
     half = len(compiled) // 2
     one, other = (
         [form.signature() for form in some] for some in (compiled[:half], compiled[half:])
@@ -327,10 +331,10 @@ def test_forms_are_compiled_once_in_a_process(compiled):
     """For scenes with other numbers, on other meshes; hinges of the same kind included."""
     for n, limit in ((3, 1.0), (5, 2.0)):
         section = ub.Section(EA=60.0 * n, GA=40.0, EI=30.0, rhoA=2.0, hinge=ub.Softening(limit, 1))
-        hinges = {0.0: ub.Softening(limit, 2.0), 1.0: ub.Hardening(limit, 0.1 * n)}
+        hinges = {0.0: ub.Softening(limit, 2.0), 1.0: ub.ElastoPlastic(limit, 0.1 * n)}
         beam = ub.Beam((0, 0), (n, 1), section, cells=n, hinges=hinges)
         scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Clamped(beam.end)])
-        ub.Simulation(scene, ub.Midpoint())
+        ub.Simulation(scene, ub.EnergyMomentum())
         if n == 3:
             before = len(compiled)
     assert before == len(compiled) > 10
@@ -351,7 +355,7 @@ def test_energies_share_the_values_of_the_force(degree):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=5)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
     mesh = ub.Mesh(degree=degree)
-    simulation = ub.Simulation(scene, scheme := ub.Midpoint(alpha=0.1), mesh=mesh)
+    simulation = ub.Simulation(scene, scheme := ub.EnergyMomentum(alpha=0.1), mesh=mesh)
     (beams,) = simulation.beams
     energies = beams._stored, *beams._losses
     assert all(np.shares_memory(x._packed, beams._force._packed) for x in energies)
@@ -367,7 +371,7 @@ def test_batches_alike_have_one_pattern():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=1000)
     other = ub.Beam((1, 0), (2, 0), SECTION, cells=3)
     scene = ub.Scene([beam, other], joints=[ub.Revolute(beam.end, other.start)])
-    simulation = ub.Simulation(scene, ub.Midpoint())
+    simulation = ub.Simulation(scene, ub.EnergyMomentum())
     A, dofs = simulation.equation.A, simulation.share.cell_dofs
     places = A.blocks(np.ascontiguousarray(dofs), LANES)
     found = patterns(places)

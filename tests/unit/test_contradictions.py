@@ -18,11 +18,11 @@ REASON = "a RigidPlastic connector holds its motion until it yields"
 
 
 def fuse():
-    return ub.RigidPlastic(ub.Hardening(10.0, modulus=1.0))
+    return ub.RigidPlastic(ub.ElastoPlastic(10.0, isotropic=1.0))
 
 
 def motor():
-    return ub.Motor(lambda t: 0.1 * t)
+    return ub.PrescribedMotion(lambda t: 0.1 * t)
 
 
 class Parts:
@@ -41,7 +41,9 @@ class Parts:
     def joined(self, joint, *connectors):
         """Arm and rod, clamped on both sides, with a joint."""
         supports = [ub.Clamped(self.arm.start), ub.Clamped(self.rod.end)]
-        return ub.Scene([self.arm, self.rod], [joint], supports, connectors=connectors)
+        return ub.Scene(
+            [self.arm, self.rod], joints=[joint], supports=supports, connectors=connectors
+        )
 
     def led(self, *joints, across=None, **more):
         """The block with joints, and a connector across the x axis."""
@@ -70,7 +72,7 @@ class Parts:
 
 
 def prescribed(place):
-    return ub.Prescribed(place, u=0, v=0, psi=lambda t: 0.1 * t)
+    return ub.PrescribedDisplacement(place, u=0, v=0, psi=lambda t: 0.1 * t)
 
 
 GUIDED = "Guided(ground (1, 0), block (1, 0))"
@@ -88,7 +90,7 @@ TABLE = {
     ),
     "rigid-plastic and motor": (
         lambda p: p.turned(fuse(), motor()),
-        [f"{FIRST} with RigidPlastic", f"{FIRST} with Motor", REASON],
+        [f"{FIRST} with RigidPlastic", f"{FIRST} with PrescribedMotion", REASON],
     ),
     "rigid-plastic and support": (
         lambda p: p.turned(fuse(), support=ub.Clamped),
@@ -99,7 +101,7 @@ TABLE = {
         [f"{ALONG}RigidPlastic", PIN, REASON],
     ),
     "rigid-plastic and measured Revolute": (
-        lambda p: p.joined(p.pin(measured=True), p.along(fuse())),
+        lambda p: p.joined(p.pin(multipliers=True), p.along(fuse())),
         [PIN, f"{ALONG}RigidPlastic", REASON],
     ),
     "rigid-plastic and Rigid": (
@@ -129,21 +131,21 @@ TABLE = {
     ),
     "two motors": (
         lambda p: p.turned(motor(), motor()),
-        [f"{FIRST} with Motor; {FIRST} with Motor", "Remove one"],
+        [f"{FIRST} with PrescribedMotion; {FIRST} with PrescribedMotion", "Remove one"],
     ),
-    "motor and Prescribed": (
+    "motor and PrescribedDisplacement": (
         lambda p: p.turned(motor(), support=prescribed),
-        [f"{FIRST} with Motor", "Prescribed at arm.start (0, 0)"],
+        [f"{FIRST} with PrescribedMotion", "PrescribedDisplacement at arm.start (0, 0)"],
     ),
     "motor and Rigid": (
         lambda p: p.joined(
             ub.Rigid(p.arm.end, p.rod.start), ub.Turn(p.arm.end, p.rod.start, motor())
         ),
-        [f"{MET}Motor", RIGID],
+        [f"{MET}PrescribedMotion", RIGID],
     ),
     "motor and guide": (
         lambda p: p.led(p.guide(), across=motor()),
-        [GUIDED, f"{ACROSS}Motor"],
+        [GUIDED, f"{ACROSS}PrescribedMotion"],
     ),
     "guide and support": (
         lambda p: p.led(p.guide(), supports=[ub.Pinned(p.block.middle)]),
@@ -163,7 +165,7 @@ def test_the_table(case):
     """All holders are named, and one reason and remedy; no step is tried."""
     make, words = TABLE[case]
     with pytest.raises(ub.SceneError) as refused:
-        ub.Simulation(make(Parts()), ub.Midpoint(alpha=0.05, beta=0.05), comm=MPI.COMM_SELF)
+        ub.Simulation(make(Parts()), ub.EnergyMomentum(alpha=0.05, beta=0.05), comm=MPI.COMM_SELF)
     for part in words:
         assert part in str(refused.value)
 
@@ -173,7 +175,7 @@ ALLOWED = {
     "rigid-plastic and friction": lambda p: p.turned(fuse(), ub.Coulomb(3.0)),
     "motor and friction": lambda p: p.turned(motor(), ub.Coulomb(3.0)),
     "rigid-plastic beside other motions of a joint": lambda p: p.joined(
-        p.pin(measured=True), ub.Turn(p.arm.end, p.rod.start, fuse())
+        p.pin(multipliers=True), ub.Turn(p.arm.end, p.rod.start, fuse())
     ),
     "rigid-plastic across a Link": lambda p: p.joined(
         ub.Link(p.arm.at(0.5), p.rod.at(0.5)),
@@ -186,7 +188,7 @@ ALLOWED = {
 @pytest.mark.parametrize("case", ALLOWED)
 def test_neighbours_of_the_table_run(case):
     solution = ub.simulate(
-        ALLOWED[case](Parts()), ub.Midpoint(alpha=0.05, beta=0.05), t=(0, 0.1), dt=0.01
+        ALLOWED[case](Parts()), ub.EnergyMomentum(alpha=0.05, beta=0.05), t=(0, 0.1), dt=0.01
     )
     assert np.isfinite(solution.q).all()
     assert solution.energy.worst < 1e-9
@@ -196,10 +198,12 @@ def test_rigid_plastic_beside_friction_adds_its_limit():
     """A cantilever on both: it begins to turn at 10 + 3 N m, by a load at 1 m."""
     parts = Parts()
     scene = parts.turned(fuse(), ub.Coulomb(3.0))
-    load = ub.PointLoad(parts.arm.end, (0, -20.0), time=lambda t: t)
-    loaded = ub.Scene([parts.arm], [], scene.supports, [load], connectors=scene.connectors)
+    load = ub.PointLoad(parts.arm.end, (0, -20.0), amplitude=lambda t: t)
+    loaded = ub.Scene(
+        [parts.arm], supports=scene.supports, loads=[load], connectors=scene.connectors
+    )
     # slow, so that accelerations bear nothing: the first period of the arm is 0.18 s
-    solution = ub.simulate(loaded, ub.Midpoint(alpha=0.05, beta=0.05), t=(0, 1), dt=2e-3)
+    solution = ub.simulate(loaded, ub.EnergyMomentum(alpha=0.05, beta=0.05), t=(0, 1), dt=2e-3)
     turns = np.abs(solution.displacement(parts.arm.start)[:, 2]) > 1e-6
     first = solution.times[int(np.argmax(turns))]
     assert 20.0 * first == pytest.approx(13.0, rel=0.05)
@@ -207,15 +211,15 @@ def test_rigid_plastic_beside_friction_adds_its_limit():
 
 def test_many_hinges_are_looked_through_at_once():
     """A hinge that moves a node of its own repeats nothing; only others are decomposed."""
-    law = ub.Softening(limit=10.0, energy=1.0)
+    law = ub.Softening(limit=10.0, fracture_energy=1.0)
     beams = [
         ub.Beam((x, 0), (x + 1, 0), SECTION, cells=1, hinges={0.0: law, 1.0: law}, name=f"b{x}")
         for x in range(60)
     ]
     joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
     fuses = [ub.Turn(ORIGIN, beams[0].start, fuse()) for _ in range(2)]
-    scene = ub.Scene(beams, joints, [ub.Pinned(beams[0].start)], connectors=fuses)
+    scene = ub.Scene(beams, joints=joints, supports=[ub.Pinned(beams[0].start)], connectors=fuses)
     with pytest.raises(ub.SceneError) as refused:
-        ub.Simulation(scene, ub.Midpoint(), comm=MPI.COMM_SELF)
+        ub.Simulation(scene, ub.EnergyMomentum(), comm=MPI.COMM_SELF)
     names = re.findall(r"Turn\(ground \(0, 0\), b0.start \(0, 0\)\)", str(refused.value))
     assert len(names) == 2

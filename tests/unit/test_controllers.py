@@ -27,11 +27,11 @@ def slider(sample=None, log=None, gain=GAIN, rate=RATE):
     law = ub.Controller(control, sample=sample)
     drive = ub.Slide(ub.ground(0, 0), body.middle, law, axis=(1, 0))
     way = ub.Prismatic(ub.ground(0, 0), body.middle, axis=(1, 0))
-    return ub.Scene([], [way], connectors=[drive], bodies=[body]), body, drive
+    return ub.Scene([], joints=[way], connectors=[drive], bodies=[body]), body, drive
 
 
 def run(scene, t=(0.0, 0.5), dt=1e-3, **more):
-    return ub.simulate(scene, ub.Midpoint(), t=t, dt=dt, progress=False, **more)
+    return ub.simulate(scene, ub.EnergyMomentum(), t=t, dt=dt, progress=False, **more)
 
 
 def by_hand(sample, samples):
@@ -194,7 +194,7 @@ def controlled(beam):
     )
 
 
-DAMPED = ub.Midpoint(alpha=0.02, beta=0.02)
+DAMPED = ub.EnergyMomentum(alpha=0.02, beta=0.02)
 
 
 @pytest.mark.parametrize("dt", [1e-3, 1e-4])
@@ -232,7 +232,7 @@ def test_a_relay_that_holds_for_some_steps_does_not_warn():
     relay = ub.Controller(lambda now: 5.0 * (-1) ** int(now.t / 0.0201))
     drive = ub.Turn(ub.ground(0, 0), body.middle, relay)
     scene = ub.Scene(
-        [], [ub.Revolute(ub.ground(0, 0), body.middle)], connectors=[drive], bodies=[body]
+        [], joints=[ub.Revolute(ub.ground(0, 0), body.middle)], connectors=[drive], bodies=[body]
     )
     with warnings.catch_warnings():
         warnings.simplefilter("error")

@@ -23,7 +23,7 @@ def failure(scene, scheme=None, **more):
 
 
 def spring():
-    return ub.Spring(1e8, law=ub.Hardening(1.0))
+    return ub.Spring(1e8, law=ub.ElastoPlastic(1.0))
 
 
 def node_between_hinges(*more):
@@ -33,7 +33,7 @@ def node_between_hinges(*more):
     right = ub.Beam((1, 0), (2, 0), section, cells=2, name="right")
     node = ub.Body((1, 0), name="node")
     turns = [ub.Turn(left.end, node.middle, spring()), ub.Turn(node.middle, right.start, spring())]
-    growing = {"time": lambda t: t}
+    growing = {"amplitude": lambda t: t}
     loads = [ub.PointLoad(left.end, force=(0, -1), **growing)]
     loads += [ub.PointLoad(node.middle, moment=moment, **growing) for moment in more]
     return turns, ub.Scene(
@@ -81,7 +81,7 @@ def test_a_beam_on_a_spring_that_breaks():
         [beam],
         joints=[ub.Revolute(ub.ground(0, 0), beam.start)],
         connectors=[turn],
-        loads=[ub.PointLoad(beam.end, force=(0, -1), time=lambda t: t)],
+        loads=[ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)],
     )
     message = str(failure(scene))
     # A limit of 1 N m at 1 m: the load 1 N is reached at t = 1
@@ -94,14 +94,14 @@ def test_a_beam_on_a_spring_that_breaks():
 def test_a_plastic_mechanism_names_the_cell():
     """A short part of a cantilever yields; no rotation of the rest resists more of the moment."""
     numbers = {"EA": 1e7, "GA": 1e7, "EI": 1e4}
-    weak = ub.Section(**numbers, bending=ub.Hardening(limit=1.0))
+    weak = ub.Section(**numbers, bending=ub.ElastoPlastic(yield_limit=1.0))
     fuse = ub.Beam((0, 0), (0.1, 0), weak, cells=1, name="fuse")
     arm = ub.Beam((0.1, 0), (1, 0), ub.Section(**numbers), cells=3, name="arm")
     scene = ub.Scene(
         [fuse, arm],
         joints=[ub.Rigid(fuse.end, arm.start)],
         supports=[ub.Clamped(fuse.start)],
-        loads=[ub.PointLoad(arm.end, moment=1.0, time=lambda t: t)],
+        loads=[ub.PointLoad(arm.end, moment=1.0, amplitude=lambda t: t)],
     )
     message = str(failure(scene, dt=0.3))
     # All rotations of the arm are alike; the first of them is named first.
@@ -111,7 +111,7 @@ def test_a_plastic_mechanism_names_the_cell():
 
 def test_too_few_iterations_in_words():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e7, GA=1e7, EI=1e4), cells=2)
-    load = ub.PointLoad(beam.end, force=(0, -1e4), time=lambda t: t)
+    load = ub.PointLoad(beam.end, force=(0, -1e4), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     error = failure(scene, newton=ub.Newton(max_iterations=1, rtol=1e-14))
     assert "Newton's method did not converge after 1 iterations; residual" in str(error)
@@ -142,17 +142,17 @@ def test_perfectly_plastic_cells_in_a_row():
 
     def rod(**more):
         strength = ub.Normal(300e6, 60e6, seed=1558)
-        fibres = ub.Fibres(ub.Hardening(strength, **more), number=4)
+        fibres = ub.Fibres(ub.ElastoPlastic(strength, **more), number=4)
         section = ub.Section.rectangle(b=0.02, h=0.02, E=200e9, nu=0.3, fibres=fibres)
         beam = ub.Beam((0, 0), (1, 0), section, cells=4)
-        held = [ub.Prescribed(beam.at(k / 4), v=0.0, psi=0.0) for k in range(1, 4)]
-        pulled = ub.Prescribed(beam.end, u=lambda t: 0.008 * t, v=0.0, psi=0.0)
+        held = [ub.PrescribedDisplacement(beam.at(k / 4), v=0.0, psi=0.0) for k in range(1, 4)]
+        pulled = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.008 * t, v=0.0, psi=0.0)
         return pulled, ub.Scene([beam], supports=[ub.Clamped(beam.start), pulled, *held])
 
     assert "if they are in a row, nothing tells which of them flows" in str(
         failure(rod()[1], t=(0, 1), dt=0.25)
     )
-    pulled, hardens = rod(modulus=200e9 * 1e-6)
+    pulled, hardens = rod(isotropic=200e9 * 1e-6)
     run = ub.simulate(hardens, ub.Static(), t=(0, 1), dt=0.25, progress=False)
     # N; the weakest cell bears about 300 MPa on 4 cm²
     assert 0.8 < run.reaction(pulled)[-1, 0] / 120e3 < 1.2
@@ -169,11 +169,13 @@ def test_collapse_by_its_weight_is_a_limit_load():
     column = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e7, GA=1e7, EI=1e3), cells=4)
     loads = [
         ub.PointLoad(column.end, force=(0, -50)),
-        ub.PointLoad(column.end, force=(8, 0), time=lambda t: t),
+        ub.PointLoad(column.end, force=(8, 0), amplitude=lambda t: t),
     ]
     foot = ub.ground(0, 0)
-    turn = ub.Turn(foot, column.start, ub.Spring(100.0, ub.Hardening(5.0, modulus=20.0)))
-    scene = ub.Scene([column], [ub.Revolute(foot, column.start)], [], loads, connectors=[turn])
+    turn = ub.Turn(foot, column.start, ub.Spring(100.0, ub.ElastoPlastic(5.0, isotropic=20.0)))
+    scene = ub.Scene(
+        [column], joints=[ub.Revolute(foot, column.start)], loads=loads, connectors=[turn]
+    )
     error = failure(scene, t=(0, 1), dt=0.1)
     assert error.time == pytest.approx(2.5 / 8, rel=0.05)
     assert re.search(NEAR_A_LIMIT, str(error))
@@ -185,16 +187,18 @@ def test_snap_through_is_a_limit_load():
     section = ub.Section(EA=1e6, GA=1e6, EI=1e9, depth=0.1)
     left = ub.Beam((-4, 0), (0, 1), section, cells=1)
     right = ub.Beam((0, 1), (4, 0), section, cells=1)
-    load = ub.PointLoad(left.end, force=(0, -4e4), time=lambda t: t)
+    load = ub.PointLoad(left.end, force=(0, -4e4), amplitude=lambda t: t)
     supports = [ub.Pinned(left.start), ub.Pinned(right.end)]
-    scene = ub.Scene([left, right], [ub.Revolute(left.end, right.start)], supports, [load])
+    scene = ub.Scene(
+        [left, right], joints=[ub.Revolute(left.end, right.start)], supports=supports, loads=[load]
+    )
     assert re.search(NEAR_A_LIMIT, str(failure(scene, t=(0, 1), dt=0.1)))
 
 
 def test_what_is_far_from_a_limit_load_is_not_called_one():
     """A single iteration is too little for a large deflection."""
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4)
-    load = ub.PointLoad(beam.end, force=(0, 1e5), time=lambda t: 1.0)
+    load = ub.PointLoad(beam.end, force=(0, 1e5), amplitude=lambda t: 1.0)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     error = failure(scene, t=(0, 1), dt=0.5, newton=ub.Newton(max_iterations=1))
     assert "limit load or a bifurcation is near" not in str(error)

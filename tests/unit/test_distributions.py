@@ -107,7 +107,7 @@ def test_streams_are_independent():
 
 # -- in scenes ---------------------------------------------------------------------------------
 
-LAW = ub.Hardening(ub.Lognormal(MEAN, DEVIATION, seed=SEED))
+LAW = ub.ElastoPlastic(ub.Lognormal(MEAN, DEVIATION, seed=SEED))
 
 
 def limits(beams, comm=MPI.COMM_SELF, joints=()):
@@ -115,7 +115,7 @@ def limits(beams, comm=MPI.COMM_SELF, joints=()):
     scene = ub.Scene(beams, joints=joints)
     share = Share(Grid(scene), comm)
     layout = beams[0].section.layout(None)
-    drawn = layout.numbers(share.grid.keys(share.cells))["limit"]
+    drawn = layout.numbers(share.grid.keys(share.cells))["yield_limit"]
     return dict(zip(share.cells.tolist(), drawn, strict=True))
 
 
@@ -157,8 +157,8 @@ def test_number_of_processes_does_not_matter():
 
 def test_resultants_may_be_random_too():
     section = ub.Section(
-        EA=1.0, GA=1.0, EI=1.0, bending=ub.Hardening(ub.Weibull(10.0, 5.0, seed=2))
+        EA=1.0, GA=1.0, EI=1.0, bending=ub.ElastoPlastic(ub.Weibull(10.0, 5.0, seed=2))
     )
-    limit = section.layout(None).numbers([(0, k) for k in range(50)])["limit"]
+    limit = section.layout(None).numbers([(0, k) for k in range(50)])["yield_limit"]
     assert limit.shape == (50, 1)
     assert len(np.unique(limit)) == 50

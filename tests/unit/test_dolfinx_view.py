@@ -23,7 +23,7 @@ def test_total_is_that_of_the_scene_on_any_processes(monkeypatch, least):
     beam = ub.Beam((0, 0), (3, 0), ub.Section(**STEEL), cells=12)
     load = ub.PointLoad(beam.end, force=(10.0, 30.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    simulation = moved(scene, ub.Midpoint(), comm=MPI.COMM_WORLD)
+    simulation = moved(scene, ub.EnergyMomentum(), comm=MPI.COMM_WORLD)
     assert simulation.share.comm.size == (MPI.COMM_WORLD.size if least == 1 else 1)
     view = simulation.dolfinx
     x, C, e = ufl.SpatialCoordinate(view.mesh), view.stiffness, view.strains
@@ -38,14 +38,14 @@ def test_total_is_that_of_the_scene_on_any_processes(monkeypatch, least):
 
 
 def test_what_total_refuses():
-    view = moved(frame(), ub.Midpoint()).dolfinx
+    view = moved(frame(), ub.EnergyMomentum()).dolfinx
     w = ufl.TestFunction(view.function_space)
     for wrong, message in [
         (w[0] * view.dx, "without test functions"),
         (view.configuration, "a scalar expression"),
         (3.0, "a form of UFL"),
         (fem.Constant(view.mesh, 1.0) * ufl.ds, "over facets"),
-        (moved(frame(), ub.Midpoint()).dolfinx.configuration[0] * ufl.dx, "another mesh"),
+        (moved(frame(), ub.EnergyMomentum()).dolfinx.configuration[0] * ufl.dx, "another mesh"),
     ]:
         with pytest.raises(ub.SceneError, match=message):
             view.total(wrong)
@@ -65,7 +65,9 @@ def _shuffled(monkeypatch):
 def frame():
     """Elastic cells, cells that yield and hinge, and hinges of zero length; a rigid corner."""
     weak = ub.Section(
-        **STEEL, bending=ub.Hardening(30.0, modulus=80.0), hinge=ub.Softening(40.0, energy=15.0)
+        **STEEL,
+        bending=ub.ElastoPlastic(30.0, isotropic=80.0),
+        hinge=ub.Softening(40.0, fracture_energy=15.0),
     )
     left = ub.Beam((0, 0), (0, 1), weak, cells=5)
     roof = ub.Beam(
@@ -75,7 +77,7 @@ def frame():
         [left, roof],
         joints=[ub.Rigid(left.end, roof.start)],
         supports=[ub.Clamped(left.start), ub.Pinned(roof.end)],
-        loads=[ub.PointLoad(roof.at(0.25), force=(900.0, -700.0), time=ub.ramp(0.1))],
+        loads=[ub.PointLoad(roof.at(0.25), force=(900.0, -700.0), amplitude=ub.ramp(0.1))],
     )
 
 
@@ -95,7 +97,9 @@ def assembled(simulation, work):
     return r
 
 
-@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1), ub.ExactStatic(), ub.GeneralizedAlpha()])
+@pytest.mark.parametrize(
+    "scheme", [ub.EnergyMomentum(0.1), ub.EnergyMomentumStatic(), ub.GeneralizedAlpha()]
+)
 def test_forms_are_those_of_the_terms(scheme):
     """In a step that has not begun; cells that flow have the tangent of a step."""
     simulation = moved(frame(), scheme, t=0.06 if scheme.dynamic else 0.03)
@@ -135,7 +139,7 @@ def test_forms_are_those_of_the_terms(scheme):
 
 def test_forms_asked_for_on_the_way():
     """They change no digit of the steps to come."""
-    plain, asked = (ub.Simulation(frame(), ub.Midpoint(0.1)) for _ in range(2))
+    plain, asked = (ub.Simulation(frame(), ub.EnergyMomentum(0.1)) for _ in range(2))
     for k in range(8):
         asked.dolfinx.forms  # noqa: B018
         for one in (plain, asked):
@@ -147,7 +151,7 @@ def test_forms_asked_for_on_the_way():
 
 
 def test_functions_follow_the_state():
-    simulation = moved(frame(), ub.Midpoint(0.1))
+    simulation = moved(frame(), ub.EnergyMomentum(0.1))
     view, first = simulation.dolfinx, simulation.dolfinx.configuration
     before = first.x.array.copy()
     simulation.step_to(0.08)
@@ -172,7 +176,7 @@ def test_an_own_form(degree):
     beam = ub.Beam((0, 0), (2, 0.3), ub.Section(**STEEL), cells=4)
     down = ub.PointLoad(beam.at(0.5), force=(0, -30.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Pinned(beam.end)], loads=[down])
-    simulation = moved(scene, ub.ExactStatic(), mesh=ub.Mesh(degree=degree))
+    simulation = moved(scene, ub.EnergyMomentumStatic(), mesh=ub.Mesh(degree=degree))
     view = simulation.dolfinx
     w = ufl.TestFunction(view.function_space)
     weight = assembled(simulation, w[1] * view.dx)
@@ -189,7 +193,7 @@ def test_an_own_form(degree):
 def test_each_process_has_its_cells():
     """Energies of all of them are those of the ledger; of one process, those of the scene."""
     scene = frame()
-    simulation = moved(scene, ub.Midpoint(0.1), comm=MPI.COMM_WORLD)
+    simulation = moved(scene, ub.EnergyMomentum(0.1), comm=MPI.COMM_WORLD)
     view, (state, _, _) = simulation.dolfinx, simulation.entries()
     v, M = view.velocity.x.array, fem.assemble_matrix(fem.form(view.forms.mass)).to_scipy()
     kinetic = MPI.COMM_WORLD.allreduce(v @ M @ v / 2)
@@ -197,7 +201,7 @@ def test_each_process_has_its_cells():
     jump = np.zeros(len(simulation.grid.cells))
     jump[view.cells] = view.jump.x.array
     MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, jump)
-    alone = moved(scene, ub.Midpoint(0.1))
+    alone = moved(scene, ub.EnergyMomentum(0.1))
     # Jumps of some 0.1 rad, by steps solved to 1e-12 of the forces.
     assert np.allclose(jump, alone.damage()[0], rtol=0, atol=1e-8)
     assert np.abs(jump).max() > 1e-3
@@ -220,7 +224,7 @@ def test_what_a_scene_does_not_have():
 def test_files_of_dolfinx(tmp_path):
     from dolfinx.io import VTXWriter
 
-    simulation = moved(frame(), ub.Midpoint(0.1), t=0.03)
+    simulation = moved(frame(), ub.EnergyMomentum(0.1), t=0.03)
     view = simulation.dolfinx
     ψ = fem.Function(fem.functionspace(view.mesh, ("Lagrange", 1)))
     with (
@@ -243,9 +247,9 @@ def test_files_of_dolfinx(tmp_path):
 
 
 def test_a_monitor_sees_each_iteration_and_changes_none():
-    plain = moved(frame(), ub.Midpoint(0.1))
+    plain = moved(frame(), ub.EnergyMomentum(0.1))
     watched = ub.Simulation(
-        frame(), ub.Midpoint(0.1), newton=ub.Newton(rtol=1e-12)
+        frame(), ub.EnergyMomentum(0.1), newton=ub.Newton(rtol=1e-12)
     )  # under mpirun, by all processes
     seen = []
     watched.snes.setMonitor(lambda snes, iteration, norm: seen.append((iteration, norm)))
@@ -261,7 +265,7 @@ def test_a_monitor_sees_each_iteration_and_changes_none():
 
 
 def test_a_history_of_residuals():
-    simulation = ub.Simulation(frame(), ub.Midpoint(0.1))
+    simulation = ub.Simulation(frame(), ub.EnergyMomentum(0.1))
     simulation.snes.setConvergenceHistory()
     simulation.step_to(0.01)
     norms, _ = simulation.snes.getConvergenceHistory()
@@ -272,7 +276,7 @@ def test_a_history_of_residuals():
 
 def test_the_matrix_of_snes():
     """PETSc has it from when it is asked for; before, nobody has its columns."""
-    simulation = ub.Simulation(frame(), ub.Midpoint(0.1))
+    simulation = ub.Simulation(frame(), ub.EnergyMomentum(0.1))
     simulation.step_to(0.01)
     assert "indices" not in vars(simulation.equation.A)
     snes = simulation.snes
@@ -300,7 +304,7 @@ class Monitored(ub.Recorder):
 
 def test_a_monitor_of_a_path():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=4)
-    down = ub.PointLoad(beam.end, force=(0, -100.0), time=lambda t: t)
+    down = ub.PointLoad(beam.end, force=(0, -100.0), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[down])
     watch = Monitored()
     ub.follow(scene, ub.ArcLength(0.1), steps=3, record=watch)

@@ -18,7 +18,7 @@ STIFF = {"EA": 1e9, "GA": 1e9, "EI": EI, "rhoA": 100.0, "rhoI": 1.0}
 CURVED = ub.Section(**STIFF, bending=Eigenstrain(E0))
 SIMPLE = [lambda beam: ub.Pinned(beam.start), lambda beam: ub.Roller(beam.end)]
 CLAMPED = [lambda beam: ub.Clamped(beam.start), lambda beam: ub.Clamped(beam.end)]
-STATICS = [ub.Static(), ub.ExactStatic(1.0)]
+STATICS = [ub.Static(), ub.EnergyMomentumStatic(1.0)]
 
 
 def scene(supports, section=CURVED, **more):
@@ -48,7 +48,7 @@ def test_beams(scheme, dt, reference):
 def pressed(section):
     """A simple beam with a load that grows in its middle."""
     beam, simple = scene(SIMPLE, section)
-    load = ub.PointLoad(beam.at(0.5), force=(0, -1e3), time=lambda t: t)
+    load = ub.PointLoad(beam.at(0.5), force=(0, -1e3), amplitude=lambda t: t)
     return ub.Scene([beam], supports=simple.supports, loads=[load])
 
 
@@ -116,7 +116,9 @@ def test_of_interacting_resultants():
 
 
 @pytest.mark.parametrize(
-    "scheme", [ub.Midpoint(), ub.Midpoint(0.05), ub.DecayingMidpoint(), ub.Newmark()], ids=repr
+    "scheme",
+    [ub.EnergyMomentum(), ub.EnergyMomentum(0.05), ub.EnergyMomentumDecaying(), ub.Newmark()],
+    ids=repr,
 )
 def test_dynamics(scheme):
     """From the undeformed scene it vibrates about the static solution; from that it stays there."""
@@ -145,12 +147,16 @@ def test_analyses_about_the_undeformed_scene_are_refused():
     for analyse in (lambda: ub.modes(simple, 1), lambda: ub.buckling(pushed, 1)):
         with pytest.raises(ub.SceneError, match="Eigenstrain of girder bears a stress at no strai"):
             analyse()
-    with pytest.raises(ub.SceneError, match=r"ExactStatic\(theta=0.5\): Eigenstrain of girder"):
-        ub.simulate(simple, ub.ExactStatic(0.5), t=(0, 1), dt=0.5, progress=False)
+    with pytest.raises(
+        ub.SceneError, match=r"EnergyMomentumStatic\(theta=0.5\): Eigenstrain of girder"
+    ):
+        ub.simulate(simple, ub.EnergyMomentumStatic(0.5), t=(0, 1), dt=0.5, progress=False)
     at = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0, progress=False)
     with warnings.catch_warnings():  # see above
         warnings.simplefilter("ignore", ub.ModelWarning)
-        held = ub.simulate(simple, ub.ExactStatic(0.5), t=(1, 2), dt=0.5, start=at, progress=False)
+        held = ub.simulate(
+            simple, ub.EnergyMomentumStatic(0.5), t=(1, 2), dt=0.5, start=at, progress=False
+        )
     y = held.displacement(beam.at(0.5))[:, 1]
     assert y == pytest.approx(np.full(3, at.displacement(beam.at(0.5))[-1, 1]), rel=1e-9)
     omega = ub.modes(elastic, 1).omega
@@ -162,7 +168,10 @@ def test_analyses_about_the_undeformed_scene_are_refused():
 @pytest.mark.parametrize(
     "law", [Eigenstrain(0.01), YieldingEigenstrain(2.0, 20.0, 10.0, 0.5)], ids=["elastic", "yields"]
 )
-@pytest.mark.parametrize("scheme", [ub.ExactStatic(0.5), ub.ExactStatic(0.8), ub.ExactStatic(1.0)])
+@pytest.mark.parametrize(
+    "scheme",
+    [ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(0.8), ub.EnergyMomentumStatic(1.0)],
+)
 def test_work_is_stored_or_dissipated_or_lost(scheme, law):
     """At points; what is dissipated is none, or what limit and viscosity take."""
     for k in range(4):
@@ -190,7 +199,7 @@ def test_round_off_of_dissipation_turns_no_path(law):
     paths = []
     for section in (ub.Section(**STIFF), ub.Section(**STIFF, bending=law)):
         beam, _ = scene(SIMPLE, section)
-        load = ub.PointLoad(beam.at(0.5), force=(0, -1e5), time=lambda t: t)
+        load = ub.PointLoad(beam.at(0.5), force=(0, -1e5), amplitude=lambda t: t)
         loaded = ub.Scene([beam], supports=[make(beam) for make in SIMPLE], loads=[load])
         paths.append(ub.follow(loaded, ub.ArcLength(0.01), steps=20, progress=False).times)
     assert paths[1] == pytest.approx(paths[0], rel=1e-9)

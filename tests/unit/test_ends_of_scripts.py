@@ -13,7 +13,7 @@ SIMULATION = """
 import ufl_beam as ub
 beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0, rhoA=1.0), cells=2)
 scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
-ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1, progress=False)
+ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, progress=False)
 """
 
 LINES = """
@@ -40,7 +40,11 @@ def run(script, *, unread=False, **environment):
 
 @pytest.mark.parametrize(
     "script",
-    [LINES, "import ufl_beam as ub; ub.say('hello')", "import ufl_beam; print('at the end')"],
+    [
+        LINES,
+        "import ufl_beam as ub; ub.print_once('hello')",
+        "import ufl_beam; print('at the end')",
+    ],
 )
 def test_a_script_that_nobody_reads_ends_quietly(script):
     """As in ``script | head``: PETSc's handler of the signal has printed a page and aborted."""

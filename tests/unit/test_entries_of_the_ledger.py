@@ -10,7 +10,12 @@ import pytest
 import ufl_beam as ub
 
 QUIET = {"progress": False}
-EXACT = [ub.Midpoint(), ub.Midpoint(0.1, 0.1), ub.DecayingMidpoint(), ub.ExactStatic(0.5)]
+EXACT = [
+    ub.EnergyMomentum(),
+    ub.EnergyMomentum(0.1, 0.1),
+    ub.EnergyMomentumDecaying(),
+    ub.EnergyMomentumStatic(0.5),
+]
 AT_END = [ub.Static(), ub.Newmark(), ub.GeneralizedAlpha(0.8)]
 
 
@@ -40,7 +45,7 @@ def test_a_work_may_not_have_the_name_of_a_column(tmp_path):
     scene = ub.Scene([one], supports=held, connectors=[spring], works=[wind])
     table = ub.History(tmp_path / "run.csv", connectors=[spring])
     with pytest.raises(ub.SceneError, match="would be a column of a connector"):
-        ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1, record=table, **QUIET)
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, record=table, **QUIET)
 
 
 def test_a_scene_is_in_one_frame():
@@ -92,7 +97,7 @@ class OneSided(Stiffening):
 
 def bent(law, scheme, reference=False, dt=0.05):
     one = beam(bending=law)
-    load = ub.PointLoad(one.end, (0, 1.0), time=lambda t: t)
+    load = ub.PointLoad(one.end, (0, 1.0), amplitude=lambda t: t)
     scene = ub.Scene([one], supports=[ub.Clamped(one.start)], loads=[load])
     newton = ub.Newton(reference=reference)
     return ub.simulate(scene, scheme, t=(0, 1), dt=dt, newton=newton, **QUIET).energy
@@ -130,6 +135,6 @@ def test_dissipation_of_a_law_that_flows_is_the_same_in_all_static_schemes():
     """∫ σ rate (e - creep) dt, to the first order of their steps: 1/256 each, and twice as safe."""
     found = [
         bent(Stiffening(5.0, rate=0.5), scheme, dt=1 / 256)["plastic"][-1]
-        for scheme in (ub.Static(), ub.ExactStatic(), ub.ExactStatic(0.5))
+        for scheme in (ub.Static(), ub.EnergyMomentumStatic(), ub.EnergyMomentumStatic(0.5))
     ]
     assert np.ptp(found) < 3 / 256 * found[0]

@@ -15,17 +15,18 @@ def test_a_scheme_of_the_page_in_both_paths(reference):
     for block in blocks_of(DOCS / "extending.md")[:2]:
         exec(block, names)
     weak = ub.Section(
-        EA=1e6, GA=4e5, EI=800.0, rhoA=10.0, rhoI=0.01, bending=ub.Hardening(30.0, modulus=80.0),
-        hinge=ub.Softening(40.0, energy=15.0),
+        EA=1e6, GA=4e5, EI=800.0, rhoA=10.0, rhoI=0.01,
+        bending=ub.ElastoPlastic(30.0, isotropic=80.0),
+        hinge=ub.Softening(40.0, fracture_energy=15.0),
     )  # fmt: skip
     beam = ub.Beam((0, 0), (0, 1), weak, cells=5)
-    push = ub.PointLoad(beam.end, force=(900.0, 0.0), time=ub.ramp(0.1))
-    spring = ub.Stretch(ub.ground(1, 1), beam.end, ub.Spring(3e3, law=ub.Hardening(40.0)))
+    push = ub.PointLoad(beam.end, force=(900.0, 0.0), amplitude=ub.ramp(0.1))
+    spring = ub.Stretch(ub.ground(1, 1), beam.end, ub.Spring(3e3, law=ub.ElastoPlastic(40.0)))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=[spring])
     newton = ub.Newton(rtol=1e-12, reference=reference)
     mine, known = (
         ub.simulate(scene, scheme, t=(0, 0.1), dt=2e-3, newton=newton)
-        for scheme in (names["Weighted"](0.6), ub.Midpoint(alpha=0.1, beta=0.1))
+        for scheme in (names["Weighted"](0.6), ub.EnergyMomentum(alpha=0.1, beta=0.1))
     )
     assert min(known.energy.lost[name][-1] for name in ("plastic", "hinges", "numerical")) > 1e-3
     assert mine.parts == known.parts

@@ -16,12 +16,12 @@ GROWING = ub.ramp(0.1)
 
 def cantilever(*, time=GROWING, connect=lambda beam: (), hold=ub.Clamped):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
-    load = ub.PointLoad(beam.end, force=(0.0, 0.1), time=time)
+    load = ub.PointLoad(beam.end, force=(0.0, 0.1), amplitude=time)
     return ub.Scene([beam], supports=[hold(beam.start)], connectors=connect(beam), loads=[load])
 
 
 def run(scene, scheme=None, t=(0.0, 0.1), dt=0.01):
-    return ub.simulate(scene, scheme or ub.Midpoint(), t=t, dt=dt)
+    return ub.simulate(scene, scheme or ub.EnergyMomentum(), t=t, dt=dt)
 
 
 def late(value):
@@ -39,20 +39,22 @@ def test_load_that_is_no_number_is_named():
     assert np.isfinite(solution.q).all()
 
 
-@pytest.mark.filterwarnings("ignore:Prescribed at beam.start .* psi jumps:ufl_beam.ModelWarning")
+@pytest.mark.filterwarnings(
+    "ignore:PrescribedDisplacement at beam.start .* psi jumps:ufl_beam.ModelWarning"
+)
 def test_motion_that_is_no_number_is_named():
     def hold(place):
-        return ub.Prescribed(place, u=0, v=0, psi=late(math.inf))
+        return ub.PrescribedDisplacement(place, u=0, v=0, psi=late(math.inf))
 
     with pytest.raises(
-        ub.ConvergenceError, match=r"Prescribed at beam.start.*inf at t = 0\.0(5|49)"
+        ub.ConvergenceError, match=r"PrescribedDisplacement at beam.start.*inf at t = 0\.0(5|49)"
     ):
         run(cantilever(hold=hold))
 
 
 def test_drive_that_is_no_number_is_named():
     def drive(beam):
-        law = ub.Actuator(late(math.nan))
+        law = ub.PrescribedForce(late(math.nan))
         return [ub.Slide(ub.ground(2, 0), beam.end, law, axis=(0, 1))]
 
     with pytest.raises(ub.ConvergenceError, match=r"Slide\(ground .*nan at t = 0\.0(5|49)"):

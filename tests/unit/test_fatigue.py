@@ -146,13 +146,13 @@ def mast(*loads, cells=4):
 
 
 def to_and_fro(beam):
-    return ub.PointLoad(beam.end, force=(8e3, -2e3), time=lambda t: math.sin(40 * t) * (1 + t))
+    return ub.PointLoad(beam.end, force=(8e3, -2e3), amplitude=lambda t: math.sin(40 * t) * (1 + t))
 
 
 def test_stress_is_in_balance_with_the_load():
     """To the right at the top: tension on the left of the way up, largest at the clamp."""
     F, axial = 1e3, -500.0
-    beam, scene = mast(lambda b: ub.PointLoad(b.end, force=(F, axial), time=ub.ramp(1.0)))
+    beam, scene = mast(lambda b: ub.PointLoad(b.end, force=(F, axial), amplitude=ub.ramp(1.0)))
     y, A, W = 0.1, 0.02, 0.1 * 0.2**2 / 6
     places = {beam.start: 4.0, beam.at(0.3): 2.8, beam.at(0.5): 2.0, beam.end: 0.0}
     spots = [ub.HotSpot.fibre(place, y=y, E=210e9, factor=2.0) for place in places]
@@ -179,7 +179,7 @@ def test_a_run_is_counted_as_its_solution(monkeypatch):
     beam, scene = mast(to_and_fro)
     spot = ub.HotSpot.fibre(beam.at(0.375), y=-0.1, E=210e9)  # in the middle of a cell
     recorder = ub.Fatigue(spot, CURVE, resolution=1e5)
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.4), dt=0.01, record=recorder)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.4), dt=0.01, record=recorder)
     N, _, M = solution.section_forces_at(spot.place).T
     expected = ub.rainflow(np.rint((N / 0.02 + M * 0.1 * 12 / (0.1 * 0.2**3)) / 1e5))
     found = recorder.cycles(spot)
@@ -200,7 +200,7 @@ def test_extremes_are_those_of_all_steps():
         supports=scene.supports, loads=scene.loads,
     )  # fmt: skip
     extremes = ub.Extremes()
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.4), dt=0.01, record=extremes)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.4), dt=0.01, record=extremes)
     kept = range(len(solution))
     forces = np.array([np.transpose(solution.diagram(beam, n, points=2)[1:]) for n in kept])
     nodes = solution.grid.nodes_of(beam)[1]
@@ -225,11 +225,11 @@ def test_what_a_run_that_fails_has_counted_is_kept():
             raise RuntimeError("enough")
         return math.sin(40 * t)
 
-    beam, scene = mast(lambda b: ub.PointLoad(b.end, force=(8e3, 0.0), time=force))
+    beam, scene = mast(lambda b: ub.PointLoad(b.end, force=(8e3, 0.0), amplitude=force))
     spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
     recorder, extremes = ub.Fatigue(spot, CURVE), ub.Extremes()
     with pytest.raises(RuntimeError, match="enough"):
-        ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.01, record=[recorder, extremes])
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, record=[recorder, extremes])
     assert recorder.duration == pytest.approx(0.2)
     assert recorder.cycles(spot).count.sum() > 0
     assert extremes.displacement(beam).high[-1, 0] > 0
@@ -242,7 +242,7 @@ def test_counts_and_extremes_go_on_from_a_checkpoint(shared_path):
     def run(end, **more):
         recorders = ub.Fatigue(spot, CURVE), ub.Extremes()
         run = {"t": (0, end), "dt": 0.01, "record": recorders}
-        ub.simulate(scene, ub.Midpoint(), **run, **more)
+        ub.simulate(scene, ub.EnergyMomentum(), **run, **more)
         return recorders
 
     checkpoint = ub.Checkpoint(shared_path / "run.checkpoint", every=10)
@@ -272,14 +272,14 @@ def test_history_of_some_steps_has_their_rows(shared_path, on_first_rank):
     all_of_them, some, few, one = (shared_path / f"{name}.csv" for name in names)
     ub.simulate(
         scene,
-        ub.Midpoint(),
+        ub.EnergyMomentum(),
         t=(0, 0.5),
         dt=0.01,
         record=[
             ub.History(all_of_them, [beam.end]),
             ub.History(some, [beam.end], every=4),
-            ub.History(few, [beam.end], most=10),
-            ub.History(one, [beam.end], every=3, most=1),
+            ub.History(few, [beam.end], max_rows=10),
+            ub.History(one, [beam.end], every=3, max_rows=1),
         ],
     )
 
@@ -297,8 +297,8 @@ def test_history_of_some_steps_has_their_rows(shared_path, on_first_rank):
 def test_a_solution_is_thinned():
     _, scene = mast(to_and_fro)
     run = {"t": (0, 0.5), "dt": 0.01}
-    whole = ub.simulate(scene, ub.Midpoint(), **run)
-    thin = ub.simulate(scene, ub.Midpoint(), most=10, **run)
+    whole = ub.simulate(scene, ub.EnergyMomentum(), **run)
+    thin = ub.simulate(scene, ub.EnergyMomentum(), max_states=10, **run)
     # 0, 8, ..., 48 and the last one
     rows = [*range(0, 50, 8), 50]
     assert len(thin) == len(rows)
@@ -339,7 +339,7 @@ PLACE = ub.Beam((0, 0), (1, 0), SECTION, name="arm").end
         (lambda: ub.Fatigue([], CURVE, resolution=-1.0), "resolution = -1 must be at least 0"),
         (lambda: RainflowCounter(0.0), "resolution = 0 must be positive"),
         (lambda: ub.History("h.csv", every=0), "History h.csv: every = 0 must be a whole number"),
-        (lambda: ub.History("h.csv", most=1.5), r"most = 1\.5 must be a whole number"),
+        (lambda: ub.History("h.csv", max_rows=1.5), r"max_rows = 1\.5 must be a whole number"),
         (lambda: ub.Extremes().section_forces(PLACE.beam), "Extremes: nothing was run"),
     ],
 )
@@ -351,15 +351,15 @@ def test_bad_input(make, message):
 def test_bad_input_of_a_run():
     beam, scene = mast(to_and_fro)
     run = {"t": (0, 1), "dt": 0.1}
-    with pytest.raises(ub.SceneError, match="simulate: most = 0 must be a whole number"):
-        ub.simulate(scene, ub.Midpoint(), most=0, **run)
+    with pytest.raises(ub.SceneError, match="simulate: max_states = 0 must be a whole number"):
+        ub.simulate(scene, ub.EnergyMomentum(), max_states=0, **run)
     elsewhere = ub.Fatigue(ub.HotSpot(PLACE, stress=lambda N, V, M: M), CURVE)
     with pytest.raises(ub.SceneError, match="arm is not in the scene"):
-        ub.simulate(scene, ub.Midpoint(), record=elsewhere, **run)
+        ub.simulate(scene, ub.EnergyMomentum(), record=elsewhere, **run)
     spot = ub.HotSpot(beam.start, stress=lambda N, V, M: M[0])  # one number
     single = ub.Fatigue(spot, CURVE)
     with pytest.raises(ub.SceneError, match=r"mast\.start .* a finite number each"):
-        ub.simulate(scene, ub.Midpoint(), record=single, **run)
+        ub.simulate(scene, ub.EnergyMomentum(), record=single, **run)
     with pytest.raises(ub.SceneError, match=r"nothing was counted at arm\.end"):
         single.cycles(ub.HotSpot(PLACE, stress=lambda N, V, M: M))
 
@@ -371,18 +371,18 @@ def test_pictures():
     beam, scene = mast(to_and_fro)
     spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
     recorder, extremes = ub.Fatigue(spot, CURVE), ub.Extremes()
-    solution = ub.simulate(
-        scene, ub.Midpoint(), t=(0, 0.4), dt=0.01, record=[recorder, extremes], most=4
+    ub.simulate(
+        scene, ub.EnergyMomentum(), t=(0, 0.4), dt=0.01, record=[recorder, extremes], max_states=4
     )
-    (axes,) = ub.plot_extremes(solution, extremes, "M").axes
+    (axes,) = ub.plot(extremes, "M").axes
     reached = extremes.section_forces(beam)
     texts = {text.get_text() for text in axes.texts}
     assert f"{1e-3 * reached.high[:, 2].max():.3g}" in texts
     assert f"−{-1e-3 * reached.low[:, 2].min():.3g}" in texts
-    matrix, spectrum, damage, _ = ub.plot_cycles(recorder, spot).axes
+    matrix, spectrum, damage, _ = ub.plot(recorder, "cycles", spot).axes
     shown = np.nansum(matrix.collections[0].get_array())
     assert shown == pytest.approx(recorder.cycles(spot).count.sum())
     assert spectrum.lines[0].get_xdata()[0] == pytest.approx(shown)
     assert sum(bar.get_width() for bar in damage.patches) == pytest.approx(100.0)
     with pytest.raises(ub.SceneError, match="is not one of"):
-        ub.plot_extremes(solution, extremes, "shape")
+        ub.plot(extremes, "shape")

@@ -12,7 +12,7 @@ import ufl_beam as ub
 pytestmark = pytest.mark.filterwarnings("ignore:beam. its section is:ufl_beam.ModelWarning")
 
 STEEL = {"E": 210e9, "nu": 0.3, "rho": 7850.0}
-ELASTIC = ub.Hardening(limit=math.inf)
+ELASTIC = ub.ElastoPlastic(yield_limit=math.inf)
 SHAPES = {
     "rectangle": lambda **more: ub.Section.rectangle(b=0.10, h=0.20, **STEEL, **more),
     "circle": lambda **more: ub.Section.circle(d=0.30, **STEEL, **more),
@@ -137,13 +137,19 @@ def bent(fibres):
     if not fibres:
         section = ub.Section(section.EA, section.GA, section.EI, section.rhoA, section.rhoI)
     beam = ub.Beam.arc((0, 0), 5.0, (0, 1.5), section, cells=5)
-    load = ub.PointLoad(beam.end, force=(3e5, -2e5), moment=1e5, time=ub.ramp(0.1))
+    load = ub.PointLoad(beam.end, force=(3e5, -2e5), moment=1e5, amplitude=ub.ramp(0.1))
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
 
 
 @pytest.mark.parametrize(
     "scheme",
-    [ub.Static(), ub.ExactStatic(), ub.ExactStatic(0.5), ub.Midpoint(), ub.Midpoint(0.1, 0.1)],
+    [
+        ub.Static(),
+        ub.EnergyMomentumStatic(),
+        ub.EnergyMomentumStatic(0.5),
+        ub.EnergyMomentum(),
+        ub.EnergyMomentum(0.1, 0.1),
+    ],
     ids=str,
 )
 def test_elastic_fibres_are_elastic_resultants(scheme):
@@ -170,13 +176,13 @@ YIELD_MOMENT = LIMIT * b * h**2 / 6
 
 def moment(times, *, number, limit=LIMIT, softening=None, **more):
     """Moments of a cell that is bent to `times` the curvature at first yield, in ten steps each."""
-    fibres = ub.Fibres(ub.Hardening(limit, **more), number=number, softening=softening)
+    fibres = ub.Fibres(ub.ElastoPlastic(limit, **more), number=number, softening=softening)
     section = ub.Section.rectangle(b, h, E=E, nu=0.3, fibres=fibres)
     # A cell so short that it hardly turns: its length stays, though the section may bear nothing
     length = 1e-3
     beam = ub.Beam((0, 0), (length, 0), section, cells=1)
     turns = [0.0, *(x * YIELD_CURVATURE * length for x in times)]
-    turn = ub.Prescribed(beam.end, u=0, psi=ub.Table(range(len(turns)), turns))
+    turn = ub.PrescribedDisplacement(beam.end, u=0, psi=ub.Table(range(len(turns)), turns))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
     solution = ub.simulate(scene, ub.Static(), t=(0, len(times)), dt=0.1)
     return solution.material_at(beam.at(0.5)).forces[::10, 2][1:] / YIELD_MOMENT, solution
@@ -209,7 +215,7 @@ def test_unloading_is_elastic_and_leaves_a_curvature():
 
 def test_hardening_fibres_keep_a_slope():
     """[closed] Far beyond first yield dM/dκ = E_t I with E_t = E H/(E + H), for all fibres flow."""
-    (_, before, after), _ = moment([1.0, 400.0, 410.0], number=20, modulus=E / 9)
+    (_, before, after), _ = moment([1.0, 400.0, 410.0], number=20, isotropic=E / 9)
     assert (after - before) / 10 == pytest.approx(0.1 * (1 - 1 / 20**2), rel=1e-9)
 
 

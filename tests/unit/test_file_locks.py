@@ -24,7 +24,7 @@ SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[LOAD])
 
 def run(folder, *more, t1=0.05):
     return ub.simulate(
-        *(SCENE, ub.Midpoint()),
+        *(SCENE, ub.EnergyMomentum()),
         t=(0, t1),
         dt=0.01,
         record=[ub.History(folder / "run.csv", [BEAM.end]), *more],

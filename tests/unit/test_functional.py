@@ -120,7 +120,10 @@ def pushed(section, turn=0.3):
     beam = ub.Beam((0, 0), (1, 2), section, cells=3)
     scene = ub.Scene(
         [beam],
-        supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, psi=lambda t: turn * t)],
+        supports=[
+            ub.Clamped(beam.start),
+            ub.PrescribedDisplacement(beam.end, psi=lambda t: turn * t),
+        ],
     )
     simulation = ub.Simulation(scene, ub.Static(), comm=MPI.COMM_SELF)
     for t in np.linspace(0.05, 1, 20):

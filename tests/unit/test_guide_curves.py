@@ -18,7 +18,7 @@ def scene(curve):
         [beam],
         joints=[ub.Guided(beam.end, curve)],
         supports=[ub.Roller(beam.start, along=(1, 0))],
-        loads=[ub.Gravity(), ub.PointLoad(beam.end, (5.0, 0.0), time=lambda t: min(t, 0.1))],
+        loads=[ub.Gravity(), ub.PointLoad(beam.end, (5.0, 0.0), amplitude=lambda t: min(t, 0.1))],
     )
 
 
@@ -27,11 +27,11 @@ def wave(s):
 
 
 def run(guided):
-    return ub.simulate(guided, ub.Midpoint(), t=(0, 0.4), dt=0.01, progress=False)
+    return ub.simulate(guided, ub.EnergyMomentum(), t=(0, 0.4), dt=0.01, progress=False)
 
 
 def stepped(curve, steps=40, scheme=None):
-    simulation = ub.Simulation(scene(curve), scheme or ub.Midpoint())
+    simulation = ub.Simulation(scene(curve), scheme or ub.EnergyMomentum())
     for k in range(1, steps + 1):
         simulation.step_to(0.01 * k)
     return simulation
@@ -61,7 +61,7 @@ def test_few_points_are_asked_for():
         return wave(s)
 
     counts = []
-    simulation = ub.Simulation(scene(counted), ub.Midpoint())
+    simulation = ub.Simulation(scene(counted), ub.EnergyMomentum())
     simulation.step_to(0.01)
     counts.clear()
     before, steps = simulation.iterations, 30

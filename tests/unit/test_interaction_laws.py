@@ -10,7 +10,7 @@ from ufl_beam.terms.material_points import Points
 
 EA, EI, NP, MP = 1000.0, 50.0, 10.0, 2.0
 LAW = ub.AxialBending(NP, MP)
-SCHEMES = [ub.Static(), ub.ExactStatic(0.5), ub.ExactStatic(1.0)]
+SCHEMES = [ub.Static(), ub.EnergyMomentumStatic(0.5), ub.EnergyMomentumStatic(1.0)]
 
 
 def section(**more):
@@ -92,8 +92,8 @@ def test_pure_resultants():
 def test_a_column_under_axial_force(reference):
     """[closed] Beyond yielding M = Mp (1 - n²) under a constant force n Np; rounded by 0.01."""
     beam = ub.Beam((0, 0), (1, 0), section(interaction=LAW), cells=1)
-    press = ub.PointLoad(beam.end, force=(-0.6 * NP, 0.0), time=lambda t: min(t, 1.0))
-    turn = ub.Prescribed(beam.end, psi=lambda t: 0.4 * max(t - 1.0, 0.0))
+    press = ub.PointLoad(beam.end, force=(-0.6 * NP, 0.0), amplitude=lambda t: min(t, 1.0))
+    turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: 0.4 * max(t - 1.0, 0.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn], loads=[press])
     newton = ub.Newton(reference=reference)
     run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.05, newton=newton, progress=False)
@@ -106,9 +106,9 @@ def test_a_column_under_axial_force(reference):
 def test_the_ledger_closes():
     """Of a beam that is thrown and yields in tension and bending."""
     beam = ub.Beam((0, 0), (2, 0), section(interaction=LAW), cells=4)
-    load = ub.PointLoad(beam.end, force=(3.0, 8.0), time=lambda t: float(t < 0.5))
+    load = ub.PointLoad(beam.end, force=(3.0, 8.0), amplitude=lambda t: float(t < 0.5))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    for scheme in (ub.Midpoint(), ub.Midpoint(0.1)):
+    for scheme in (ub.EnergyMomentum(), ub.EnergyMomentum(0.1)):
         run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01, progress=False)
         assert run.energy.worst < 1e-9
         assert run.energy.lost["plastic"][-1] > 0.01 * run.energy.throughput
@@ -118,8 +118,11 @@ def test_the_ledger_closes():
     ("make", "says"),
     [
         (lambda: section(bending=LAW), r"is a law of NM together; use it as Section\(interaction"),
-        (lambda: section(interaction=ub.Hardening(1.0)), "is no law of N and M together"),
-        (lambda: section(interaction=LAW, bending=ub.Hardening(1.0)), "bending beside interaction"),
+        (lambda: section(interaction=ub.ElastoPlastic(1.0)), "is no law of N and M together"),
+        (
+            lambda: section(interaction=LAW, bending=ub.ElastoPlastic(1.0)),
+            "bending beside interaction",
+        ),
         (lambda: section(interaction=LAW, hinge=ub.Softening(1.0, 1.0)), "hinge beside interact"),
         (lambda: ub.Spring(1.0, law=LAW), "Spring: law = .* is a law of NM together"),
         (lambda: ub.Fibres(LAW), "Fibres: law = .* is a law of NM together"),

@@ -24,7 +24,7 @@ def section(**more):
 def bent(law, cells=4, moment=200.0, time=lambda t: t):
     """A cantilever under a moment at its end."""
     beam = ub.Beam((0, 0), (2, 0), section(bending=law), cells=cells)
-    load = ub.PointLoad(beam.end, moment=moment, time=time)
+    load = ub.PointLoad(beam.end, moment=moment, amplitude=time)
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
 
 
@@ -52,7 +52,7 @@ def test_unloading_is_elastic():
 def test_a_law_without_variables():
     """[closed] N = EA Σ + c Σ³ of a bar that is pulled."""
     beam = ub.Beam((0, 0), (1, 0), section(axial=Stiffening(1e8)), cells=2)
-    pull = ub.Prescribed(beam.end, u=lambda t: 0.1 * t, v=0.0)
+    pull = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.1 * t, v=0.0)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
     run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     Σ = 0.1 * run.times
@@ -65,7 +65,7 @@ def test_relaxation():
     """[closed] At constant strain stress decays as exp(-t C/eta); of second order at θ = 1/2."""
     errors = []
     for n in (10, 20):
-        one = Bars(1, Dashpot(eta=40.0), None, ub.ExactStatic(0.5))  # C/eta = 5/s
+        one = Bars(1, Dashpot(eta=40.0), None, ub.EnergyMomentumStatic(0.5))  # C/eta = 5/s
         for dt in (1e-12, *[0.5 / n] * n):
             one.step([0.1], dt=dt)
         errors.append(abs(one.stress()[0] / (C * 0.1) - np.exp(-2.5)))
@@ -86,7 +86,7 @@ SCENES = {
 
 
 def thrown(beam, **more):
-    load = ub.PointLoad(beam.end, force=(0, 300.0), time=lambda t: float(t < 0.05))
+    load = ub.PointLoad(beam.end, force=(0, 300.0), amplitude=lambda t: float(t < 0.05))
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
 
 
@@ -112,7 +112,9 @@ def sprung(law):
     return thrown(beam, connectors=[link])
 
 
-@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Midpoint(0.1), ub.Midpoint(0.5)], ids=str)
+@pytest.mark.parametrize(
+    "scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(0.1), ub.EnergyMomentum(0.5)], ids=str
+)
 @pytest.mark.parametrize("name", SCENES)
 def test_the_ledger_closes_in_both_paths(name, scheme):
     """Energies of laws that do not state their dissipation, too."""
@@ -137,7 +139,7 @@ def test_the_ledger_closes_in_both_paths(name, scheme):
 @pytest.mark.parametrize("name", SCENES)
 def test_a_run_that_goes_on_is_the_whole_one(name):
     """By ``start``: internal variables of any name are taken over."""
-    scene, scheme = SCENES[name](), ub.Midpoint()
+    scene, scheme = SCENES[name](), ub.EnergyMomentum()
     whole = ub.simulate(scene, scheme, t=(0, 0.1), dt=5e-3)
     half = ub.simulate(scene, scheme, t=(0, 0.05), dt=5e-3)
     rest = ub.simulate(scene, scheme, t=(0.05, 0.1), dt=5e-3, start=half)
@@ -263,8 +265,8 @@ class Renamed(Dashpot):
         (Both(), "Both has both increments and residuals"),
         (Infinite(), "Infinite.stress is .* must be a number"),
         (PowerLaw("strong", 1.0, 2.0), "PowerLaw: M0 = 'strong' is no number"),
-        (PowerLaw, "is not a Hardening or another MaterialLaw"),
-        (3.0, "3.0 is not a Hardening or another MaterialLaw"),
+        (PowerLaw, "is not a ElastoPlastic or another MaterialLaw"),
+        (3.0, "3.0 is not a ElastoPlastic or another MaterialLaw"),
     ],
     ids=str,
 )
@@ -312,7 +314,7 @@ def test_hinges_of_zero_length_have_no_elastic_stiffness():
 @pytest.mark.parametrize(
     ("axial", "said"),
     [
-        (ub.Hardening(1.0), r"of one class, not Hardening\(.*\) and PowerLaw\("),
+        (ub.ElastoPlastic(1.0), r"of one class, not ElastoPlastic\(.*\) and PowerLaw\("),
         (PowerLaw(1.0, 1.0, 2.0), None),
     ],
 )

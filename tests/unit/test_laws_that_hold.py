@@ -64,7 +64,12 @@ class Wearing(ub.ConnectorLaw):
 LAWS = {
     "dry": Dry(2.0), "breakaway": Breakaway(2.0, 1.2, 0.05, 0.5), "wearing": Wearing(2.0, 0.5, 0.1),
 }  # fmt: skip
-SCHEMES = [ub.Midpoint(), ub.Midpoint(0.1, 0.1), ub.DecayingMidpoint(), ub.Static()]
+SCHEMES = [
+    ub.EnergyMomentum(),
+    ub.EnergyMomentum(0.1, 0.1),
+    ub.EnergyMomentumDecaying(),
+    ub.Static(),
+]
 
 
 CASES = pytest.mark.parametrize(
@@ -79,7 +84,7 @@ def oscillator(*laws, v=1.5):
     mass = ub.Body((1, 0), mass=2.0, inertia=1.0)
     rail = ub.ground(0, 0), mass.middle
     links = [ub.Slide(*rail, law) for law in laws]
-    push = ub.PointLoad(mass.middle, force=(3.0, 0), time=lambda t: math.sin(4 * t))
+    push = ub.PointLoad(mass.middle, force=(3.0, 0), amplitude=lambda t: math.sin(4 * t))
     scene = ub.Scene(
         bodies=[mass], joints=[ub.Prismatic(*rail)], loads=[push],
         connectors=[ub.Slide(*rail, ub.Spring(50.0)), *links],
@@ -121,7 +126,7 @@ class Named(Wearing):
         return {"slip": f.absolute(rate) * dt, "held": 0.0, "dissipated": 0.0}
 
 
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()], ids=str)
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()], ids=str)
 def test_names_of_variables_are_free(scheme):
     found = []
     for law in (Named(2.0, 0.5, 0.1), LAWS["wearing"]):
@@ -164,12 +169,13 @@ def test_a_slow_pull_slips_by_twice_the_drop():
     body = ub.Body((1, 0), mass=mass, inertia=1.0)
     hand = ub.Body((2, 0), mass=1.0, inertia=1.0)
     links = [ub.Slide(ub.ground(0, 0), one.middle, law) for one, law in (
-        (body, Drop(3.0, 2.0, 1.0, 0.0)), (hand, ub.Motor(lambda t: 0.059 + v * t)))]  # fmt: skip
+        (body, Drop(3.0, 2.0, 1.0, 0.0)),
+        (hand, ub.PrescribedMotion(lambda t: 0.059 + v * t)))]  # fmt: skip
     spring = ub.Slide(body.middle, hand.middle, ub.Spring(k))
     rails = [ub.Prismatic(ub.ground(0, 0), one.middle) for one in (body, hand)]
     scene = ub.Scene(bodies=[body, hand], joints=rails, connectors=[*links, spring])
     start = run(scene, ub.Static(), t=(-1, 0), dt=1.0)
-    solution = run(scene, ub.Midpoint(), t=(0, 30), dt=0.005, start=start)
+    solution = run(scene, ub.EnergyMomentum(), t=(0, 30), dt=0.005, start=start)
     pull, moved = solution.connector(spring).force, solution.connector(links[0]).motion
     assert pull.max() == pytest.approx(3.0, rel=1e-4)
     assert moved[-1] == pytest.approx(2 * (3.0 - 2.0) / k, rel=5e-3)
@@ -186,7 +192,7 @@ def test_iterations_do_not_decide_what_breaks_loose(dt):
 
     def scene():
         beam = ub.Beam((0, 0), (1, 0.2), ub.Section(1e4, 4e3, 100, rhoA=1, rhoI=0.01), cells=4)
-        load = ub.PointLoad(beam.end, force=(13.0, 1.5), time=ub.ramp(0.06))
+        load = ub.PointLoad(beam.end, force=(13.0, 1.5), amplitude=ub.ramp(0.06))
         brake = ub.Turn(ub.ground(0, 0), beam.end, Drop(0.5, 0.285, 1.0, 0.0))
         swing = ub.Velocity([beam], linear=(0.3, 1.0), angular=0.22, about=(0, 0))
         return brake, ub.Scene(beams=[beam], loads=[load], connectors=[brake], initial=[swing])
@@ -194,7 +200,7 @@ def test_iterations_do_not_decide_what_breaks_loose(dt):
     def go(until, since=0.0, scene=None, **more):
         newton = ub.Newton(rtol=1e-12, reference=more.pop("reference", False))
         mesh = ub.Mesh(degree=3, lumped=True)
-        return run(scene, ub.Midpoint(), (since, until), dt, mesh=mesh, newton=newton, **more)
+        return run(scene, ub.EnergyMomentum(), (since, until), dt, mesh=mesh, newton=newton, **more)
 
     brake, made = scene()
     whole = go(0.15, scene=made)
@@ -213,7 +219,7 @@ def test_what_wears_is_lost():
     """The way of sliding is the variable, and the loss its integral of the limit [closed]."""
     _, (link,), scene = oscillator(Wearing(2.0, 0.5, 0.1))
     coarse, fine = (
-        (solution := run(scene, ub.Midpoint(), dt=dt)).energy.lost["connectors"][-1]
+        (solution := run(scene, ub.EnergyMomentum(), dt=dt)).energy.lost["connectors"][-1]
         - lost_over(np.abs(np.diff(solution.connector(link).motion)).sum())
         for dt in (0.02, 0.01)
     )
@@ -232,7 +238,7 @@ def test_reference(name, scheme):
     require_reference(run, scene, link, scheme, t=(0, 1))
 
 
-@pytest.mark.parametrize("scheme", [ub.Midpoint(0.05), ub.Static()], ids=str)
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.05), ub.Static()], ids=str)
 def test_restart_and_start(scheme, shared_path):
     _, links, scene = oscillator(*LAWS.values())
     require_restart(run, scene, links, scheme, shared_path, until=1.0)

@@ -106,10 +106,10 @@ def test_loads_of_one_time_function_and_of_several_add_up():
         return 1.0
 
     loads = [
-        lambda b: ub.PointLoad(b.end, force=(1, 0), time=once),
-        lambda b: ub.PointLoad(b.end, force=(2, 0), time=once),
+        lambda b: ub.PointLoad(b.end, force=(1, 0), amplitude=once),
+        lambda b: ub.PointLoad(b.end, force=(2, 0), amplitude=once),
         lambda b: ub.PointLoad(b.at(0.5), force=(4, 0)),
-        lambda b: ub.FollowerLoad(b.end, force=(8, 0), time=ub.ramp(2.0)),
+        lambda b: ub.FollowerLoad(b.end, force=(8, 0), amplitude=ub.ramp(2.0)),
     ]
     check(reaction_of(*loads), [-(1 + 2 + 4 + 8 / 2), 0, 0])  # the ramp is at a half
 
@@ -122,8 +122,8 @@ def test_a_load_where_nothing_else_is_makes_a_vertex():
 def test_loads_in_dynamics_act_at_the_middle_of_the_step():
     # A free mass on a ramp: the momentum is the mid-point sum of the force, exact for linear ones.
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=2)
-    push = [ub.LineLoad(beam, force=(3, 0), time=lambda t: t)]
-    solution = ub.simulate(ub.Scene([beam], loads=push), ub.Midpoint(), t=(0, 2), dt=0.5)
+    push = [ub.LineLoad(beam, force=(3, 0), amplitude=lambda t: t)]
+    solution = ub.simulate(ub.Scene([beam], loads=push), ub.EnergyMomentum(), t=(0, 2), dt=0.5)
     assert solution.momentum()[:, 0] == pytest.approx(3 * solution.times**2, rel=1e-9)
 
 
@@ -142,7 +142,7 @@ def test_loads_at_joints_between_processes(joint, load):
         masses=[ub.PointMass(b.start, i, i) for i, b in enumerate(beams)],
     )
     all_of_us, alone = (
-        ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.1, comm=comm)
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, comm=comm)
         for comm in (MPI.COMM_WORLD, MPI.COMM_SELF)
     )
     assert np.abs(alone.q[-1]).max() > 0.1
@@ -155,13 +155,13 @@ def test_loads_at_joints_between_processes(joint, load):
 def test_work_of_follower_loads_among_many_entries():
     """The ledger needs more room after the loads have been made."""
     beam = ub.Beam((0, 0), (4, 0), SECTION, cells=4)
-    load = ub.FollowerLoad(beam.end, force=(0.0, -2.0), time=ub.ramp(0.3))
+    load = ub.FollowerLoad(beam.end, force=(0.0, -2.0), amplitude=ub.ramp(0.3))
 
     def lift(w):
         return 0.01 * w[1]
 
     works = [ub.VirtualWork(f"wind {k}", lift) for k in range(20)]
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], works=works)
-    run = ub.simulate(scene, ub.Midpoint(), t=(0.0, 0.5), dt=0.02, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, 0.5), dt=0.02, progress=False)
     assert run.energy.supplied["loads"][-1] > 0.001
     assert run.energy.worst < 1e-9

@@ -20,8 +20,8 @@ STEP = 1e-30
 
 
 def bulk(C=C, limit=LIMIT, H=H, B=B, eta=ETA):
-    numbers = {"limit": limit, "modulus": H, "kinematic": B, "viscosity": eta}
-    return ub.Hardening(1.0).of(*arrays(C, numbers))
+    numbers = {"yield_limit": limit, "isotropic": H, "kinematic": B, "viscosity": eta}
+    return ub.ElastoPlastic(1.0).of(*arrays(C, numbers))
 
 
 def arrays(C, numbers):
@@ -277,16 +277,16 @@ def test_laws_of_resultants_stand_at_their_points():
     """Axial force and moment yield; shear has no point."""
     section = ub.Section(
         EA=7.0, GA=5.0, EI=3.0,
-        axial=ub.Hardening(2.0, 1.0, viscosity=ub.DuvautLions(0.5)),
-        bending=ub.Hardening(4.0, kinematic=6.0, viscosity=ub.Perzyna(9.0)),
+        axial=ub.ElastoPlastic(2.0, 1.0, viscosity=ub.DuvautLions(0.5)),
+        bending=ub.ElastoPlastic(4.0, kinematic=6.0, viscosity=ub.Perzyna(9.0)),
     )  # fmt: skip
     layout = section.layout(None)
     numbers = layout.numbers([(0, 0), (0, 1)])
     assert layout.strains.tolist() == [[1, 0, 0], [0, 0, 1]]
     assert layout.rest.tolist() == [0, 5, 0]
     assert layout.stiffness.tolist() == [7, 3]
-    assert numbers["limit"].tolist() == [[2, 4], [2, 4]]
-    assert numbers["modulus"].tolist() == [[1, 0], [1, 0]]
+    assert numbers["yield_limit"].tolist() == [[2, 4], [2, 4]]
+    assert numbers["isotropic"].tolist() == [[1, 0], [1, 0]]
     assert numbers["kinematic"].tolist() == [[0, 6], [0, 6]]
     assert numbers["viscosity"].tolist() == [[0.5 * (7 + 1), 9], [0.5 * (7 + 1), 9]]
     assert layout.softening is None

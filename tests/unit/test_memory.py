@@ -63,7 +63,7 @@ class Watch(ub.Recorder):
 def test_memory_does_not_grow():
     """The four-beam swing with stiff links, 10 000 steps of 1 ms."""
     watch = Watch({2_000, 10_000})
-    scheme = ub.Midpoint(alpha=0.05, beta=0.05)
+    scheme = ub.EnergyMomentum(alpha=0.05, beta=0.05)
     solution = ub.simulate(
         swing(rigidity=1e4), scheme, t=(0, 10), dt=1e-3, every=10_000, record=watch
     )
@@ -81,18 +81,18 @@ def test_memory_does_not_grow_with_inelastic_material():
     """A frame that yields and breaks, swayed to and fro in 2000 steps."""
     section = ub.Section(
         EA=1e5, GA=1e5, EI=100.0, rhoA=1.0, rhoI=0.01,
-        bending=ub.Hardening(5.0, 2.0), hinge=ub.Softening(8.0, 50.0),
+        bending=ub.ElastoPlastic(5.0, 2.0), hinge=ub.Softening(8.0, 50.0),
     )  # fmt: skip
     column = ub.Beam((0, 0), (0, 1), section, cells=4, name="column")
     girder = ub.Beam((0, 1), (1, 1), section, cells=4, name="girder")
-    sway = ub.Prescribed(girder.end, u=lambda t: 0.2 * math.sin(20 * t), v=0)
+    sway = ub.PrescribedDisplacement(girder.end, u=lambda t: 0.2 * math.sin(20 * t), v=0)
     scene = ub.Scene(
         [column, girder],
         joints=[ub.Rigid(column.end, girder.start)],
         supports=[ub.Clamped(column.start), sway],
     )
     watch = Watch({500, 2_000})
-    scheme = ub.Midpoint(alpha=0.05, beta=0.05)
+    scheme = ub.EnergyMomentum(alpha=0.05, beta=0.05)
     solution = ub.simulate(scene, scheme, t=(0, 2), dt=1e-3, every=2_000, record=watch)
     energy = solution.energy
     assert energy["plastic"][-1] > 1
@@ -110,7 +110,7 @@ def test_a_simulation_gives_everything_back():
 
     def runs(count):
         for _ in range(count):
-            ub.simulate(scene, ub.Midpoint(), t=(0, 2e-3), dt=1e-3)
+            ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2e-3), dt=1e-3)
         gc.collect()
         return resident()
 
@@ -127,11 +127,11 @@ def test_memory_does_not_grow_with_the_members_of_a_study():
 
     def member(number):
         section = ub.Section(EA=1e5 + number, GA=1e5, EI=100.0, rhoA=1.0, rhoI=0.01)
-        law = ub.Softening(limit=5.0 + 1e-3 * number, energy=1.0)
+        law = ub.Softening(limit=5.0 + 1e-3 * number, fracture_energy=1.0)
         beam = ub.Beam((0, 0), (1 + 1e-4 * number, 0), section, cells=4, hinges={0.0: law})
         load = ub.PointLoad(beam.end, force=(0, -10.0))
         scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-        solution = ub.simulate(scene, ub.Midpoint(), t=(0, 2e-3), dt=1e-3)
+        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2e-3), dt=1e-3)
         if number in (200, 999):
             gc.collect()
             memory[number] = resident()

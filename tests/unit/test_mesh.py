@@ -130,7 +130,7 @@ def test_second_order():
 
 
 def test_hinges_are_where_the_place_is():
-    law = ub.Softening(limit=10.0, energy=1.0)
+    law = ub.Softening(limit=10.0, fracture_energy=1.0)
     beam = ub.Beam((0, 0), (1, 0), STEEL, cells=4, hinges={0.6: law})
     for refine in (1, 2, 5):
         grid = Grid(ub.Scene([beam]), ub.Mesh(refine))
@@ -140,10 +140,10 @@ def test_hinges_are_where_the_place_is():
 @pytest.mark.parametrize("degree", [2, 3])
 def test_elastic_beams_of_higher_degree_may_have_hinges(degree):
     """[closed] θ = M L/EI + α with M = limit exp(-limit α/energy), whatever the degree."""
-    law = ub.Softening(limit=10.0, energy=5.0)
+    law = ub.Softening(limit=10.0, fracture_energy=5.0)
     section = ub.Section(EA=1e6, GA=1e6, EI=100.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=2, hinges={0.5: law})
-    turn = ub.Prescribed(beam.end, psi=lambda t: 0.3 * t)
+    turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: 0.3 * t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
     mesh = ub.Mesh(degree=degree)
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, mesh=mesh, progress=False)
@@ -169,7 +169,7 @@ def test_modes_and_buckling():
     scene = ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(0.0, -1.0), time=lambda t: t)],
+        loads=[ub.PointLoad(beam.end, force=(0.0, -1.0), amplitude=lambda t: t)],
     )
     mesh = ub.Mesh(refine=8)
     euler = math.pi**2 * 1e3 / (4 * 2**2)  # N, with 1 N as load
@@ -190,7 +190,13 @@ def test_everything_takes_a_finer_mesh(shared_path):
     arm = scene.beams[1]
     records = [ub.XDMF(shared_path / "a.xdmf"), ub.History(shared_path / "a.csv", [arm.at(0.25)])]
     solution = ub.simulate(
-        scene, ub.Midpoint(), t=(0, 1e-2), dt=1e-3, mesh=ub.Mesh(2), record=records, progress=False
+        scene,
+        ub.EnergyMomentum(),
+        t=(0, 1e-2),
+        dt=1e-3,
+        mesh=ub.Mesh(2),
+        record=records,
+        progress=False,
     )
     assert len(solution.shape(arm)) == 15
     assert solution.displacement(arm.at(0.25)).shape == (11, 3)
@@ -205,7 +211,7 @@ def test_the_mesh_belongs_to_a_checkpoint(shared_path):
 
     def run(t1, refine):
         return ub.simulate(
-            portal(), ub.Midpoint(), t=(0, t1), dt=1e-3, mesh=ub.Mesh(refine),
+            portal(), ub.EnergyMomentum(), t=(0, t1), dt=1e-3, mesh=ub.Mesh(refine),
             checkpoint=ub.Checkpoint(path, every=2), progress=False,
         )  # fmt: skip
 
@@ -243,7 +249,7 @@ def test_lumped_is_yes_or_no():
         ub.Mesh(lumped=1)
 
 
-LAW = ub.Hardening(1.0)
+LAW = ub.ElastoPlastic(1.0)
 INELASTIC = {
     "yields": {"section": ub.Section(EA=1, GA=1, EI=1, bending=LAW)},
     "softens": {"section": ub.Section(EA=1, GA=1, EI=1, hinge=ub.Softening(1.0, 1.0))},
@@ -328,7 +334,13 @@ def test_everything_takes_a_higher_degree(mesh, shared_path, on_first_rank):
         ub.Fatigue(ub.HotSpot.fibre(arm.at(0.3), y=0.1, E=1e9), ub.SNCurve(range=1e8)),
     ]  # fmt: skip
     solution = ub.simulate(
-        scene, ub.Midpoint(0.05), t=(0, 0.1), dt=0.01, mesh=mesh, record=records, progress=False
+        scene,
+        ub.EnergyMomentum(0.05),
+        t=(0, 0.1),
+        dt=0.01,
+        mesh=mesh,
+        record=records,
+        progress=False,
     )
     assert solution.energy.worst < 1e-9
     written = on_first_rank(lambda: (shared_path / "b.xdmf").read_text())
@@ -336,11 +348,11 @@ def test_everything_takes_a_higher_degree(mesh, shared_path, on_first_rank):
     # Degree pieces a cell; and the body, the link and the spring
     assert int(lines) == mesh.degree * int(mesh.refine) * (4 + 7) + 3
     ub.plot(solution, "M")
-    ub.plot_shapes(solution)
+    ub.plot(solution, "shapes")
     modes = ub.modes(scene, 3, at=solution)
-    ub.plot_modes(modes)
+    ub.plot(modes)
     assert modes.grid.mesh == mesh
     again = ub.simulate(
-        scene, ub.Midpoint(0.05), t=(0.1, 0.12), dt=0.01, start=solution, progress=False
+        scene, ub.EnergyMomentum(0.05), t=(0.1, 0.12), dt=0.01, start=solution, progress=False
     )
     assert again.energy.worst < 1e-9

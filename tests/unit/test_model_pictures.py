@@ -61,8 +61,8 @@ LAWS = {
     "damper": ub.Damper(300.0),
     "stop": ub.Stop(1e6, high=0.02),
     "friction": ub.Coulomb(50.0),
-    "motor": ub.Motor(lambda t: t),
-    "actuator": ub.Actuator(lambda t: t),
+    "motor": ub.PrescribedMotion(lambda t: t),
+    "actuator": ub.PrescribedForce(lambda t: t),
     "controller": ub.Controller(lambda simulation: 0.0),
     "function": ub.ForceLaw(lambda motion, rate: motion),
     "own law": Dashpot(3.0),
@@ -74,8 +74,11 @@ OBJECTS = {
     "pinned": ("supports", lambda c, g, r: ub.Pinned(c.start)),
     "roller": ("supports", lambda c, g, r: ub.Roller(g.end)),
     "inclined roller": ("supports", lambda c, g, r: ub.Roller(g.end, along=(1, 1))),
-    "prescribed": ("supports", lambda c, g, r: ub.Prescribed(g.end, u=0.1, v=lambda t: t)),
-    "turned": ("supports", lambda c, g, r: ub.Prescribed(r.middle, psi=lambda t: t)),
+    "prescribed": (
+        "supports",
+        lambda c, g, r: ub.PrescribedDisplacement(g.end, u=0.1, v=lambda t: t),
+    ),
+    "turned": ("supports", lambda c, g, r: ub.PrescribedDisplacement(r.middle, psi=lambda t: t)),
     "force": ("loads", lambda c, g, r: ub.PointLoad(g.at(0.5), force=(0, -4e4))),
     "moment": ("loads", lambda c, g, r: ub.PointLoad(g.end, moment=-3e3)),
     "no force": ("loads", lambda c, g, r: ub.PointLoad(g.end)),
@@ -137,13 +140,15 @@ def test_words_say_sizes_with_units():
         frame(
             loads=lambda c, g, r: [
                 ub.PointLoad(g.end, force=(3e3, -4e3)),
-                ub.LineLoad(g, force=(0, -1e4), time=ub.ramp(1.0)),
+                ub.LineLoad(g, force=(0, -1e4), amplitude=ub.ramp(1.0)),
                 ub.FollowerLoad(c.end, moment=-20.0),
                 ub.Gravity(),
             ],
             masses=lambda c, g, r: [ub.PointMass(c.at(0.5), 50.0)],
             initial=lambda c, g, r: [ub.Velocity([r], linear=(3, 4))],
-            supports=lambda c, g, r: [ub.Prescribed(c.start, u=0.01, v=0.0, psi=lambda t: t)],
+            supports=lambda c, g, r: [
+                ub.PrescribedDisplacement(c.start, u=0.01, v=0.0, psi=lambda t: t)
+            ],
             connectors=lambda c, g, r: [ub.Turn(ub.ground(7, 1), r.middle, ub.Stop(1e3, low=-0.1))],
         )
     )
@@ -258,7 +263,7 @@ def test_labels_cover_neither_beams_nor_each_other(bays, floors, number):
     # Each box covers itself; to a square pixel, as texts have whole pixels
     np.testing.assert_allclose(area, own, atol=1.0)
     to_pixels = figure.axes[0].transData.transform
-    ends = np.array([np.ravel(to_pixels(np.array([b.a, b.b]))) for b in scene.beams])
+    ends = np.array([np.ravel(to_pixels(np.array(b.ends))) for b in scene.beams])
     assert lengths_inside(found[:, :2], found[:, 2:], ends).max() == 0.0
     inside = figure.axes[0].get_window_extent().extents
     assert (found[:, :2] > inside[:2]).all()
@@ -306,11 +311,17 @@ def test_a_single_body_and_a_scene_far_away():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda s: ub.plot(3), "plot: 3 is a int; give a Scene, or the Solution of a run"),
+        (lambda s: ub.plot(3), "plot: 3 is a int; give a Scene, the Solution of a run, or"),
         (lambda s: ub.plot([s]), "is a list; give a Scene"),
-        (lambda s: ub.plot(s, "M"), "a scene has no what = 'M' before a run"),
-        (lambda s: ub.plot(s, n=3), "a scene has no n = 3 before a run"),
-        (lambda s: ub.plot(s, magnify=10), "a scene has no magnify = 10 before a run"),
+        (
+            lambda s: ub.plot(s, "M"),
+            "quantity = 'M' of a Scene is not one of model; a scene has none before a run",
+        ),
+        (
+            lambda s: ub.plot(s, n=3),
+            "unexpected keyword argument 'n'; the picture 'model' takes ax",
+        ),
+        (lambda s: ub.plot(s, magnify=10), "unexpected keyword argument 'magnify'"),
     ],
 )
 def test_refused(call, message):

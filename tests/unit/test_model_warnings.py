@@ -25,7 +25,7 @@ def beam(a=(0, 0), b=(1, 0), section=HEAVY, **more):
 def begin(*beams, scheme=None, **parts):
     """A simulation of a scene that has made no step."""
     scene = ub.Scene(beams, **parts)
-    simulation = ub.Simulation(scene, scheme or ub.Midpoint(), comm=MPI.COMM_SELF)
+    simulation = ub.Simulation(scene, scheme or ub.EnergyMomentum(), comm=MPI.COMM_SELF)
     simulation.close()
     return simulation
 
@@ -54,7 +54,7 @@ def test_warnings_point_at_the_line_of_the_user():
 
 @pytest.mark.parametrize("rotary", [0.0, 1e-3])
 def test_a_massless_beam_that_nothing_holds(rotary):
-    """Its motion is not determined; Midpoint made it go to and fro."""
+    """Its motion is not determined; EnergyMomentum made it go to and fro."""
     loose = beam((2, 0), (3, 1), ub.Section(**LIGHT, rhoA=0.0, rhoI=rotary), name="loose")
     held = beam()
     with raises("dynamics needs mass or something that holds: loose (beam 1) can shift along"):
@@ -79,7 +79,7 @@ def test_a_massless_beam_that_nothing_holds(rotary):
         (
             lambda a, b: {
                 "joints": [ub.Revolute(a.end, b.start)],
-                "connectors": [ub.Turn(a.end, b.start, ub.Actuator(lambda t: t))],
+                "connectors": [ub.Turn(a.end, b.start, ub.PrescribedForce(lambda t: t))],
             },
             "turn about (1, 0)",
         ),
@@ -99,7 +99,7 @@ def test_massless_parts_whose_motion_is_not_determined(hold, moves):
     [
         lambda a, b: {"joints": [ub.Rigid(a.end, b.start)]},
         lambda a, b: {"joints": [ub.Revolute(a.end, b.start)], "supports": [ub.Roller(b.end)]},
-        lambda a, b: {"joints": [ub.Rigid(a.end, b.start, measured=True)]},
+        lambda a, b: {"joints": [ub.Rigid(a.end, b.start, multipliers=True)]},
         lambda a, b: {"supports": [ub.Clamped(b.end)], "joints": [ub.Link(a.start, b.start)]},
         lambda a, b: {"masses": [ub.PointMass(b.start, 1.0, 1.0)]},
         lambda a, b: {"masses": [ub.PointMass(b.start, 1.0), ub.PointMass(b.end, 1.0)]},
@@ -109,7 +109,7 @@ def test_massless_parts_whose_motion_is_not_determined(hold, moves):
                 "connectors": [ub.Turn(a.end, b.start, law)],
             }
             for law in (
-                ub.Spring(1.0), ub.Damper(1.0), ub.Motor(lambda t: t), ub.Coulomb(1.0),
+                ub.Spring(1.0), ub.Damper(1.0), ub.PrescribedMotion(lambda t: t), ub.Coulomb(1.0),
                 ub.ForceLaw(lambda e, rate: e), ub.Stop(1.0, low=0.0),
             )
         ),
@@ -200,7 +200,7 @@ def test_a_ring_that_is_not_closed():
     "join",
     [
         lambda a, b: {"joints": [ub.Rigid(a.end, b.start)]},
-        lambda a, b: {"joints": [ub.Revolute(a.end, b.start, measured=True)]},
+        lambda a, b: {"joints": [ub.Revolute(a.end, b.start, multipliers=True)]},
         lambda a, b: {"connectors": [ub.Turn(a.end, b.start, ub.Spring(1.0))]},
         lambda a, b: {"supports": [ub.Pinned(a.end), ub.Clamped(b.start)]},
         lambda a, b: {
@@ -277,7 +277,7 @@ def test_a_point_of_a_body_that_was_meant_relative_to_its_centre(inertia):
     """at(x, y) takes coordinates of the scene; with inertia the radius of gyration tells."""
     wheel = ub.Body((12, 0), mass=1.0, inertia=inertia, name="wheel")
     spring = ub.Stretch(ub.ground(12, 1), wheel.at(0.1, 0.2), ub.Spring(1.0))
-    far = [ub.Prescribed(wheel.middle, psi=0.0)]
+    far = [ub.PrescribedDisplacement(wheel.middle, psi=0.0)]
     with warns("wheel (0.1, 0.2) is 11.9 m away from the centre of wheel", "at(12 + 0.1, 0 + 0.2)"):
         begin(bodies=[wheel], connectors=[spring], supports=far)
     near = ub.Stretch(ub.ground(12, 1), wheel.at(12.1, 0.2), ub.Spring(1.0))
@@ -324,10 +324,12 @@ def test_a_velocity_that_a_support_takes_away():
 
 def test_motions_that_jump_at_the_start():
     one = beam()
-    jump = ub.Prescribed(one.end, v=0.5)
-    with warns("Prescribed at girder.end (1, 0): v jumps from 0 to 0.5 m at the start, t = 0 s"):
+    jump = ub.PrescribedDisplacement(one.end, v=0.5)
+    with warns(
+        "PrescribedDisplacement at girder.end (1, 0): v jumps from 0 to 0.5 m at the start, t = 0 s"
+    ):
         begin(one, supports=[ub.Clamped(one.start), jump])
-    turn = ub.Turn(ub.ground(0, 0), one.start, ub.Motor(lambda t: 0.2 + t))
+    turn = ub.Turn(ub.ground(0, 0), one.start, ub.PrescribedMotion(lambda t: 0.2 + t))
     with warns("Turn(", "its motion jumps from 0 to 0.2 rad"):
         begin(one, supports=[ub.Pinned(one.start)], connectors=[turn])
     # In statics it is a step of loading
@@ -336,10 +338,10 @@ def test_motions_that_jump_at_the_start():
 
 def test_a_run_that_begins_where_the_motion_is():
     one = beam()
-    held = ub.Prescribed(one.end, v=0.01)
+    held = ub.PrescribedDisplacement(one.end, v=0.01)
     scene = ub.Scene([one], supports=[ub.Clamped(one.start), held])
     statics = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, comm=MPI.COMM_SELF)
-    ub.Simulation(scene, ub.Midpoint(), t0=1.0, start=statics, comm=MPI.COMM_SELF).close()
+    ub.Simulation(scene, ub.EnergyMomentum(), t0=1.0, start=statics, comm=MPI.COMM_SELF).close()
 
 
 # -- sections ------------------------------------------------------------------------------------
@@ -370,7 +372,7 @@ def test_more_cells_than_memory():
         beam(cells=10**12)
     one = beam()
     with raises("Mesh: refine = 1000000000000 of girder, 2000000000000 cells, would take 8e+05 GB"):
-        ub.Simulation(ub.Scene([one]), ub.Midpoint(), mesh=ub.Mesh(refine=10**12))
+        ub.Simulation(ub.Scene([one]), ub.EnergyMomentum(), mesh=ub.Mesh(refine=10**12))
 
 
 def test_good_scenes_are_silent():
@@ -385,10 +387,10 @@ def test_good_scenes_are_silent():
             ub.Release(roof.end, right.start, free="M"),
             ub.Rigid(right.end, hub.middle),
         ],
-        supports=[ub.Prescribed(left.start, u=lambda t: 0.01 * t, v=0, psi=0)],
+        supports=[ub.PrescribedDisplacement(left.start, u=lambda t: 0.01 * t, v=0, psi=0)],
         connectors=[ub.Stretch(ub.ground(1.2, 0.1), hub.at(1.1, 0.1), ub.Spring(10.0))],
         loads=[ub.Gravity()],
         initial=[ub.Velocity([right, hub], linear=(0, 0))],
     )
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.02), dt=0.01, comm=MPI.COMM_SELF)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.02), dt=0.01, comm=MPI.COMM_SELF)
     assert np.isfinite(solution.q).all()

@@ -18,7 +18,7 @@ def thrown_beam(cells, **law):
 def hinged_frame():
     """A portal whose corner hinge is about free after 75 of 100 steps, and turns to and fro."""
     section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
-    hinge = {1.0: ub.Softening(limit=50e3, energy=2e3)}
+    hinge = {1.0: ub.Softening(limit=50e3, fracture_energy=2e3)}
     left = ub.Beam((0, 0), (0, 3), section, cells=15)
     roof = ub.Beam((0, 3), (4, 3), section, cells=20, hinges=hinge)
     right = ub.Beam((4, 3), (4, 0), section, cells=15)
@@ -26,12 +26,12 @@ def hinged_frame():
         [left, roof, right],
         joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
-        loads=[ub.PointLoad(left.end, force=(200e3, 0), time=lambda t: float(t < 0.02))],
+        loads=[ub.PointLoad(left.end, force=(200e3, 0), amplitude=lambda t: float(t < 0.02))],
     )
 
 
 def run_of(scene, steps, dt):
-    run = ub.simulate(scene, ub.Midpoint(), t=(0, steps * dt), dt=dt, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, steps * dt), dt=dt, progress=False)
     assert run.parts == steps
     assert abs(run.energy.worst) < 1e-9
     return run
@@ -44,7 +44,7 @@ def test_iterations_where_all_cells_yield(cells):
     Branches chosen by strains take twice the elastic iterations in 1024 cells, and with 4096 cells
     steps are cut.
     """
-    steps, law = 15, ub.Hardening(limit=1.0, kinematic=10.0)
+    steps, law = 15, ub.ElastoPlastic(yield_limit=1.0, kinematic=10.0)
     elastic = run_of(thrown_beam(cells), steps, 0.01)
     yields = run_of(thrown_beam(cells, bending=law), steps, 0.01)
     # What hardening stores counts as well; it is more than half of all that yielding takes.
@@ -60,9 +60,9 @@ def test_a_cantilever_that_yields_in_many_cells(kinematic):
     M = P y is My.  The deflection is the integral of curvature times y, and P L/GA.
     """
     EI, GA, My, cells = 1e3, 1e6, 1e-3, 512
-    section = ub.Section(EA=1e6, GA=GA, EI=EI, bending=ub.Hardening(My, kinematic=kinematic))
+    section = ub.Section(EA=1e6, GA=GA, EI=EI, bending=ub.ElastoPlastic(My, kinematic=kinematic))
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
-    load = ub.PointLoad(beam.end, force=(0, 2 * My), time=lambda t: t)
+    load = ub.PointLoad(beam.end, force=(0, 2 * My), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
     P, b = 2 * My, 0.5
@@ -84,7 +84,7 @@ def test_a_kept_tangent_ends_below_the_tolerance():
     ends = []
     for rtol in (1e-10, 1e-13):
         run = ub.simulate(
-            hinged_frame(), ub.Midpoint(), t=(0, 0.05), dt=1e-3, progress=False,
+            hinged_frame(), ub.EnergyMomentum(), t=(0, 0.05), dt=1e-3, progress=False,
             newton=ub.Newton(rtol=rtol),
         )  # fmt: skip
         ends.append(np.delete(run.q[-1], run.grid.multipliers))

@@ -13,7 +13,7 @@ import ufl_beam as ub
 
 SECTION = ub.Section(EA=1e4, GA=4e3, EI=10.0, rhoA=1.0, rhoI=1e-3)
 WRONG = [math.nan, math.inf, -math.inf]
-SCHEMES = [ub.Midpoint(), ub.Static(), ub.GeneralizedAlpha(0.8)]
+SCHEMES = [ub.EnergyMomentum(), ub.Static(), ub.GeneralizedAlpha(0.8)]
 
 
 def girder(**parts):
@@ -46,27 +46,33 @@ def work(kind):
 TURN = "Turn(ground (2, 0), girder.end (1, 0)): "
 LATER = {
     "PointLoad": lambda v: (
-        girder(loads=lambda b: ub.PointLoad(b.end, (1, 0), time=after(v))),
+        girder(loads=lambda b: ub.PointLoad(b.end, (1, 0), amplitude=after(v))),
         "PointLoad at girder.end (1, 0): the time function is",
     ),
     "FollowerLoad": lambda v: (
-        girder(loads=lambda b: ub.FollowerLoad(b.end, (1, 0), time=after(v))),
+        girder(loads=lambda b: ub.FollowerLoad(b.end, (1, 0), amplitude=after(v))),
         "FollowerLoad at girder.end (1, 0): the time function is",
     ),
     "LineLoad": lambda v: (
-        girder(loads=lambda b: ub.LineLoad(b, (1, 0), time=after(v))),
+        girder(loads=lambda b: ub.LineLoad(b, (1, 0), amplitude=after(v))),
         "LineLoad on girder: the time function is",
     ),
     "Gravity": lambda v: (
-        girder(loads=lambda b: ub.Gravity(time=after(v))),
+        girder(loads=lambda b: ub.Gravity(amplitude=after(v))),
         "Gravity: the time function is",
     ),
-    "Prescribed": lambda v: (
-        girder(supports=lambda b: ub.Prescribed(b.start, u=0, v=after(v), psi=0)),
-        "Prescribed at girder.start (0, 0): the time function is",
+    "PrescribedDisplacement": lambda v: (
+        girder(supports=lambda b: ub.PrescribedDisplacement(b.start, u=0, v=after(v), psi=0)),
+        "PrescribedDisplacement at girder.start (0, 0): the time function is",
     ),
-    "Motor": lambda v: (turned(ub.Motor(after(v))), f"{TURN}the time function is"),
-    "Actuator": lambda v: (turned(ub.Actuator(after(v))), f"{TURN}the time function is"),
+    "PrescribedMotion": lambda v: (
+        turned(ub.PrescribedMotion(after(v))),
+        f"{TURN}the time function is",
+    ),
+    "PrescribedForce": lambda v: (
+        turned(ub.PrescribedForce(after(v))),
+        f"{TURN}the time function is",
+    ),
     "Controller": lambda v: (
         turned(ub.Controller(lambda now: after(v)(now.t))),
         f"{TURN}the controller returned",
@@ -135,7 +141,7 @@ def test_the_first_call(law, words, value, scheme, reference):
 @pytest.mark.parametrize("value", WRONG)
 def test_a_time_function_is_asked_before_a_run(value):
     with pytest.raises(ub.SceneError, match=f"the time function is {value} at t = 0"):
-        ub.Motor(lambda t: value)
+        ub.PrescribedMotion(lambda t: value)
 
 
 def test_a_law_without_a_value_far_away_is_met_by_shorter_steps():
@@ -148,8 +154,8 @@ def test_a_law_without_a_value_far_away_is_met_by_shorter_steps():
     beyond = []
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
     stop = ub.Slide(ub.ground(1, 0), beam.end, ub.ForceLaw(wall), axis=(0, 1))
-    push = ub.PointLoad(beam.end, (0, 0.36), time=lambda t: t)
-    scene = ub.Scene([beam], [], [ub.Clamped(beam.start)], [push], connectors=[stop])
+    push = ub.PointLoad(beam.end, (0, 0.36), amplitude=lambda t: t)
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=[stop])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False, comm=MPI.COMM_SELF)
     way = solution.connector(stop).motion[-1]
     assert 0.0095 < way < 0.01
@@ -162,8 +168,8 @@ def test_a_guide_that_ends():
     """The curve is known up to 1 mm; the load along it brings the point there at t = 0.1 s."""
     scene = girder(
         joints=lambda b: ub.Guided(b.end, lambda s: (1 + s, s) if s < 1e-3 else (math.nan,) * 2),
-        loads=lambda b: ub.PointLoad(b.end, (100.0, 1.0), time=lambda t: t),
+        loads=lambda b: ub.PointLoad(b.end, (100.0, 1.0), amplitude=lambda t: t),
     )
     with pytest.raises(ub.ConvergenceError, match=r"girder.end .* no nearest point") as failure:
-        run(scene, ub.Midpoint())
+        run(scene, ub.EnergyMomentum())
     assert "singular" not in str(failure.value)

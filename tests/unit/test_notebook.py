@@ -55,7 +55,7 @@ def test_models_and_results_have_a_page(cells, name):
     assert "no picture" not in data["text/html"]
 
 
-@pytest.mark.parametrize("plot", ["plot(", "plot_history", "plot_energy", "plot_hinge"])
+@pytest.mark.parametrize("plot", ["plot(", '"history"', '"energy"', '"hinge"'])
 def test_figures_are_pictures(cells, plot):
     """Without `%matplotlib inline`."""
     (source,) = (source for source in cells if source.startswith(f"ub.{plot}"))

@@ -9,9 +9,9 @@ import pytest
 import ufl_beam as ub
 from ufl_beam.discretization.state_io import Memory
 
-DYNAMIC = [ub.Midpoint(), ub.Midpoint(alpha=0.1, beta=0.1), ub.DecayingMidpoint()]
-STATIC = [ub.Static(), ub.ExactStatic()]
-PERFECT = ub.Softening(limit=0.0, energy=1.0)
+DYNAMIC = [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1, beta=0.1), ub.EnergyMomentumDecaying()]
+STATIC = [ub.Static(), ub.EnergyMomentumStatic()]
+PERFECT = ub.Softening(limit=0.0, fracture_energy=1.0)
 
 
 def star(number, *, hinge=None, joint=ub.Rigid, moment=0.0):
@@ -47,7 +47,7 @@ def test_perfect_hinges_around_a_node_are_a_revolute_joint(scheme, number):
         assert np.abs(hinged.displacement(member.end)[:, 2]).max() < 1e-12
 
 
-@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Static()], ids=str)
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Static()], ids=str)
 def test_a_driven_node_is_not_idle(scheme):
     """Nothing resists a moment on the node, however small."""
     with pytest.raises(ub.ConvergenceError) as caught:
@@ -76,7 +76,7 @@ def storeys(embedded):
             joints += [ub.Rigid(*meeting["right"], right.start)]
         meeting = {"left": [left.end, girder.start], "right": [right.end, girder.end]}
         members += [left, right, girder]
-        loads.append(ub.PointLoad(left.end, force=(200e3 * (k + 1) / 3, -20e3), time=push))
+        loads.append(ub.PointLoad(left.end, force=(200e3 * (k + 1) / 3, -20e3), amplitude=push))
     joints += [ub.Rigid(*ends) for ends in meeting.values()]
     feet = [ub.Clamped(members[0].start), ub.Clamped(members[1].start)]
     return ub.Scene(members, joints=joints, supports=feet, loads=loads)
@@ -87,7 +87,7 @@ def storeys(embedded):
 def test_a_frame_falls_when_all_hinges_around_its_nodes_have_broken(embedded):
     """The run goes on; what was dissipated is a whole number of fracture energies, all spent."""
     solution = ub.simulate(
-        storeys(embedded), ub.DecayingMidpoint(), t=(0, 0.15), dt=1e-3, progress=False
+        storeys(embedded), ub.EnergyMomentumDecaying(), t=(0, 0.15), dt=1e-3, progress=False
     )
     energy = solution.energy
     broken = energy.lost["hinges"][-1] / 10.0
@@ -105,7 +105,7 @@ def test_a_run_goes_on_with_what_is_idle():
         return simulation
 
     def begun():
-        return ub.Simulation(star(3, hinge=PERFECT), ub.Midpoint())
+        return ub.Simulation(star(3, hinge=PERFECT), ub.EnergyMomentum())
 
     whole, other = after(begun(), range(10)), begun()
     half = after(begun(), range(5))

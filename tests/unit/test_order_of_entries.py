@@ -10,14 +10,21 @@ import pytest
 
 import ufl_beam as ub
 
-SCHEMES = [ub.Midpoint(0.1, 0.1), ub.DecayingMidpoint(), ub.Static(), ub.ExactStatic()]
+SCHEMES = [
+    ub.EnergyMomentum(0.1, 0.1),
+    ub.EnergyMomentumDecaying(),
+    ub.Static(),
+    ub.EnergyMomentumStatic(),
+]
 QUIET = {"dt": 0.02, "progress": False}
 
 
 def chain():
     """Elastic beams, then yielding ones; each law of connectors is at one place only."""
     elastic = ub.Section(EA=1e4, GA=4e3, EI=1.0, rhoA=1.0, rhoI=1e-3)
-    yielding = ub.Section(EA=1e4, GA=4e3, EI=1.0, rhoA=1.0, rhoI=1e-3, bending=ub.Hardening(0.05))
+    yielding = ub.Section(
+        EA=1e4, GA=4e3, EI=1.0, rhoA=1.0, rhoI=1e-3, bending=ub.ElastoPlastic(0.05)
+    )
     beams = [
         ub.Beam((i, 0), (i + 1, 0), elastic if i < 2 else yielding, cells=4, name=f"b{i}")
         for i in range(4)
@@ -25,7 +32,7 @@ def chain():
     joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
     laws = [
         ub.Spring(2.0), ub.ForceLaw(lambda x, rate: x), ub.Damper(1.0),
-        ub.RigidPlastic(ub.Hardening(0.1, modulus=1.0)),
+        ub.RigidPlastic(ub.ElastoPlastic(0.1, isotropic=1.0)),
     ]  # fmt: skip
     connectors = [
         ub.Turn(ub.ground(*beam.end.point), beam.end, law)
@@ -36,9 +43,11 @@ def chain():
                      beams=[beams[3]]),
         ub.VirtualWork("push", lambda w: 0.1 * w[1], beams=[beams[0]]),
     ]  # fmt: skip
-    load = ub.PointLoad(beams[3].end, (0, 0.1), time=lambda t: math.sin(9 * t))
+    load = ub.PointLoad(beams[3].end, (0, 0.1), amplitude=lambda t: math.sin(9 * t))
     held = [ub.Clamped(beams[0].start)]
-    return ub.Scene(beams, joints, held, [load], connectors=connectors, works=works)
+    return ub.Scene(
+        beams, joints=joints, supports=held, loads=[load], connectors=connectors, works=works
+    )
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=lambda scheme: type(scheme).__name__)
@@ -67,7 +76,7 @@ def test_a_table_goes_on_on_other_processes(shared_path, on_first_rank):
         table = ub.History(shared_path / f"{name}.csv", [scene.beams[3].end])
         file = ub.Checkpoint(shared_path / f"{name}.checkpoint", every=2)
         more = {"record": table, "checkpoint": file, "comm": comm, **QUIET}
-        return ub.simulate(scene, ub.Midpoint(), t=(0, end), **more)
+        return ub.simulate(scene, ub.EnergyMomentum(), t=(0, end), **more)
 
     on_first_rank(lambda: run(0.04, "split", MPI.COMM_SELF) and None)
     run(0.08, "split")

@@ -34,7 +34,7 @@ def scene():
 
 
 def run(*record, steps=5, dt=0.1, **more):
-    scheme = ub.Midpoint()
+    scheme = ub.EnergyMomentum()
     return ub.simulate(
         scene(), scheme, t=(0, steps * dt), dt=dt, record=record, progress=False, **more
     )
@@ -75,7 +75,7 @@ COLLISIONS = {
     "numbers of XDMF": lambda d: [ub.XDMF(d / "a.xdmf"), ub.History(d / "a.xdmf.bin")],
     "VTKHDF": lambda d: [ub.VTKHDF(d / "a.vtkhdf"), ub.VTKHDF(d / "a.vtkhdf")],
     "of a user": lambda d: [ub.History(d / "a.csv"), Notes(d / "a.csv")],
-    "table being thinned": lambda d: [ub.History(d / "a.csv", most=3), Notes(d / "a.csv.part")],
+    "table being thinned": lambda d: [ub.History(d / "a.csv", max_rows=3), Notes(d / "a.csv.part")],
 }
 
 
@@ -195,7 +195,9 @@ def test_a_step_costs_the_same_at_any_time(recorder, tmp_path):
     factor of 3 for that as well.  A file that grew with the steps took 30 ms for the thousandth.
     """
     beam = ub.Beam((0, 0), (4, 0), SECTION, cells=8)
-    simulation = ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Midpoint())
+    simulation = ub.Simulation(
+        ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.EnergyMomentum()
+    )
     file = recorder(tmp_path / f"a{recorder.ending}")
     file.open(simulation)
 

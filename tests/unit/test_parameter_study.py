@@ -34,7 +34,7 @@ def post(force=1.0):
 def pushed(force, record=()):
     """A member that simulates; its numbers have all 53 bits."""
     scene = post(force)
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.02, record=record)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.02, record=record)
     u = solution.displacement(scene.beams[0].end)[:, 0]
     return {"history": u, "peak": u.max(), "steps": solution.parts}
 
@@ -123,7 +123,7 @@ def test_members_need_not_pickle():
 
 def test_a_member_has_its_process_for_itself(shared_path):
     def member(force):
-        simulation = ub.Simulation(post(force), ub.Midpoint())
+        simulation = ub.Simulation(post(force), ub.EnergyMomentum())
         simulation.close()
         files = [ub.XDMF(shared_path / f"{force}.xdmf"), ub.History(shared_path / f"{force}.csv")]
         return {"processes": simulation.comm.size, **pushed(force, files)}
@@ -134,7 +134,7 @@ def test_a_member_has_its_process_for_itself(shared_path):
         assert len((shared_path / f"{case['force']}.csv").read_text().splitlines()) == 7
         assert (shared_path / f"{case['force']}.xdmf").exists()
     assert active_comm() == COMM
-    simulation = ub.Simulation(post(), ub.Midpoint())
+    simulation = ub.Simulation(post(), ub.EnergyMomentum())
     assert simulation.comm.size == COMM.size
     simulation.close()
 
@@ -398,7 +398,7 @@ def member(x):
 
 study = ub.study(member, [{"x": x} for x in range(6)], path="study.h5")
 assert list(study.failed) == [3]
-ub.say(study["square"].tolist())
+ub.print_once(study["square"].tolist())
 """
 
 

@@ -27,12 +27,12 @@ def truss(*, time=growing, moved=False):
     section = ub.Section(EA=EA, GA=EA, EI=1e9, depth=0.1)
     left = ub.Beam((-WIDTH, 0), (0, HEIGHT), section, cells=1, name="left")
     right = ub.Beam((0, HEIGHT), (WIDTH, 0), section, cells=1, name="right")
-    push = ub.Prescribed(left.end, v=lambda t: -t)
+    push = ub.PrescribedDisplacement(left.end, v=lambda t: -t)
     scene = ub.Scene(
         [left, right],
         joints=[ub.Revolute(left.end, right.start)],
         supports=[ub.Pinned(left.start), ub.Pinned(right.end), *([push] if moved else [])],
-        loads=[] if moved else [ub.PointLoad(left.end, force=(0, -1e3), time=time)],
+        loads=[] if moved else [ub.PointLoad(left.end, force=(0, -1e3), amplitude=time)],
     )
     return left.end, scene
 
@@ -126,8 +126,10 @@ STEADY = {
     "rotating frame": {"loads": [ub.RotatingFrame(10.0)]},
     "potential": {"works": [ub.Potential("well", lambda q, axis: 1e3 * q[1] + 1e3 * q[1] ** 2)]},
     "virtual work": {"works": [ub.VirtualWork("wind", lambda q, w, axis: -1e3 * w[1])]},
-    "support": {"supports": [ub.Prescribed(CANTILEVER.at(0.5), v=0.01)]},
-    "moving support": {"supports": [ub.Prescribed(CANTILEVER.end, v=lambda t: 0.01 + 1e-3 * t)]},
+    "support": {"supports": [ub.PrescribedDisplacement(CANTILEVER.at(0.5), v=0.01)]},
+    "moving support": {
+        "supports": [ub.PrescribedDisplacement(CANTILEVER.end, v=lambda t: 0.01 + 1e-3 * t)]
+    },
 }
 
 
@@ -139,7 +141,7 @@ def test_ledgers_begin_with_what_acts_at_the_factor_zero(steady):
     """
     given = {"supports": [], "loads": [], **STEADY[steady]}
     given["supports"] = [ub.Clamped(CANTILEVER.start), *given["supports"]]
-    tip = ub.PointLoad(CANTILEVER.at(0.75), force=(0, -1e3), time=growing)
+    tip = ub.PointLoad(CANTILEVER.at(0.75), force=(0, -1e3), amplitude=growing)
     scene = ub.Scene([CANTILEVER], **{**given, "loads": [*given["loads"], tip]})
     path = ub.follow(scene, ub.LoadControl(0.5), steps=2)
     assert path.energy.worst < 2e-6
@@ -171,7 +173,7 @@ def arch():
     """A semicircle on pins, which sways before it snaps through."""
     section = ub.Section(EA=1e8, GA=1e8, EI=1e6)
     beam = ub.Beam.arc((0, 0), 100.0, (math.pi, 0), section, cells=16)
-    load = ub.PointLoad(beam.at(0.5), force=(0, -1e3), time=growing)
+    load = ub.PointLoad(beam.at(0.5), force=(0, -1e3), amplitude=growing)
     supports = [ub.Pinned(beam.start), ub.Pinned(beam.end)]
     return beam.at(0.5), ub.Scene([beam], supports=supports, loads=[load])
 
@@ -216,7 +218,7 @@ def test_recorders_write_paths(tmp_path):
 # -- joints whose forces hold what would float --------------------------------------------------
 
 
-def lee_frame(*, measured, angle=0.0, length=1.0, force=1.0):
+def lee_frame(*, multipliers, angle=0.0, length=1.0, force=1.0):
     """Lee's frame with 10 cells a beam; turned, and in other units of length and force."""
     EA, EI, nu = 43.2e6, 1440.0, 0.3
     section = ub.Section(EA=EA * force, GA=EA / (2 * (1 + nu)) * force, EI=EI * force * length**2)
@@ -229,13 +231,13 @@ def lee_frame(*, measured, angle=0.0, length=1.0, force=1.0):
     column = ub.Beam(foot, corner, section, cells=10, name="column")
     girder = ub.Beam(corner, end, section, cells=10, name="girder")
     place, size = girder.at(0.2), 1e3 * force
-    load = ub.PointLoad(place, force=(size * s, -size * c), time=growing)
-    stiff = ub.Rigid(column.end, girder.start, measured=measured)
-    if not measured:
+    load = ub.PointLoad(place, force=(size * s, -size * c), amplitude=growing)
+    stiff = ub.Rigid(column.end, girder.start, multipliers=multipliers)
+    if not multipliers:
         supports = [ub.Pinned(column.start), ub.Pinned(girder.end)]
         return ub.Scene([column, girder], joints=[stiff], supports=supports, loads=[load])
     pins = [
-        ub.Revolute(ub.ground(*where), place, measured=True)
+        ub.Revolute(ub.ground(*where), place, multipliers=True)
         for where, place in ((foot, column.start), (end, girder.end))
     ]
     return ub.Scene([column, girder], joints=[stiff, *pins], loads=[load])
@@ -245,16 +247,16 @@ LEE = (18.7923, -9.86194)
 """Limit loads with 10 cells a beam and no joint that measures; the digits that are printed."""
 
 
-@pytest.mark.parametrize("measured", [False, True])
+@pytest.mark.parametrize("multipliers", [False, True])
 @pytest.mark.parametrize(
     "other", [{}, {"length": 1e3, "force": 1e-6}, {"length": 1e-6, "force": 1e9}, {"angle": 0.7}]
 )
-def test_limit_points_do_not_depend_on_joints_axes_and_units(measured, other):
-    """No beam is held by anything but forces of joints where they are measured.
+def test_limit_points_do_not_depend_on_joints_axes_and_units(multipliers, other):
+    """No beam is held by anything but forces of joints where they are multipliers.
 
     A limit load is located to 1e-7 of a step, where it is flat; half a unit of the last digit.
     """
-    scene = lee_frame(measured=measured, **other)
+    scene = lee_frame(multipliers=multipliers, **other)
     two = ub.follow(
         scene, ub.ArcLength(0.08, factor=10), until=lambda now: len(now.solution.critical) == 2
     ).critical
@@ -267,7 +269,7 @@ def frame(corner):
     section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
     column = ub.Beam((0, 0), (0, 3), section, cells=4)
     girder = ub.Beam((0, 3), (3, 3), section, cells=4)
-    load = ub.PointLoad(column.end, force=(10.0, -5.0), time=growing)
+    load = ub.PointLoad(column.end, force=(10.0, -5.0), amplitude=growing)
     return ub.Scene(
         [column, girder],
         joints=[corner(column.end, girder.start)],
@@ -293,8 +295,8 @@ def test_a_cantilever_held_by_measured_forces():
     """
     section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
     beam = ub.Beam((0, 0), (0, 3), section, cells=4)
-    load = ub.PointLoad(beam.end, force=(10.0, 0), time=growing)
-    clamp = ub.Rigid(ub.ground(0, 0), beam.start, measured=True)
+    load = ub.PointLoad(beam.end, force=(10.0, 0), amplitude=growing)
+    clamp = ub.Rigid(ub.ground(0, 0), beam.start, multipliers=True)
     path = ub.follow(ub.Scene([beam], joints=[clamp], loads=[load]), ub.LoadControl(0.5), steps=20)
     assert path.factor[-1] == pytest.approx(10, rel=1e-12)
     assert path.critical == []
@@ -315,9 +317,9 @@ def test_springs_of_all_slopes():
     ]
     scene = ub.Scene(
         [column],
-        joints=[ub.Revolute(foot, column.start, measured=True)],
+        joints=[ub.Revolute(foot, column.start, multipliers=True)],
         connectors=springs,
-        loads=[ub.PointLoad(column.end, force=(0, -1.0), time=growing)],
+        loads=[ub.PointLoad(column.end, force=(0, -1.0), amplitude=growing)],
     )
     path = ub.follow(scene, ub.LoadControl(0.7), steps=10)
     (point,) = path.critical
@@ -333,7 +335,7 @@ def softening_row(number, stronger=0.0):
     EI, M, G = 63e6, 300e3, 40e3  # N m², N m, J
     section = ub.Section(EA=40 * EI, GA=8 * EI, EI=EI)
     columns = [ub.Beam((3.0 * i, 0), (3.0 * i, 3), section, cells=4) for i in range(number)]
-    feet = [ub.ground(*column.a) for column in columns]
+    feet = [ub.ground(*column.ends[0]) for column in columns]
     springs = [
         ub.Spring(1e5 * EI, softening=ub.Softening(M * (1 + stronger * i), G))
         for i in range(number)
@@ -348,7 +350,7 @@ def softening_row(number, stronger=0.0):
             ub.Turn(foot, c.start, spring)
             for foot, c, spring in zip(feet, columns, springs, strict=True)
         ],
-        loads=[ub.PointLoad(columns[0].end, force=(1e3, 0), time=growing)],
+        loads=[ub.PointLoad(columns[0].end, force=(1e3, 0), amplitude=growing)],
     )
     return columns[0].end, scene
 
@@ -380,7 +382,7 @@ def test_displacement_control_in_any_unit_of_the_load():
     """Whether the load is 1 N or 1 kN, what turns at a limit point is the load."""
     for unit in (1e3, 1.0, 1e-3):
         apex, scene = truss()
-        load = ub.PointLoad(apex, force=(0, -unit), time=growing)
+        load = ub.PointLoad(apex, force=(0, -unit), amplitude=growing)
         scene = ub.Scene(scene.beams, joints=scene.joints, supports=scene.supports, loads=[load])
         path = ub.follow(scene, ub.DisplacementControl(apex, "v", -0.125), steps=18)
         assert [point.kind for point in path.critical] == ["limit", "limit"]
@@ -415,7 +417,7 @@ def test_load_factors_are_not_called_times(tmp_path):
     assert "t =" not in str(path)
     if active_comm().size == 1:
         assert table.read_text().startswith("load factor [-],")
-    for figure in (ub.plot_history(path, top), ub.plot_energy(path), ub.plot(path)):
+    for figure in (ub.plot(path, "history", top), ub.plot(path, "energy"), ub.plot(path)):
         texts = [a.get_xlabel() + a.get_title(loc="left") for a in figure.axes]
         assert any("load factor" in text or "along the path" in text for text in texts)
         assert not any("time" in text or "t =" in text for text in texts)
@@ -426,7 +428,7 @@ def test_events_of_a_path(law):
     """A hinge opens at the load factor 1; the event is that of the end of the step, a bit below."""
     section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
     beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.0: law(10.0, 5.0)})
-    load = ub.PointLoad(beam.end, force=(0, 10.0), time=growing)
+    load = ub.PointLoad(beam.end, force=(0, 10.0), amplitude=growing)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     events = ub.Events()
     ub.follow(scene, ub.DissipationControl(0.5), steps=30, record=events)
@@ -442,7 +444,7 @@ def test_shapes_of_a_path_are_spaced_along_it():
     """
     apex, scene = truss()
     path = ub.follow(scene, ub.ArcLength(0.05, factor=4.0), until=down_to(apex, -2.2 * HEIGHT))
-    figure = ub.plot_shapes(path)
+    figure = ub.plot(path, "shapes")
     (bar,) = (axes for axes in figure.axes if "load factor" in axes.get_ylabel())
     assert bar.get_ylim() == pytest.approx((path.factor.min(), path.factor.max()), rel=0.3)
     axes = figure.axes[0]

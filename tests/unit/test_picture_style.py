@@ -15,13 +15,15 @@ from ufl_beam.plotting.style import BLUE, INK
 @pytest.fixture(scope="module")
 def bent():
     """A cantilever that yields, with a hinge at the clamp that opens, and its extremes."""
-    section = ub.Section(EA=1e6, GA=1e6, EI=100.0, bending=ub.Hardening(8.0, modulus=30.0))
+    section = ub.Section(EA=1e6, GA=1e6, EI=100.0, bending=ub.ElastoPlastic(8.0, isotropic=30.0))
     hinges = {0.0: ub.Softening(10.0, 3.0)}
     beam = ub.Beam((0, 0), (1, 0), section, cells=4, name="arm", hinges=hinges)
-    held = [ub.Clamped(beam.start), ub.Prescribed(beam.end, v=lambda t: 0.3 * t)]
+    held = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=lambda t: 0.3 * t)]
     extremes = ub.Extremes()
     scene = ub.Scene([beam], supports=held)
-    run = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.02, record=extremes, progress=False)
+    run = ub.simulate(
+        scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.02, record=extremes, progress=False
+    )
     return run, extremes
 
 
@@ -29,13 +31,13 @@ ONE_PANEL = {
     "scene": lambda s, e, **ax: ub.plot(s.scene, **ax),
     "shape": lambda s, e, **ax: ub.plot(s, **ax),
     "moments": lambda s, e, **ax: ub.plot(s, "M", **ax),
-    "shapes": lambda s, e, **ax: ub.plot_shapes(s, **ax),
-    "history": lambda s, e, **ax: ub.plot_history(s, s.scene.beams[0].end, **ax),
-    "curvature": lambda s, e, **ax: ub.plot_moment_curvature(s, s.scene.beams[0].end, **ax),
-    "hinge": lambda s, e, **ax: ub.plot_hinge(s, s.scene.beams[0].start, **ax),
-    "damage": lambda s, e, **ax: ub.plot_damage(s, **ax),
-    "dissipation": lambda s, e, **ax: ub.plot_dissipation(s, **ax),
-    "extremes": lambda s, e, **ax: ub.plot_extremes(s, e, **ax),
+    "shapes": lambda s, e, **ax: ub.plot(s, "shapes", **ax),
+    "history": lambda s, e, **ax: ub.plot(s, "history", s.scene.beams[0].end, **ax),
+    "curvature": lambda s, e, **ax: ub.plot(s, "moment-curvature", s.scene.beams[0].end, **ax),
+    "hinge": lambda s, e, **ax: ub.plot(s, "hinge", s.scene.beams[0].start, **ax),
+    "damage": lambda s, e, **ax: ub.plot(s, "damage", **ax),
+    "dissipation": lambda s, e, **ax: ub.plot(s, "dissipation", **ax),
+    "extremes": lambda s, e, **ax: ub.plot(e, **ax),
 }
 
 
@@ -55,7 +57,7 @@ def test_axes_of_the_user(bent, draw):
 def test_axes_of_a_part_of_a_figure(bent):
     whole = Figure(figsize=(14, 5), layout="constrained")
     axes = whole.subfigures(1, 2)[1].subplots()
-    assert ub.plot_damage(bent[0], ax=axes) is whole
+    assert ub.plot(bent[0], "damage", ax=axes) is whole
     whole.draw_without_rendering()
 
 
@@ -119,11 +121,11 @@ def test_other_settings_of_the_user(bent):
     run, end = bent[0], bent[0].scene.beams[0].end
     settings = {"axes.edgecolor": "red", "figure.dpi": 80, "axes.prop_cycle": mpl.cycler(color="k")}
     with mpl.rc_context(settings):
-        figure = ub.plot_history(run, end)
+        figure = ub.plot(run, "history", end)
     assert same_color(figure.axes[0].spines["left"].get_edgecolor(), "red")
     assert figure.dpi == 80
     assert same_color(figure.axes[0].lines[-1].get_color(), "k")
-    figure = ub.plot_history(run, end)
+    figure = ub.plot(run, "history", end)
     assert not same_color(figure.axes[0].spines["left"].get_edgecolor(), "red")
     assert same_color(figure.axes[0].lines[-1].get_color(), BLUE)
     assert mpl.rcParams["font.size"] == mpl.rcParamsDefault["font.size"]  # left as they were

@@ -41,7 +41,7 @@ def guess(prediction, q, dt):
     return out
 
 
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()])
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()])
 def test_uniform_motion(scheme):
     """[closed] Exact over any steps; round-off of the times is below 1e-12 of them."""
     prediction, size = prediction_of(scheme)
@@ -52,7 +52,7 @@ def test_uniform_motion(scheme):
 
 def test_constant_acceleration():
     """[closed] Exact over equal steps; a longer one is at the velocity of the last."""
-    prediction, size = prediction_of(ub.Midpoint())
+    prediction, size = prediction_of(ub.EnergyMomentum())
     a = SMALL * np.arange(1.0, size + 1)
     times = 0.1 * np.arange(6)
     found = follow(prediction, lambda t: a * t**2 / 2, times)
@@ -63,7 +63,7 @@ def test_constant_acceleration():
 
 def test_second_difference_needs_three_equal_steps():
     """[closed] Two second differences over equal steps are compared."""
-    prediction, size = prediction_of(ub.Midpoint())
+    prediction, size = prediction_of(ub.EnergyMomentum())
     a = np.full(size, SMALL)
     found = follow(prediction, lambda t: a * t**2 / 2, [0, 0.5, 0.6, 0.7, 0.8])
     assert found == pytest.approx(a * (0.7**2 / 2 + 0.065), rel=1e-12)
@@ -72,7 +72,7 @@ def test_second_difference_needs_three_equal_steps():
 @pytest.mark.parametrize("part", [0.01, 0.2])
 def test_part_of_a_second_difference(part):
     """That part of the last second difference is added which the one before was."""
-    prediction, size = prediction_of(ub.Midpoint())
+    prediction, size = prediction_of(ub.EnergyMomentum())
     steps = SMALL * np.array([10, 10 + part, 11 + part])
     places = np.cumsum([0, *steps])
     found = follow(prediction, lambda t: np.full(size, places[round(t)]), np.arange(5))
@@ -90,7 +90,7 @@ def test_part_of_a_second_difference(part):
 )
 def test_motion_that_steps_do_not_resolve(places):
     """[closed] It is taken to go on at the velocity of the last step."""
-    prediction, size = prediction_of(ub.Midpoint())
+    prediction, size = prediction_of(ub.EnergyMomentum())
     found = follow(prediction, lambda t: np.full(size, places[round(t)]), np.arange(6))
     assert found == pytest.approx(np.full(size, 2 * places[4] - places[3]), rel=1e-12)
 
@@ -111,7 +111,7 @@ def test_steps_by_attempts():
         beam = ub.Beam((0, 0), (1, 0), section, cells=8)
         loads = [ub.Gravity((0, -10))]
         scene = ub.Scene([beam], supports=[ub.Pinned(beam.start)], loads=loads)
-        simulation = ub.Simulation(scene, ub.Midpoint())
+        simulation = ub.Simulation(scene, ub.EnergyMomentum())
         for n in range(1, 41):
             if at_once:
                 simulation.step_to(n * 0.002)

@@ -17,7 +17,7 @@ from ufl_beam import parallel
 FIRST = MPI.COMM_WORLD.rank == 0
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
 BEAM = ub.Beam((0, 0), (0, 2), SECTION, cells=2)
-PUSH = ub.PointLoad(BEAM.end, force=(1.0, 0), time=lambda t: t)
+PUSH = ub.PointLoad(BEAM.end, force=(1.0, 0), amplitude=lambda t: t)
 SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[PUSH])
 
 

@@ -28,7 +28,7 @@ def no_mesh(monkeypatch):
 
 def refused(said, scheme=None, **more):
     with pytest.raises(ub.SceneError) as caught:
-        ub.simulate(SCENE, scheme or ub.Midpoint(), t=(0, 0.1), dt=0.01, **more)
+        ub.simulate(SCENE, scheme or ub.EnergyMomentum(), t=(0, 0.1), dt=0.01, **more)
     assert said in str(caught.value)
 
 
@@ -57,14 +57,14 @@ def test_each_member_counts(name):
 
 def test_a_scheme_with_inertia_that_lacks_something():
     @dataclass(frozen=True)
-    class Mine(ub.ExactStep, ub.Midway):
+    class Mine(ub.EnergyMomentumBase, ub.MidpointLoads):
         alpha = 0.0
 
     refused("lacks coefficients, error_weights", Mine())
 
 
 def test_a_method_with_other_arguments():
-    class Mine(ub.Midpoint):
+    class Mine(ub.EnergyMomentum):
         def coefficients(self, dt):
             return super().coefficients(dt, dt, 0)
 
@@ -79,7 +79,7 @@ def test_a_method_with_other_arguments():
 
 
 def test_more_arguments_with_defaults_are_no_fault():
-    class Mine(ub.Midpoint):
+    class Mine(ub.EnergyMomentum):
         def slip(self, dt, change, rates, more=0):
             return 0.0 * change
 
@@ -93,10 +93,10 @@ def test_a_scheme_that_cannot_be_hashed():
     refused("Mine cannot be hashed, and forms are kept by scheme; decorate the class with", mine)
 
 
-@pytest.mark.parametrize("value", [1.0, "Midpoint", ub.Midpoint, object(), np.zeros(3)])
+@pytest.mark.parametrize("value", [1.0, "EnergyMomentum", ub.EnergyMomentum, object(), np.zeros(3)])
 def test_no_scheme_at_all(value):
     with pytest.raises(
-        ub.SceneError, match=r"must be a scheme, such as Static\(\) or Midpoint\(\)"
+        ub.SceneError, match=r"must be a scheme, such as Static\(\) or EnergyMomentum\(\)"
     ):
         ub.simulate(SCENE, value, t=(0, 0.1), dt=0.01)
 

@@ -23,17 +23,17 @@ def pushed(**more):
     """A cantilever whose end is pushed to and fro."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
     more.setdefault("supports", [ub.Clamped(beam.start)])
-    load = ub.PointLoad(beam.end, (0, -1), time=lambda t: math.sin(4 * t))
+    load = ub.PointLoad(beam.end, (0, -1), amplitude=lambda t: math.sin(4 * t))
     return ub.Scene([beam], loads=[load], **more)
 
 
 @SLOW_MOTION
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.ExactStatic()])
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
 def test_a_work_with_velocities_acts_in_statics_as_dampers_do(scheme):
     """A rigid bar on springs k in drag c: backward Euler of c u' + k u = F; [exact] to 1e-9 of u.
 
-    Strains of the bar are 1e-9 of the motion over its length.  ``ExactStatic`` applies the load of
-    the beginning in an eighth of the first step.
+    Strains of the bar are 1e-9 of the motion over its length.  ``EnergyMomentumStatic`` applies the
+    load of the beginning in an eighth of the first step.
     """
     k, c, force, dt = 50.0, 20.0, 3.0, 0.1
     rigid = ub.Section(EA=1e10, GA=1e10, EI=1e10)
@@ -45,7 +45,7 @@ def test_a_work_with_velocities_acts_in_statics_as_dampers_do(scheme):
         if "c" in more:
             springs += [ub.Slide(*end, ub.Damper(more["c"] / 2), axis=(0, 1)) for end in ends]
         guides = [ub.Roller(end, along=(0, 1)) for end in (bar.start, bar.end)]
-        load = ub.PointLoad(bar.at(0.5), (0, force), time=lambda t: 1 + t)
+        load = ub.PointLoad(bar.at(0.5), (0, force), amplitude=lambda t: 1 + t)
         held, acting = {"supports": guides[:1], "connectors": springs}, more.get("works", [])
         scene = ub.Scene([bar], loads=[load], works=acting, **held)
         return ub.simulate(scene, scheme, t=(0, 1), dt=dt, **QUIET).displacement(bar.end)[:, 1]
@@ -69,7 +69,7 @@ def test_a_static_run_warns_of_a_work_with_velocities():
     with pytest.warns(ub.ModelWarning, match=r"'wind' takes v, which is \(q1 - q0\)/dt") as told:
         ub.simulate(scene, ub.Static(), t=(0, 0.1), dt=0.1, **QUIET)
     assert told[0].filename == __file__
-    ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1, **QUIET)  # warnings are errors here
+    ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, **QUIET)  # warnings are errors here
     push = ub.VirtualWork("push", lambda q, w: (1 + q[1]) * w[1])
     ub.simulate(pushed(works=[push]), ub.Static(), t=(0, 0.1), dt=0.1, **QUIET)
 
@@ -97,7 +97,7 @@ def split(scene, scheme):
 @SLOW_MOTION
 @pytest.mark.parametrize(
     "scheme",
-    [ub.GeneralizedAlpha(0.6), ub.Newmark(0.6, 0.3025), ub.Static(), ub.ExactStatic()],
+    [ub.GeneralizedAlpha(0.6), ub.Newmark(0.6, 0.3025), ub.Static(), ub.EnergyMomentumStatic()],
 )
 def test_the_work_of_drag_in_two_runs_is_that_of_one(scheme):
     """[round-off] Newton's tolerance leaves 1e-10 of the energy that went through."""
@@ -110,7 +110,7 @@ def test_the_work_of_drag_in_two_runs_is_that_of_one(scheme):
 @pytest.mark.parametrize("reference", [False, True])
 def test_the_last_step_of_decaying_midpoint_goes_on(reference):
     """Its second differences begin with the step before; [round-off] as above."""
-    scene, scheme = pushed(), ub.DecayingMidpoint()
+    scene, scheme = pushed(), ub.EnergyMomentumDecaying()
     newton = {"newton": ub.Newton(reference=reference), **QUIET}
     whole = ub.simulate(scene, scheme, t=(0, 1), dt=0.05, **newton)
     one = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.05, **newton)
@@ -130,7 +130,7 @@ def test_the_last_step_of_decaying_midpoint_goes_on(reference):
 def test_the_work_of_a_support_in_two_damped_runs_is_that_of_one(scheme):
     """As above; forces of damping are a part of its reaction."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    moving = ub.Prescribed(beam.end, v=lambda t: -0.05 * math.sin(t) ** 2)
+    moving = ub.PrescribedDisplacement(beam.end, v=lambda t: -0.05 * math.sin(t) ** 2)
     scene = ub.Scene(
         [beam], supports=[ub.Clamped(beam.start), moving], damping=[ub.KelvinVoigt(0.5)]
     )
@@ -159,23 +159,24 @@ def test_a_pin_with_friction_sticks_in_two_runs_where_it_sticks_in_one():
     left = ub.Beam((0.0, 0.0), (0.1, 1.0), creeps, cells=4)
     roof = ub.Beam((0.1, 1.0), (1.0, 1.1), section, cells=2)
     right = ub.Beam((1.0, 1.1), (1.1, 0.0), section, cells=3)
-    pin = ub.Revolute(left.end, roof.start, measured=True)
+    pin = ub.Revolute(left.end, roof.start, multipliers=True)
     rubs = ub.Turn(left.end, roof.start, ub.Coulomb(0.1168, coefficient=0.02, joint=pin))
     stiffens = ub.ForceLaw(lambda motion, rate: 123 * motion + 2329 * motion**3)
     spring = ub.Turn(ub.ground(0, 0), roof.at(0.5), stiffens)
     loads = [
-        ub.PointLoad(roof.end, (-6.136, 5.109), time=ub.Table([0, 0.05, 0.15], [0, 0.703, 1])),
+        ub.PointLoad(roof.end, (-6.136, 5.109), amplitude=ub.Table([0, 0.05, 0.15], [0, 0.703, 1])),
         ub.FollowerLoad(roof.end, (3.027, -7.783), moment=-1.204),
-        ub.PointLoad(roof.at(0.5), moment=-3.415, time=ub.ramp(0.06103)),
+        ub.PointLoad(roof.at(0.5), moment=-3.415, amplitude=ub.ramp(0.06103)),
     ]
     scene = ub.Scene(
-        [left, roof, right], [pin, ub.Rigid(roof.end, right.start)],
-        [ub.Clamped(left.start), ub.Pinned(right.end)], loads, connectors=[spring, rubs],
+        [left, roof, right], joints=[pin, ub.Rigid(roof.end, right.start)],
+        supports=[ub.Clamped(left.start), ub.Pinned(right.end)], loads=loads,
+        connectors=[spring, rubs],
     )  # fmt: skip
     tight = ub.Newton(rtol=1e-12)
 
     def states(t, **more):
-        return ub.simulate(scene, ub.Midpoint(), t=t, dt=0.15 / 13, newton=tight, **more)
+        return ub.simulate(scene, ub.EnergyMomentum(), t=t, dt=0.15 / 13, newton=tight, **more)
 
     whole, middle = states((0.0, 0.15)), 0.15 * 6 / 13
     first = states((0.0, middle))

@@ -27,13 +27,13 @@ def scene():
         [post, arm],
         joints=[ub.Rigid(post.end, arm.start)],
         supports=[ub.Clamped(post.start)],
-        loads=[ub.PointLoad(arm.end, force=(5, -30), time=ub.ramp(1.0))],
+        loads=[ub.PointLoad(arm.end, force=(5, -30), amplitude=ub.ramp(1.0))],
     )
 
 
 def run(scene, *record, steps=6, scheme=None, **more):
     return ub.simulate(
-        scene, scheme or ub.Midpoint(0.1, 0.1), t=(0, 1), dt=1 / steps, record=record, **more
+        scene, scheme or ub.EnergyMomentum(0.1, 0.1), t=(0, 1), dt=1 / steps, record=record, **more
     )
 
 
@@ -123,7 +123,7 @@ def machine(beams=True):
     connectors = [
         ub.Stretch(ub.ground(-1, 0), rocker.at(0, 0.5), ub.Spring(50.0)),
         ub.Turn(rocker.at(0, 0), ub.ground(0, 0), ub.Damper(0.5)),
-        ub.Turn(ub.ground(-1, 1), wheel.middle, ub.Motor(lambda t: t * t)),
+        ub.Turn(ub.ground(-1, 1), wheel.middle, ub.PrescribedMotion(lambda t: t * t)),
     ]
     return ub.Scene(
         [arm] if beams else [],
@@ -298,7 +298,7 @@ def solution_entries(solution):
 
 def test_history_tells_the_forces_of_a_joint_apart(shared_path, on_first_rank):
     body = ub.Body((1.0, 0.0), mass=1.0, inertia=0.1)
-    joint = ub.Rigid(ub.ground(0, 0), body.at(0, 0), measured=True)
+    joint = ub.Rigid(ub.ground(0, 0), body.at(0, 0), multipliers=True)
     scene = ub.Scene(bodies=[body], joints=[joint], loads=[ub.Gravity((3.0, -10.0))])
     run(scene, ub.History(shared_path / "run.csv", connectors=[joint]), steps=3)
     header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
@@ -377,7 +377,7 @@ def test_recorders_of_users():
     assert count.calls == [*asked, "open", "write", "write", "close"]
     assert count.times == list(solution.times)
     alone = Count()
-    ub.simulate(scene(), ub.Midpoint(), t=(0, 1), dt=0.5, record=alone)  # no list
+    ub.simulate(scene(), ub.EnergyMomentum(), t=(0, 1), dt=0.5, record=alone)  # no list
     assert alone.calls == count.calls
 
 
@@ -439,13 +439,17 @@ def test_files_do_not_depend_on_the_number_of_ranks(shared_path, on_first_rank):
 def test_rows_of_displacements_follow_the_beam(degree):
     """Hinges and inner nodes change nothing: the last row is that of the end."""
     section = ub.Section(EA=1e6, GA=1e6, EI=500.0, rhoA=2.0, rhoI=0.01)
-    hinges = {0.0: ub.Hardening(20.0, 50.0), 0.5: ub.Hardening(10.0, 50.0)} if degree == 1 else {}
+    hinges = (
+        {0.0: ub.ElastoPlastic(20.0, 50.0), 0.5: ub.ElastoPlastic(10.0, 50.0)}
+        if degree == 1
+        else {}
+    )
     beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges=hinges)
-    load = ub.PointLoad(beam.end, force=(0.0, -20.0), time=ub.ramp(0.1))
+    load = ub.PointLoad(beam.end, force=(0.0, -20.0), amplitude=ub.ramp(0.1))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     extremes, mesh = ub.Extremes(), ub.Mesh(degree=degree)
     run = ub.simulate(
-        scene, ub.Midpoint(), t=(0, 0.1), dt=5e-3, record=extremes, mesh=mesh, progress=False
+        scene, ub.EnergyMomentum(), t=(0, 0.1), dt=5e-3, record=extremes, mesh=mesh, progress=False
     )
     low = extremes.displacement(beam).low
     assert len(low) == 4 * degree + 1
@@ -457,12 +461,12 @@ def test_rows_of_displacements_follow_the_beam(degree):
 @pytest.mark.parametrize("most", [10**9, 3], ids=["all states", "thinned"])
 def test_iterations_of_a_failed_step_count_with_and_without_recorders(most):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
-    twist = ub.Prescribed(beam.start, psi=lambda t: t + 4.0 * (t > 0.55))
+    twist = ub.PrescribedDisplacement(beam.start, psi=lambda t: t + 4.0 * (t > 0.55))
     moved = ub.Scene([beam], supports=[twist])
 
     def counts(*recorders):
         with pytest.raises(ub.ConvergenceError) as failure:
-            run(moved, *recorders, most=most)
+            run(moved, *recorders, max_states=most)
         return failure.value.solution.parts, failure.value.solution.iterations
 
     assert counts() == counts(ub.Extremes()) == counts(ub.Events())

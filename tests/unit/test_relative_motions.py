@@ -11,9 +11,14 @@ from test_tangent import Probe
 
 import ufl_beam as ub
 from ufl_beam.model.connector_laws import HELD
-from ufl_beam.model.connectors import Connector
+from ufl_beam.model.connectors import Component
 
-SCHEMES = [ub.Midpoint(), ub.Midpoint(0.1, 0.1), ub.ExactStatic(0.5), ub.Static()]
+SCHEMES = [
+    ub.EnergyMomentum(),
+    ub.EnergyMomentum(0.1, 0.1),
+    ub.EnergyMomentumStatic(0.5),
+    ub.Static(),
+]
 EXACT = SCHEMES[:3]
 SEEDS = range(4)
 MOTIONS = ["turning", "stretching", "parting", "sliding"]
@@ -34,7 +39,7 @@ def pair(motion, law=HELD):
     """Two bodies and a connector between points of them that are not their centres."""
     a, b = bodies()
     axis = (math.cos(0.4), math.sin(0.4))
-    link = Connector("test", motion, a.at(0.5, 0.3), b.at(1.1, 0.9), law, axis)
+    link = Component("test", motion, a.at(0.5, 0.3), b.at(1.1, 0.9), law, axis)
     return ub.Scene(bodies=[a, b], connectors=[link]), link
 
 
@@ -63,7 +68,7 @@ class Between:
             # Springs, so that statics has an answer.
             ends, soft = [body.middle for body in scene.bodies], ub.Spring(1.0)
             springs = [
-                Connector("spring", "parting", *ends, soft, axis) for axis in ((1, 0), (0, 1))
+                Component("spring", "parting", *ends, soft, axis) for axis in ((1, 0), (0, 1))
             ]
             scene = ub.Scene(
                 bodies=scene.bodies, supports=[ub.Clamped(ends[0])],
@@ -104,7 +109,7 @@ class Between:
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_values(motion, seed):
-    some = Between(motion, ub.Midpoint(), seed)
+    some = Between(motion, ub.EnergyMomentum(), seed)
     expected = by_hand(some.link, some.q1[some.dofs])
     (value,) = some.coupling.motion(some.q1)
     assert value == pytest.approx(expected, abs=1e-14)  # round-off of lengths near one
@@ -124,7 +129,7 @@ def test_variation_of_the_step_is_the_increment(motion, scheme, seed):
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_variation_of_a_small_turn(motion):
     """Where angles hardly change no digit is lost: 0/0 of x/tan x."""
-    some = Between(motion, ub.Midpoint(), 3, turn=1e-9)
+    some = Between(motion, ub.EnergyMomentum(), 3, turn=1e-9)
     increment = by_hand(some.link, some.q1[some.dofs]) - by_hand(some.link, some.q0[some.dofs])
     assert some.gradient() @ some.step_of_nodes() == pytest.approx(increment, abs=2e-15)
 
@@ -160,13 +165,13 @@ def test_rigid_motions_are_free(motion, scheme, seed):
 
 LAWS = {
     "held": HELD,
-    "motor": ub.Motor(lambda t: 0.2 * t),
-    "actuator": ub.Actuator(lambda t: 3.0),
+    "motor": ub.PrescribedMotion(lambda t: 0.2 * t),
+    "actuator": ub.PrescribedForce(lambda t: 3.0),
     "controller": ub.Controller(lambda simulation: 2.0),
     "spring": ub.Spring(20.0),
-    "yielding": ub.Spring(20.0, ub.Hardening(limit=1.0, modulus=3.0, kinematic=2.0)),
-    "viscous": ub.Spring(20.0, ub.Hardening(limit=1.0, viscosity=ub.Perzyna(2.0))),
-    "breaking": ub.Spring(20.0, softening=ub.Softening(limit=1.0, energy=5.0)),
+    "yielding": ub.Spring(20.0, ub.ElastoPlastic(yield_limit=1.0, isotropic=3.0, kinematic=2.0)),
+    "viscous": ub.Spring(20.0, ub.ElastoPlastic(yield_limit=1.0, viscosity=ub.Perzyna(2.0))),
+    "breaking": ub.Spring(20.0, softening=ub.Softening(limit=1.0, fracture_energy=5.0)),
     "damper": ub.Damper(3.0),
     "stop": ub.Stop(30.0, low=-0.05, high=0.05),
     "damped stop": ub.Stop(30.0, low=-0.05, high=0.05, damping=0.4),
@@ -175,7 +180,7 @@ LAWS = {
 }
 
 
-@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Midpoint(0.2, 0.1)], ids=str)
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(0.2, 0.1)], ids=str)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_tangent(motion, law, scheme):

@@ -16,13 +16,13 @@ from ufl_beam.plotting import plots
 
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 BEAM = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
-FORCE = ub.PointLoad(BEAM.end, force=(0, -1e5), time=lambda t: t)
+FORCE = ub.PointLoad(BEAM.end, force=(0, -1e5), amplitude=lambda t: t)
 SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[FORCE])
 
 
 @pytest.fixture(scope="module")
 def solution():
-    return ub.simulate(SCENE, ub.Midpoint(), t=(0, 1), dt=0.05)
+    return ub.simulate(SCENE, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
 
 
 def cells(page):
@@ -63,15 +63,15 @@ def test_a_solution_has_its_text_ledger_and_shapes(solution):
 
 def test_small_displacements_are_magnified(solution, monkeypatch):
     """[closed] The deflection of 0.019 m, 1 % of the length, ten times; of 1 m as it is."""
-    factors, draw = [], plots.plot_shapes
+    factors, draw = [], plots.draw_shapes
 
     def shapes(solution, count, magnify):
         factors.append(magnify)
         return draw(solution, count=count, magnify=magnify)
 
-    monkeypatch.setattr(plots, "plot_shapes", shapes)
+    monkeypatch.setattr(plots, "draw_shapes", shapes)
     solution._repr_html_()
-    sink = ub.Prescribed(BEAM.start, v=lambda t: -t, u=0, psi=0)
+    sink = ub.PrescribedDisplacement(BEAM.start, v=lambda t: -t, u=0, psi=0)
     ub.simulate(ub.Scene([BEAM], supports=[sink]), ub.Static(), t=(0, 1), dt=1)._repr_html_()
     still = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
     ub.simulate(still, ub.Static(), t=(0, 1), dt=1)._repr_html_()
@@ -92,7 +92,7 @@ def test_modes_have_a_table(solution):
 
 
 def test_a_path_names_its_critical_points():
-    push = ub.PointLoad(BEAM.end, force=(-2e7, 0), time=lambda t: t)
+    push = ub.PointLoad(BEAM.end, force=(-2e7, 0), amplitude=lambda t: t)
     column = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[push])
     path = ub.follow(column, ub.LoadControl(0.05), steps=10)
     assert "bifurcation point at factor 0.441" in path._repr_html_()
@@ -132,7 +132,7 @@ def test_errors_of_pictures_leave_the_text(solution, monkeypatch):
     def fail(*args, **options):
         raise RuntimeError("<no> ink")
 
-    monkeypatch.setattr(plots, "plot_shapes", fail)
+    monkeypatch.setattr(plots, "draw_shapes", fail)
     page = solution._repr_html_()
     assert "no picture: RuntimeError: &lt;no&gt; ink" in page
     assert solution.summary()[0] in page

@@ -97,6 +97,6 @@ def test_records_are_frozen():
 def test_layers_of_a_circle_end_at_its_rim():
     """For some diameters r² - y² has a negative last digit there."""
     for d in np.append(np.random.default_rng(1).uniform(1e-3, 1.0, 300), 0.00976466):
-        fibres = ub.Fibres(ub.Hardening(1e6), number=4)
+        fibres = ub.Fibres(ub.ElastoPlastic(1e6), number=4)
         section = ub.Section.circle(d=d, E=1e9, nu=0.3, fibres=fibres)
         assert pytest.approx(1e9 * np.pi * d**2 / 4, rel=1e-12) == section.EA

@@ -249,20 +249,20 @@ def hub(spokes):
     )
 
 
-HARD = ub.Hardening(limit=20.0, modulus=5.0)
+HARD = ub.ElastoPlastic(yield_limit=20.0, isotropic=5.0)
 RUNS = {
-    "rows of 255 entries": (hub(84), ub.Midpoint(), {}),
-    "rows of 261 entries": (hub(86), ub.Midpoint(), {}),
+    "rows of 255 entries": (hub(84), ub.EnergyMomentum(), {}),
+    "rows of 261 entries": (hub(86), ub.EnergyMomentum(), {}),
     "static": (scene(), ub.Static(), {}),
-    "midpoint": (scene(), ub.Midpoint(), {}),
-    "lossy": (scene(), ub.Midpoint(alpha=0.1, beta=0.1), {}),
-    "printed": (scene(), ub.PrintedMidpoint(), {}),
-    "decaying": (scene(), ub.DecayingMidpoint(), {}),
+    "midpoint": (scene(), ub.EnergyMomentum(), {}),
+    "lossy": (scene(), ub.EnergyMomentum(alpha=0.1, beta=0.1), {}),
+    "printed": (scene(), ub.EnergyMomentumPrinted(), {}),
+    "decaying": (scene(), ub.EnergyMomentumDecaying(), {}),
     "generalised": (scene(), ub.GeneralizedAlpha(0.8), {}),
-    "degree 2": (scene(), ub.Midpoint(), {"mesh": ub.Mesh(degree=2)}),
-    "degree 3": (scene(), ub.PrintedMidpoint(), {"mesh": ub.Mesh(degree=3)}),
-    "inelastic": (scene(bending=HARD), ub.Midpoint(), {}),
-    "viscous": (scene(damping=[ub.KelvinVoigt(time=0.01)]), ub.Midpoint(), {}),
+    "degree 2": (scene(), ub.EnergyMomentum(), {"mesh": ub.Mesh(degree=2)}),
+    "degree 3": (scene(), ub.EnergyMomentumPrinted(), {"mesh": ub.Mesh(degree=3)}),
+    "inelastic": (scene(bending=HARD), ub.EnergyMomentum(), {}),
+    "viscous": (scene(damping=[ub.KelvinVoigt(retardation_time=0.01)]), ub.EnergyMomentum(), {}),
 }
 
 

@@ -30,8 +30,8 @@ def static(scene, steps=4, **more):
 
 
 def test_shapes_and_first_rows():
-    scene, beam = cantilever(lambda b: ub.PointLoad(b.end, force=(0, -5), time=ub.ramp(1)))
-    solution = ub.simulate(scene, ub.Midpoint(), t=(2, 3), dt=0.2)
+    scene, beam = cantilever(lambda b: ub.PointLoad(b.end, force=(0, -5), amplitude=ub.ramp(1)))
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(2, 3), dt=0.2)
     assert solution.times == pytest.approx([2, 2.2, 2.4, 2.6, 2.8, 3], abs=1e-15)
     assert solution.q.shape == solution.v.shape == (6, 15)
     assert solution.displacement(beam.end).shape == (6, 3)
@@ -54,12 +54,12 @@ def test_shapes_and_first_rows():
 def test_the_last_step_arrives():
     # 1 / 0.3 is no whole number: steps are a little shorter
     scene, _ = cantilever()
-    assert ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.3).times == pytest.approx(
+    assert ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.3).times == pytest.approx(
         [0, 0.25, 0.5, 0.75, 1]
     )
     # 0.3 / 0.1 is 2.9999999999999996: three steps, not four
-    assert len(ub.simulate(scene, ub.Midpoint(), t=(0, 0.3), dt=0.1).times) == 4
-    assert len(ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=10.0).times) == 2
+    assert len(ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.3), dt=0.1).times) == 4
+    assert len(ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=10.0).times) == 2
 
 
 def test_displacement_is_linear_between_vertices():
@@ -92,8 +92,8 @@ def test_rigid_rotation():
     def turn(t):
         return t**2
 
-    scene = ub.Scene([beam], supports=[ub.Prescribed(beam.start, u=0, v=0, psi=turn)])
-    solution = ub.simulate(scene, ub.Midpoint(0.1, 0.1), t=(0, 1), dt=0.01)
+    scene = ub.Scene([beam], supports=[ub.PrescribedDisplacement(beam.start, u=0, v=0, psi=turn)])
+    solution = ub.simulate(scene, ub.EnergyMomentum(0.1, 0.1), t=(0, 1), dt=0.01)
     t = solution.times
     circle = np.column_stack([1 + 2 * np.cos(turn(t)), 1 + 2 * np.sin(turn(t))])
     # Strains are forces over stiffness, 10 / 1e9
@@ -119,7 +119,7 @@ def frame():
         supports=[
             ub.Clamped(a.start),
             ub.Roller(c.end, along=(2, 1)),
-            ub.Prescribed(b.at(0.5), psi=0),
+            ub.PrescribedDisplacement(b.at(0.5), psi=0),
         ],
         loads=[
             ub.PointLoad(b.start, force=(5, -2), moment=3.0),
@@ -170,7 +170,7 @@ def test_reactions_are_of_the_kind_of_the_support():
 
 def test_no_supports_no_reactions():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
-    solution = ub.simulate(ub.Scene([beam]), ub.Midpoint(), t=(0, 1), dt=0.5)
+    solution = ub.simulate(ub.Scene([beam]), ub.EnergyMomentum(), t=(0, 1), dt=0.5)
     with pytest.raises(
         ub.SceneError, match=r"reaction: Clamped at beam.end .* is not in the scene"
     ):
@@ -179,8 +179,10 @@ def test_no_supports_no_reactions():
 
 def test_reaction_drives_the_momentum():
     """In dynamics a reaction acts during the step that ends at its time."""
-    scene, _ = cantilever(lambda b: ub.PointLoad(b.end, force=(2, -8), time=lambda t: math.cos(t)))
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
+    scene, _ = cantilever(
+        lambda b: ub.PointLoad(b.end, force=(2, -8), amplitude=lambda t: math.cos(t))
+    )
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
     t = solution.times
     forces = solution.reaction(scene.supports[0])[1:, :2] + np.outer(
         np.cos((t[1:] + t[:-1]) / 2), [2, -8]
@@ -245,7 +247,7 @@ def test_momentum_of_known_motions():
     beam = ub.Beam((0, 0), (2, 0), ub.Section(EA=1e9, GA=1e9, EI=1e9, rhoA=3.0, rhoI=0.5), cells=3)
     throw = ub.Velocity([beam], linear=(2, 3), angular=0.5, about=(1, 0))
     scene = ub.Scene([beam], masses=[ub.PointMass(beam.end, 4.0, 0.25)], initial=[throw])
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.1), dt=0.1)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1)
     p_x, p_y, L = solution.momentum()[0]
     v_end = (2.0, 3.0 + 0.5)
     assert p_x == pytest.approx(6 * 2 + 4 * v_end[0], rel=1e-14)
@@ -257,7 +259,7 @@ def test_momentum_of_known_motions():
 
 def test_a_solution_can_be_read():
     scene, _ = cantilever()
-    text = str(ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.5))
+    text = str(ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.5))
     for part in (
         "1 beam",
         "4 cells, 15 degrees of freedom",

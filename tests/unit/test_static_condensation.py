@@ -174,7 +174,7 @@ def tower():
     return ub.Scene(beams, joints=joints, supports=[*feet, roller], loads=[push])
 
 
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint()], ids=["statics", "dynamics"])
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()], ids=["statics", "dynamics"])
 def test_on_several_processes_as_on_one(scheme):
     """Under mpirun the same scene, shared, and by each process alone."""
     alone, together = (
@@ -188,7 +188,7 @@ def test_on_several_processes_as_on_one(scheme):
 
 def test_a_singular_tangent_cuts_the_step():
     """Also where elimination finds it; the message is that of any failure."""
-    simulation = ub.Simulation(tower(), ub.Midpoint())
+    simulation = ub.Simulation(tower(), ub.EnergyMomentum())
     c = simulation.equation.c
     c.cells, c.product, c.stiffnesses = ffi.NULL, ffi.NULL, 0  # nothing adds to the tangent
     with pytest.raises(ub.ConvergenceError, match="found a singular tangent"):

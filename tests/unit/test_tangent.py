@@ -36,7 +36,9 @@ def scene(kind):
     if "masses" in kind:
         masses += [ub.PointMass(c.start, 3.0, 2.0), ub.PointMass(b.end, 1.0)]
     if "moved" in kind:
-        supports[0] = ub.Prescribed(a.start, u=lambda t: 0.1 * t, v=0, psi=lambda t: 0.3 * t)
+        supports[0] = ub.PrescribedDisplacement(
+            a.start, u=lambda t: 0.1 * t, v=0, psi=lambda t: 0.3 * t
+        )
     works = works_of(b) if "works" in kind else []
     return ub.Scene(
         [a, b, c], joints=joints, supports=supports, loads=loads, masses=masses, works=works
@@ -63,12 +65,12 @@ def works_of(beam):
 KINDS = ["plain", "follower", "roller", "masses", "moved", "works", "follower roller masses"]
 SCHEMES = [
     ub.Static(),
-    ub.Midpoint(),
-    ub.Midpoint(0.1, 0.1),
-    ub.Midpoint(alpha=0.5),
-    ub.Midpoint(beta=0.5),
-    ub.PrintedMidpoint(),
-    ub.DecayingMidpoint(),
+    ub.EnergyMomentum(),
+    ub.EnergyMomentum(0.1, 0.1),
+    ub.EnergyMomentum(alpha=0.5),
+    ub.EnergyMomentum(beta=0.5),
+    ub.EnergyMomentumPrinted(),
+    ub.EnergyMomentumDecaying(),
     ub.Newmark(0.6, 0.35),
     ub.GeneralizedAlpha(0.6),
 ]
@@ -158,7 +160,7 @@ def test_tangent(kind, scheme):
 
 
 @pytest.mark.parametrize("mesh", [ub.Mesh(degree=2), ub.Mesh(degree=3, lumped=True)], ids=str)
-@pytest.mark.parametrize("scheme", [ub.Static(), ub.Midpoint(0.1, 0.1)], ids=str)
+@pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum(0.1, 0.1)], ids=str)
 def test_tangent_of_higher_degrees(mesh, scheme):
     probe = Probe(scene("follower roller masses"), scheme, turn=1.5, mesh=mesh)
     tangent = probe.tangent()
@@ -168,7 +170,7 @@ def test_tangent_of_higher_degrees(mesh, scheme):
 @pytest.mark.parametrize("turn", [1e-2, 2.5])
 def test_tangent_of_short_and_long_steps(turn):
     """Where x / tan x is a series, and near the limit of the step."""
-    probe = Probe(scene("follower roller masses"), ub.Midpoint(0.1, 0.1), turn=turn)
+    probe = Probe(scene("follower roller masses"), ub.EnergyMomentum(0.1, 0.1), turn=turn)
     tangent = probe.tangent()
     # Third derivatives grow with tan² of half the turn: a hundred times as above at 2.5 rad
     assert np.abs(tangent - probe.differences(1e-5)).max() < 1e-6 * np.abs(tangent).max()
@@ -177,8 +179,8 @@ def test_tangent_of_short_and_long_steps(turn):
 @pytest.mark.parametrize("kind", ["follower", "masses", "roller"])
 def test_each_term_shows_in_the_tangent(kind):
     """That the comparison above can fail: without the term the tangent is another one."""
-    with_term = Probe(scene(kind), ub.Midpoint(), turn=1.5).tangent()
-    without = Probe(scene("plain"), ub.Midpoint(), turn=1.5).tangent()
+    with_term = Probe(scene(kind), ub.EnergyMomentum(), turn=1.5).tangent()
+    without = Probe(scene("plain"), ub.EnergyMomentum(), turn=1.5).tangent()
     assert np.abs(with_term - without).max() > 1e-2 * np.abs(without).max()
 
 
@@ -206,16 +208,16 @@ def test_held_rows_and_columns_are_diagonal():
 
 # -- inelastic material --------------------------------------------------------------------------
 
-VISCOUS = ub.Hardening(2.0, 5.0, 3.0, ub.Perzyna(0.7))
-WEAK = ub.Hardening(1.0, 2.0, viscosity=ub.Perzyna(0.1))
+VISCOUS = ub.ElastoPlastic(2.0, 5.0, 3.0, ub.Perzyna(0.7))
+WEAK = ub.ElastoPlastic(1.0, 2.0, viscosity=ub.Perzyna(0.1))
 LAWS = {
-    "plastic": {"bending": ub.Hardening(2.0)},
-    "hardening": {"axial": ub.Hardening(3.0, 4.0), "bending": ub.Hardening(2.0, 5.0, 3.0)},
-    "viscous": {"shear": VISCOUS, "bending": ub.Hardening(1.0, viscosity=ub.DuvautLions(0.2))},
+    "plastic": {"bending": ub.ElastoPlastic(2.0)},
+    "hardening": {"axial": ub.ElastoPlastic(3.0, 4.0), "bending": ub.ElastoPlastic(2.0, 5.0, 3.0)},
+    "viscous": {"shear": VISCOUS, "bending": ub.ElastoPlastic(1.0, viscosity=ub.DuvautLions(0.2))},
     "softening": {"hinge": ub.Softening(4.0, 5.0)},
     "linear softening": {"hinge": ub.LinearSoftening(4.0, 5.0)},
     "plastic and softening": {"bending": WEAK, "hinge": ub.Softening(8.0, 40.0)},
-    "fibres": {"law": ub.Hardening(2.0, 5.0)},
+    "fibres": {"law": ub.ElastoPlastic(2.0, 5.0)},
     "viscous fibres": {"law": VISCOUS},
     "cracking fibres": {"law": WEAK, "softening": ub.Softening(8.0, 40.0)},
 }
@@ -247,10 +249,10 @@ def inelastic_scene(kind):
     "scheme",
     [
         ub.Static(),
-        ub.ExactStatic(),
-        ub.ExactStatic(0.6),
-        ub.Midpoint(),
-        ub.Midpoint(0.1, 0.1),
+        ub.EnergyMomentumStatic(),
+        ub.EnergyMomentumStatic(0.6),
+        ub.EnergyMomentum(),
+        ub.EnergyMomentum(0.1, 0.1),
         ub.GeneralizedAlpha(0.6),
     ],
     ids=str,
@@ -269,7 +271,7 @@ def test_laws_show_in_the_tangent(kind):
     """That the comparison above is about flow and openings, and about both at one point."""
     flows, opens, both = False, False, False
     for seed in range(3):
-        probe = Probe(inelastic_scene(kind), ub.Midpoint(), turn=1.0, seed=seed)
+        probe = Probe(inelastic_scene(kind), ub.EnergyMomentum(), turn=1.0, seed=seed)
         probe.tangent()
         (inelastic,) = probe.simulation.inelastic
         p, opening = (inelastic.points[name].copy() for name in ("state plastic", "opening"))

@@ -54,7 +54,8 @@ def smooth(h, dt, scheme, newton):
 
 def ask(*, scheme=None, dt=0.1, mesh=LINEAR, newton=STRICT, **goal):
     return ub.tradeoff(
-        SCENE, {"value": lambda s: s.value}, scheme=scheme or ub.Midpoint(), t=(0.0, 10.0), dt=dt,
+        SCENE, {"value": lambda s: s.value}, scheme=scheme or ub.EnergyMomentum(), t=(0.0, 10.0),
+        dt=dt,
         mesh=mesh, newton=newton, **goal,
     )  # fmt: skip
 
@@ -244,7 +245,7 @@ def test_a_dial_that_does_nothing_stays_as_it_is(law):
 
 def test_the_better_scheme_wins(law):
     """The second one needs steps ten times as short for the same error."""
-    first, second = ub.Midpoint(), ub.Midpoint(alpha=0.1)
+    first, second = ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)
     law(lambda h, dt, scheme, newton: smooth(h, (1 + 90 * scheme.alpha) * dt, scheme, newton))
     for schemes in ([first, second], [second, first]):
         found = ask(scheme=schemes, tolerance=1e-4)
@@ -288,22 +289,22 @@ def test_another_newton_is_taken_if_it_changes_little(law, change, taken):
 
 def test_schemes_that_converge_to_different_limits_are_named(law):
     law(lambda h, dt, scheme, newton: smooth(h, dt, scheme, newton) + 0.1 * (scheme.alpha > 0))
-    found = ask(scheme=[ub.Midpoint(), ub.Midpoint(alpha=0.1)], tolerance=1e-3)
+    found = ask(scheme=[ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1)], tolerance=1e-3)
     assert any("its limit of value is 0.1 away" in note for note in found.notes)
 
 
 def test_dials_that_a_scene_cannot_have_leave_the_others(law):
     def error(h, dt, scheme, newton):
         if scheme.alpha > 0:
-            raise ub.SceneError("Midpoint: not for this scene")
+            raise ub.SceneError("EnergyMomentum: not for this scene")
         return smooth(h, dt, scheme, newton)
 
     law(error)
-    found = ask(scheme=[ub.Midpoint(alpha=0.1), ub.Midpoint()], tolerance=1e-3)
-    assert found.best.dials.scheme == ub.Midpoint()
+    found = ask(scheme=[ub.EnergyMomentum(alpha=0.1), ub.EnergyMomentum()], tolerance=1e-3)
+    assert found.best.dials.scheme == ub.EnergyMomentum()
     assert "not for this scene" in found.notes[0]
     with raises("not for this scene"):
-        ask(scheme=ub.Midpoint(alpha=0.1), tolerance=1e-3)
+        ask(scheme=ub.EnergyMomentum(alpha=0.1), tolerance=1e-3)
 
 
 # -- refusals ----------------------------------------------------------------------------------
@@ -325,8 +326,10 @@ def test_divergence_is_refused(law):
 
 def test_what_would_take_too_long_is_refused(law):
     law(smooth)
-    with raises("runs would take about", "more than most = 5 s", kind=ub.TradeoffError) as info:
-        ask(tolerance=1e-8, most=5.0)
+    with raises(
+        "runs would take about", "more than max_seconds = 5 s", kind=ub.TradeoffError
+    ) as info:
+        ask(tolerance=1e-8, max_seconds=5.0)
     assert info.value.runs
 
 
@@ -334,7 +337,7 @@ def test_what_there_is_no_time_for_is_left_out(law):
     """Checks and other options of Newton's method, once there is a setting that serves."""
     law(smooth)
     whole = ask(tolerance=1e-4, newton=None)
-    found = ask(tolerance=1e-4, newton=None, most=0.99 * whole.spent)
+    found = ask(tolerance=1e-4, newton=None, max_seconds=0.99 * whole.spent)
     assert len(found.runs) < len(whole.runs)
     assert found.spent < whole.spent
     assert abs(found.best.values["value"] - 1.0) <= 1e-4
@@ -368,7 +371,7 @@ def test_coarse_steps_that_fail_are_left_out(law):
         ({"tolerance": {"tip": 1.0}}, ("tolerance is of tip, quantities are value",)),
         ({"tolerance": {"value": 0.0}}, ("tolerance of value = 0 must be positive",)),
         ({"budget": math.inf}, ("budget = inf is not finite",)),
-        ({"budget": 1.0, "most": 0}, ("most = 0 must be positive",)),
+        ({"budget": 1.0, "max_seconds": 0}, ("max_seconds = 0 must be positive",)),
         ({"budget": 1.0, "scheme": ()}, ("scheme = ",)),
         ({"budget": 1.0, "dt": []}, ("dt is empty",)),
         ({"budget": 1.0, "dt": -1.0}, ("dt = -1 must be positive",)),
@@ -434,10 +437,15 @@ def test_a_vibration():
         return np.interp(at, solution.times, solution.displacement(tip)[:, 1])
 
     found = ub.tradeoff(
-        scene, {"tip": history}, scheme=ub.Midpoint(), t=(0, 3), dt=0.25, tolerance=0.02
+        scene, {"tip": history}, scheme=ub.EnergyMomentum(), t=(0, 3), dt=0.25, tolerance=0.02
     )
     fine = ub.simulate(
-        scene, ub.Midpoint(), t=(0, 3), dt=0.25 / 64, mesh=ub.Mesh(refine=32), comm=MPI.COMM_SELF
+        scene,
+        ub.EnergyMomentum(),
+        t=(0, 3),
+        dt=0.25 / 64,
+        mesh=ub.Mesh(refine=32),
+        comm=MPI.COMM_SELF,
     )
     size = np.abs(history(fine)).max()
     assert np.abs(found.best.values["tip"] - history(fine)).max() < 0.02 * size
@@ -446,4 +454,4 @@ def test_a_vibration():
     assert len({str(run.dials) for run in found.runs}) == len(found.runs)
     texts = COMM.allgather(str(found))
     assert len(set(texts)) == 1
-    ub.plot_tradeoff(found)
+    ub.plot(found)

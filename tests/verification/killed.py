@@ -16,7 +16,7 @@ directory, steps, every = Path(sys.argv[1]), *map(int, sys.argv[2:])
 elastic = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
 yielding = ub.Section(
     **{"EA": 1e6, "GA": 1e6, "EI": 1e2, "rhoA": 1.0, "rhoI": 1e-3},
-    bending=ub.Hardening(limit=25.0, modulus=10.0),
+    bending=ub.ElastoPlastic(yield_limit=25.0, isotropic=10.0),
 )
 a = ub.Beam((0, 0), (1, 0), yielding, cells=4)
 b = ub.Beam((1, 0), (2, 0), elastic, cells=4)
@@ -45,14 +45,14 @@ scene = ub.Scene(
     bodies=[body],
     joints=[ub.Revolute(a.end, b.start), ub.Rigid(b.end, body.middle)],
     supports=[ub.Clamped(a.start)],
-    loads=[ub.PointLoad(b.end, force=(0, -60.0), time=ub.Table([0, 0.1, 0.2], [0, 1, 0]))],
+    loads=[ub.PointLoad(b.end, force=(0, -60.0), amplitude=ub.Table([0, 0.1, 0.2], [0, 1, 0]))],
     connectors=[
         ub.Turn(a.end, b.start, ub.Coulomb(0.5)),
         ub.Turn(ub.ground(3, 3), body.middle, ub.Controller(Integral())),
     ],
 )
 solution = ub.simulate(
-    *(scene, ub.Midpoint(0.01, 0.01)),
+    *(scene, ub.EnergyMomentum(0.01, 0.01)),
     t=(0, steps * 1e-3),
     dt=1e-3,
     every=50,

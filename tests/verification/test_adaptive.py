@@ -18,12 +18,12 @@ def oscillator(*, load=None, damper=0.0):
     """A mass of 1 kg on a spring of 1 N/m, let go 1 m beside its rest, in a scene of 1 m."""
     mass = ub.Body((1, 0), mass=1.0, inertia=1.0)
     at = ub.ground(0, 0), mass.middle
-    loads = [ub.PointLoad(mass.middle, force=(1.0, 0.0), time=load)] if load else []
+    loads = [ub.PointLoad(mass.middle, force=(1.0, 0.0), amplitude=load)] if load else []
     connectors = [ub.Slide(*at, ub.Spring(1.0))]
     connectors += [ub.Slide(*at, ub.Damper(damper))] if damper else []
     return ub.Scene(
         bodies=[mass],
-        supports=[ub.Prescribed(mass.middle, v=0.0, psi=0.0)],
+        supports=[ub.PrescribedDisplacement(mass.middle, v=0.0, psi=0.0)],
         connectors=connectors,
         initial=[] if load else [ub.Velocity([mass], linear=(1.0, 0.0))],
         loads=loads,
@@ -31,7 +31,7 @@ def oscillator(*, load=None, damper=0.0):
 
 
 def run(scene, dt, *, end, scheme=None, **more):
-    return ub.simulate(scene, scheme or ub.Midpoint(), t=(0, end), dt=dt, **more)
+    return ub.simulate(scene, scheme or ub.EnergyMomentum(), t=(0, end), dt=dt, **more)
 
 
 def at_end(solution, place):
@@ -64,7 +64,9 @@ def test_the_estimate_of_a_turn():
     assert errors.max() <= 1e-4
 
 
-@pytest.mark.parametrize("scheme", [ub.Midpoint(0.1, 0.0), ub.Midpoint(0.0, 0.1)], ids=str)
+@pytest.mark.parametrize(
+    "scheme", [ub.EnergyMomentum(0.1, 0.0), ub.EnergyMomentum(0.0, 0.1)], ids=str
+)
 def test_the_estimate_counts_dissipation(scheme):
     """Decaying schemes err more with the same steps, so they take more of them."""
     scene = oscillator()
@@ -110,7 +112,10 @@ def test_stops_that_differ_by_rounding_are_one():
     assert 0.3 in early.times
     assert np.diff(early.times).min() > 1e-3
     late = ub.simulate(
-        oscillator(), ub.Midpoint(), t=(2.0**20, 2.0**20 + 1), dt=ub.Adaptive(1e-4, stops=[0.3])
+        oscillator(),
+        ub.EnergyMomentum(),
+        t=(2.0**20, 2.0**20 + 1),
+        dt=ub.Adaptive(1e-4, stops=[0.3]),
     )
     assert late.parts > 1
     x = [at_end(s, s.scene.bodies[0].middle) for s in (early, late)]
@@ -128,12 +133,12 @@ def test_functions_of_time_are_those_of_the_scene():
     scene = ub.Scene(
         [beam],
         bodies=[body],
-        supports=[ub.Prescribed(beam.start, v=ub.Table((0, 3), (0, 1)), u=0.0)],
+        supports=[ub.PrescribedDisplacement(beam.start, v=ub.Table((0, 3), (0, 1)), u=0.0)],
         loads=[
-            ub.PointLoad(beam.end, force=(1, 0), time=pulse),
-            ub.LineLoad(beam, force=(0, 1), time=ub.ramp(4.0)),
+            ub.PointLoad(beam.end, force=(1, 0), amplitude=pulse),
+            ub.LineLoad(beam, force=(0, 1), amplitude=ub.ramp(4.0)),
         ],
-        connectors=[ub.Turn(ub.ground(0, 1), body.middle, ub.Actuator(ub.ramp(5.0)))],
+        connectors=[ub.Turn(ub.ground(0, 1), body.middle, ub.PrescribedForce(ub.ramp(5.0)))],
     )
     kinks = {t for _, f in scene.time_functions() for t in getattr(f, "kinks", ())}
     assert kinks == {0.0, 1.0, 2.0, 3.0, 4.0, 5.0}
@@ -158,7 +163,9 @@ def test_where_no_step_is_short_enough():
     """The end of a beam jumps, and the cell behind it with it: it says so; nothing is lost."""
     section = ub.Section(EA=1.0, GA=1.0, EI=1.0, rhoA=1.0, rhoI=1.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=2)
-    scene = ub.Scene([beam], supports=[ub.Prescribed(beam.start, u=lambda t: 0.1 * (t > 1.0))])
+    scene = ub.Scene(
+        [beam], supports=[ub.PrescribedDisplacement(beam.start, u=lambda t: 0.1 * (t > 1.0))]
+    )
     with pytest.raises(ub.ConvergenceError, match="name the time in `stops`") as failure:
         run(scene, ub.Adaptive(1e-6), end=2.0)
     assert failure.value.time == pytest.approx(1.0, abs=1e-6)

@@ -25,16 +25,18 @@ def a_frame(EA, cells):
     section = ub.Section(EA=EA, GA=EA, EI=1.0)
     left = ub.Beam((0, 0), (1, 1), section, cells=cells)
     right = ub.Beam((1, 1), (2, 0), section, cells=cells)
-    load = ub.PointLoad(right.start, force=(0, -8), time=growing)
+    load = ub.PointLoad(right.start, force=(0, -8), amplitude=growing)
     supports = [ub.Clamped(left.start), ub.Clamped(right.end)]
-    scene = ub.Scene([left, right], [ub.Rigid(left.end, right.start)], supports, [load])
+    scene = ub.Scene(
+        [left, right], joints=[ub.Rigid(left.end, right.start)], supports=supports, loads=[load]
+    )
     return right.start, scene, 8 / 2**0.5
 
 
 def column(EA, cells):
     """A column at 53 degrees, so that round-off of its axial force moves it sideways."""
     beam = ub.Beam((0, 0), (0.6, 0.8), ub.Section(EA=EA, GA=EA, EI=1.0), cells=cells)
-    load = ub.PointLoad(beam.end, force=(-0.6, -0.8), time=growing)
+    load = ub.PointLoad(beam.end, force=(-0.6, -0.8), amplitude=growing)
     return beam.end, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), 1.0
 
 
@@ -44,9 +46,9 @@ def portal(EA, cells):
     beams = [ub.Beam(a, b, section, cells=cells) for a, b in pairwise(points)]
     left, girder, right = beams
     joints = [ub.Rigid(left.end, girder.start), ub.Rigid(girder.end, right.start)]
-    loads = [ub.PointLoad(p, force=(0, -1), time=growing) for p in (left.end, right.start)]
+    loads = [ub.PointLoad(p, force=(0, -1), amplitude=growing) for p in (left.end, right.start)]
     supports = [ub.Pinned(left.start), ub.Pinned(right.end)]
-    return left.end, ub.Scene(beams, joints, supports, loads), 1.0
+    return left.end, ub.Scene(beams, joints=joints, supports=supports, loads=loads), 1.0
 
 
 @pytest.mark.parametrize("control", CONTROLS, ids=lambda one: type(one).__name__ + str(one.step))
@@ -84,7 +86,10 @@ def test_a_ring_under_pressure(EA, cells, control):
 
     section = ub.Section(EA=EA, GA=EA, EI=1.0)
     arc = ub.Beam.arc((0, 0), 1.0, (0, np.pi / 2), section, cells=cells)
-    supports = [ub.Prescribed(arc.start, v=0, psi=0), ub.Prescribed(arc.end, u=0, psi=0)]
+    supports = [
+        ub.PrescribedDisplacement(arc.start, v=0, psi=0),
+        ub.PrescribedDisplacement(arc.end, u=0, psi=0),
+    ]
     water = ub.VirtualWork("water", pressure, numbers={"p": growing})
     scene = ub.Scene([arc], supports=supports, works=[water])
     path = ub.follow(scene, control, until=lambda now: now.t >= 4, progress=False)
@@ -108,8 +113,8 @@ def test_all_bifurcations_of_a_column():
     """
     for step in (2.0, 33.0):
         beam = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e8, GA=1e8, EI=1.0), cells=16)
-        supports = [ub.Pinned(beam.start), ub.Prescribed(beam.end, u=0)]
-        load = ub.PointLoad(beam.end, force=(0, -1), time=growing)
+        supports = [ub.Pinned(beam.start), ub.PrescribedDisplacement(beam.end, u=0)]
+        load = ub.PointLoad(beam.end, force=(0, -1), amplitude=growing)
         scene = ub.Scene([beam], supports=supports, loads=[load])
         path = ub.follow(scene, ub.LoadControl(step), until=lambda now: now.t > 100)
         assert [point.kind for point in path.critical] == ["bifurcation"] * 3
@@ -117,7 +122,7 @@ def test_all_bifurcations_of_a_column():
         np.testing.assert_allclose(factors, ub.buckling(scene, 3).factors, rtol=1e-6)
     sections = [ub.Section(EA=1e6, GA=1e6, EI=EI) for EI in (1.0, 1.0001)]
     beams = [ub.Beam((x, 0), (x, 1), s, cells=8) for x, s in enumerate(sections)]
-    loads = [ub.PointLoad(beam.end, force=(0, -1), time=growing) for beam in beams]
+    loads = [ub.PointLoad(beam.end, force=(0, -1), amplitude=growing) for beam in beams]
     scene = ub.Scene(beams, supports=[ub.Clamped(beam.start) for beam in beams], loads=loads)
     path = ub.follow(scene, ub.LoadControl(0.3), until=lambda now: now.t > 3)
     factors = [point.factor for point in path.critical]
@@ -135,9 +140,14 @@ def test_a_frame_of_roorda_has_a_limit_point():
         section = ub.Section(EA=EA, GA=EA, EI=1.0)
         post = ub.Beam((0, 0), (0, 1), section, cells=16)
         girder = ub.Beam((0, 1), (1, 1), section, cells=16)
-        load = ub.PointLoad(post.end, force=(0, -1), time=growing)
+        load = ub.PointLoad(post.end, force=(0, -1), amplitude=growing)
         supports = [ub.Pinned(post.start), ub.Pinned(girder.end)]
-        scene = ub.Scene([post, girder], [ub.Rigid(post.end, girder.start)], supports, [load])
+        scene = ub.Scene(
+            [post, girder],
+            joints=[ub.Rigid(post.end, girder.start)],
+            supports=supports,
+            loads=[load],
+        )
         path = ub.follow(
             scene, ub.ArcLength(0.02, factor=5), until=lambda now: bool(now.solution.critical)
         )

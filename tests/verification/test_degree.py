@@ -130,7 +130,7 @@ def test_energy_and_momentum_are_exact(degree, lumped, dt):
     """Free flight after the load is gone, as in `test_flying_beam.py`, on four cells."""
     scene = flying_beam(cells=4)
     solution = ub.simulate(
-        scene, ub.Midpoint(), t=(0, 6), dt=dt, mesh=ub.Mesh(degree=degree, lumped=lumped),
+        scene, ub.EnergyMomentum(), t=(0, 6), dt=dt, mesh=ub.Mesh(degree=degree, lumped=lumped),
         newton=TIGHT, progress=False,
     )  # fmt: skip
     free = solution.times > 2.5 + dt
@@ -145,7 +145,7 @@ def test_energy_and_momentum_are_exact(degree, lumped, dt):
 def test_exact_statics_closes_the_ledger(degree):
     scene = cantilever(cells=2, force=(0.0, 5.0), time=lambda t: t)
     solution = ub.simulate(
-        scene, ub.ExactStatic(0.5), t=(0, 1), dt=0.25, mesh=ub.Mesh(degree=degree),
+        scene, ub.EnergyMomentumStatic(0.5), t=(0, 1), dt=0.25, mesh=ub.Mesh(degree=degree),
         newton=TIGHT, progress=False,
     )  # fmt: skip
     assert solution.energy.worst < 1e-10
@@ -166,7 +166,7 @@ def test_orders_of_motions(degree, cells, lumped):
 
     def end(mesh):
         solution = ub.simulate(
-            scene, ub.Midpoint(), t=(0, 3), dt=0.02, mesh=mesh, newton=TIGHT, progress=False
+            scene, ub.EnergyMomentum(), t=(0, 3), dt=0.02, mesh=mesh, newton=TIGHT, progress=False
         )
         return solution.displacement(scene.beams[0].end)[-1]
 
@@ -183,7 +183,7 @@ def test_a_decaying_scheme_knows_what_it_takes(degree):
     """Also where it remembers strains in the points of the cells."""
     scene, mesh = flying_beam(cells=4), ub.Mesh(degree=degree)
     more = {"dt": 0.1, "newton": TIGHT, "progress": False}
-    first = ub.simulate(scene, ub.DecayingMidpoint(), t=(0, 4), mesh=mesh, **more)
+    first = ub.simulate(scene, ub.EnergyMomentumDecaying(), t=(0, 4), mesh=mesh, **more)
     lost = first.energy.lost["numerical"]
     assert first.energy.worst <= 1e-10
     assert 0 < lost[-1] < 0.1 * first.energy.total[-1]

@@ -44,8 +44,11 @@ def closed_form(α):
 def buckled(cells, P, α):
     """(x, y, ψ) of the end of a column of unit length and stiffness, after letting go."""
     beam = ub.Beam((0, 0), (1, 0), SLENDER, cells=cells)
-    foot, load = ub.Clamped(beam.start), ub.PointLoad(beam.end, force=(-P, 0), time=ub.ramp(1.0))
-    turned = ub.Prescribed(beam.end, psi=lambda t: α * t)
+    foot, load = (
+        ub.Clamped(beam.start),
+        ub.PointLoad(beam.end, force=(-P, 0), amplitude=ub.ramp(1.0)),
+    )
+    turned = ub.PrescribedDisplacement(beam.end, psi=lambda t: α * t)
     held = ub.Scene([beam], supports=[foot, turned], loads=[load])
     free = ub.Scene([beam], supports=[foot], loads=[load])
     bent = ub.simulate(held, ub.Static(), t=(0, 1), dt=0.05, progress=False)

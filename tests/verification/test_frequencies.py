@@ -166,14 +166,17 @@ COLUMNS = {
         lambda b: [ub.Clamped(b.start), ub.Roller(b.end)],
         (brentq(lambda x: math.tan(x) - x, 4.4, 4.6) / math.pi) ** 2,
     ),
-    "clamped-clamped": (lambda b: [ub.Clamped(b.start), ub.Prescribed(b.end, v=0, psi=0)], 4.0),
+    "clamped-clamped": (
+        lambda b: [ub.Clamped(b.start), ub.PrescribedDisplacement(b.end, v=0, psi=0)],
+        4.0,
+    ),
 }
 """Supports, and the load over π² EI/L²."""
 
 
 def critical(cells, supports, section=SLENDER, force=-1.0, **more):
     beam = beam_of(cells, section)
-    load = ub.PointLoad(beam.end, force=(force, 0), time=lambda t: t)
+    load = ub.PointLoad(beam.end, force=(force, 0), amplitude=lambda t: t)
     return ub.buckling(ub.Scene([beam], supports=supports(beam), loads=[load]), 1, **more)
 
 
@@ -196,7 +199,7 @@ def test_slender_columns(ends, cells):
     supports, factor = COLUMNS[ends]
     section = ub.Section(EA=1e9, GA=1e9, EI=1.0)
     beam = beam_of(cells, section)
-    load = ub.PointLoad(beam.end, force=(-1, 0), time=lambda t: t)
+    load = ub.PointLoad(beam.end, force=(-1, 0), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=supports(beam), loads=[load])
     found = ub.buckling(scene, 1, mesh=ub.Mesh(degree=3)).factors[0]
     np.testing.assert_allclose(found, factor * math.pi**2, rtol=2 * 40 / 1e9)
@@ -207,7 +210,7 @@ def shared(a, b):
 
 
 def measured(a, b):
-    return {"joints": [ub.Rigid(a, b, measured=True)]}
+    return {"joints": [ub.Rigid(a, b, multipliers=True)]}
 
 
 def sprung(a, b):
@@ -283,7 +286,7 @@ def test_a_stocky_column_is_reissners():
     runs = []
     for cells in (10, 20, 40):
         beam = beam_of(cells, section)
-        load = ub.PointLoad(beam.end, force=(-1, 0), time=lambda t: t)
+        load = ub.PointLoad(beam.end, force=(-1, 0), amplitude=lambda t: t)
         supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
         scene = ub.Scene([beam], supports=supports, loads=[load])
         near = ub.simulate(scene, ub.Static(), t=(0, 0.999 * wanted), dt=wanted, progress=False)
@@ -321,14 +324,14 @@ def test_decrement_of_a_vibration():
     """
     supports, _ = ENDS["clamped-free"]
     beam = beam_of(8)
-    push = ub.PointLoad(beam.end, force=(0, 3e-4), time=lambda t: float(t <= 0))
+    push = ub.PointLoad(beam.end, force=(0, 3e-4), amplitude=lambda t: float(t <= 0))
     held = ub.Scene([beam], supports=supports(beam), loads=[push])
     free = ub.Scene([beam], supports=supports(beam), damping=[ub.KelvinVoigt(0.02)])
     bent = ub.simulate(held, ub.Static(), t=(-1, 0), dt=1, progress=False)
     first = ub.modes(free, 1)
     period = 1 / first.frequencies[0]
     moving = ub.simulate(
-        free, ub.Midpoint(), t=(0, 10 * period), dt=period / 200, start=bent, progress=False
+        free, ub.EnergyMomentum(), t=(0, 10 * period), dt=period / 200, start=bent, progress=False
     )
     tip = moving.displacement(beam.end)[:, 1]
     _, heights = ub.peaks(moving.times, tip)

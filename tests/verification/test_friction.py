@@ -20,7 +20,7 @@ ROD = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
 
 
 def run(scene, end, dt, **more):
-    return ub.simulate(scene, ub.Midpoint(), t=(0, end), dt=dt, progress=False, **more)
+    return ub.simulate(scene, ub.EnergyMomentum(), t=(0, end), dt=dt, progress=False, **more)
 
 
 # -- a mass on a spring ------------------------------------------------------------------------
@@ -96,7 +96,7 @@ def test_a_run_goes_on_in_the_same_way_from_each_of_its_states(steps):
     for k in range(1, last):
         first = run(scene, whole.times[k], dt)
         t = (whole.times[k], last * dt)
-        second = ub.simulate(scene, ub.Midpoint(), t=t, dt=dt, start=first, progress=False)
+        second = ub.simulate(scene, ub.EnergyMomentum(), t=t, dt=dt, start=first, progress=False)
         # 2e-10 of the forces by Newton's rtol in each step, against a stiffness of 50 N/m
         assert np.abs(second.q - whole.q[k:]).max() < 1e-9 * V0 / OMEGA
 
@@ -204,7 +204,7 @@ def test_bearing():
     """
     inertia, radius, coefficient, ω0, dt = 0.4, 0.02, 0.3, 5.0, 0.02
     wheel = ub.Body((0, 0), mass=MASS, inertia=inertia)
-    bearing = ub.Revolute(ub.ground(0, 0), wheel.middle, measured=True)
+    bearing = ub.Revolute(ub.ground(0, 0), wheel.middle, multipliers=True)
     pin = ub.Coulomb(coefficient=coefficient * radius, joint=bearing)
     rub = ub.Turn(ub.ground(0, 0), wheel.middle, pin)
     scene = ub.Scene(
@@ -231,7 +231,7 @@ def test_bearing():
     assert energy.worst < 1e-9
 
 
-@pytest.mark.parametrize("scheme", [ub.Midpoint(), ub.Midpoint(0.1, 0.1)])
+@pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(0.1, 0.1)])
 def test_a_support_presses_as_a_measured_joint_does(scheme):
     """The same pin, once a support and once a joint to the ground; also if the run goes on.
 
@@ -240,7 +240,7 @@ def test_a_support_presses_as_a_measured_joint_does(scheme):
     motions, works = [], []
     for how in ("support", "joint", "in two runs"):
         rod = ub.Beam((0, 0), (1, 0), ROD, cells=2)
-        pin = ub.Revolute(ub.ground(0, 0), rod.start, measured=True)
+        pin = ub.Revolute(ub.ground(0, 0), rod.start, multipliers=True)
         held = {"joints": [pin]}
         if how != "joint":
             pin = ub.Pinned(rod.start)
@@ -286,7 +286,7 @@ def test_friction_at_all_pins_of_a_closed_loop():
     frictions = [
         ub.Turn(*pin, ub.Coulomb(force=moment)) for pin, moment in zip(pins, moments, strict=True)
     ]
-    push = ub.PointLoad(coupler.middle, force=(1, 0), time=lambda t: 60 * t)
+    push = ub.PointLoad(coupler.middle, force=(1, 0), amplitude=lambda t: 60 * t)
     scene = ub.Scene(
         bodies=[crank, coupler, rocker],
         joints=[ub.Revolute(*pin) for pin in pins],
@@ -294,7 +294,7 @@ def test_friction_at_all_pins_of_a_closed_loop():
         loads=[push],
     )
     events = ub.Events()
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.2), dt=1e-3, record=events)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=1e-3, record=events)
     slides = {}
     for event in events.found:
         if event.what == "slides":

@@ -28,7 +28,7 @@ FAR = 100 * M_P / EI
 
 
 def yields(modulus=0.0):
-    law = ub.Hardening(M_P, modulus)
+    law = ub.ElastoPlastic(M_P, modulus)
     return ub.Section(EA=1e3 * EI, GA=1e3 * EI, EI=EI, bending=law)
 
 
@@ -48,7 +48,7 @@ def member(a, b, corners, section, cells=1, name="beam"):
 
 def pushed(beams, joints, supports, place, component, size=2e-3, steps=100):
     """Largest force of a support that moves ``place`` in one direction: the limit load."""
-    move = ub.Prescribed(place, **{component: lambda t: size * t})
+    move = ub.PrescribedDisplacement(place, **{component: lambda t: size * t})
     scene = ub.Scene(beams, joints=joints, supports=[*supports, move])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / steps, progress=False)
     force = solution.reaction(move)[1:, ["u", "v", "psi"].index(component)]
@@ -83,7 +83,7 @@ def test_cantilever():
 
 def slides(place):
     """Clamped, but free to move along."""
-    return ub.Prescribed(place, v=0, psi=0)
+    return ub.PrescribedDisplacement(place, v=0, psi=0)
 
 
 @pytest.mark.parametrize(
@@ -105,7 +105,7 @@ def test_line_load(end, factor):
     beam = member((0, 0), (1, 0), [0.0, 1.0], yields(), cells=41)
 
     def scene(time):
-        load = ub.LineLoad(beam, force=(0, -M_P), time=time)
+        load = ub.LineLoad(beam, force=(0, -M_P), amplitude=time)
         return ub.Scene([beam], supports=[ub.Clamped(beam.start), end(beam.end)], loads=[load])
 
     assert loaded(scene, factor) == pytest.approx(1, rel=5e-3)
@@ -143,8 +143,8 @@ def test_combined_mechanism_of_a_portal(feet, sum_):
 
     def scene(time):
         loads = [
-            ub.PointLoad(beams[0].end, force=(M_P, 0), time=time),
-            ub.PointLoad(beams[1].at(0.5), force=(0, -3 * M_P), time=time),
+            ub.PointLoad(beams[0].end, force=(M_P, 0), amplitude=time),
+            ub.PointLoad(beams[1].at(0.5), force=(0, -3 * M_P), amplitude=time),
         ]
         return ub.Scene(beams, joints=joints, supports=supports, loads=loads)
 
@@ -165,11 +165,11 @@ def test_cantilever_that_breaks():
     digit each; the shortening of the bent cantilever is 1e-4 of its length, half a unit 3e-4.
     """
     a, l, h = ARMERO, 2.5, 2.5e-5  # m
-    bulk = ub.Hardening(a["M_c"], a["H"])
+    bulk = ub.ElastoPlastic(a["M_c"], a["H"])
     section = ub.Section(EA=1e3 * a["EI"], GA=1e3 * a["EI"], EI=a["EI"], bending=bulk)
     law = ub.LinearSoftening(a["M_u"], a["M_u"] ** 2 / (2 * a["K_s"]))
     beam = ub.Beam((0, 0), (l, 0), section, cells=20, corners=(h / l,), hinges={0.0: law})
-    push = ub.Prescribed(beam.end, v=lambda t: 0.12 * t)
+    push = ub.PrescribedDisplacement(beam.end, v=lambda t: 0.12 * t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), push])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.005, progress=False)
     F = solution.reaction(push)[1:, 1]

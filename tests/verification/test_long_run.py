@@ -24,7 +24,7 @@ def test_damage_of_cycles_of_one_size():
     section = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3)
     beam = ub.Beam((0, 0), (2, 0), section, cells=2)
     F, W, n = 20e3, 0.1 * 0.2**2 / 6, 20
-    push = ub.PointLoad(beam.end, force=(0, F), time=lambda t: math.sin(2 * math.pi * t))
+    push = ub.PointLoad(beam.end, force=(0, F), amplitude=lambda t: math.sin(2 * math.pi * t))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
     spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
     curve = ub.SNCurve(range=71e6, cycles=2e6, slope=3.0)
@@ -42,11 +42,11 @@ def test_damage_of_cycles_of_one_size():
 def softening_portal():
     """A clamped portal frame, 4 m by 6 m, shaken harder than its feet can bear."""
     section = ub.Section.rectangle(b=0.10, h=0.20, E=210e9, nu=0.3, rho=7850.0)
-    law = ub.Softening(limit=6e3, energy=1.0 * STEPS)  # N m, J
+    law = ub.Softening(limit=6e3, fracture_energy=1.0 * STEPS)  # N m, J
     left = ub.Beam((0, 0), (0, 4), section, cells=2, name="left", hinges={0.25: law})
     roof = ub.Beam((0, 4), (6, 4), section, cells=2, name="roof")
     right = ub.Beam((6, 4), (6, 0), section, cells=2, name="right", hinges={0.75: law})
-    shake = ub.PointLoad(left.end, force=(20e3, 0.0), time=lambda t: math.sin(8 * t))
+    shake = ub.PointLoad(left.end, force=(20e3, 0.0), amplitude=lambda t: math.sin(8 * t))
     return ub.Scene(
         [left, roof, right],
         joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
@@ -67,11 +67,11 @@ def test_very_many_steps(tmp_path):
     table, watch = tmp_path / "long.csv", Watch({1000, STEPS})
     solution = ub.simulate(
         scene,
-        ub.Midpoint(alpha=0.05, beta=0.05),
+        ub.EnergyMomentum(alpha=0.05, beta=0.05),
         t=(0, 0.01 * STEPS),
         dt=0.01,
-        record=[fatigue, extremes, ub.History(table, [left.end], most=200), watch],
-        most=200,
+        record=[fatigue, extremes, ub.History(table, [left.end], max_rows=200), watch],
+        max_states=200,
     )
     gc.collect()
     grown = watch.memory[STEPS] - watch.memory[1000]

@@ -43,12 +43,12 @@ def lee(cells, *, moved=False):
     column = ub.Beam((0, 0), (0, 1.2), section, cells=cells, name="column")
     girder = ub.Beam((0, 1.2), (1.2, 1.2), section, cells=cells, name="girder")
     place = girder.at(0.2)
-    push = ub.Prescribed(place, v=lambda t: -t)
+    push = ub.PrescribedDisplacement(place, v=lambda t: -t)
     scene = ub.Scene(
         [column, girder],
         joints=[ub.Rigid(column.end, girder.start)],
         supports=[ub.Pinned(column.start), ub.Pinned(girder.end), *([push] if moved else [])],
-        loads=[] if moved else [ub.PointLoad(place, force=(0, -1e3), time=growing)],
+        loads=[] if moved else [ub.PointLoad(place, force=(0, -1e3), amplitude=growing)],
     )
     return place, push, scene
 
@@ -98,7 +98,7 @@ def test_deep_arch():
         scene = ub.Scene(
             [arch],
             supports=[ub.Clamped(arch.start), ub.Pinned(arch.end)],
-            loads=[ub.PointLoad(apex, force=(0, -1000), time=growing)],
+            loads=[ub.PointLoad(apex, force=(0, -1000), amplitude=growing)],
         )
         path = ub.follow(scene, ub.ArcLength(0.04), until=two_critical_points)
         assert [point.kind for point in path.critical] == ["limit", "limit"]
@@ -115,7 +115,7 @@ def test_deep_arch():
 def column(cells, section, P):
     """A perfect column of unit length, clamped at its foot, loaded along its axis."""
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
-    load = ub.PointLoad(beam.end, force=(-P, 0), time=growing)
+    load = ub.PointLoad(beam.end, force=(-P, 0), amplitude=growing)
     return beam, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
 
 
@@ -184,7 +184,7 @@ def test_hinge_snap_back(law, steepness):
         (0, 0), (LENGTH, 0), ub.Section(EA=GA, GA=GA, EI=EI), cells=8, corners=(h / LENGTH,),
         hinges={0.0: law(SCALE * M_U, SCALE**2 * energy)},
     )  # fmt: skip
-    load = ub.PointLoad(beam.end, force=(0, SCALE * M_U / LENGTH), time=growing)
+    load = ub.PointLoad(beam.end, force=(0, SCALE * M_U / LENGTH), amplitude=growing)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     control = ub.DissipationControl(SCALE**2 * energy / 16, ub.ArcLength(0.2))
     spent = SCALE**2 * energy * 0.9

@@ -31,13 +31,13 @@ def hung(cells):
             ub.Link(ub.ground(1.08, 0), beam.end),
         ],
         masses=[ub.PointMass(beam.at(0.5), 0.5)],
-        loads=[ub.PointLoad(beam.at(0.5), force=(1, 0), time=SWING_PULSE)],
+        loads=[ub.PointLoad(beam.at(0.5), force=(1, 0), amplitude=SWING_PULSE)],
     )
 
 
 @lru_cache
 def run(cells=4, dt=1e-3, end=0.7):
-    return ub.simulate(hung(cells), ub.Midpoint(), t=(0, end), dt=dt, progress=False)
+    return ub.simulate(hung(cells), ub.EnergyMomentum(), t=(0, end), dt=dt, progress=False)
 
 
 def row(solution, t):
@@ -134,7 +134,7 @@ def test_adaptive_steps_meet_the_table():
 
     def adaptive(cells, tolerance):
         steps = ub.Adaptive(tolerance, stops=stops)
-        return ub.simulate(hung(cells), ub.Midpoint(), t=(0, 0.64), dt=steps, progress=False)
+        return ub.simulate(hung(cells), ub.EnergyMomentum(), t=(0, 0.64), dt=steps, progress=False)
 
     coarse, fine, exact = adaptive(16, 5e-7), adaptive(32, 5e-7), motion_of(adaptive(16, 1e-8))
     limit = extrapolated(motion_of(coarse), motion_of(fine))
@@ -177,7 +177,7 @@ def outrigger(scheme, *, load, how, cells=4, arm=0.5):
     joints = [joint] if bodies else []
     x, y = load
     moment = -arm * x if how == "statically" else 0.0
-    loads = [ub.PointLoad(at, force=(x, y), moment=moment, time=ub.ramp(1.0))]
+    loads = [ub.PointLoad(at, force=(x, y), moment=moment, amplitude=ub.ramp(1.0))]
     scene = ub.Scene(
         [beam], joints=joints, bodies=bodies, supports=[ub.Clamped(beam.start)], loads=loads
     )
@@ -247,7 +247,7 @@ def with_arm(ratio):
         beams, joints=[joint], bodies=bodies, masses=masses,
         supports=[ub.Clamped(beam.start)], loads=loads,
     )  # fmt: skip
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.01, progress=False)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, progress=False)
     assert solution.energy.worst < 1e-9
     return solution.displacement(beam.end)[-1]
 
@@ -267,7 +267,7 @@ def test_stiff_links_become_links():
     errors = []
     for ratio in (1e-2, 1e-1, 1.0):
         scene = swing(cells=4, rigidity=ratio)
-        solution = ub.simulate(scene, ub.Midpoint(), t=(0, 0.6), dt=1e-3, progress=False)
+        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.6), dt=1e-3, progress=False)
         moved = solution.displacement(scene.beams[0].at(0.5))[-1, :2]
         errors.append(np.abs(moved - exact).max())
     assert errors[1] < errors[0] / 8

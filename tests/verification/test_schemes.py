@@ -20,15 +20,15 @@ pytestmark = pytest.mark.filterwarnings("ignore:Velocity of beam. Clamped:ufl_be
 
 DAMPED = ub.Newmark(gamma=0.6, beta=0.35)
 SECOND_ORDER = [
-    ub.Midpoint(),
-    ub.PrintedMidpoint(),
-    ub.DecayingMidpoint(),
-    ub.DecayingMidpoint(1 / 3),
+    ub.EnergyMomentum(),
+    ub.EnergyMomentumPrinted(),
+    ub.EnergyMomentumDecaying(),
+    ub.EnergyMomentumDecaying(1 / 3),
     ub.Newmark(),
     ub.GeneralizedAlpha(0.8),
     ub.GeneralizedAlpha(0.0),
 ]
-FIRST_ORDER = [ub.Midpoint(0.05, 0.05), DAMPED]
+FIRST_ORDER = [ub.EnergyMomentum(0.05, 0.05), DAMPED]
 AT_END = [ub.Newmark(), DAMPED, ub.GeneralizedAlpha(0.8), ub.GeneralizedAlpha(0.0)]
 SOFT = ub.Section(EA=400.0, GA=400.0, EI=20.0, rhoA=1.0, rhoI=0.05)
 """So soft that steps of 1 ms resolve what a mesh of four cells can do."""
@@ -47,7 +47,7 @@ def go(scene, scheme, end, steps, **more):
 def shaken():
     """A cantilever under a smooth force that begins at zero, bent by a sixth of its length."""
     beam = ub.Beam((0, 0), (1, 0), SOFT, cells=4)
-    push = ub.PointLoad(beam.end, force=(0, 10), time=lambda t: math.sin(3 * t))
+    push = ub.PointLoad(beam.end, force=(0, 10), amplitude=lambda t: math.sin(3 * t))
     damping = [ub.Rayleigh(mass=1.0, stiffness=0.01)]
     return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], damping=damping)
 
@@ -55,7 +55,7 @@ def shaken():
 @lru_cache
 def exact():
     """Displacements and velocities at its end."""
-    solution = go(shaken(), ub.Midpoint(), 0.5, 2000, every=2000)
+    solution = go(shaken(), ub.EnergyMomentum(), 0.5, 2000, every=2000)
     return solution.q[-1], solution.v[-1]
 
 
@@ -75,7 +75,7 @@ def test_second_order(scheme):
     assert orders.min() > 1.7  # annihilating needs shorter steps until only the leading term counts
     assert orders[-1] == pytest.approx(2, abs=0.13)
     imbalances = np.array([run.energy.worst for run in runs])
-    if scheme in AT_END or scheme == ub.PrintedMidpoint():
+    if scheme in AT_END or scheme == ub.EnergyMomentumPrinted():
         # The ledger does not close, and says so: its imbalance is of second order too.
         assert 1e-8 < imbalances[-1] < 1e-3
         assert np.log2(imbalances[:-1] / imbalances[1:]) == pytest.approx(2, abs=0.5)
@@ -116,14 +116,14 @@ def bar():
     beam = ub.Beam((0, 0), (LENGTH, 0), section, cells=1)
     return ub.Scene(
         [beam],
-        supports=[ub.Clamped(beam.start), ub.Prescribed(beam.end, v=0, psi=0)],
+        supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=0, psi=0)],
         initial=[ub.Velocity([beam], linear=(0.1, 0))],
     )
 
 
 def polynomial(scheme, Ω):
     """[closed] Characteristic polynomial of the steps of a mode, Ω = ω dt; highest power first."""
-    if isinstance(scheme, ub.DecayingMidpoint):
+    if isinstance(scheme, ub.EnergyMomentumDecaying):
         # u and v/ω are parts of one complex number: p(λ) = λ(λ-1) - iΩ q(λ), for ω and -ω
         difference, mean = np.array([1, -1, 0]), scheme.part * np.array([1, -2, 1])
         mean = mean + np.array([0.5, 0.5, 0])
@@ -138,7 +138,7 @@ def polynomial(scheme, Ω):
 
 @pytest.mark.parametrize("Ω", [0.3, 3.0, 300.0])
 @pytest.mark.parametrize(
-    "scheme", [*AT_END, ub.GeneralizedAlpha(1.0), ub.DecayingMidpoint()], ids=str
+    "scheme", [*AT_END, ub.GeneralizedAlpha(1.0), ub.EnergyMomentumDecaying()], ids=str
 )
 def test_amplification_of_a_mode(scheme, Ω):
     """[closed] The displacements obey the recurrence of the polynomial."""
@@ -172,14 +172,14 @@ def test_spectral_radius_at_infinity(rho_inf):
     roots = np.roots(polynomial(ub.GeneralizedAlpha(rho_inf), 1e6))
     assert np.abs(roots).max() == pytest.approx(rho_inf, abs=1e-3)
     if rho_inf >= 0.4:
-        roots = np.roots(polynomial(ub.DecayingMidpoint(rho_inf), 1e6))
+        roots = np.roots(polynomial(ub.EnergyMomentumDecaying(rho_inf), 1e6))
         assert np.abs(roots).max() == pytest.approx(rho_inf, abs=1e-3)
 
 
 @pytest.mark.parametrize("rho_inf", [1 / 3, 0.6, 0.9])
 @pytest.mark.parametrize("Ω", np.geomspace(1e-2, 1e4, 7))
 def test_decaying_midpoint_never_amplifies(rho_inf, Ω):
-    scheme = ub.DecayingMidpoint(rho_inf)
+    scheme = ub.EnergyMomentumDecaying(rho_inf)
     largest = np.abs(np.roots(polynomial(scheme, Ω))).max()
     assert largest <= 1 + 1e-12
     if Ω <= 0.1:
@@ -192,7 +192,7 @@ def test_decaying_midpoint_never_amplifies(rho_inf, Ω):
 
 def test_energy_of_decaying_midpoint_with_its_memory_never_grows():
     """[closed] E + c/2 (k Δu² + m Δv²), whatever the steps; E loses what the ledger says."""
-    scheme, random = ub.DecayingMidpoint(0.5), np.random.default_rng(4)
+    scheme, random = ub.EnergyMomentumDecaying(0.5), np.random.default_rng(4)
     simulation = ub.Simulation(bar(), scheme)
     place = simulation.scene.beams[0].end
     k, m, states, entries = EA / LENGTH, DENSITY * LENGTH / 3, [], []
@@ -219,7 +219,7 @@ def thrown(cells=4):
 @pytest.mark.parametrize(("dt", "degree"), [(0.005, 1), (0.05, 1), (0.02, 2), (0.02, 3)])
 def test_decaying_midpoint_in_large_motion(dt, degree):
     mesh = ub.Mesh(degree=degree)
-    solution = go(thrown(), ub.DecayingMidpoint(), 1.0, round(1 / dt), mesh=mesh)
+    solution = go(thrown(), ub.EnergyMomentumDecaying(), 1.0, round(1 / dt), mesh=mesh)
     energy, momentum = solution.energy.total, solution.momentum()
     assert solution.energy.worst < 1e-10
     assert energy.max() <= energy[0] * (1 + 1e-12)
@@ -231,7 +231,7 @@ def test_decaying_midpoint_in_large_motion(dt, degree):
 def test_decaying_midpoint_loses_angular_momentum_at_second_order():
     drifts = []
     for steps in (100, 200, 400):
-        momentum = go(thrown(), ub.DecayingMidpoint(), 0.5, steps).momentum()[:, 2]
+        momentum = go(thrown(), ub.EnergyMomentumDecaying(), 0.5, steps).momentum()[:, 2]
         drifts.append(np.abs(momentum - momentum[0]).max())
     assert np.log2(drifts[-2] / drifts[-1]) == pytest.approx(2, abs=0.1)
     assert drifts[-1] < 1e-4 * abs(momentum[0])
@@ -240,7 +240,7 @@ def test_decaying_midpoint_loses_angular_momentum_at_second_order():
 @pytest.mark.parametrize(("dt", "drift"), [(0.01, 1.2e-5), (0.1, 1.1e-3)])
 def test_printed_midpoint_drifts_in_energy_and_keeps_momenta(dt, drift):
     """[calc] The drift of design notes, by another program, of the flying beam with 8 cells."""
-    solution = go(flying_beam(cells=8), ub.PrintedMidpoint(), 10.0, round(10 / dt))
+    solution = go(flying_beam(cells=8), ub.EnergyMomentumPrinted(), 10.0, round(10 / dt))
     loaded = np.sum(solution.times[1:] - dt / 2 < 2.5 - 1e-9)
     energy, momentum = solution.energy.total[loaded:], solution.momentum()[loaded:]
     assert np.ptp(energy) / energy[0] == pytest.approx(drift, rel=0.1)
@@ -263,7 +263,7 @@ def test_newmark_survives_the_snap_of_the_swing_but_not_its_energy():
     """
     runs = [
         ub.simulate(swing(), scheme, t=(0, 2), dt=1e-3, progress=False)
-        for scheme in (ub.Newmark(), ub.DecayingMidpoint())
+        for scheme in (ub.Newmark(), ub.EnergyMomentumDecaying())
     ]
     newmark, decaying = (run.energy for run in runs)
     assert newmark.total[-1] < 0.95 * newmark.total[500]
@@ -294,7 +294,7 @@ def test_forces_of_the_beginning_do_their_work(scheme):
 
     def scene():
         beam = ub.Beam((0, 0), (1, 0), SOFT, cells=4)
-        push = ub.Slide(ub.ground(0, 0), beam.end, ub.Actuator(lambda t: 3.0), axis=(0, 1))
+        push = ub.Slide(ub.ground(0, 0), beam.end, ub.PrescribedForce(lambda t: 3.0), axis=(0, 1))
         return ub.Scene(
             [beam],
             connectors=[push],
@@ -312,16 +312,16 @@ def test_moving_supports_and_joints_of_multipliers_with_generalised_alpha():
     def scene():
         body = ub.Body((0.25, 0), mass=1.0, inertia=0.1)
         beam = ub.Beam((0.5, 0), (1.5, 0), SOFT, cells=2)
-        hinge = ub.Revolute(body.at(0.5, 0), beam.start, measured=True)
+        hinge = ub.Revolute(body.at(0.5, 0), beam.start, multipliers=True)
         return ub.Scene(
             [beam],
             bodies=[body],
             joints=[ub.Revolute(ub.ground(0, 0), body.at(0, 0)), hinge],
-            supports=[ub.Prescribed(beam.end, v=lambda t: 0.3 * math.sin(3 * t) ** 4)],
+            supports=[ub.PrescribedDisplacement(beam.end, v=lambda t: 0.3 * math.sin(3 * t) ** 4)],
             damping=[ub.Rayleigh(stiffness=0.02)],
         )
 
-    finest = go(scene(), ub.Midpoint(), 0.5, 1000)
+    finest = go(scene(), ub.EnergyMomentum(), 0.5, 1000)
     runs = [go(scene(), ub.GeneralizedAlpha(0.6), 0.5, n) for n in (50, 100)]
     coarse, fine = (np.abs(run.v[-1] - finest.v[-1]).max() for run in runs)
     assert math.log2(coarse / fine) == pytest.approx(2, abs=0.05)
@@ -341,7 +341,7 @@ def one_beam(**parts):
     return ub.Scene([beam], **{name: [make(beam)] for name, make in parts.items()})
 
 
-MOVED = one_beam(supports=lambda beam: ub.Prescribed(beam.start, u=math.sin))
+MOVED = one_beam(supports=lambda beam: ub.PrescribedDisplacement(beam.start, u=math.sin))
 GUIDED = one_beam(joints=lambda beam: ub.Guided(beam.end, lambda s: (1 + s, 0.0)))
 RUBBING = one_beam(
     connectors=lambda beam: ub.Turn(ub.ground(0, 0), beam.start, ub.Coulomb(1.0)),
@@ -371,7 +371,7 @@ def test_refused(scheme, scene, message):
         (lambda: ub.Newmark(gamma=0.4), "gamma = 0.4 must be at least 0.5"),
         (lambda: ub.Newmark(beta=1 / 6), "at least gamma/2 = 0.25"),
         (lambda: ub.GeneralizedAlpha(1.1), "between 0 and 1"),
-        (lambda: ub.DecayingMidpoint(0.2), "at least 0.333333"),
+        (lambda: ub.EnergyMomentumDecaying(0.2), "at least 0.333333"),
     ],
 )
 def test_numbers_out_of_range(make, message):

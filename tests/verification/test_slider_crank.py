@@ -64,7 +64,7 @@ def flexible(kind="prismatic", *, cells=4):
         joints=joints,
         supports=supports,
         bodies=bodies,
-        loads=[ub.PointLoad(crank.start, moment=TORQUE, time=pulse)],
+        loads=[ub.PointLoad(crank.start, moment=TORQUE, amplitude=pulse)],
     )
 
 
@@ -87,13 +87,13 @@ def rigid():
             ub.Revolute(crank.at(CRANK, 0), rod.at(CRANK, 0)),
             ub.Prismatic(ub.ground(0, 0), end, axis=(1, 0), turning=True),
         ],
-        loads=[ub.PointLoad(crank.middle, moment=TORQUE, time=pulse)],
+        loads=[ub.PointLoad(crank.middle, moment=TORQUE, amplitude=pulse)],
     )
 
 
 @lru_cache
 def run(make=flexible, dt=5e-3, **more):
-    solution = ub.simulate(make(**more), ub.Midpoint(), t=(0, 3), dt=dt, progress=False)
+    solution = ub.simulate(make(**more), ub.EnergyMomentum(), t=(0, 3), dt=dt, progress=False)
     if make is rigid:
         crank, rod = solution.scene.bodies
         return solution, crank.middle, rod.at(CRANK + ROD, 0)

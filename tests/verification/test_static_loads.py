@@ -52,7 +52,7 @@ def test_line_load_on_a_cantilever(kind):
     exact = np.array(exact)
 
     def line_load(beam):
-        return ub.LineLoad(beam, force=force, moment=moment, time=ub.ramp(1.0))
+        return ub.LineLoad(beam, force=force, moment=moment, amplitude=ub.ramp(1.0))
 
     scenes = (cantilever(STOCKY, length=LENGTH, cells=n, loads=[line_load]) for n in (2, 4, 8))
     limit = romberg(*(at_tip(scene) for scene in scenes))
@@ -70,7 +70,7 @@ def test_gravity_on_a_cantilever():
         return ub.Scene(
             [beam],
             supports=bare.supports,
-            loads=[ub.Gravity((0, -g), time=ub.ramp(1.0))],
+            loads=[ub.Gravity((0, -g), amplitude=ub.ramp(1.0))],
             masses=[ub.PointMass(beam.end, mass)],
         )
 
@@ -215,7 +215,7 @@ def test_polyline_is_two_beams_rigidly_joined():
     arm = ub.Beam((0, 1), (1, 1), STOCKY, cells=4, name="arm")
 
     def load(beam):
-        return [ub.PointLoad(beam.end, force=(-1, -3), time=ub.ramp(1.0))]
+        return [ub.PointLoad(beam.end, force=(-1, -3), amplitude=ub.ramp(1.0))]
 
     one = ub.Scene([stick], supports=[ub.Clamped(stick.start)], loads=load(stick))
     two = ub.Scene(

@@ -31,7 +31,12 @@ def swing():
 def yielding_cantilever():
     """Plastic: a force that grows within 20 ms and stays."""
     section = ub.Section.rectangle(
-        b=0.1, h=0.1, E=210e9, nu=0.3, rho=7850.0, bending=ub.Hardening(limit=40e3, modulus=1e5)
+        b=0.1,
+        h=0.1,
+        E=210e9,
+        nu=0.3,
+        rho=7850.0,
+        bending=ub.ElastoPlastic(yield_limit=40e3, isotropic=1e5),
     )
     scene = scenes.cantilever(
         section, length=2.0, cells=4, force=(0, -25e3), time=ub.Table([0, 0.02], [0, 1])
@@ -48,7 +53,7 @@ def softening_cantilever():
     scene = ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(0, 40e3), time=push)],
+        loads=[ub.PointLoad(beam.end, force=(0, 40e3), amplitude=push)],
     )
     return scene, beam.end, {"t": (0.0, 0.05), "dt": 1e-3}
 
@@ -73,13 +78,13 @@ def test_a_tolerance_is_kept(make, part):
         return solution.position(place)[-1]
 
     found = ub.tradeoff(
-        scene, {"end": end}, scheme=ub.Midpoint(), tolerance={"end": tolerance}, **times
+        scene, {"end": end}, scheme=ub.EnergyMomentum(), tolerance={"end": tolerance}, **times
     )
     print(found)
     dials = found.best.dials
     fine = ub.simulate(
         scene,
-        ub.Midpoint(),
+        ub.EnergyMomentum(),
         t=times["t"],
         dt=dials.dt / 5,
         mesh=ub.Mesh(refine=2 * max(dials.mesh.refine, 8)),
@@ -109,12 +114,12 @@ def test_a_tolerance_is_used_up_at_a_limited_cost(make, part):
         moved = solution.displacement(place)[:, :2].T
         return np.stack([np.interp(at, solution.times, one) for one in moved])
 
-    found = ub.tradeoff(scene, {"path": path}, scheme=ub.Midpoint(), tolerance=part, **times)
+    found = ub.tradeoff(scene, {"path": path}, scheme=ub.EnergyMomentum(), tolerance=part, **times)
     print(found)
     # Cells of sixth order and steps that are ten times as short leave a hundredth of the error.
     fine = ub.simulate(
         scene,
-        ub.Midpoint(),
+        ub.EnergyMomentum(),
         t=times["t"],
         dt=found.best.dials.dt / 10,
         mesh=ub.Mesh(refine=8, degree=3),
@@ -137,7 +142,11 @@ def test_a_budget_is_kept(make):
     """As it measured the time; benchmarks/bench_budget.py runs what is recommended again."""
     scene, place, times = make()
     found = ub.tradeoff(
-        scene, {"end": lambda s: s.position(place)[-1]}, scheme=ub.Midpoint(), budget=1.0, **times
+        scene,
+        {"end": lambda s: s.position(place)[-1]},
+        scheme=ub.EnergyMomentum(),
+        budget=1.0,
+        **times,
     )
     print(found)
     assert found.best.seconds <= 1.2

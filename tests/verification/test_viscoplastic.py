@@ -9,10 +9,10 @@ import pytest
 import ufl_beam as ub
 
 EI, M_Y, H = 100.0, 5.0, 20.0  # N m², N m, N m²
-SCHEMES = [ub.Midpoint(), ub.Midpoint(0.05, 0.05), ub.Midpoint(0.5)]
+SCHEMES = [ub.EnergyMomentum(), ub.EnergyMomentum(0.05, 0.05), ub.EnergyMomentum(0.5)]
 
 
-def struck(viscosity=None, scheme=None, *, dt=2e-3, law=ub.Hardening, cells=4):
+def struck(viscosity=None, scheme=None, *, dt=2e-3, law=ub.ElastoPlastic, cells=4):
     """A metre of cantilever whose end is pushed for 0.1 s; kept to 0.3 s."""
     bending = law(M_Y, H, H / 2, viscosity=viscosity) if viscosity else None
     section = ub.Section(EA=1e4, GA=1e4, EI=EI, rhoA=1.0, rhoI=1e-3, bending=bending)
@@ -21,9 +21,9 @@ def struck(viscosity=None, scheme=None, *, dt=2e-3, law=ub.Hardening, cells=4):
     scene = ub.Scene(
         [beam],
         supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(0, 40.0), time=push)],
+        loads=[ub.PointLoad(beam.end, force=(0, 40.0), amplitude=push)],
     )
-    solution = ub.simulate(scene, scheme or ub.Midpoint(), t=(0, 0.3), dt=dt, progress=False)
+    solution = ub.simulate(scene, scheme or ub.EnergyMomentum(), t=(0, 0.3), dt=dt, progress=False)
     energy = solution.energy
     assert energy.worst <= 1e-9
     for lost in energy.lost.values():

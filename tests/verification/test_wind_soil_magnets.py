@@ -40,7 +40,7 @@ def falling(dt, cells=16):
         initial=[ub.Velocity((beam,), linear=(1.0, 5.0), angular=3.0)],
         works=[ub.VirtualWork("wind", drag, numbers=numbers)],
     )
-    solution = ub.simulate(scene, ub.Midpoint(), t=(0, TIME), dt=dt, **QUIET)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, TIME), dt=dt, **QUIET)
     middle = solution.displacement(beam.at(0.5))[-1]
     return middle, solution
 
@@ -99,9 +99,9 @@ def on_soil(mesh, scheme=None, force=1e-4, dt=0.5):
     """A rail of stiffness 1 N m² and 4 m on soil of 4 N/m², so that λ = 1/m."""
     section = ub.Section(EA=1e10, GA=1e10, EI=1.0)
     beam = ub.Beam((0, 0), (4, 0), section, cells=2)
-    load = ub.PointLoad(beam.at(0.5), force=(0, -force), time=lambda t: t)
+    load = ub.PointLoad(beam.at(0.5), force=(0, -force), amplitude=lambda t: t)
     soil = ub.Potential("soil", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": 4.0})
-    held = [ub.Prescribed(beam.at(0.5), u=0.0)]
+    held = [ub.PrescribedDisplacement(beam.at(0.5), u=0.0)]
     scene = ub.Scene([beam], supports=held, loads=[load], works=[soil])
     return beam, ub.simulate(scene, scheme or ub.Static(), t=(0, 1), dt=dt, mesh=mesh, **QUIET)
 
@@ -183,13 +183,13 @@ def test_the_ledger_of_a_magnet():
     """Exact in statics, while the field grows and turns; and in motion after it was let go."""
     _, scene = cantilever(lambda t: 4.0 * min(t, 1.0))
     mesh = ub.Mesh(refine=8)
-    bent = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.1, mesh=mesh, **QUIET)
+    bent = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.1, mesh=mesh, **QUIET)
     assert bent.energy.worst < 1e-9
     assert bent.energy["field"][-1] < -1
-    swinging = ub.simulate(scene, ub.Midpoint(), t=(1, 3), dt=0.02, start=bent, **QUIET)
+    swinging = ub.simulate(scene, ub.EnergyMomentum(), t=(1, 3), dt=0.02, start=bent, **QUIET)
     assert swinging.energy.worst < 1e-9
     _, still = cantilever(1.0)
-    free = ub.simulate(still, ub.Midpoint(), t=(0, 3), dt=0.02, mesh=mesh, **QUIET)
+    free = ub.simulate(still, ub.EnergyMomentum(), t=(0, 3), dt=0.02, mesh=mesh, **QUIET)
     assert free.energy.worst < 1e-9
     assert np.ptp(free.energy["field"]) > 0.1
 
@@ -206,7 +206,7 @@ def test_a_current_in_a_field():
         tangent = axis.t0 + axis.d(ufl.as_vector([q1[0], q1[1]]))
         return t * IB * (-tangent[1] * w[0] + tangent[0] * w[1])
 
-    closer = ub.Prescribed(beam.end, u=lambda t: -0.1 * t, v=0.0)
+    closer = ub.PrescribedDisplacement(beam.end, u=lambda t: -0.1 * t, v=0.0)
     wire = ub.VirtualWork("current", lorentz, numbers={"IB": 50.0})
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), closer], works=[wire])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02, **QUIET)

@@ -37,7 +37,7 @@ class Branch:
         mode: Direction at all degrees of freedom, in the order of the grid.
 
     Example:
-        >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), time=lambda t: t)
+        >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), amplitude=lambda t: t)
         >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
         >>> straight = ub.follow(column, ub.LoadControl(0.05), steps=10)
         >>> buckled = straight.critical[0].branch()
@@ -65,7 +65,7 @@ class CriticalPoint:
             and of rotations; all degrees of freedom in the order of the grid.
 
     Example:
-        >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), time=lambda t: t)
+        >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), amplitude=lambda t: t)
         >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
         >>> point = ub.follow(column, ub.LoadControl(0.05), steps=10).critical[0]
         >>> print(point.kind, round(point.factor, 2))

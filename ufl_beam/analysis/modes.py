@@ -91,7 +91,7 @@ class Shapes(Rich, ABC):
         return np.asarray(velocity_of(self.grid, place, self.q[None], shape[None])[0])
 
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
-        """Return one period of the k-th mode as a solution, for ``animate`` or ``plot_shapes``.
+        """Return one period of the k-th mode as a solution, for :func:`animate` or :func:`plot`.
 
         Args:
             k: Which.
@@ -203,7 +203,7 @@ class Modes(Shapes):
         >>> shapes = ub.modes(scene, 3)
         >>> print(shapes.frequencies.round())  # Hz
         [ 42. 286. 651.]
-        >>> figure = ub.plot_modes(shapes)
+        >>> figure = ub.plot(shapes)
     """
 
     exponents: Complex

@@ -38,7 +38,7 @@ from ufl_beam.output.output_files import (
     reserved,
     write,
 )
-from ufl_beam.parallel import alone, communicator, on_first, progress_bar, say
+from ufl_beam.parallel import alone, communicator, on_first, print_once, progress_bar
 
 Case = dict[str, Any]
 Member = Callable[..., dict[str, Any]]
@@ -259,7 +259,7 @@ def study(
     if len(result.failed) == len(result):
         raise RuntimeError(f"study: all {len(result)} members failed, {result.failed[0]}")
     if result.failed and comm.rank == 0:
-        say(result)
+        print_once(result)
     return result
 
 

@@ -276,7 +276,7 @@ class PathCorrector:
         if not math.isfinite(size) or not self.size(motion) > 0:
             raise StepFailed(
                 "nothing moves with the load factor here; let a load or a motion go on to change, "
-                "as with time=lambda t: t"
+                "as with amplitude=lambda t: t"
             )
         return stiffness, way / size
 
@@ -373,8 +373,8 @@ class ArcLength(Control):
     Example:
         >>> rod = ub.Section.circle(d=0.05, E=210e9, nu=0.3)
         >>> half = ub.Beam((0, 0), (2, 0.2), rod, cells=8)  # of a shallow arch
-        >>> crown = ub.Prescribed(half.end, u=0, psi=0)
-        >>> down = ub.PointLoad(half.end, force=(0, -5e4), time=lambda t: t)
+        >>> crown = ub.PrescribedDisplacement(half.end, u=0, psi=0)
+        >>> down = ub.PointLoad(half.end, force=(0, -5e4), amplitude=lambda t: t)
         >>> arch = ub.Scene([half], supports=[ub.Pinned(half.start), crown], loads=[down])
         >>> path = ub.follow(arch, ub.ArcLength(0.1), steps=40)  # it snaps through
         >>> print([round(point.factor, 2) for point in path.critical if point.kind == "limit"])
@@ -495,7 +495,7 @@ class DissipationControl(Control):
         SceneError: ``step`` is not positive.
 
     Example:
-        >>> pull = ub.PointLoad(weak.end, force=(0, -1e5), time=lambda t: t)
+        >>> pull = ub.PointLoad(weak.end, force=(0, -1e5), amplitude=lambda t: t)
         >>> pulled = ub.Scene([weak], supports=[ub.Clamped(weak.start)], loads=[pull])
         >>> path = ub.follow(pulled, ub.DissipationControl(50.0), steps=15)
         >>> print(path.factor.max().round(2))  # at the limit of the hinge

@@ -143,7 +143,7 @@ def follow(
     Limit points of the load factor and bifurcation points become states of the path.
 
     Args:
-        scene: Model; some load or motion must vary in time, ``time=lambda t: t``.
+        scene: Model; some load or motion must vary in time, ``amplitude=lambda t: t``.
         control: :class:`ArcLength`, :class:`LoadControl`, :class:`DisplacementControl` or
             :class:`DissipationControl`.
         until: The path ends after the first step for which this is true, as in
@@ -224,7 +224,7 @@ def _require_driven(scene: Scene, t0: float) -> None:
     if not driven and not any(f(t) != f(t0) for _, f in scene.time_functions() for t in times):
         raise SceneError(
             "follow: no load and no motion depends on time, which is the load factor here; give "
-            "the one that is to grow time=lambda t: t"
+            "the one that is to grow amplitude=lambda t: t"
         )
 
 

@@ -76,7 +76,7 @@ def tradeoff(
     budget: float | None = None,
     mesh: Mesh | Sequence[Mesh] | None = None,
     newton: Newton | Sequence[Newton] | None = None,
-    most: float = 600.0,
+    max_seconds: float = 600.0,
     progress: bool = True,
     comm: MPI.Intracomm | None = None,
 ) -> Tradeoff:
@@ -104,7 +104,7 @@ def tradeoff(
         newton: How exactly equilibria are found; of several the first is used, and the others are
             compared with it on a coarse run.  The fastest one that changes the quantities little is
             used for the answer.
-        most: Wall time of all runs; s.
+        max_seconds: Wall time of all runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run is done by one of them, several at a time.  Runs that go on
             together disturb each other's times: leave cores idle where times matter.
@@ -133,7 +133,7 @@ def tradeoff(
                 "function of a Solution"
             )
     target = _target_of(quantities, tolerance, budget)
-    require_number(most, "tradeoff: most", positive=True)
+    require_number(max_seconds, "tradeoff: max_seconds", positive=True)
     require_switch(progress, "tradeoff: progress")
     comm = communicator(comm, "tradeoff: comm")
     t = require_times(t)
@@ -150,7 +150,15 @@ def tradeoff(
     families = [Dials(*one, newtons[0]) for one in product(schemes, steps, meshes)]
     with progress_bar(progress, comm, unit="run", bar_format=BAR) as bar:
         runs = _Runs(
-            scene, quantities, simulate, families, newtons, t=t, most=most, comm=comm, bar=bar
+            scene,
+            quantities,
+            simulate,
+            families,
+            newtons,
+            t=t,
+            max_seconds=max_seconds,
+            comm=comm,
+            bar=bar,
         )
         best, others, notes = _find(runs, target)
         run = best.best()
@@ -249,7 +257,7 @@ class _Runs:
     families: Sequence[Dials]  # coarsest dials to begin with
     newtons: Sequence[Newton]
     t: tuple[float, float]
-    most: float  # wall time that all runs together may take; s
+    max_seconds: float  # wall time that all runs together may take; s
     comm: MPI.Intracomm
     bar: Any  # progress bar
     runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
@@ -272,7 +280,7 @@ class _Runs:
 
     def allowed(self, refinements: Sequence[Refinement]) -> bool:
         """Return whether there is time for runs."""
-        return self.spent + sum(map(self._longest, refinements)) <= self.most
+        return self.spent + sum(map(self._longest, refinements)) <= self.max_seconds
 
     def run(self, refinements: Sequence[Refinement]) -> None:
         """Run what is missing, several at a time where there are processes."""
@@ -283,7 +291,8 @@ class _Runs:
             needed = sum(map(self._longest, missing))
             raise TradeoffError(
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
-                f"{self.spent:.3g} s of runs, more than most = {self.most:g} s; the finest is "
+                f"{self.spent:.3g} s of runs, more than max_seconds = "
+                f"{self.max_seconds:g} s; the finest is "
                 f"{self.dials(missing[-1])}"
             )
         self.bar.set_postfix_str(f"{len(missing)} more up to {self.dials(missing[-1])}")

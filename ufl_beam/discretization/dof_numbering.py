@@ -242,7 +242,9 @@ class Grid:
     def keys(self, cells: Index) -> list[tuple[int, int]]:
         """A number for the ends of the beam, and the number in the beam, of some cells."""
         beams = self.beam_of_cell[cells]
-        of_beam = [crc32(struct.pack("4d", *beam.a, *beam.b)) for beam in self.scene.beams]
+        of_beam = [
+            crc32(struct.pack("4d", *beam.ends[0], *beam.ends[1])) for beam in self.scene.beams
+        ]
         in_beam = cells - self._first_cells[beams]
         return [(of_beam[b], int(c)) for b, c in zip(beams, in_beam, strict=True)]
 

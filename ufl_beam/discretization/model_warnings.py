@@ -17,7 +17,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.errors import warn
 from ufl_beam.memory import of_structure
 from ufl_beam.model.bodies import GROUND, Place, Spot, carries
-from ufl_beam.model.connector_laws import HELD, Motor
+from ufl_beam.model.connector_laws import HELD, PrescribedMotion
 from ufl_beam.model.connectors import place_of
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.scene import Scene
@@ -229,7 +229,7 @@ def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
     ] + [
         (f"{link}: its motion", here, value_at(link.law.motion, t, link), link.turns)
         for link, here in zip(grid.scene.links, motions, strict=True)
-        if isinstance(link.law, Motor) and link.law is not HELD
+        if isinstance(link.law, PrescribedMotion) and link.law is not HELD
     ]
     for what, here, target, turns in starts:
         if abs(target - here) > JUMP * (1.0 if turns else grid.scene.size):

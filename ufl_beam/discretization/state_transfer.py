@@ -57,7 +57,7 @@ class Transfer:
             raise SceneError(
                 "start: the solution is of other beams, joints or cells; use the same Beam objects "
                 "in the same order, and the same Mesh. From a file: "
-                "start=ub.load(path, scene=scene) with the scene that was saved"
+                "start=ub.Solution.load(path, scene=scene) with the scene that was saved"
             )
         if not np.array_equal(old.points, new.points):
             nodes = ((b, old.nodes_of(b)[0], new.nodes_of(b)[0]) for b in new.scene.beams)

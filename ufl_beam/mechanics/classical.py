@@ -166,8 +166,8 @@ class Newmark(_Accelerated):
     """Newmark's scheme, by default with average acceleration; for comparison with other programs.
 
     ``gamma = 1/2`` is of second order and damps nothing: in large motion its energy is not bounded,
-    and it may diverge where :class:`Midpoint` does not.  ``gamma > 1/2`` damps at first order;
-    :class:`GeneralizedAlpha` does so at second order.
+    and it may diverge where :class:`EnergyMomentum` does not.  ``gamma > 1/2`` damps at first
+    order; :class:`GeneralizedAlpha` does so at second order.
 
     The ledger counts works by the trapezoidal rule.  It does not close, and its imbalance, of
     second order in the step, is a measure of the error.  Accelerations at the beginning are those
@@ -194,7 +194,9 @@ class Newmark(_Accelerated):
     beta: float = 0.25
 
     kept = ("acceleration",)
-    advice = "Try a smaller dt, or GeneralizedAlpha(0.8), or Midpoint(), which conserves energy"
+    advice = (
+        "Try a smaller dt, or GeneralizedAlpha(0.8), or EnergyMomentum(), which conserves energy"
+    )
 
     def __post_init__(self) -> None:
         require_number(self.gamma, "Newmark: gamma", at_least=0.5)
@@ -222,7 +224,7 @@ class GeneralizedAlpha(_Accelerated):
     so that the order remains.
 
     Ledger, initial accelerations and rate-dependent laws are as in :class:`Newmark`.  In large
-    motion the energy may grow; with :class:`DecayingMidpoint` it cannot.
+    motion the energy may grow; with :class:`EnergyMomentumDecaying` it cannot.
 
     Args:
         rho_inf: Spectral radius at infinite frequency, from 0 (gone in a step) to 1 (undamped).
@@ -239,7 +241,9 @@ class GeneralizedAlpha(_Accelerated):
     rho_inf: float = 0.8
 
     kept = ("acceleration", "lead of acceleration")
-    advice = "Try a smaller dt, a smaller rho_inf, or DecayingMidpoint(), whose energy is bounded"
+    advice = (
+        "Try a smaller dt, a smaller rho_inf, or EnergyMomentumDecaying(), whose energy is bounded"
+    )
 
     def __post_init__(self) -> None:
         require_number(self.rho_inf, "GeneralizedAlpha: rho_inf", at_least=0.0, at_most=1.0)

@@ -21,7 +21,7 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import State
-from ufl_beam.model.material_laws import Hardening
+from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.softening_laws import SofteningLaw
 
 # -- energy and resistance -------------------------------------------------------------------------
@@ -151,13 +151,13 @@ class Slip(NamedTuple):
     back_force: Values  # force about which the limit lies after the step
 
 
-def numbers(law: SofteningLaw | Hardening) -> dict[str, Any]:
+def numbers(law: SofteningLaw | ElastoPlastic) -> dict[str, Any]:
     """Numbers of a law of slip by the names that :func:`slip` has for them."""
     of_law = law.numbers() if isinstance(law, SofteningLaw) else law.numbers(np.ones(()))
     return {f"number {name}": value for name, value in of_law.items()}
 
 
-def slip(law: SofteningLaw | Hardening, at: Mapping[str, Values], scheme: Scheme) -> Slip:
+def slip(law: SofteningLaw | ElastoPlastic, at: Mapping[str, Values], scheme: Scheme) -> Slip:
     """Slip by a law; numbers of ``law`` itself do not matter.
 
     They are by name: the slip of the step and its direction (1 or -1); accumulated slip (slipped)
@@ -171,7 +171,7 @@ def slip(law: SofteningLaw | Hardening, at: Mapping[str, Values], scheme: Scheme
         return Slip(force, a * law.mean_traction(ξ, a), none, none, law.traction(ξ + a), none)
     e, θ, dt = (at[name] for name in ("start", "θ", "dt"))
     change = State({"plastic": a, "accumulated": a})
-    limit, H, B = (of_law[name] for name in ("limit", "modulus", "kinematic"))
+    limit, H, B = (of_law[name] for name in ("yield_limit", "isotropic", "kinematic"))
     bulk = law.of(np.inf, of_law)
     resistance = limit + H * (ξ + θ * a) + of_law["viscosity"] * a / dt
     return Slip(

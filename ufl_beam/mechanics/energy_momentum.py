@@ -59,14 +59,15 @@ class _OverStep:
         return sum((float(w) / 2 * f for w, f in zip(weights, values, strict=True)), 0)
 
 
-class ExactStep(_OverStep):
+class EnergyMomentumBase(_OverStep):
     """Base of schemes in whose steps works are exact increments of energy.
 
     A scheme has an ``alpha``: the energy that its resultants take, P(89).
 
     Example:
-        >>> issubclass(ub.Midpoint, ub.ExactStep), issubclass(ub.ExactStatic, ub.ExactStep)
-        (True, True)
+        >>> schemes = ub.EnergyMomentum, ub.EnergyMomentumStatic
+        >>> [issubclass(scheme, ub.EnergyMomentumBase) for scheme in schemes]
+        [True, True]
     """
 
     exact_ledger = True
@@ -83,17 +84,17 @@ class ExactStep(_OverStep):
 
 
 @dataclass(frozen=True)
-class ExactStatic(ExactStep):
+class EnergyMomentumStatic(EnergyMomentumBase):
     """Static equilibrium with an exact ledger: works are exact increments of energy.
 
     :class:`Static` is in equilibrium at the ends of steps and counts works by the trapezoidal rule;
-    here the equation of the step is that of :class:`Midpoint`.  Inelastic material follows its laws
-    over the step, not only at its end.  The ledger is exact; the solution is of first order in the
-    step with ``theta=1`` and of second order with ``theta=1/2``, see docs/schemes.md for measured
-    errors.  Loads that act from the start are applied in the first step, in parts that turn nodes
-    little.  At a jump to another branch of equilibria the run goes on, and the released energy is
-    in the entry "numerical"; :class:`Static` stops there.  Time is real for what is viscous, as in
-    :class:`Static`.
+    here the equation of the step is that of :class:`EnergyMomentum`.  Inelastic material follows
+    its laws over the step, not only at its end.  The ledger is exact; the solution is of first
+    order in the step with ``theta=1`` and of second order with ``theta=1/2``, see docs/schemes.md
+    for measured errors.  Loads that act from the start are applied in the first step, in parts that
+    turn nodes little.  At a jump to another branch of equilibria the run goes on, and the released
+    energy is in the entry "numerical"; :class:`Static` stops there.  Time is real for what is
+    viscous, as in :class:`Static`.
 
     Args:
         theta: Part of the step at which resultants and loads are in equilibrium.  With 1/2 no
@@ -105,7 +106,7 @@ class ExactStatic(ExactStep):
         SceneError: A number outside [1/2, 1].
 
     Example:
-        >>> run = ub.simulate(scene, ub.ExactStatic(), t=(0, 1), dt=0.1)
+        >>> run = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.1)
         >>> bool(run.energy.worst < 1e-9)
         True
     """
@@ -117,7 +118,7 @@ class ExactStatic(ExactStep):
     slack = math.inf
 
     def __post_init__(self) -> None:
-        require_number(self.theta, "ExactStatic: theta", at_least=0.5, at_most=1.0)
+        require_number(self.theta, "EnergyMomentumStatic: theta", at_least=0.5, at_most=1.0)
 
     @property
     def alpha(self) -> float:  # type: ignore[override]
@@ -130,14 +131,15 @@ class ExactStatic(ExactStep):
         return self.theta
 
 
-class Midway:
+class MidpointLoads:
     """Base of dynamic schemes whose loads act in the middle of the step.
 
     A scheme states its ``coefficients`` and ``error_weights``, see :class:`DynamicScheme`.
 
     Example:
-        >>> issubclass(ub.DecayingMidpoint, ub.Midway), issubclass(ub.Newmark, ub.Midway)
-        (True, False)
+        >>> schemes = ub.EnergyMomentumDecaying, ub.Newmark
+        >>> [issubclass(scheme, ub.MidpointLoads) for scheme in schemes]
+        [True, False]
     """
 
     dynamic = True
@@ -149,11 +151,11 @@ class Midway:
     kept: tuple[str, ...] = ()
     advice = (
         "Try a smaller dt, loads and motions without jumps, or more energy taken out of high "
-        "frequencies, such as Midpoint(alpha=0.05, beta=0.05) or DecayingMidpoint()"
+        "frequencies, such as EnergyMomentum(alpha=0.05, beta=0.05) or EnergyMomentumDecaying()"
     )
 
 
-class _Velocities(Midway):
+class _Velocities(MidpointLoads):
     """Velocities of which ``beta`` takes energy."""
 
     alpha: float
@@ -176,7 +178,7 @@ class _Velocities(Midway):
 
 
 @dataclass(frozen=True)
-class Midpoint(ExactStep, _Velocities):
+class EnergyMomentum(EnergyMomentumBase, _Velocities):
     """Midpoint rule that conserves energy and momentum exactly, with dissipation on request.
 
     ``alpha = beta = 0`` conserves energy, linear and angular momentum to solver tolerance at any
@@ -201,8 +203,8 @@ class Midpoint(ExactStep, _Velocities):
         P(77)-P(91); P(82) corrected, see docs/errata.md.
 
     Example:
-        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
-        >>> lossy = ub.simulate(scene, ub.Midpoint(alpha=0.05, beta=0.05), t=(0, 1), dt=0.05)
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
+        >>> lossy = ub.simulate(scene, ub.EnergyMomentum(alpha=0.05, beta=0.05), t=(0, 1), dt=0.05)
         >>> bool(run.energy.worst < 1e-9), bool(lossy.energy.lost["numerical"][-1] > 0)
         (True, True)
     """
@@ -212,18 +214,20 @@ class Midpoint(ExactStep, _Velocities):
 
     def __post_init__(self) -> None:
         for name in ("alpha", "beta"):
-            require_number(getattr(self, name), f"Midpoint: {name}", at_least=0.0, at_most=0.5)
+            require_number(
+                getattr(self, name), f"EnergyMomentum: {name}", at_least=0.0, at_most=0.5
+            )
 
 
 @dataclass(frozen=True)
-class DecayingMidpoint(ExactStep, Midway):
+class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
     """Midpoint rule of second order that dissipates the energy of high frequencies.
 
-    The dissipation of :class:`Midpoint` is proportional to the changes of strains and velocities in
-    a step, and of first order.  Here it is proportional to second differences of both: a mode of
-    circular frequency ω loses the part c (ω dt)⁴ of its energy in a step, with c = rho_inf (1 -
-    rho_inf) / (2 (1 + rho_inf)²), and unresolved modes are reduced to ``rho_inf`` of their
-    amplitude.  The equations of the step are
+    The dissipation of :class:`EnergyMomentum` is proportional to the changes of strains and
+    velocities in a step, and of first order.  Here it is proportional to second differences of
+    both: a mode of circular frequency ω loses the part c (ω dt)⁴ of its energy in a step, with c =
+    rho_inf (1 - rho_inf) / (2 (1 + rho_inf)²), and unresolved modes are reduced to ``rho_inf`` of
+    their amplitude.  The equations of the step are
 
         resultants  C ((e0 + e1)/2 + c (Δe - r Δe')),     Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'),
 
@@ -243,7 +247,7 @@ class DecayingMidpoint(ExactStep, Midway):
         SceneError: A number outside [1/3, 1].
 
     Example:
-        >>> run = ub.simulate(scene, ub.DecayingMidpoint(rho_inf=0.5), t=(0, 1), dt=0.05)
+        >>> run = ub.simulate(scene, ub.EnergyMomentumDecaying(rho_inf=0.5), t=(0, 1), dt=0.05)
         >>> bool(run.energy.lost["numerical"][-1] > 0), bool(run.energy.worst < 1e-9)
         (True, True)
     """
@@ -254,7 +258,7 @@ class DecayingMidpoint(ExactStep, Midway):
     looks_back = True
 
     def __post_init__(self) -> None:
-        require_number(self.rho_inf, "DecayingMidpoint: rho_inf", at_least=1 / 3, at_most=1.0)
+        require_number(self.rho_inf, "EnergyMomentumDecaying: rho_inf", at_least=1 / 3, at_most=1.0)
 
     @property
     def part(self) -> float:
@@ -279,8 +283,8 @@ class DecayingMidpoint(ExactStep, Midway):
 
 
 @dataclass(frozen=True)
-class PrintedMidpoint(_OverStep, _Velocities, PlainStep):
-    """The midpoint rule as the paper prints it, for comparison; :class:`Midpoint` is better.
+class EnergyMomentumPrinted(_OverStep, _Velocities, PlainStep):
+    """The midpoint rule as the paper prints it, for comparison; :class:`EnergyMomentum` is better.
 
     The variation of the strains is that in the middle of the step, which differs from their
     increment: energy drifts by the square of the rotation of a step.  Linear and angular momentum
@@ -292,8 +296,8 @@ class PrintedMidpoint(_OverStep, _Velocities, PlainStep):
 
     Example:
         >>> free = ub.Scene([beam], initial=[ub.Velocity((beam,), angular=10.0)])
-        >>> printed = ub.simulate(free, ub.PrintedMidpoint(), t=(0, 1), dt=0.1)
-        >>> exact = ub.simulate(free, ub.Midpoint(), t=(0, 1), dt=0.1)
+        >>> printed = ub.simulate(free, ub.EnergyMomentumPrinted(), t=(0, 1), dt=0.1)
+        >>> exact = ub.simulate(free, ub.EnergyMomentum(), t=(0, 1), dt=0.1)
         >>> bool(printed.energy.worst > 1e-5), bool(exact.energy.worst < 1e-9)
         (True, True)
     """

@@ -31,7 +31,7 @@ class Step(NamedTuple):
     """A step in time, as a scheme has it: its ends, and where loads and motions are taken.
 
     Example:
-        >>> step = ub.Step.of(ub.Midpoint(), 0.0, 0.1, 0.1, np.zeros(3))
+        >>> step = ub.Step.of(ub.EnergyMomentum(), 0.0, 0.1, 0.1, np.zeros(3))
         >>> step.load_time, step.motion_time, step.dt  # s
         (0.05, 0.1, 0.1)
     """
@@ -68,7 +68,7 @@ class Scheme(Protocol):
     """Protocol of time schemes, static ones and those with inertia.
 
     Any hashable object with these attributes and methods is a scheme; a run names what it lacks.
-    A base class to begin with is :class:`ExactStep`; docs/extending.md has an example.
+    A base class to begin with is :class:`EnergyMomentumBase`; docs/extending.md has an example.
 
     Example:
         >>> class Mine:
@@ -125,7 +125,7 @@ class Coefficients(NamedTuple):
             momentum is lost; its first number multiplies the change of velocities.  None: no loss.
 
     Example:
-        >>> print(ub.Midpoint().coefficients(dt=0.1, last_dt=0.1, known=0).rates)
+        >>> print(ub.EnergyMomentum().coefficients(dt=0.1, last_dt=0.1, known=0).rates)
         ((20.0, -1.0, 0.0),)
     """
 
@@ -138,12 +138,12 @@ class Coefficients(NamedTuple):
 class DynamicScheme(Scheme, Protocol):
     """Protocol of time schemes with inertia, whose ``dynamic`` is true.
 
-    A base class to begin with is :class:`Midway`; docs/extending.md has an example.
+    A base class to begin with is :class:`MidpointLoads`; docs/extending.md has an example.
 
     Example:
         >>> from dataclasses import dataclass
         >>> @dataclass(frozen=True)
-        ... class Mine(ub.ExactStep, ub.Midway):
+        ... class Mine(ub.EnergyMomentumBase, ub.MidpointLoads):
         ...     alpha = 0.0
         >>> ub.simulate(scene, Mine(), t=(0, 1), dt=0.1)
         Traceback (most recent call last):

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import KW_ONLY, dataclass, field
+from dataclasses import dataclass, fields
 from fractions import Fraction
 from functools import cached_property, partial
 from itertools import accumulate, pairwise
@@ -34,27 +34,25 @@ from ufl_beam.model.functions import Arc, Curve, Point, Polyline, Straight, poin
 from ufl_beam.model.records import Instance, Record, Text
 from ufl_beam.model.sections import Section
 
-End = Annotated[Point, require_vector, "end"]
 
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class Beam(Record, Member):
-    """Beam with straight cells along a curve, by default along the line from ``a`` to ``b``.
+    """Beam with straight cells along a curve, by default along the line from ``start`` to ``end``.
 
     Args:
-        a: First end; m.
-        b: Last end; m.
+        start: First end; m.
+        end: Last end; m.
         section: Its cross-section.
         cells: Number of cells, of equal length in the parameter of the curve.  Places that
             something is attached to, and corners, become vertices too.
         name: Name in messages and pictures.
-        curve: Axis from ``s = 0`` at ``a`` to ``s = 1`` at ``b``.
+        curve: Axis from ``s = 0`` at the start to ``s = 1`` at the end.
         corners: Parameters ``s`` that must be vertices.
         hinges: Plastic hinges of zero length, by their parameter ``s``, which becomes a vertex:
-            ``{0.0: Softening(limit, energy)}``.  A hinge is rigid until the moment at ``s`` reaches
-            its limit; then it follows its law, :class:`Softening` or :class:`Hardening` (limit in
-            N m, moduli in N m/rad, ``eta`` in N m s).  At an end it comes before the law of the
-            section; ``None`` there is an end without a hinge.
+            ``{0.0: Softening(limit, fracture_energy)}``.  A hinge is rigid until the moment at
+            ``s`` reaches its limit; then it follows its law, :class:`Softening` or
+            :class:`ElastoPlastic` (limit in N m, moduli in N m/rad, ``eta`` in N m s).  At an end
+            it comes before the law of the section; ``None`` there is an end without a hinge.
 
     Raises:
         SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
@@ -67,17 +65,24 @@ class Beam(Record, Member):
         column.end (0, 3) and arch.start (5, 0)
     """
 
-    a: End
-    b: End
+    ends: tuple[Point, Point]
     section: Instance[Section]
-    _: KW_ONLY
-    cells: Annotated[int, require_count] = 8
-    name: Text = "beam"
-    curve: Curve = field(default=None, repr=False)  # type: ignore[assignment]
-    corners: Annotated[tuple[float, ...], require_sequence] = ()
-    hinges: Annotated[Mapping[float, HingeLaw | None], partial(require_kind, kind=Mapping)] = field(
-        default_factory=dict
-    )
+    cells: Annotated[int, require_count]
+    name: Text
+    curve: Curve
+    corners: Annotated[tuple[float, ...], require_sequence]
+    hinges: Annotated[Mapping[float, HingeLaw | None], partial(require_kind, kind=Mapping)]
+
+    def __init__(
+        self, start: Point, end: Point, section: Section, *, cells: int = 8, name: str = "beam",
+        curve: Curve | None = None, corners: Sequence[float] = (),
+        hinges: Mapping[float, HingeLaw | None] = {},
+    ) -> None:  # fmt: skip
+        ends = require_vector(start, f"{name}: start"), require_vector(end, f"{name}: end")
+        values = (ends, section, cells, name, curve, corners, hinges)
+        for field, value in zip(fields(self), values, strict=True):
+            object.__setattr__(self, field.name, value)
+        self.__post_init__()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -88,14 +93,15 @@ class Beam(Record, Member):
                 raise SceneError(f"{self.name}: corner s = {s:g} must lie between 0 and 1")
         self._require_hinges()
         if self.curve is None:
-            if self.a == self.b:
-                raise SceneError(f"{self.name}: zero length, both ends are at {self.a}")
-            object.__setattr__(self, "curve", Straight(self.a, self.b))
-            length = math.dist(self.a, self.b)
+            first, last = self.ends
+            if first == last:
+                raise SceneError(f"{self.name}: zero length, both ends are at {first}")
+            object.__setattr__(self, "curve", Straight(first, last))
+            length = math.dist(first, last)
         else:
             at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
             points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
-            for s, there, end in ((0, points[0], self.a), (1, points[-1], self.b)):
+            for s, there, end in zip((0, 1), (points[0], points[-1]), self.ends, strict=True):
                 if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
                     raise SceneError(f"{self.name}: curve({s}) = {there} is not the end {end}")
             length = sum(math.dist(p, q) for p, q in pairwise(points))
@@ -129,7 +135,7 @@ class Beam(Record, Member):
         return self.name
 
     def __repr__(self) -> str:
-        a, b = (f"({x:g}, {y:g})" for x, y in (self.a, self.b))
+        a, b = (f"({x:g}, {y:g})" for x, y in self.ends)
         return f"<Beam {self.name!r}: {a} to {b}, {self.cells} cells>"
 
     @property

@@ -317,7 +317,9 @@ class PointMass(Record):
         inertia: About the place; kg m².
 
     Example:
-        >>> heavy = ub.Scene([beam], [], scene.supports, masses=[ub.PointMass(beam.end, 300.0)])
+        >>> heavy = ub.Scene(
+        ...     [beam], supports=scene.supports, masses=[ub.PointMass(beam.end, 300.0)]
+        ... )
         >>> bool(ub.modes(heavy, 1).omega < ub.modes(scene, 1).omega)
         True
     """

@@ -58,7 +58,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
 
     Attributes:
         variables: Internal variables, and their values before anything has happened.
-        components: Motions that the law acts on; 2 or 3 of a law for :func:`Bushing`, whose
+        components: Motions that the law acts on; 2 or 3 of a law for :class:`Bushing`, whose
             methods get tuples of motions and rates, and whose resistance is a tuple.
         entry: Entry of the ledger, in ``lost``, of what is not stored.
         active: True of a law that may give energy, such as a drive.  Else runs warn if the energy
@@ -76,8 +76,10 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         ...     def resistance(self, motion, rate, state, dt):
         ...         return self.damping * ub.law_functions.absolute(rate) * rate
         >>> buffer = ub.Slide(ub.ground(2, 0), beam.end, Buffer(1e6, 1e9, 1e4), axis=(0, 1))
-        >>> caught = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[buffer])
-        >>> run = ub.simulate(caught, ub.Midpoint(), t=(0, 0.5), dt=0.005)
+        >>> caught = ub.Scene(
+        ...     [beam], supports=scene.supports, loads=scene.loads, connectors=[buffer]
+        ... )
+        >>> run = ub.simulate(caught, ub.EnergyMomentum(), t=(0, 0.5), dt=0.005)
         >>> bool(run.energy.lost["connectors"][-1] > 0), bool(run.energy.worst < 1e-9)
         (True, True)
     """
@@ -317,7 +319,9 @@ class ForceLaw(Record):
     Example:
         >>> law = ub.ForceLaw(lambda motion, rate: 1e6 * motion + 1e9 * motion**3)
         >>> spring = ub.Slide(ub.ground(2, 0), beam.end, law, axis=(0, 1))
-        >>> propped = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[spring])
+        >>> propped = ub.Scene(
+        ...     [beam], supports=scene.supports, loads=scene.loads, connectors=[spring]
+        ... )
         >>> run = ub.simulate(propped, ub.Static(), t=(0, 1), dt=0.25)
         >>> bool(run.connector(spring).force[-1] < 0)  # it is compressed
         True
@@ -325,8 +329,10 @@ class ForceLaw(Record):
         ...     after = (state[0] + 1e6 * rate * dt) / (1 + dt / 0.1)
         ...     return (state[0] + after) / 2, [after]
         >>> device = ub.Slide(ub.ground(2, 0), beam.end, ub.ForceLaw(maxwell, [0.0]), axis=(0, 1))
-        >>> relaxing = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[device])
-        >>> run = ub.simulate(relaxing, ub.Midpoint(), t=(0, 1), dt=0.01)
+        >>> relaxing = ub.Scene(
+        ...     [beam], supports=scene.supports, loads=scene.loads, connectors=[device]
+        ... )
+        >>> run = ub.simulate(relaxing, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
         >>> bool(run.energy["functions"][-1] > 0), bool(run.energy.worst < 1e-9)
         (True, True)
     """

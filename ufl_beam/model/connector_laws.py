@@ -23,7 +23,7 @@ from ufl_beam.model.connector_law import ForceLaw as ForceLaw
 from ufl_beam.model.functions import Constant, Curve, Timed
 from ufl_beam.model.law_functions import Values, larger, positive, smaller, sqrt
 from ufl_beam.model.material_law import MaterialLaw, State, require_bulk_law
-from ufl_beam.model.material_laws import DuvautLions, Hardening
+from ufl_beam.model.material_laws import DuvautLions, ElastoPlastic
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.softening_laws import (
     LinearSoftening,
@@ -38,14 +38,16 @@ OWN_LAW = "state a ConnectorLaw of your own"
 
 @closed(OWN_LAW)
 @dataclass(frozen=True, repr=False)
-class Motor(Record):
+class PrescribedMotion(Record):
     """Prescribed relative motion of a connector; its force is unknown.
 
     Args:
         motion: In time; m or rad.  Zero, which joints use, holds it.
 
     Example:
-        >>> motor = ub.Turn(ub.ground(0, 0), beam.start, ub.Motor(lambda t: np.pi / 2 * t))
+        >>> motor = ub.Turn(
+        ...     ub.ground(0, 0), beam.start, ub.PrescribedMotion(lambda t: np.pi / 2 * t)
+        ... )
         >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[motor])
         >>> run = ub.simulate(arm, ub.Static(), t=(0, 1), dt=0.25)
         >>> np.allclose(run.position(beam.end)[-1], (0, 2))
@@ -57,14 +59,16 @@ class Motor(Record):
 
 @closed(OWN_LAW)
 @dataclass(frozen=True, repr=False)
-class Actuator(Record):
+class PrescribedForce(Record):
     """Prescribed force or moment of a connector; a positive one makes the motion grow.
 
     Args:
         force: In time; N or N m.
 
     Example:
-        >>> jack = ub.Slide(ub.ground(2, 0), beam.end, ub.Actuator(lambda t: 1e3 * t), axis=(0, 1))
+        >>> jack = ub.Slide(
+        ...     ub.ground(2, 0), beam.end, ub.PrescribedForce(lambda t: 1e3 * t), axis=(0, 1)
+        ... )
         >>> lifted = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[jack])
         >>> run = ub.simulate(lifted, ub.Static(), t=(0, 1), dt=0.5)
         >>> print(run.connector(jack).force.round())  # of its resistance; N
@@ -107,8 +111,10 @@ class Controller(Record):
     Example:
         >>> brake = ub.Controller(lambda now: -1e4 * now.velocity(beam.end)[1])
         >>> device = ub.Slide(ub.ground(2, 0), beam.end, brake, axis=(0, 1))
-        >>> braked = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[device])
-        >>> run = ub.simulate(braked, ub.Midpoint(), t=(0, 0.2), dt=0.001)
+        >>> braked = ub.Scene(
+        ...     [beam], supports=scene.supports, loads=scene.loads, connectors=[device]
+        ... )
+        >>> run = ub.simulate(braked, ub.EnergyMomentum(), t=(0, 0.2), dt=0.001)
         >>> bool(run.connector(device).work[-1] > 0)  # it takes energy
         True
     """
@@ -137,7 +143,7 @@ class Spring(Record):
 
     Example:
         >>> spring = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))  # N/m
-        >>> hung = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[spring])
+        >>> hung = ub.Scene([beam], supports=scene.supports, loads=scene.loads, connectors=[spring])
         >>> run = ub.simulate(hung, ub.Static(), t=(0, 1), dt=0.5)
         >>> bool(run.connector(spring).force[-1] > 0)  # it is stretched
         True
@@ -158,8 +164,10 @@ class Damper(Record):
 
     Example:
         >>> damper = ub.Stretch(ub.ground(2, -1), beam.end, ub.Damper(2e3))  # N s/m
-        >>> damped = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[damper])
-        >>> run = ub.simulate(damped, ub.Midpoint(), t=(0, 1), dt=0.01)
+        >>> damped = ub.Scene(
+        ...     [beam], supports=scene.supports, loads=scene.loads, connectors=[damper]
+        ... )
+        >>> run = ub.simulate(damped, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
         >>> np.allclose(run.connector(damper).force, 2e3 * run.connector(damper).rate)
         True
     """
@@ -187,7 +195,9 @@ class Stop(Record, ConnectorLaw):
 
     Example:
         >>> buffer = ub.Slide(ub.ground(2, 0), beam.end, ub.Stop(1e9, low=-0.01), axis=(0, 1))
-        >>> caught = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[buffer])
+        >>> caught = ub.Scene(
+        ...     [beam], supports=scene.supports, loads=scene.loads, connectors=[buffer]
+        ... )
         >>> run = ub.simulate(caught, ub.Static(), t=(0, 1), dt=0.05)
         >>> print(run.displacement(beam.end)[-1, 1].round(3))  # m
         -0.01
@@ -254,7 +264,7 @@ class Clearance(Record, ConnectorLaw):
     Example:
         >>> hole = ub.Clearance(stiffness=1e8, gap=1e-3, friction=0.2, radius=0.02)
         >>> pin = ub.Bushing(ub.ground(2, 0), beam.end, hole)
-        >>> hung = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[pin])
+        >>> hung = ub.Scene([beam], supports=scene.supports, loads=scene.loads, connectors=[pin])
         >>> run = ub.simulate(hung, ub.Static(), t=(0, 1), dt=0.1)
         >>> along, across, turn = run.connector(pin).force[-1]  # N, N, N m
         >>> bool(abs(turn) <= 0.2 * 0.02 * np.hypot(along, across))
@@ -345,7 +355,7 @@ class Coulomb(Record):
         force: Constant part of the limit; N or N m.
         coefficient: Coefficient of friction; for rotations times the radius of the pin; 1 or m.
         joint: Joint or support that provides the normal force.  Joints must be ``measured``, or
-            hold their places with forces anyway, as :func:`Prismatic` and :func:`Link` do.
+            hold their places with forces anyway, as :class:`Prismatic` and :class:`Link` do.
 
     Raises:
         SceneError: No limit, or a coefficient without a joint.
@@ -353,8 +363,10 @@ class Coulomb(Record):
     Example:
         >>> brake = ub.Turn(ub.ground(0, 0), beam.start, ub.Coulomb(1e3))  # N m
         >>> spin = ub.Velocity((beam,), angular=1.0)
-        >>> arm = ub.Scene([beam], [], [ub.Pinned(beam.start)], initial=[spin], connectors=[brake])
-        >>> run = ub.simulate(arm, ub.Midpoint(alpha=0.1), t=(0, 0.5), dt=0.01)
+        >>> arm = ub.Scene(
+        ...     [beam], supports=[ub.Pinned(beam.start)], initial=[spin], connectors=[brake]
+        ... )
+        >>> run = ub.simulate(arm, ub.EnergyMomentum(alpha=0.1), t=(0, 0.5), dt=0.01)
         >>> print(run.connector(brake).motion[-1].round(2))  # rad, to rest
         0.21
     """
@@ -382,13 +394,13 @@ OWN_HINGE = (
     "join both sides by Turn(a, b, law) with Spring(stiffness, law=) or a ForceLaw of your own"
 )
 
-HingeLaw = SofteningLaw | Hardening
+HingeLaw = SofteningLaw | ElastoPlastic
 """Laws of a plastic hinge of zero length, which has no elasticity of its own."""
 
 
 def require_hinge_law(law: object, what: str) -> None:
     """Raise :class:`SceneError` naming ``what`` unless a rigid-plastic hinge can follow a law."""
-    if isinstance(law, MaterialLaw) and not isinstance(law, Hardening):
+    if isinstance(law, MaterialLaw) and not isinstance(law, ElastoPlastic):
         raise SceneError(
             f"{what}: {type(law).__name__} is the law of an elastic stiffness, and a hinge of zero "
             "length has none; use it as Section(bending=), or join both sides by "
@@ -397,11 +409,11 @@ def require_hinge_law(law: object, what: str) -> None:
     if isinstance(law, SofteningLaw):
         require_softening(law, what)
         return
-    require_kind(law, (Softening, Hardening, LinearSoftening, SofteningLaw), what)
-    if isinstance(law, Hardening):
-        if type(law) is not Hardening:
+    require_kind(law, (Softening, ElastoPlastic, LinearSoftening, SofteningLaw), what)
+    if isinstance(law, ElastoPlastic):
+        if type(law) is not ElastoPlastic:
             raise SceneError(
-                f"{what}: {type(law).__name__} is a subclass of Hardening, and a hinge of zero "
+                f"{what}: {type(law).__name__} is a subclass of ElastoPlastic, and a hinge of zero "
                 f"length would ignore what is its own; {OWN_HINGE}"
             )
         require_number(law.limit, f"{what}: limit", at_least=0.0, infinite=True)
@@ -422,14 +434,14 @@ class RigidPlastic(Record):
     rotations with this law.
 
     Args:
-        law: A :class:`SofteningLaw` or :class:`Hardening`; limit in N m or N, moduli in N m/rad or
-            N/m, fracture energy in J.
+        law: A :class:`SofteningLaw` or :class:`ElastoPlastic`; limit in N m or N, moduli in N m/rad
+            or N/m, fracture energy in J.
 
     Raises:
         SceneError: A law of another kind, or one that relaxes an elastic stress.
 
     Example:
-        >>> fuse = ub.RigidPlastic(ub.Hardening(limit=5e4))  # N m
+        >>> fuse = ub.RigidPlastic(ub.ElastoPlastic(yield_limit=5e4))  # N m
         >>> hinge = ub.Turn(ub.ground(0, 0), beam.start, fuse)
         >>> arm = ub.Scene([beam], supports=[ub.Pinned(beam.start)], connectors=[hinge])
     """
@@ -440,18 +452,18 @@ class RigidPlastic(Record):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Guide(Record):
-    """The point stays on a curve of the plane, free along it; see :func:`Guided`."""
+    """The point stays on a curve of the plane, free along it; see :class:`Guided`."""
 
     # ``s -> (x, y)``, smooth, for all s that the motion may reach; m
     curve: Annotated[Curve, partial(require_function, of="s that returns (x, y)")]
 
 
 Law = (
-    Guide | Motor | Actuator | Controller | Spring | Damper | ConnectorLaw | ForceLaw | Coulomb
-    | RigidPlastic
+    Guide | PrescribedMotion | PrescribedForce | Controller | Spring | Damper | ConnectorLaw
+    | ForceLaw | Coulomb | RigidPlastic
 )  # fmt: skip
 
-HOLDING = (Motor, Guide)
+HOLDING = (PrescribedMotion, Guide)
 """Laws that prescribe the motion."""
 
 RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
@@ -468,5 +480,5 @@ def rubs(law: object) -> bool:
     return isinstance(law, Coulomb) or (isinstance(law, ConnectorLaw) and law.holds)
 
 
-HELD = Motor(Constant(0.0))
+HELD = PrescribedMotion(Constant(0.0))
 """The law of what a joint holds."""

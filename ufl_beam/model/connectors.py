@@ -4,8 +4,10 @@
 from __future__ import annotations
 
 import math
+from abc import ABC
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import SceneError, require_kind, require_vector
@@ -19,33 +21,32 @@ Factors = tuple[float, float, float]
 """Derivatives of a relative motion by (u, v, ψ) of a node."""
 
 
-@dataclass(frozen=True, eq=False)
-class Connector:
-    """Relative motion of two anchors with a force law; made by :func:`Turn` and its siblings.
+class Connector(ABC):
+    """Relative motion of two anchors with a force law; base of :class:`Turn` and its siblings.
 
     The motion is zero in the undeformed scene.  The force of a connector resists its growth: it is
     positive in a spring that is stretched, and negative in a motor that drives.
 
     Attributes:
-        kind: Name for messages.
         motion: Which relative motion; a name in ``relative_motions.MOTIONS``.
         a, b: The anchors.
         law: Law of its force.
         axis: Unit vector, for motions along one.
         corner: The point of frame a that is meant, if it is not that of the anchor.
-        component: Which motion of its law it is, in a :func:`Bushing`.
-        components: Connectors of its components, of a :func:`Bushing`.
+        component: Which motion of its law it is, in a :class:`Bushing`.
+        components: Connectors of its components, of a :class:`Bushing`.
 
     Example:
         >>> spring = ub.Slide(ub.ground(2, 0), beam.end, ub.Spring(1e6), axis=(0, 1))
-        >>> propped = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[spring])
+        >>> propped = ub.Scene(
+        ...     [beam], supports=scene.supports, loads=scene.loads, connectors=[spring]
+        ... )
         >>> run = ub.simulate(propped, ub.Static(), t=(0, 1), dt=1.0)
         >>> history = run.connector(spring)
         >>> np.allclose(history.force, 1e6 * history.motion)
         True
     """
 
-    kind: str
     motion: str
     a: Anchor
     b: Anchor
@@ -53,7 +54,7 @@ class Connector:
     axis: Point = (1.0, 0.0)
     corner: Point | None = None
     component: int = 0
-    components: tuple[Connector, ...] = field(default=(), repr=False)
+    components: tuple[Connector, ...] = ()
 
     __repr__ = bracketed
 
@@ -71,6 +72,11 @@ class Connector:
 
     def __str__(self) -> str:
         return f"{self.kind}({self.a}, {self.b})"
+
+    @property
+    def kind(self) -> str:
+        """Name of its class, for messages."""
+        return type(self).__name__
 
     @property
     def arms(self) -> tuple[Point, Point]:
@@ -110,7 +116,8 @@ class Connector:
         return (-x, -y, x * ay - y * ax + turned_with_a), (x, y, y * bx - x * by)
 
 
-def Turn(a: Anchor, b: Anchor, law: Law) -> Connector:
+@dataclass(frozen=True, eq=False, repr=False)
+class Turn(Connector):
     """Connector of the rotation of ``b`` relative to ``a``: springs, dampers, motors; rad, N m.
 
     Example:
@@ -119,10 +126,15 @@ def Turn(a: Anchor, b: Anchor, law: Law) -> Connector:
         >>> bool(ub.modes(swaying, 1).omega < ub.modes(scene, 1).omega)
         True
     """
-    return Connector("Turn", "turning", a, b, law)
+
+    a: Anchor
+    b: Anchor
+    law: Law
+    motion = "turning"
 
 
-def Stretch(a: Anchor, b: Anchor, law: Law) -> Connector:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stretch(Connector):
     """Connector of the distance between ``a`` and ``b``: springs, dampers, actuators; m, N.
 
     Raises:
@@ -132,12 +144,19 @@ def Stretch(a: Anchor, b: Anchor, law: Law) -> Connector:
         >>> rod = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))
         >>> stayed = ub.Scene([beam], supports=scene.supports, connectors=[rod])
     """
-    connector = Connector("Stretch", "stretching", a, b, law)
-    require_apart(connector)
-    return connector
+
+    a: Anchor
+    b: Anchor
+    law: Law
+    motion = "stretching"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        require_apart(self)
 
 
-def Slide(a: Anchor, b: Anchor, law: Law, *, axis: Point | None = None) -> Connector:
+@dataclass(frozen=True, eq=False, repr=False)
+class Slide(Connector):
     """Connector of the displacement of ``b`` along an axis that turns with ``a``; m, N.
 
     Args:
@@ -153,10 +172,21 @@ def Slide(a: Anchor, b: Anchor, law: Law, *, axis: Point | None = None) -> Conne
         >>> spring = ub.Slide(ub.ground(2, 0), beam.end, ub.Spring(1e6), axis=(0, 1))
         >>> propped = ub.Scene([beam], supports=scene.supports, connectors=[spring])
     """
-    return Connector("Slide", "sliding", a, b, law, unit_axis(a, b, axis, "Slide"))
+
+    a: Anchor
+    b: Anchor
+    law: Law
+    _: KW_ONLY
+    axis: Point = None  # type: ignore[assignment]  # a unit vector follows
+    motion = "sliding"
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "axis", unit_axis(self.a, self.b, self.axis, "Slide"))
+        super().__post_init__()
 
 
-def Bushing(a: Anchor, b: Anchor, law: ConnectorLaw, *, axis: Point = (1.0, 0.0)) -> Connector:
+@dataclass(frozen=True, eq=False, repr=False)
+class Bushing(Connector):
     """Connector of two or three components of the motion of ``b`` relative to ``a``; N, N m.
 
     The components are the displacement along an axis that turns with ``a``, that across it, 90
@@ -175,24 +205,58 @@ def Bushing(a: Anchor, b: Anchor, law: ConnectorLaw, *, axis: Point = (1.0, 0.0)
     Example:
         >>> hole = ub.Clearance(stiffness=1e9, gap=1e-3)  # N/m; m
         >>> pin = ub.Bushing(ub.ground(2, 0), beam.end, hole)
-        >>> hung = ub.Scene([beam], [], scene.supports, scene.loads, connectors=[pin])
+        >>> hung = ub.Scene([beam], supports=scene.supports, loads=scene.loads, connectors=[pin])
         >>> run = ub.simulate(hung, ub.Static(), t=(0, 1), dt=0.1)
         >>> print(np.hypot(*run.connector(pin).motion[-1]).round(3))  # m, to the edge of the hole
         0.001
     """
-    x, y = unit_axis(a, b, require_vector(axis, "Bushing: axis"), "Bushing")
-    require_kind(law, ConnectorLaw, f"Bushing({a}, {b}): law")
-    motions = (("sliding", (x, y)), ("sliding", (-y, x)), ("turning", (x, y)))
-    components = tuple(
-        Connector("Bushing", motion, a, b, law, along, component=i)
-        for i, (motion, along) in enumerate(motions[: law.components])
-    )
-    if len(components) == 1:
-        raise SceneError(
-            f"Bushing({a}, {b}): {type(law).__name__} acts on one component of a relative motion; "
-            "use Turn, Stretch or Slide, or give the law components = 2 or 3"
+
+    a: Anchor
+    b: Anchor
+    law: ConnectorLaw
+    _: KW_ONLY
+    axis: Point = (1.0, 0.0)
+    motion = "sliding"
+
+    def __post_init__(self) -> None:
+        axis = require_vector(self.axis, "Bushing: axis")
+        object.__setattr__(self, "axis", unit_axis(self.a, self.b, axis, "Bushing"))
+        require_kind(self.law, ConnectorLaw, f"{self}: law")
+        if self.law.components == 1:
+            raise SceneError(
+                f"{self}: {type(self.law).__name__} acts on one component of a relative motion; "
+                "use Turn, Stretch or Slide, or give the law components = 2 or 3"
+            )
+        super().__post_init__()
+
+    @cached_property
+    def components(self) -> tuple[Connector, ...]:  # type: ignore[override]
+        """Connectors of its components."""
+        x, y = self.axis
+        motions = (("sliding", (x, y)), ("sliding", (-y, x)), ("turning", (x, y)))
+        return tuple(
+            Component("Bushing", motion, self.a, self.b, self.law, along, component=i)
+            for i, (motion, along) in enumerate(motions[: self.law.components])
         )
-    return Connector("Bushing", "sliding", a, b, law, (x, y), components=components)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Component(Connector):
+    """One relative motion that a joint, a plastic hinge or a bushing consists of."""
+
+    owner: str
+    motion: str
+    a: Anchor
+    b: Anchor
+    law: Law
+    axis: Point = (1.0, 0.0)
+    corner: Point | None = None
+    component: int = 0
+
+    @property
+    def kind(self) -> str:
+        """Name for messages: that of its owner."""
+        return self.owner
 
 
 def unit_axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
@@ -258,7 +322,7 @@ def plastic_hinges(
         if stays(place):
             beyond = Place(place.beam, place.s, beyond=True)
             before, after = (beyond, place) if place.s == 1.0 else (place, beyond)
-            hinges.append(Connector("Hinge", "turning", before, after, RigidPlastic(law)))
+            hinges.append(Component("Hinge", "turning", before, after, RigidPlastic(law)))
     return tuple(hinges)
 
 

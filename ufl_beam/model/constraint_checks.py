@@ -34,7 +34,7 @@ from ufl_beam.model.material_law import MaterialLaw, initial_state
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 
-INSTEAD = "Add supports or joints, or run dynamics (Midpoint)"
+INSTEAD = "Add supports or joints, or run dynamics (EnergyMomentum)"
 """What to do where statics has no unique answer."""
 
 LAST_DIGITS = 1e-12
@@ -233,7 +233,7 @@ def _center(part: Member | Body) -> Point:
     """Point about which the rigid motion of a beam or body is described."""
     if isinstance(part, Body):
         return part.center
-    (xa, ya), (xb, yb) = part.a, part.b
+    (xa, ya), (xb, yb) = part.start.point, part.end.point
     return (xa + xb) / 2, (ya + yb) / 2
 
 
@@ -375,12 +375,12 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
         if (isinstance(what, RotatingFrame) or rubs(what)) and not scheme.has_mean_velocity:
             raise SceneError(
                 f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
-                "here; use Midpoint() or DecayingMidpoint()"
+                "here; use EnergyMomentum() or EnergyMomentumDecaying()"
             )
     given = [str(c) for c in scene.links if isinstance(c.law, HOLDING)]
     given += [f"the support of {s.place}" for s in scene.supports if s.moving]
     if given and scheme.rings:
         raise SceneError(
             f"{name}: {given[0]} prescribes a motion, whose accelerations ring for ever "
-            "without numerical damping; use GeneralizedAlpha(0.8), or Midpoint()"
+            "without numerical damping; use GeneralizedAlpha(0.8), or EnergyMomentum()"
         )

@@ -115,7 +115,7 @@ class Fibres(Record):
         SceneError: A law is none, or ``number`` is no whole number from 1.
 
     Example:
-        >>> steel = ub.Fibres(ub.Hardening(355e6, modulus=2e9), number=16)
+        >>> steel = ub.Fibres(ub.ElastoPlastic(355e6, isotropic=2e9), number=16)
         >>> layered = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=steel)
         >>> print(f"{layered.EI:.3g}")  # of 16 layers; N m²
         1.39e+07
@@ -227,7 +227,7 @@ class Normal(_ByMoments):
 
     Example:
         >>> limit = ub.Normal(mean=355e6, deviation=25e6, seed=1)
-        >>> scattered = ub.Fibres(ub.Hardening(limit), number=16)
+        >>> scattered = ub.Fibres(ub.ElastoPlastic(limit), number=16)
     """
 
     def _law(self) -> Any:
@@ -252,7 +252,7 @@ class Lognormal(_ByMoments):
 
     Example:
         >>> limit = ub.Lognormal(mean=355e6, deviation=25e6, seed=1)
-        >>> scattered = ub.Fibres(ub.Hardening(limit), number=16)
+        >>> scattered = ub.Fibres(ub.ElastoPlastic(limit), number=16)
     """
 
     def _law(self) -> Any:
@@ -275,7 +275,7 @@ class Weibull(Distribution):
 
     Example:
         >>> limit = ub.Weibull(scale=355e6, shape=20.0, seed=1)
-        >>> scattered = ub.Fibres(ub.Hardening(limit), number=16)
+        >>> scattered = ub.Fibres(ub.ElastoPlastic(limit), number=16)
     """
 
     scale: Positive

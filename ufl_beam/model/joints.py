@@ -4,115 +4,156 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from abc import ABC
+from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import SceneError, require_kind, require_switch, require_text
-from ufl_beam.model.bodies import Anchor, NodeDof, Place, carries, ground, node, require_anchors
+from ufl_beam.model.bodies import (
+    Anchor,
+    NodeDof,
+    Place,
+    Spot,
+    carries,
+    ground,
+    node,
+    require_anchors,
+)
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
-from ufl_beam.model.connectors import Connector, require_apart, unit_axis
+from ufl_beam.model.connectors import Component, Connector, require_apart, unit_axis
 from ufl_beam.model.functions import Curve, Point, point_of
 
 
-@dataclass(frozen=True, eq=False)
-class Joint(Bearing):
-    """Joint by shared unknowns or by constraint forces; made by :func:`Rigid` and its siblings.
+class Joint(Bearing, ABC):
+    """Joint by shared unknowns or by constraint forces; base of :class:`Rigid` and its siblings.
 
     Attributes:
-        kind: Name for messages.
         places: The anchors.
         shared: Components that are equal: 0, 1 displacement, 2 rotation.  Those of rotation are one
             unknown; so are displacements of anchors that their nodes carry.
         holders: Connectors that hold the other components.
         meets: Whether the anchors are at one point of the undeformed scene.
         advice: For anchors that should meet and do not.
-        look: Kind of joint whose picture it has; its own by default.
 
     Example:
         >>> mast = ub.Beam((2, 0), (2, 3), section, name="mast")
-        >>> corner = ub.Rigid(beam.end, mast.start, measured=True)
-        >>> frame = ub.Scene([beam, mast], [corner], scene.supports, [ub.Gravity()])
+        >>> corner = ub.Rigid(beam.end, mast.start, multipliers=True)
+        >>> frame = ub.Scene(
+        ...     [beam, mast], joints=[corner], supports=scene.supports, loads=[ub.Gravity()]
+        ... )
         >>> run = ub.simulate(frame, ub.Static(), t=(0, 1), dt=1.0)
         >>> print(run.joint(corner).force[-1, 1].round())  # weight of the mast; N
         4621.0
     """
 
-    kind: str
     places: tuple[Anchor, ...]
-    shared: tuple[int, ...]
-    holders: tuple[Connector, ...] = field(default=(), repr=False)
+    shared: tuple[int, ...] = ()
+    holders: tuple[Connector, ...] = ()
     meets: bool = False
     advice: str = "RigidLink and Link join places that are apart"
-    look: str = ""
 
     __repr__ = bracketed
 
-    def __post_init__(self) -> None:
-        if len(self.places) < 2:
-            raise SceneError(f"{self.kind}: a joint needs at least two places")
-        require_anchors(self.kind, *self.places)
-        object.__setattr__(self, "look", self.look or self.kind)
-
     def __str__(self) -> str:
-        return f"{self.kind}({', '.join(map(str, self.places))})"
+        return f"{type(self).__name__}({', '.join(map(str, self.places))})"
 
     def equal(self, component: int) -> list[NodeDof]:
         """Components of motion that are equal; of displacements those that the nodes carry."""
         alike = [place for place in self.places if component == 2 or carries(place)]
         return [(node(place), component) for place in alike]
 
+    def _hold(self, motion: str, axis: Point, corner: Point | None = None) -> Connector:
+        """Hold a relative motion of the first two places."""
+        a, b = self.places[:2]
+        return Component(type(self).__name__, motion, a, b, HELD, axis, corner)
 
-def _joined(
-    kind: str, places: tuple[Anchor, ...], shared: tuple[int, ...], measured: bool = False
-) -> Joint:
-    """A joint at one point: what is measured, and what nodes do not carry, connectors hold."""
-    require_anchors(kind, *places)
-    require_switch(measured, f"{kind}: measured")
-    carriers = [place for place in places if carries(place) and not measured]
-    first = (carriers or list(places))[:1]
-    others = [place for place in places if place not in (*carriers, *first)]
+
+class _AtPoint(Joint):
+    """Joint at one point: by multipliers, and of what nodes do not carry, connectors hold it."""
+
+    meets = True
+    joined: tuple[int, ...] = (0, 1)
+    """Components that are equal."""
+
+    multipliers: bool
+
+    def __init__(self, *places: Anchor, multipliers: bool = False) -> None:
+        kind = type(self).__name__
+        if len(places) < 2:
+            raise SceneError(f"{kind}: a joint needs at least two places")
+        require_anchors(kind, *places)
+        require_switch(multipliers, f"{kind}: multipliers")
+        object.__setattr__(self, "places", places)
+        object.__setattr__(self, "multipliers", multipliers)
+
+    @property
+    def shared(self) -> tuple[int, ...]:  # type: ignore[override]
+        return () if self.multipliers else self.joined
+
+    @cached_property
+    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
+        return _held_at_point(self, self.multipliers, self.joined)
+
+
+def _held_at_point(
+    joint: Joint, multipliers: bool, joined: tuple[int, ...]
+) -> tuple[Connector, ...]:
+    """Connectors that hold what nodes do not carry, or all that is joined."""
+    carriers = [place for place in joint.places if carries(place) and not multipliers]
+    base = (carriers or joint.places)[0]
+    others = [place for place in joint.places if place not in (*carriers, base)]
     motions = [("parting", (1.0, 0.0)), ("parting", (0.0, 1.0))]
-    if measured and 2 in shared:
+    if multipliers and 2 in joined:
         motions.append(("turning", (1.0, 0.0)))
-    holders = tuple(
-        Connector(kind, motion, base, other, HELD, axis)
-        for base in first
+    kind = type(joint).__name__
+    return tuple(
+        Component(kind, motion, base, other, HELD, axis)
         for other in others
         for motion, axis in motions
     )
-    return Joint(kind, places, () if measured else shared, holders, meets=True)
 
 
-def Rigid(*places: Anchor, measured: bool = False) -> Joint:
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Rigid(_AtPoint):
     """Rigid joint at one point: displacement and rotation are shared by all ``places``.
 
     Args:
         places: Places to be joined, at one point.
-        measured: Keep separate unknowns and hold them with forces, which solutions and
+        multipliers: Keep separate unknowns and hold them with forces, which solutions and
             controllers can ask for, in the place of sharing the unknowns, which costs nothing.
 
     Example:
         >>> column = ub.Beam((2, 0), (2, -3), section, name="column")
-        >>> frame = ub.Scene([beam, column], [ub.Rigid(beam.end, column.start)], scene.supports)
+        >>> frame = ub.Scene(
+        ...     [beam, column], joints=[ub.Rigid(beam.end, column.start)], supports=scene.supports
+        ... )
     """
-    return _joined("Rigid", places, (0, 1, 2), measured)
+
+    places: tuple[Anchor, ...]
+    multipliers: bool
+    joined = (0, 1, 2)
 
 
-def Revolute(*places: Anchor, measured: bool = False) -> Joint:
+@dataclass(frozen=True, eq=False, repr=False, init=False)
+class Revolute(_AtPoint):
     """Revolute joint: displacement is shared by all ``places``, each turns freely.
 
-    Args are those of :func:`Rigid`; friction needs ``measured``.
+    Args are those of :class:`Rigid`; friction needs ``multipliers``.
 
     Example:
         >>> rod = ub.Beam((2, 0), (4, 0), section, name="rod")
-        >>> chain = ub.Scene([beam, rod], [ub.Revolute(beam.end, rod.start)], scene.supports)
+        >>> chain = ub.Scene(
+        ...     [beam, rod], joints=[ub.Revolute(beam.end, rod.start)], supports=scene.supports
+        ... )
     """
-    return _joined("Revolute", places, (0, 1), measured)
+
+    places: tuple[Anchor, ...]
+    multipliers: bool
 
 
-def Prismatic(
-    rail: Anchor, slider: Anchor, *, axis: Point | None = None, turning: bool = False
-) -> Joint:
+@dataclass(frozen=True, eq=False, repr=False)
+class Prismatic(Joint):
     """Prismatic joint: ``slider`` moves along an axis that turns with ``rail``.
 
     Args:
@@ -130,13 +171,38 @@ def Prismatic(
         >>> print(joint)
         Prismatic(beam.end (2, 0), slider (2, 0))
     """
-    require_switch(turning, "Prismatic: turning")
-    x, y = unit_axis(rail, slider, axis, "Prismatic")
-    across = Connector("Prismatic", "sliding", rail, slider, HELD, (-y, x))
-    return Joint("Prismatic", (rail, slider), () if turning else (2,), (across,))
+
+    rail: Anchor
+    slider: Anchor
+    _: KW_ONLY
+    axis: Point | None = None
+    turning: bool = False
+
+    def __post_init__(self) -> None:
+        require_switch(self.turning, "Prismatic: turning")
+        axis = unit_axis(self.rail, self.slider, self.axis, "Prismatic")
+        object.__setattr__(self, "axis", axis)
+
+    @property
+    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+        """The rail, then the slider."""
+        return self.rail, self.slider
+
+    @property
+    def shared(self) -> tuple[int, ...]:  # type: ignore[override]
+        """The rotation, unless the slider turns."""
+        return () if self.turning else (2,)
+
+    @cached_property
+    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
+        """It holds the motion across the axis."""
+        assert self.axis is not None
+        x, y = self.axis
+        return (self._hold("sliding", (-y, x)),)
 
 
-def RigidLink(a: Anchor, b: Anchor) -> Joint:
+@dataclass(frozen=True, eq=False, repr=False)
+class RigidLink(Joint):
     """Massless rigid link: ``b`` moves as if it were a point of the cross-section or body of ``a``.
 
     Raises:
@@ -144,19 +210,36 @@ def RigidLink(a: Anchor, b: Anchor) -> Joint:
 
     Example:
         >>> flange = ub.Beam((0, 0.5), (2, 0.5), section, name="flange")
-        >>> built = ub.Scene([beam, flange], [ub.RigidLink(beam.end, flange.end)], scene.supports)
+        >>> built = ub.Scene(
+        ...     [beam, flange], joints=[ub.RigidLink(beam.end, flange.end)], supports=scene.supports
+        ... )
     """
-    require_anchors("RigidLink", a, b)
-    if a.point == b.point:
-        raise SceneError(f"RigidLink({a}, {b}): zero length; join them with Rigid")
-    holders = tuple(
-        Connector("RigidLink", "parting", a, b, HELD, axis, corner=b.point)
-        for axis in ((1.0, 0.0), (0.0, 1.0))
-    )
-    return Joint("RigidLink", (a, b), (2,), holders)
+
+    a: Anchor
+    b: Anchor
+    shared = (2,)
+
+    def __post_init__(self) -> None:
+        require_anchors("RigidLink", self.a, self.b)
+        if self.a.point == self.b.point:
+            raise SceneError(f"{self}: zero length; join them with Rigid")
+
+    @property
+    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+        """Both ends of it."""
+        return self.a, self.b
+
+    @cached_property
+    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
+        """They hold the displacement of ``b`` relative to the frame of ``a``."""
+        corner = self.b.point
+        return tuple(
+            self._hold("parting", axis, corner=corner) for axis in ((1.0, 0.0), (0.0, 1.0))
+        )
 
 
-def Link(a: Anchor, b: Anchor) -> Joint:
+@dataclass(frozen=True, eq=False, repr=False)
+class Link(Joint):
     """Massless rigid rod with a revolute joint at both ends: keeps the distance.
 
     Raises:
@@ -164,21 +247,38 @@ def Link(a: Anchor, b: Anchor) -> Joint:
 
     Example:
         >>> hanger = ub.Link(ub.ground(2, 3), beam.end)
-        >>> hung = ub.Scene([beam], [hanger], [ub.Pinned(beam.start)], [ub.Gravity()])
+        >>> hung = ub.Scene(
+        ...     [beam], joints=[hanger], supports=[ub.Pinned(beam.start)], loads=[ub.Gravity()]
+        ... )
         >>> run = ub.simulate(hung, ub.Static(), t=(0, 1), dt=1.0)
         >>> print(run.joint(hanger).force[-1, 1].round())  # half of the weight; N
         1540.0
     """
-    rod = Connector("Link", "stretching", a, b, HELD)
-    require_apart(rod)
-    return Joint("Link", (a, b), (), (rod,))
+
+    a: Anchor
+    b: Anchor
+
+    def __post_init__(self) -> None:
+        require_anchors("Link", self.a, self.b)
+        require_apart(self.holders[0])
+
+    @property
+    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+        """Both ends of it."""
+        return self.a, self.b
+
+    @cached_property
+    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
+        """It holds the distance."""
+        return (self._hold("stretching", (1.0, 0.0)),)
 
 
-def Guided(place: Anchor, curve: Curve) -> Joint:
+@dataclass(frozen=True, eq=False, repr=False)
+class Guided(Joint):
     """Joint that keeps a point on a guide curve of the ground, free along it and free to turn.
 
     Args:
-        place: Guided place; of bodies the centre, other points by a :func:`Revolute` to a beam.
+        place: Guided place; of bodies the centre, other points by a :class:`Revolute` to a beam.
         curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
 
     Raises:
@@ -187,31 +287,57 @@ def Guided(place: Anchor, curve: Curve) -> Joint:
 
     Example:
         >>> rail = ub.Guided(beam.end, lambda s: (2 + s, 0.5 * s**2))
-        >>> guided = ub.Scene([beam], [rail], [ub.Roller(beam.start)], [ub.Gravity()])
+        >>> guided = ub.Scene(
+        ...     [beam], joints=[rail], supports=[ub.Roller(beam.start)], loads=[ub.Gravity()]
+        ... )
     """
-    require_anchors("Guided", place)
-    if not carries(place):
-        raise SceneError(f"Guided({place}): it must be the centre of the body")
-    law = Guide(curve)
-    x, y = point_of(curve, 0.0, f"Guided({place}): curve")
-    (x0, y0), (x1, y1) = (point_of(curve, s, f"Guided({place}): curve") for s in (-1e-6, 1e-6))
-    length = math.hypot(x1 - x0, y1 - y0)
-    if length == 0.0:
-        raise SceneError(f"Guided({place}): the curve stands still at s = 0")
-    base, across = ground(x, y), ((y0 - y1) / length, (x1 - x0) / length)
-    holder = Connector("Guided", "guided", base, place, law, across)
+
+    place: Anchor
+    curve: Curve
+    meets = True
     advice = "curve(0) must be at the place"
-    return Joint("Guided", (base, place), (), (holder,), meets=True, advice=advice)
+
+    def __post_init__(self) -> None:
+        require_anchors("Guided", self.place)
+        if not carries(self.place):
+            raise SceneError(f"Guided({self.place}): it must be the centre of the body")
+        _ = self.holders  # which look at the curve
+
+    @cached_property
+    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+        """The start of the curve, and the place."""
+        return self._start, self.place
+
+    @cached_property
+    def _start(self) -> Spot:
+        return ground(*point_of(self.curve, 0.0, f"Guided({self.place}): curve"))
+
+    @cached_property
+    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
+        """It holds the distance from the curve."""
+        law, name = Guide(self.curve), f"Guided({self.place}): curve"
+        start = self._start
+        (x0, y0), (x1, y1) = (point_of(self.curve, s, name) for s in NEAR_START)
+        length = math.hypot(x1 - x0, y1 - y0)
+        if length == 0.0:
+            raise SceneError(f"Guided({self.place}): the curve stands still at s = 0")
+        across = (y0 - y1) / length, (x1 - x0) / length
+        return (Component("Guided", "guided", start, self.place, law, across),)
 
 
-def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
+NEAR_START = (-1e-6, 1e-6)
+"""Parameters between which a guide curve has its first direction."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Release(Joint):
     """Joint at one point that releases some of the resultants of the beam of ``a``.
 
     Args:
         a: Place on a beam, whose axis defines the axial direction.
         b: Place to which it is joined.
         free: Resultants that are not transmitted: letters of "NVM".
-        measured: As in :func:`Rigid`.
+        multipliers: As in :class:`Rigid`.
 
     Raises:
         SceneError: Other letters, or none.
@@ -222,19 +348,45 @@ def Release(a: Place, b: Anchor, *, free: str, measured: bool = False) -> Joint:
         >>> print(joint)
         Release(beam.end (2, 0), girder.start (2, 0))
     """
-    require_kind(a, Place, "Release: a")
-    require_anchors("Release: b", b)
-    require_text(free, f"Release({a}, {b}): free")
-    require_switch(measured, f"Release({a}, {b}): measured")
-    if not free or set(free) - set("NVM"):
-        raise SceneError(f"Release({a}, {b}): free = {free!r} must be letters of 'NVM'")
-    shared = () if "M" in free else (2,)
-    if not set(free) & set("NV"):
-        return _joined("Release", (a, b), (0, 1, *shared), measured)
-    x, y = a.direction
-    held = [axis for name, axis in (("N", (x, y)), ("V", (-y, x))) if name not in free]
-    holders = [Connector("Release", "sliding", a, b, HELD, axis) for axis in held]
-    if shared and measured:
-        holders.append(Connector("Release", "turning", a, b, HELD))
-        shared = ()
-    return Joint("Release", (a, b), shared, tuple(holders), meets=True)
+
+    a: Place
+    b: Anchor
+    _: KW_ONLY
+    free: str
+    multipliers: bool = False
+    meets = True
+
+    def __post_init__(self) -> None:
+        require_kind(self.a, Place, "Release: a")
+        require_anchors("Release: b", self.b)
+        require_text(self.free, f"{self}: free")
+        require_switch(self.multipliers, f"{self}: multipliers")
+        if not self.free or set(self.free) - set("NVM"):
+            raise SceneError(f"{self}: free = {self.free!r} must be letters of 'NVM'")
+
+    @property
+    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+        """Both places of it."""
+        return self.a, self.b
+
+    @property
+    def _joined(self) -> tuple[int, ...]:
+        displacement = () if set(self.free) & set("NV") else (0, 1)
+        return displacement if "M" in self.free else (*displacement, 2)
+
+    @property
+    def shared(self) -> tuple[int, ...]:  # type: ignore[override]
+        """Components that no resultant releases."""
+        return () if self.multipliers else self._joined
+
+    @cached_property
+    def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
+        """They hold what is not released along the axes of the beam."""
+        if 0 in self._joined:
+            return _held_at_point(self, self.multipliers, self._joined)
+        x, y = self.a.direction
+        axes = {"N": (x, y), "V": (-y, x)}
+        held = [self._hold("sliding", axis) for name, axis in axes.items() if name not in self.free]
+        if self.multipliers and 2 in self._joined:
+            held.append(self._hold("turning", (1.0, 0.0)))
+        return tuple(held)

@@ -19,7 +19,7 @@ class LoadAtPlace(Record, ABC):
     place: Anchor
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
-    time: Timed = steady
+    amplitude: Timed = steady
 
     def __post_init__(self) -> None:
         require_anchors(type(self).__name__, self.place)
@@ -44,10 +44,12 @@ class PointLoad(LoadAtPlace):
         place: Where.
         force: (F_x, F_y); N.
         moment: Counter-clockwise; N m.
-        time: Factor at time t.
+        amplitude: Factor at time t.
 
     Example:
-        >>> load = ub.PointLoad(beam.end, force=(0, -1e5), time=ub.Table([0, 0.5, 1], [0, 1, 0]))
+        >>> load = ub.PointLoad(
+        ...     beam.end, force=(0, -1e5), amplitude=ub.Table([0, 0.5, 1], [0, 1, 0])
+        ... )
         >>> loaded = ub.Scene([beam], supports=scene.supports, loads=[load])
         >>> run = ub.simulate(loaded, ub.Static(), t=(0, 1), dt=0.5)
         >>> print(run.section_forces_at(beam.start)[1, 1:].round())  # V, M at t = 0.5 s
@@ -63,7 +65,7 @@ class FollowerLoad(LoadAtPlace):
     Args are those of :class:`PointLoad`; the force is that before any rotation.
 
     Example:
-        >>> thrust = ub.FollowerLoad(beam.end, force=(0, -1e5), time=lambda t: t)
+        >>> thrust = ub.FollowerLoad(beam.end, force=(0, -1e5), amplitude=lambda t: t)
         >>> pushed = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[thrust])
         >>> run = ub.simulate(pushed, ub.Static(), t=(0, 1), dt=0.25)
         >>> bool(run.reaction(pushed.supports[0])[-1, 0] > 1e3)  # N: the force has turned
@@ -88,7 +90,7 @@ class LineLoad(Record):
         beam: Where.
         force: (f_x, f_y); N/m.
         moment: Counter-clockwise; N m/m.
-        time: Factor at time t.
+        amplitude: Factor at time t.
 
     Example:
         >>> snow = ub.LineLoad(beam, force=(0, -1e3))
@@ -101,7 +103,7 @@ class LineLoad(Record):
     beam: Member
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
-    time: Timed = steady
+    amplitude: Timed = steady
 
     def __post_init__(self) -> None:
         require_kind(self.beam, Member, "LineLoad: beam")
@@ -120,7 +122,7 @@ class Gravity(Record):
 
     Args:
         acceleration: (g_x, g_y); m/s².
-        time: Factor at time t.
+        amplitude: Factor at time t.
 
     Example:
         >>> hanging = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
@@ -130,7 +132,7 @@ class Gravity(Record):
     """
 
     acceleration: Vector = (0.0, -9.81)
-    time: Timed = steady
+    amplitude: Timed = steady
 
     def __str__(self) -> str:
         return "Gravity"
@@ -159,7 +161,7 @@ class RotatingFrame(Record):
     about: Vector = (0.0, 0.0)
 
     @property
-    def time(self) -> TimeFunction:
+    def amplitude(self) -> TimeFunction:
         """The rate does not change: that would make other forces."""
         return steady
 
@@ -210,24 +212,24 @@ class KelvinVoigt(Record):
     """Kelvin-Voigt damping: C times the strain rates, beside the elastic resultants; objective.
 
     Rigid motion is not damped.  The damping ratio of a mode of circular frequency ω in small
-    vibration is time ω/2, that of ``Rayleigh(stiffness=time)``.  Cells with a hinge are left out,
-    so that an open hinge turns freely.
+    vibration is retardation_time ω/2, that of ``Rayleigh(stiffness=retardation_time)``.  Cells with
+    a hinge are left out, so that an open hinge turns freely.
 
     Args:
-        time: Retardation time; s.
+        retardation_time: Viscosity over stiffness; s.
         beams: The beams that are damped; all by default.
 
     Raises:
         SceneError: A time that is not positive.
 
     Example:
-        >>> damped = ub.Scene([beam], supports=scene.supports, damping=[ub.KelvinVoigt(time=1e-4)])
+        >>> damped = ub.Scene([beam], supports=scene.supports, damping=[ub.KelvinVoigt(1e-4)])
         >>> vibration = ub.modes(damped, 2)
         >>> np.allclose(vibration.damping, 0.5e-4 * vibration.omega)
         True
     """
 
-    time: Positive
+    retardation_time: Positive
     beams: Beams = None
 
 

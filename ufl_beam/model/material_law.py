@@ -213,7 +213,7 @@ def require_interaction(law: object, what: str) -> None:
 def require_law(law: object, what: str) -> None:
     """Raise :class:`SceneError` unless a law is complete; it is called with numbers."""
     if not isinstance(law, MaterialLaw):
-        raise SceneError(f"{what} = {shorten(law)} is not a Hardening or another MaterialLaw")
+        raise SceneError(f"{what} = {shorten(law)} is not a ElastoPlastic or another MaterialLaw")
     kind = f"{what}: {type(law).__name__}"
     require_fields(law, MaterialLaw, kind)
     ways = [w for w in WAYS if getattr(type(law), w) is not getattr(MaterialLaw, w)]

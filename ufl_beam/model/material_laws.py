@@ -46,7 +46,7 @@ class Perzyna(Record):
             rate-independent, infinity elastic.
 
     Example:
-        >>> law = ub.Hardening(250e6, modulus=2e9, viscosity=ub.Perzyna(eta=1e6))  # Pa, Pa s
+        >>> law = ub.ElastoPlastic(250e6, isotropic=2e9, viscosity=ub.Perzyna(eta=1e6))  # Pa, Pa s
         >>> viscous = ub.Fibres(law, number=10)
     """
 
@@ -68,7 +68,9 @@ class DuvautLions(Record):
         tau: Relaxation time; s.  Zero is rate-independent, infinity elastic.
 
     Example:
-        >>> law = ub.Hardening(250e6, modulus=2e9, viscosity=ub.DuvautLions(tau=1e-3))  # Pa, s
+        >>> law = ub.ElastoPlastic(  # Pa, s
+        ...     250e6, isotropic=2e9, viscosity=ub.DuvautLions(tau=1e-3)
+        ... )
         >>> viscous = ub.Fibres(law, number=10)
     """
 
@@ -89,7 +91,7 @@ def _require_modulus(value: Any, what: str) -> None:
     if require_number(value, what) < 0.0:
         raise SceneError(
             f"{what} = {value:g} must not be negative: a softening bulk has no size, and results "
-            "would depend on the mesh; use Softening(limit, energy)"
+            "would depend on the mesh; use Softening(limit, fracture_energy)"
         )
 
 
@@ -111,13 +113,13 @@ class _Plastic(Record, MaterialLaw):
 
 
 @dataclass(frozen=True)
-class Hardening(_Plastic):
+class ElastoPlastic(_Plastic):
     """Elasto-(visco)plastic law with linear isotropic and kinematic hardening, P(35)-P(48).
 
     Args:
-        limit: Yield stress, or yield force or moment of a resultant; Pa, N or N m.  For fibres
-            also a distribution such as :class:`Normal`.
-        modulus: Isotropic hardening; stress per plastic strain.
+        yield_limit: Yield stress, or yield force or moment of a resultant; Pa, N or N m.  For
+            fibres also a distribution such as :class:`Normal`.
+        isotropic: Isotropic hardening; stress per plastic strain.
         kinematic: Kinematic hardening (Prager); stress per plastic strain.
         viscosity: :class:`Perzyna` or :class:`DuvautLions`; rate-independent by default.
 
@@ -125,36 +127,38 @@ class Hardening(_Plastic):
         SceneError: A number is negative or none; infinity is allowed for the limit.
 
     Example:
-        >>> law = ub.Hardening(3e5, modulus=1e6)  # N m, N m²
+        >>> law = ub.ElastoPlastic(3e5, isotropic=1e6)  # N m, N m²
         >>> yielding = ub.Section(EA=4e9, GA=1e9, EI=1.4e7, rhoA=157.0, bending=law)
     """
 
-    limit: Annotated[Any, partial(_require_limit, at_least=0.0, infinite=True)]
-    modulus: Modulus = 0.0
+    yield_limit: Annotated[Any, partial(_require_limit, at_least=0.0, infinite=True)]
+    isotropic: Modulus = 0.0
     kinematic: Modulus = 0.0
     viscosity: Annotated[Any, partial(require_kind, kind=(Perzyna, DuvautLions))] = Perzyna(0.0)
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "accumulated": 0.0}
-    energy: ClassVar[float] = math.inf  # of fracture: it never breaks
+    fracture_energy: ClassVar[float] = math.inf  # of fracture: it never breaks
     steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # fall of the stress, and where
 
     def numbers(self, C: Values) -> dict[str, Any]:
         """Limit and moduli; in the place of the viscosity, the overstress per plastic rate."""
-        eta = self.viscosity.coefficient(C + self.modulus + self.kinematic)
+        eta = self.viscosity.coefficient(C + self.isotropic + self.kinematic)
         return super().numbers(C) | {"viscosity": eta}
 
     def increments(self, strain: Values, state: State, dt: Values) -> dict[str, Values]:
         """Plastic strain of a step, and the size of it, in closed form, P(38)-P(44)."""
         trial = self.stress(strain, state) - self.kinematic * state.plastic
         direction = sign(trial)
-        overstress = direction * trial - (self.limit + self.modulus * state.accumulated)  # P(38)
-        stiffness = self.viscosity / dt + (self.C + self.modulus + self.kinematic)
+        overstress = direction * trial - (
+            self.yield_limit + self.isotropic * state.accumulated
+        )  # P(38)
+        stiffness = self.viscosity / dt + (self.C + self.isotropic + self.kinematic)
         γ = positive(overstress) / stiffness  # P(44)
         return {"plastic": direction * γ, "accumulated": γ}
 
     def hardening_energy(self, state: State) -> Values:
         """Energy per volume that hardening stores."""
         return (
-            self.kinematic * state.plastic**2 + self.modulus * state.accumulated**2
+            self.kinematic * state.plastic**2 + self.isotropic * state.accumulated**2
         ) / 2  # P(35)
 
     def dissipation(self, strain: Values, state: State, changes: State, dt: Values) -> Values:
@@ -162,13 +166,18 @@ class Hardening(_Plastic):
         γ = changes.accumulated
         flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
         return (
-            where(flows, self.limit, 0.0) + where(flows, self.viscosity, 0.0) * γ / dt
+            where(flows, self.yield_limit, 0.0) + where(flows, self.viscosity, 0.0) * γ / dt
         ) * γ  # P(37)
+
+    @property
+    def limit(self) -> Any:
+        """The yield limit, by the name that it has in all laws of hinges."""
+        return self.yield_limit
 
     @property
     def elastic(self) -> bool:
         """True if it never flows."""
-        return bool(self.limit == np.inf)
+        return bool(self.yield_limit == np.inf)
 
     @property
     def opens(self) -> bool:
@@ -179,7 +188,7 @@ class Hardening(_Plastic):
     def bounded(self) -> bool:
         """True if the stress never exceeds the limit."""
         viscous = bool(np.any(self.viscosity.coefficient(np.ones(1)) > 0.0))
-        return self.modulus == self.kinematic == 0.0 and not viscous
+        return self.isotropic == self.kinematic == 0.0 and not viscous
 
 
 # -- curved branches: power law, ratcheting, smooth hysteresis ----------------------------------
@@ -187,14 +196,14 @@ class Hardening(_Plastic):
 
 @dataclass(frozen=True)
 class RambergOsgood(_Plastic):
-    """Power law of Ramberg and Osgood: strain = stress/C + offset (stress/limit)^exponent.
+    """Power law of Ramberg and Osgood: strain = stress/C + offset (stress/yield_limit)^exponent.
 
     It holds while the stress grows beyond all stresses so far; below them the point is elastic, in
     both directions (isotropic hardening).  There is no yield limit.  After Ramberg and Osgood,
     NACA TN 902 (1943).
 
     Args:
-        limit: Stress at which the plastic strain is ``offset``, or a distribution such as
+        yield_limit: Stress at which the plastic strain is ``offset``, or a distribution such as
             :class:`Normal`; Pa, N or N m.
         offset: Plastic strain or curvature at that stress, such as 0.002; 1 or 1/m.
         exponent: At least 1.
@@ -203,11 +212,11 @@ class RambergOsgood(_Plastic):
         SceneError: A number is not positive, or the exponent is less than 1.
 
     Example:
-        >>> law = ub.RambergOsgood(limit=250e6, offset=0.002, exponent=8)  # Pa, 1
+        >>> law = ub.RambergOsgood(yield_limit=250e6, offset=0.002, exponent=8)  # Pa, 1
         >>> curved = ub.Section.rectangle(b=0.1, h=0.2, E=70e9, nu=0.3, fibres=ub.Fibres(law))
     """
 
-    limit: Limit
+    yield_limit: Limit
     offset: Positive
     exponent: AtLeastOne
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "largest": 0.0}
@@ -216,7 +225,7 @@ class RambergOsgood(_Plastic):
         """Accumulated plastic strain of the largest stress; plastic strain along the stress."""
         stress = self.stress(strain, new)
         largest = larger(
-            old.largest, self.offset * (absolute(stress) / self.limit) ** self.exponent
+            old.largest, self.offset * (absolute(stress) / self.yield_limit) ** self.exponent
         )
         flow = sign(stress) * (new.largest - old.largest)
         return {"largest": new.largest - largest, "plastic": new.plastic - old.plastic - flow}
@@ -226,25 +235,27 @@ class RambergOsgood(_Plastic):
 class ArmstrongFrederick(_Plastic):
     """Plasticity with nonlinear kinematic hardening: loops that close, ratchet and saturate.
 
-    The stress lies within ``limit`` of a back stress X with dX = kinematic dp - recovery X abs(dp),
-    which saturates at kinematic/recovery.  After Armstrong and Frederick, CEGB report RD/B/N731
-    (1966).
+    The stress lies within ``yield_limit`` of a back stress X with dX = kinematic dp - recovery X
+    abs(dp), which saturates at kinematic/recovery.  After Armstrong and Frederick, CEGB report
+    RD/B/N731 (1966).
 
     Args:
-        limit: Yield stress, or a distribution such as :class:`Normal`; Pa, N or N m.
+        yield_limit: Yield stress, or a distribution such as :class:`Normal`; Pa, N or N m.
         kinematic: Initial hardening; stress per plastic strain.
         recovery: Rate at which hardening fades; per plastic strain.  Without it use
-            :class:`Hardening` with ``kinematic``.
+            :class:`ElastoPlastic` with ``kinematic``.
 
     Raises:
         SceneError: A number is not positive.
 
     Example:
-        >>> law = ub.ArmstrongFrederick(limit=200e6, kinematic=40e9, recovery=300)  # Pa, Pa, 1
+        >>> law = ub.ArmstrongFrederick(  # Pa, Pa, 1
+        ...     yield_limit=200e6, kinematic=40e9, recovery=300
+        ... )
         >>> ratchets = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, fibres=ub.Fibres(law))
     """
 
-    limit: Limit
+    yield_limit: Limit
     kinematic: Positive
     recovery: Positive
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "back": 0.0}
@@ -254,8 +265,8 @@ class ArmstrongFrederick(_Plastic):
         C, B, r = self.C, self.kinematic, self.recovery
         trial = self.stress(strain, state)
         direction = sign(trial - state.back)
-        over = positive(direction * (trial - state.back) - self.limit)
-        b = C + B - r * (direction * trial - self.limit)  # C r γ² + b γ = over
+        over = positive(direction * (trial - state.back) - self.yield_limit)
+        b = C + B - r * (direction * trial - self.yield_limit)  # C r γ² + b γ = over
         root = sqrt(b**2 + 4 * C * r * over)
         above = where(below(b, 0.0), 1.0, b + root)  # no difference of numbers that are close
         γ = where(below(b, 0.0), (root - b) / (2 * C * r), 2 * over / above)
@@ -273,13 +284,13 @@ class BoucWen(Record, MaterialLaw):
     """Smooth hysteresis of Bouc and Wen, with the degradation of Baber and Wen.
 
     The stress is C (hardening strain + (1 - hardening) z), where the hysteretic strain z follows
-    dz = dx (1 - ν abs(z/z0)^n (1 - β + β sign(z dx))) with z0 = limit/C.  Strength degrades by
-    ν = 1 + strength e with the dissipated energy e, in parts of limit²/C.  After Wen, J. Eng. Mech.
-    Div. ASCE 102 (1976), and Baber and Wen, ibid. 107 (1981).  Their degradation of stiffness is
-    left out: in unloading it would give back energy that was dissipated.
+    dz = dx (1 - ν abs(z/z0)^n (1 - β + β sign(z dx))) with z0 = yield_limit/C.  Strength degrades
+    by ν = 1 + strength e with the dissipated energy e, in parts of yield_limit²/C.  After Wen, J.
+    Eng.  Mech.  Div. ASCE 102 (1976), and Baber and Wen, ibid. 107 (1981).  Their degradation of
+    stiffness is left out: in unloading it would give back energy that was dissipated.
 
     Args:
-        limit: Stress at which the tangents of both branches meet, hardening left out, or a
+        yield_limit: Stress at which the tangents of both branches meet, hardening left out, or a
             distribution such as :class:`Normal`; Pa, N, N m.
         hardening: Slope of the plastic branch as a part of C, below 1.
         exponent: Sharpness n of the transition, at least 1.
@@ -290,11 +301,11 @@ class BoucWen(Record, MaterialLaw):
         SceneError: A number is out of its range.
 
     Example:
-        >>> law = ub.BoucWen(limit=5e4, hardening=0.05, exponent=2, strength=0.01)  # N m
+        >>> law = ub.BoucWen(yield_limit=5e4, hardening=0.05, exponent=2, strength=0.01)  # N m
         >>> base = ub.Turn(ub.ground(0, 0), beam.start, ub.Spring(1e7, law=law))
     """
 
-    limit: Limit
+    yield_limit: Limit
     hardening: Annotated[float, partial(require_number, at_least=0.0, at_most=0.999)] = 0.0
     exponent: AtLeastOne = 1.0
     shape: Annotated[float, partial(require_number, at_least=0.5, at_most=1.0)] = 0.5
@@ -310,7 +321,7 @@ class BoucWen(Record, MaterialLaw):
 
         Far beyond all solutions the flow grows no more with z, and so has one zero there, too.
         """
-        z, z0, dx = strain - new.slip, self.limit / self.C, strain - old.strain
+        z, z0, dx = strain - new.slip, self.yield_limit / self.C, strain - old.strain
         before = old.strain - old.slip
         size = smaller(absolute(z), 2 * larger(z0, absolute(before)))
         slips = dx + before - sign(z) * size

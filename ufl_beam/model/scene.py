@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass
 from functools import cached_property, partial
 from typing import Annotated, Any
 
@@ -31,8 +31,8 @@ from ufl_beam.model.bodies import (
     merged,
     node,
 )
-from ufl_beam.model.connector_laws import Actuator, Bearing, Coulomb, Motor
-from ufl_beam.model.connectors import Connector, plastic_hinges
+from ufl_beam.model.connector_laws import Bearing, Coulomb, PrescribedForce, PrescribedMotion
+from ufl_beam.model.connectors import Component, Connector, plastic_hinges
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along, value_at
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import (
@@ -60,16 +60,17 @@ class Scene(Record, Rich):
 
     Args:
         beams: The beams.
-        joints: Made by :func:`Rigid`, :func:`Revolute`, :func:`Prismatic`, :func:`RigidLink`,
-            :func:`Link` and :func:`Release`.
-        supports: Made by :func:`Clamped`, :func:`Pinned`, :func:`Roller`, :func:`Prescribed`.
+        joints: :class:`Rigid`, :class:`Revolute`, :class:`Prismatic`, :class:`RigidLink`,
+            :class:`Link` and :class:`Release`.
+        supports: :class:`Clamped`, :class:`Pinned`, :class:`Roller`,
+            :class:`PrescribedDisplacement`.
         loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`,
             :class:`RotatingFrame`.
         masses: :class:`PointMass`.
         initial: :class:`Velocity`; at rest without.
         damping: :class:`Rayleigh`, :class:`KelvinVoigt`; besides what materials dissipate.
         bodies: :class:`Body`.
-        connectors: Made by :func:`Turn`, :func:`Stretch`, :func:`Slide`: springs, dampers, stops,
+        connectors: :class:`Turn`, :class:`Stretch`, :class:`Slide`: springs, dampers, stops,
             friction, motors.
         works: :class:`VirtualWork`, :class:`Potential`: effects along beams that you state in UFL.
 
@@ -82,6 +83,7 @@ class Scene(Record, Rich):
     """
 
     beams: Annotated[Sequence[Beam], _all(Beam)] = ()
+    _: KW_ONLY
     joints: Annotated[Sequence[Joint], _all(Joint)] = ()
     supports: Annotated[Sequence[Support], _all(Support)] = ()
     loads: Annotated[Sequence[Load], _all(*Load.__args__)] = ()
@@ -115,8 +117,8 @@ class Scene(Record, Rich):
                 gap = math.dist(joint.places[0].point, other.point)
                 if joint.meets and gap > 1e-9 * self.size:
                     raise SceneError(
-                        f"{joint.kind}: joint ends lie {gap:.6g} m apart: {joint.places[0]} and "
-                        f"{other}; {joint.advice}"
+                        f"{type(joint).__name__}: joint ends lie {gap:.6g} m apart: "
+                        f"{joint.places[0]} and {other}; {joint.advice}"
                     )
         for connector in self.links:
             if node(connector.a) == node(connector.b):
@@ -209,12 +211,14 @@ class Scene(Record, Rich):
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
         """Iterate over functions of time of loads, motions and drives, and their owners."""
-        yield from ((one, one.time) for one in self.loads if not isinstance(one, RotatingFrame))
+        yield from (
+            (one, one.amplitude) for one in self.loads if not isinstance(one, RotatingFrame)
+        )
         yield from ((one, motion) for one in self.supports for motion in one.held.values())
         for link in self.links:
-            if isinstance(link.law, Motor):
+            if isinstance(link.law, PrescribedMotion):
                 yield link, link.law.motion
-            if isinstance(link.law, Actuator):
+            if isinstance(link.law, PrescribedForce):
                 yield link, link.law.force
         for work in self.works:
             yield from ((work, number) for number in work.numbers.values() if callable(number))
@@ -261,7 +265,7 @@ class Scene(Record, Rich):
         for joint, twice in _again(
             "joints", self.joints,
             key=lambda joint: (
-                joint.kind, frozenset(joint.places),
+                type(joint), frozenset(joint.places),
                 *((link.motion, link.axis, id(link.law)) for link in joint.holders),
             ),
         ):  # fmt: skip
@@ -293,7 +297,7 @@ class Scene(Record, Rich):
         elif isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
             why = "holds no displacement and bears no force; name another support or joint"
         elif isinstance(pressing, Joint) and all(holder.turns for holder in pressing.holders):
-            why = "shares unknowns, so that its force is not known; make it with measured=True"
+            why = "shares unknowns, so that its force is not known; make it with multipliers=True"
         else:
             return
         raise SceneError(f"{connector}: {pressing}, which presses on its friction, {why}")
@@ -348,8 +352,8 @@ def _off_center(load: PointLoad) -> tuple[Connector, ...]:
         return ()
 
     def push(motion: str, size: float, axis: tuple[float, float] = (1.0, 0.0)) -> Connector:
-        law = Actuator(lambda t: size * value_at(load.time, t, load))
-        return Connector("PointLoad", motion, ground(*load.place.point), load.place, law, axis)
+        law = PrescribedForce(lambda t: size * value_at(load.amplitude, t, load))
+        return Component("PointLoad", motion, ground(*load.place.point), load.place, law, axis)
 
     (x, y), moment = load.force, load.moment
     return (

@@ -17,7 +17,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import SceneError, require_array, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
 from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, require_interaction
-from ufl_beam.model.material_laws import Hardening
+from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
@@ -113,7 +113,7 @@ class Section(Record):
             )
         laws = [self.axial, self.shear, self.bending]
         if hinge is not None and hinge.opens:
-            laws[2] = self.bending or Hardening(limit=math.inf)
+            laws[2] = self.bending or ElastoPlastic(yield_limit=math.inf)
         else:
             hinge = None
         here = np.array([law is not None for law in laws])

@@ -52,8 +52,8 @@ class SofteningLaw(ABC):
 
     Attributes:
         limit: Traction at zero opening; a field of the law, or found from :meth:`traction`.
-        energy: Integral of the traction over all openings, the fracture energy; a field of the law,
-            or found by quadrature.
+        fracture_energy: Integral of the traction over all openings; a field of the law, or found
+            by quadrature.
 
     Example:
         >>> from dataclasses import dataclass
@@ -65,13 +65,13 @@ class SofteningLaw(ABC):
         ...     def traction(self, opening):
         ...         return self.limit * (1 + opening / self.width) ** -self.n
         >>> law = PowerLaw(limit=5e4, width=0.02, n=3.0)
-        >>> print(f"{law.energy:.6g}")  # limit width / (n - 1); J
+        >>> print(f"{law.fracture_energy:.6g}")  # limit width / (n - 1); J
         500
         >>> breaks = ub.Section(EA=4e9, GA=1e9, EI=1.4e7, rhoA=157.0, hinge=law)
     """
 
     limit: Values
-    energy: Values
+    fracture_energy: Values
 
     @abstractmethod
     def traction(self, opening: Values) -> Values:
@@ -93,11 +93,11 @@ class SofteningLaw(ABC):
         before, after = self.energy_to(opening), self.energy_to(opening + growth)
         if before is None or after is None:
             return mean
-        large = below(SMALL * self.energy, growth * self.limit)
+        large = below(SMALL * self.fracture_energy, growth * self.limit)
         return where(large, (after - before) / where(large, growth, 1.0), mean)
 
     def __getattr__(self, name: str) -> Any:
-        if name in ("limit", "energy"):
+        if name in ("limit", "fracture_energy"):
             return getattr(course(self), name)
         raise AttributeError(f"{type(self).__name__} has no attribute {name!r}")
 
@@ -119,7 +119,7 @@ class SofteningLaw(ABC):
     def numbers(self) -> dict[str, Any]:
         """Numbers of the law by name: its fields, and limit and energy."""
         own = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
-        return {"limit": self.limit, "energy": self.energy} | own
+        return {"limit": self.limit, "fracture_energy": self.fracture_energy} | own
 
     def of(self, numbers: Mapping[str, Values]) -> SofteningLaw:
         """Return the law with other numbers, arrays or symbols."""
@@ -146,13 +146,13 @@ class _OfLimitAndEnergy(Record, SofteningLaw):
     """Base of laws of two numbers that fall by limit²/energy or less; others state `steepest`."""
 
     limit: FromZero
-    energy: Positive
+    fracture_energy: Positive
     bounded: ClassVar[bool] = True
 
     @property
     def steepest(self) -> tuple[float, float]:
         """Fall of the traction per opening when it opens; linear softening has half of it."""
-        return self.limit * (self.limit / self.energy), 0.0
+        return self.limit * (self.limit / self.fracture_energy), 0.0
 
 
 @closed(OWN_LAW)
@@ -162,46 +162,46 @@ class Softening(_OfLimitAndEnergy):
     Args:
         limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
             perfect joint, infinity never opens.
-        energy: Fracture energy, dissipated by a complete opening: J; for fibres J/m².
+        fracture_energy: Energy dissipated by a complete opening: J; for fibres J/m².
 
     Raises:
         SceneError: A negative limit, or an energy that is not positive.
 
     Example:
-        >>> law = ub.Softening(limit=5e4, energy=1e3)  # N m, J
+        >>> law = ub.Softening(limit=5e4, fracture_energy=1e3)  # N m, J
         >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after openings in rad; N m
         [50000. 18394.  6767.]
     """
 
     def traction(self, ξ: Values) -> Values:
         """Resistance after the accumulated opening ξ."""
-        decay = self.limit / self.energy * ξ
+        decay = self.limit / self.fracture_energy * ξ
         return where(below(decay, BROKEN), self.limit * exp(-decay), 0.0)  # P(52)!
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
         """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
-        return self.traction(ξ) * _mean_of_decay(self.limit / self.energy * a)
+        return self.traction(ξ) * _mean_of_decay(self.limit / self.fracture_energy * a)
 
 
 @closed(OWN_LAW)
 class LinearSoftening(_OfLimitAndEnergy):
-    """Linear softening of a hinge or crack, to zero at the opening 2 energy / limit.
+    """Linear softening of a hinge or crack, to zero at the opening 2 fracture_energy / limit.
 
     Args and errors are those of :class:`Softening`.
 
     Example:
-        >>> law = ub.LinearSoftening(limit=5e4, energy=1e3)  # N m, J
+        >>> law = ub.LinearSoftening(limit=5e4, fracture_energy=1e3)  # N m, J
         >>> print(law.traction(np.array([0.0, 0.02, 0.04])))  # after openings in rad; N m
         [50000. 25000.     0.]
     """
 
     def traction(self, ξ: Values) -> Values:
         """Resistance after the accumulated opening ξ."""
-        return positive(self.limit - self.limit**2 / (2 * self.energy) * ξ)
+        return positive(self.limit - self.limit**2 / (2 * self.fracture_energy) * ξ)
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
         """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
-        now, slope = self.traction(ξ), self.limit**2 / (2 * self.energy)
+        now, slope = self.traction(ξ), self.limit**2 / (2 * self.fracture_energy)
         ends = below(now - slope * a, 0.0)
         safe = where(ends, slope * a, 1.0)
         return where(ends, now**2 / (2 * safe), now - slope * a / 2)
@@ -223,13 +223,13 @@ def require_softening(law: object, what: str) -> None:
     if isinstance(law, _OfLimitAndEnergy):
         return
     kind = f"{what}: {type(law).__name__}"
-    require_fields(law, SofteningLaw, kind, but=("limit", "energy"))
+    require_fields(law, SofteningLaw, kind, but=("limit", "fracture_energy"))
     for field in fields(law):  # type: ignore[arg-type]
         value = getattr(law, field.name)
         if hasattr(value, "draw"):
             raise SceneError(
                 f"{kind}: {field.name} = {shorten(value)} is a distribution; numbers of softening "
-                "are the same in all cells; draw those of the bulk, Hardening(limit)"
+                "are the same in all cells; draw those of the bulk, ElastoPlastic(limit)"
             )
         require_field(value, f"{kind}: {field.name}")
     try:
@@ -245,7 +245,7 @@ class Course(NamedTuple):
     """Course of a traction over all openings."""
 
     limit: float
-    energy: float
+    fracture_energy: float
     largest: float  # traction
     steepest: tuple[float, float]  # fall per opening, and an opening at which it falls so
 
@@ -270,7 +270,7 @@ def course(law: SofteningLaw) -> Course:
             raise SceneError(
                 f"{kind}: its traction is still {t[-1]:.6g} at the opening {edges[-1]:g}, so that "
                 "its energy is not finite; let it fall to zero, or faster than 1/opening. For a "
-                "hinge that never breaks give Hardening(limit)"
+                "hinge that never breaks give ElastoPlastic(limit)"
             )
         energy += float(t[-1] * edges[-1] / (power - 1))
     unit = energy / limit
@@ -365,7 +365,7 @@ def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:
                     f"integral of the traction is {found:.6g}; make both agree, or leave it out"
                 )
     (first,) = _called(law, "traction", np.zeros(1))
-    for name, found in (("limit", first), ("energy", energy)):
+    for name, found in (("limit", first), ("fracture_energy", energy)):
         if name in vars(law) or hasattr(type(law), name):
             stated = getattr(law, name)
             if not abs(stated - found) <= 1e-6 * found:

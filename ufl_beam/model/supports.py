@@ -4,7 +4,10 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from abc import ABC, abstractmethod
+from dataclasses import KW_ONLY, dataclass
+from functools import cached_property
+from typing import ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import SceneError, require_number, require_vector
@@ -17,12 +20,15 @@ COMPONENTS = ("u", "v", "psi")
 Motion = float | TimeFunction
 
 
-@dataclass(frozen=True, eq=False)
-class Support(Bearing):
-    """Held or prescribed motion of a place; made by :func:`Clamped` and its siblings.
+def still(t: float) -> float:
+    """The time function of a component that is held fast: 0."""
+    return 0.0
+
+
+class Support(Bearing, ABC):
+    """Held or prescribed motion of a place; base of :class:`Clamped` and its siblings.
 
     Attributes:
-        kind: Name for messages.
         place: Where.
         held: Component -> its value in time (m, m, rad), in axes turned by ``angle``.
         angle: Direction of the first axis; rad.
@@ -35,15 +41,18 @@ class Support(Bearing):
         100000.0
     """
 
-    kind: str
     place: Anchor
-    held: dict[int, TimeFunction]
     angle: float = 0.0
 
     __repr__ = bracketed
 
+    @property
+    @abstractmethod
+    def held(self) -> dict[int, TimeFunction]:
+        """Component -> its value in time."""
+
     def __post_init__(self) -> None:
-        require_node(self.place, self.kind)
+        require_node(self.place, type(self).__name__)
         if not self.held:
             raise SceneError(f"{self} holds nothing; give at least one of u, v, psi")
         for component, value in self.held.items():
@@ -55,15 +64,11 @@ class Support(Bearing):
         return {c: f for c, f in self.held.items() if f is not still}
 
     def __str__(self) -> str:
-        return f"{self.kind} at {self.place}"
+        return f"{type(self).__name__} at {self.place}"
 
 
-def still(t: float) -> float:
-    """The time function of a component that is held fast: 0."""
-    return 0.0
-
-
-def Clamped(place: Anchor) -> Support:
+@dataclass(frozen=True, eq=False, repr=False)
+class Clamped(Support):
     """Clamped support: holds displacement and rotation.
 
     Example:
@@ -71,10 +76,13 @@ def Clamped(place: Anchor) -> Support:
         >>> sorted(support.held)  # 0, 1: displacement, 2: rotation
         [0, 1, 2]
     """
-    return Support("Clamped", place, {0: still, 1: still, 2: still})
+
+    place: Anchor
+    held: ClassVar = {0: still, 1: still, 2: still}
 
 
-def Pinned(place: Anchor) -> Support:
+@dataclass(frozen=True, eq=False, repr=False)
+class Pinned(Support):
     """Pinned support: holds the displacement; the place turns freely.
 
     Example:
@@ -82,47 +90,78 @@ def Pinned(place: Anchor) -> Support:
         >>> sorted(support.held)  # both components of the displacement
         [0, 1]
     """
-    return Support("Pinned", place, {0: still, 1: still})
+
+    place: Anchor
+    held: ClassVar = {0: still, 1: still}
 
 
-def Roller(place: Anchor, *, along: Point = (1.0, 0.0)) -> Support:
+@dataclass(frozen=True, eq=False, repr=False)
+class Roller(Support):
     """Roller support: holds the displacement across ``along``; the place rolls and turns freely.
 
     Example:
         >>> roller = ub.Roller(beam.end, along=(1, 1))
-        >>> simple = ub.Scene([beam], [], [ub.Pinned(beam.start), roller], [ub.Gravity()])
+        >>> simple = ub.Scene(
+        ...     [beam], supports=[ub.Pinned(beam.start), roller], loads=[ub.Gravity()]
+        ... )
         >>> run = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0)
         >>> force = run.reaction(roller)[-1]
         >>> bool(abs(force[0] + force[1]) < 1e-6)  # across the direction
         True
     """
-    x, y = require_vector(along, f"Roller at {place}: along")
-    if x == y == 0.0:
-        raise SceneError(f"Roller at {place}: along = (0, 0) is no direction")
-    if x == 0.0 or y == 0.0:
-        return Support("Roller", place, {1 if y == 0.0 else 0: still})
-    return Support("Roller", place, {1: still}, math.atan2(y, x))
+
+    place: Anchor
+    _: KW_ONLY
+    along: Point = (1.0, 0.0)
+
+    def __post_init__(self) -> None:
+        x, y = require_vector(self.along, f"{self}: along")
+        if x == y == 0.0:
+            raise SceneError(f"{self}: along = (0, 0) is no direction")
+        object.__setattr__(self, "along", (x, y))
+        super().__post_init__()
+
+    @property
+    def held(self) -> dict[int, TimeFunction]:
+        """The displacement across it."""
+        return {0 if self.along[0] == 0.0 else 1: still}
+
+    @property
+    def angle(self) -> float:  # type: ignore[override]
+        """Direction in which it rolls, if that is not along an axis."""
+        return math.atan2(self.along[1], self.along[0]) if all(self.along) else 0.0
 
 
-def Prescribed(
-    place: Anchor, *, u: Motion | None = None, v: Motion | None = None, psi: Motion | None = None
-) -> Support:
+@dataclass(frozen=True, eq=False, repr=False)
+class PrescribedDisplacement(Support):
     """Prescribed motion of a place by numbers or functions of time; m, m, rad.
 
     A number is reached at once in dynamics, and in proportion to the time in statics only if it is
     given as a function such as ``lambda t: 0.1 * t``.
 
     Example:
-        >>> turned = ub.Prescribed(beam.start, u=0.0, v=0.0, psi=lambda t: np.pi / 2 * t)
+        >>> turned = ub.PrescribedDisplacement(
+        ...     beam.start, u=0.0, v=0.0, psi=lambda t: np.pi / 2 * t
+        ... )
         >>> run = ub.simulate(ub.Scene([beam], supports=[turned]), ub.Static(), t=(0, 1), dt=0.25)
         >>> np.allclose(run.position(beam.end)[-1], (0, 2))
         True
     """
-    held: dict[int, TimeFunction] = {}
-    for component, value in enumerate((u, v, psi)):
-        if callable(value):
-            held[component] = value
-        elif value is not None:
-            number = require_number(value, f"Prescribed at {place}: {COMPONENTS[component]}")
-            held[component] = Constant(number) if number else still
-    return Support("Prescribed", place, held)
+
+    place: Anchor
+    _: KW_ONLY
+    u: Motion | None = None
+    v: Motion | None = None
+    psi: Motion | None = None
+
+    @cached_property
+    def held(self) -> dict[int, TimeFunction]:
+        """Component -> its value in time."""
+        held: dict[int, TimeFunction] = {}
+        for component, value in enumerate((self.u, self.v, self.psi)):
+            if callable(value):
+                held[component] = value
+            elif value is not None:
+                number = require_number(value, f"{self}: {COMPONENTS[component]}")
+                held[component] = Constant(number) if number else still
+        return held

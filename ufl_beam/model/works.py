@@ -116,7 +116,7 @@ class VirtualWork(Work):
     whichever of these it needs:
 
     * ``q0``, ``q1``: configurations (u_x, u_y, ψ) at both ends of the step; m, m, rad,
-    * ``q``: that at which the time scheme states forces, their mean in :class:`Midpoint`,
+    * ``q``: that at which the time scheme states forces, their mean in :class:`EnergyMomentum`,
     * ``v``: mean velocity of the step, (q1 - q0)/dt, also in static runs; m/s, m/s, rad/s,
     * ``w``: virtual motion (w_x, w_y, w_ψ), in which the work is linear; m, m, rad,
     * ``axis``: undeformed axis, with ``axis.x``, its point (2,), tangent ``axis.t0`` and normal
@@ -146,7 +146,7 @@ class VirtualWork(Work):
         >>> air = ub.VirtualWork("air", drag, numbers={"c": 0.6 * 1.2 * 0.2})  # N s²/m³
         >>> kick = ub.Velocity((beam,), linear=(0.0, 30.0))  # m/s
         >>> flying = ub.Scene([beam], initial=[kick], works=[air])
-        >>> run = ub.simulate(flying, ub.Midpoint(), t=(0, 1), dt=0.05)
+        >>> run = ub.simulate(flying, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
         >>> bool(run.energy.worst < 1e-9), bool(run.energy["air"][-1] < 0)  # what the air takes
         (True, True)
     """
@@ -163,10 +163,10 @@ class Potential(Work):
 
     The function returns the energy per undeformed length.  It takes, by name, whichever it needs of
     ``q``, ``axis``, ``t`` and the names in ``numbers``, see :class:`VirtualWork`.  Forces are its
-    derivative by UFL, in :class:`Midpoint` and its relatives the mean of the derivative over the
-    step: their work is the increment of the energy, to round-off for polynomials of degree 8 and
-    otherwise but for the ninth power of a step.  The energy is the entry ``name`` of the state of
-    the ledger; what a change in time brings is the entry supplied "name in time".
+    derivative by UFL, in :class:`EnergyMomentum` and its relatives the mean of the derivative over
+    the step: their work is the increment of the energy, to round-off for polynomials of degree 8
+    and otherwise but for the ninth power of a step.  The energy is the entry ``name`` of the state
+    of the ledger; what a change in time brings is the entry supplied "name in time".
 
     Args are those of :class:`VirtualWork`.
 
@@ -176,7 +176,9 @@ class Potential(Work):
     Example:
         >>> soil = ub.Potential("soil", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": 1e6})  # N/m²
         >>> load = ub.PointLoad(beam.at(0.5), force=(0, -1e3))
-        >>> rail = ub.Scene([beam], [], [ub.Roller(beam.start, along=(0, 1))], [load], works=[soil])
+        >>> rail = ub.Scene(
+        ...     [beam], supports=[ub.Roller(beam.start, along=(0, 1))], loads=[load], works=[soil]
+        ... )
         >>> run = ub.simulate(rail, ub.Static(), t=(0, 1), dt=1.0)
         >>> print((1e3 * run.displacement(beam.end)[-1, 1]).round(3))  # mm
         -0.497

@@ -65,7 +65,7 @@ class DolfinxView:
 
     Example:
         >>> from dolfinx import fem
-        >>> simulation = ub.Simulation(scene, ub.Midpoint())
+        >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
         >>> simulation.step_to(0.5)
         >>> view = simulation.dolfinx
         >>> C, e = view.stiffness, view.strains  # (EA, GA, EI), (Σ, Γ, K)

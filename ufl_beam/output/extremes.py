@@ -164,7 +164,7 @@ class Extent(NamedTuple):
 
     Example:
         >>> extremes = ub.Extremes()
-        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes)
         >>> v = extremes.displacement(beam).of((-1, 1))
         >>> print(v.low.round(3), v.time_low)  # m, s
         -0.019 1.0
@@ -194,7 +194,7 @@ class Extremes(Restartable):
 
     Example:
         >>> extremes = ub.Extremes()
-        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes)
         >>> M = extremes.section_forces(beam).low[:, 2]  # N m
         >>> print(M[:6].round(-3))  # at both ends of three of the four cells
         [-195000. -146000. -146000.  -98000.  -98000.  -49000.]
@@ -209,6 +209,7 @@ class Extremes(Restartable):
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Begin with the initial state, or go on after a :meth:`state`."""
         self._grid: Grid = simulation.grid
+        self._solution = simulation.solution
         self._in_c = simulation.watch(self._parts)
         self.by_itself = self._in_c is not None
         shapes = (len(self._grid.cells), len(self._parts), 3), (self._grid.size,)
@@ -267,6 +268,16 @@ class Extremes(Restartable):
         if not hasattr(self, "_grid"):
             raise SceneError("Extremes: nothing was run; give it to simulate(..., record=)")
         return self._grid
+
+    @property
+    def solution(self) -> Any:
+        """The :class:`Solution` of the run.
+
+        Raises:
+            SceneError: Nothing was run.
+        """
+        _ = self.grid  # or its error
+        return self._solution
 
     def section_forces(self, beam: Member) -> Extent:
         """Return extremes of (N, V, M) in points of the cells of a beam, N, N, N m.

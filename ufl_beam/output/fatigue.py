@@ -330,7 +330,7 @@ class Fatigue(Restartable):
     Example:
         >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
         >>> fatigue = ub.Fatigue(spot, ub.SNCurve.eurocode(71e6))
-        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), time=np.sin)
+        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), amplitude=np.sin)
         >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
         >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
         >>> print(f"life: {fatigue.life(spot):.0e} s")

@@ -54,15 +54,15 @@ class History(Restartable):
             :class:`~ufl_beam.output.state_rows.Connection`; of joints, all the connectors that
             hold them.
         every: Write every so many steps.
-        most: Largest number of rows, besides the initial one.  When it is exceeded, every other row
-            is deleted, and half as many steps are written from then on.
+        max_rows: Largest number of rows, besides the initial one.  When it is exceeded, every other
+            row is deleted, and half as many steps are written from then on.
 
     Raises:
-        SceneError: ``every`` or ``most`` is no whole number, at least 1.
+        SceneError: ``every`` or ``max_rows`` is no whole number, at least 1.
 
     Example:
         >>> table = ub.History("tip.csv", [beam.end])
-        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=table)
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=table)
         >>> np.loadtxt("tip.csv", delimiter=",", skiprows=1).shape[0]
         21
     """
@@ -74,14 +74,14 @@ class History(Restartable):
         connectors: Sequence[Connector | Joint] = (),
         *,
         every: int = 1,
-        most: int = sys.maxsize,
+        max_rows: int = sys.maxsize,
     ) -> None:
         require_count(every, f"History {path}: every")
-        require_count(most, f"History {path}: most")
-        self._first_every, self._most = every, most
+        require_count(max_rows, f"History {path}: max_rows")
+        self._first_every, self._max_rows = every, max_rows
         self._path = require_path(path, "History")
         self._part = beside(self._path)  # takes its place when rows go
-        self.files = (self._path,) if most == sys.maxsize else (self._path, self._part)
+        self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._part)
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")
         for i, place in enumerate(self._places):
@@ -134,7 +134,7 @@ class History(Restartable):
     def write(self, simulation: StateView) -> None:
         """Write the row of the state, every so many steps."""
         self._steps += 1
-        if self._steps == (self._most + 1) * self._every:
+        if self._steps == (self._max_rows + 1) * self._every:
             on_first(simulation.comm, self._thin)
             self._every *= 2
         if self._steps % self._every == 0:
@@ -166,7 +166,7 @@ class History(Restartable):
             for file in self._open:
                 file.sync()
                 counts[3] = self._length
-                if self._most < sys.maxsize:
+                if self._max_rows < sys.maxsize:
                     content = file.read(0, self._length)
                 else:
                     digest = file.digest(self._length)
@@ -300,7 +300,7 @@ class Events(Restartable):
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
         breaking = [law is not None and law.limit > 0 for law in laws]
-        energies = np.array([law.energy if law is not None else np.inf for law in laws])
+        energies = np.array([law.fracture_energy if law is not None else np.inf for law in laws])
         self._enough = np.where(breaking, BROKEN_PART * energies, np.inf)
         self._breaks = np.isfinite(energies)
         links = simulation.scene.links

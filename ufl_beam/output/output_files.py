@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, shorten, warn
+from ufl_beam.errors import SceneError, shorten
 from ufl_beam.file_system import is_at, sync
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
@@ -251,9 +251,6 @@ ADVICE = {
 }
 """What to do about a file that cannot be used."""
 
-READ_TOO = {"solution of ufl_beam, 3": "solution of ufl_beam, 2"}
-"""Formats of earlier versions that are read beside those of this one."""
-
 NPY: Any = np.lib.format
 """NumPy's reader and writer of arrays; it has no types."""
 
@@ -359,58 +356,30 @@ def read(path: Path, format: str) -> Content:
         raise SceneError("there is no such file") from None
     except OSError as error:
         raise SceneError(f"the file cannot be read: {error.strerror}") from None
-    content: Content = {}
-    found, by = "", "an earlier version"
-    if data.startswith(b"\x89HDF\r\n\x1a\n"):
-        found, content = _without_checksum(data)
-    elif data.startswith(b"checkpoint of ufl_beam, 2;"):
-        found = "checkpoint of ufl_beam, 2"
-    elif end := END.fullmatch(data[-256:]):
+    kind = format.rpartition(", ")[0]
+    found = by = ""
+    if end := END.fullmatch(data[-256:]):
         if hashlib.sha256(data[:-DIGEST]).hexdigest().encode() != data[-DIGEST:]:
             raise SceneError("the file is damaged: its checksum is not that of its content")
-        found, by = end[1].decode(), f"version {end[2].decode()}"
-    kind = format.rpartition(", ")[0]
+        found, by = end[1].decode(), end[2].decode()
     if not found:
         why = "its end is not that of such a file" if data else "it is empty"
         raise SceneError(f"the file holds no {kind}, or is damaged: {why}")
-    if content and found == f"{kind}, 1":
-        warn(
-            f"{path} is a {found}, written by an earlier version of ufl_beam without a checksum, "
-            "so that damage cannot be seen; save it again"
-        )
-        return content
-    if found not in (format, READ_TOO.get(format)):
+    if found != format:
         raise SceneError(
-            f"the file is a {found}, written by {by} of ufl_beam; this version, {version()}, reads "
-            f"a {format}"
+            f"the file is a {found}, written by version {by} of ufl_beam; this version, "
+            f"{version()}, reads a {format}"
         )
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         if sum(member.file_size for member in archive.infolist()) > len(data):
             raise SceneError("the file is damaged: what it contains is larger than itself")
-        content = json.loads(archive.read("text.json"))
+        content: Content = json.loads(archive.read("text.json"))
         for member in archive.namelist():
             name, _, ending = member.rpartition(".")
             if ending == "npy":
                 stored = io.BytesIO(archive.read(member))
                 content[name] = NPY.read_array(stored, allow_pickle=False)
     return content
-
-
-def _without_checksum(data: bytes) -> tuple[str, Content]:
-    """Format and content of a solution or a study that an earlier version wrote, in HDF5."""
-    import h5py
-
-    with h5py.File(io.BytesIO(data), "r") as file:
-        found = str(file.attrs.get("format", ""))
-        if found.startswith("solution"):
-            text: Content = json.loads(file["text"][()])
-            return found, {**text, **{name: file[name][()] for name in text.pop("arrays")}}
-        if found.startswith("study"):
-            text = {name: [*file[name].asstr()[()]] for name in ("cases", "errors")}
-            results = {name: values[()] for name, values in file["results"].items()}
-            seconds = {"member": file.attrs["member"], "seconds": file["seconds"][()]}
-            return found, {**text, **seconds, **above("results/", results)}
-    return "", {}
 
 
 def require_arrays(found: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> None:

@@ -19,6 +19,7 @@ from ufl_beam.arrays import Array, Index, State
 from ufl_beam.errors import SceneError, require_count
 from ufl_beam.model.bodies import Anchor, arm
 from ufl_beam.model.connectors import Connector
+from ufl_beam.model.joints import Link, RigidLink
 from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
 from ufl_beam.output.postprocessing import turned
@@ -62,7 +63,7 @@ def rods_of(scene: Scene) -> list[Rod]:
         others = [s for s in spots[body] if s.point != body.center] or [beside]
         rods += [Rod(body.middle, spot, BODY) for spot in others]
     for joint in scene.joints:
-        if joint.look in ("RigidLink", "Link"):
+        if isinstance(joint, RigidLink | Link):
             a, b = joint.places
             pulls = next((c for c in joint.holders if c.stretches), None)
             rods.append(Rod(a, b, LINK, pulls))
@@ -542,7 +543,7 @@ class XDMF(TimeSeries):
 
     Example:
         >>> film = ub.XDMF("beam.xdmf", every=5)
-        >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=film)
+        >>> solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=film)
         >>> [path.name for path in film.files]
         ['beam.xdmf', 'beam.xdmf.bin']
     """
@@ -578,7 +579,7 @@ class VTKHDF(TimeSeries):
 
     Example:
         >>> film = ub.VTKHDF("beam.vtkhdf", every=5)
-        >>> solution = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=film)
+        >>> solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=film)
         >>> [path.name for path in film.files]
         ['beam.vtkhdf', 'beam.vtkhdf.part']
     """

@@ -62,7 +62,7 @@ def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
         raise SceneError(f"{of} is not in the scene")
     if not of.holders:
         raise SceneError(
-            f"{of} shares unknowns, so that its force is not known; make it with measured=True"
+            f"{of} shares unknowns, so that its force is not known; make it with multipliers=True"
         )
     return [scene.links.index(holder) for holder in of.holders]
 

@@ -88,7 +88,7 @@ class PresentState(ABC):
         """Size of the force of a joint or a support at the end of the last step; N.
 
         Raises:
-            SceneError: The joint shares its displacement; make it with ``measured=True``.
+            SceneError: The joint shares its displacement; make it with ``multipliers=True``.
         """
         if isinstance(joint, Support):
             number = self.scene.supports.index(joint)
@@ -114,6 +114,7 @@ class StateView(PresentState):
     parameter: Parameter  # words for `t`: time, or the load factor of a path
     parts: int  # steps so far, parts of cut steps counted each
     cell_forces: CellForces
+    solution: Any  # `Solution` of the run
     inertia: Inertia
     inelastic: list[InelasticBeams]
     solver: Solver  # Newton's method
@@ -150,7 +151,7 @@ class StateView(PresentState):
         Monitors are also called in line searches and along paths.
 
         Example:
-            >>> simulation, norms = ub.Simulation(scene, ub.Midpoint()), []
+            >>> simulation, norms = ub.Simulation(scene, ub.EnergyMomentum()), []
             >>> simulation.snes.setMonitor(lambda snes, iteration, norm: norms.append(norm))
             >>> simulation.step_to(0.05)
             >>> len(norms) == simulation.iterations + 1
@@ -189,7 +190,7 @@ class Recorder(ABC):
         ...         self.largest = 0.0
         ...     def write(self, simulation):
         ...         self.largest = max(self.largest, abs(simulation.velocity(beam.end)[1]))
-        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=Speed())
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=Speed())
     """
 
     files: tuple[Path, ...] = ()

@@ -58,7 +58,7 @@ class SavedFunction:
             raise SceneError(
                 f"the function {self.name} is not known at t = {t:g}: a file of a solution has "
                 "the values of functions at its times only; load it with your own scene, which has "
-                "the function: ub.load(path, scene=scene)"
+                "the function: ub.Solution.load(path, scene=scene)"
             )
         return self.values[n]
 
@@ -200,7 +200,7 @@ def require_no_code(data: Data) -> None:
             kind = f"the class {record['is']} of your own (module {record['from']})"
             raise SceneError(
                 f"the scene has {kind}, and files have no code; load it with the scene of the "
-                "script, ub.load(path, scene=scene)"
+                "script, ub.Solution.load(path, scene=scene)"
             )
 
 
@@ -225,8 +225,21 @@ def from_data(data: Data) -> Any:
         warnings.simplefilter("ignore", ModelWarning)
         for record in data["records"]:
             fields = {name: make(value) for name, value in record.items() if name != "is"}
-            made.append(RECORDS[record["is"]](**fields))
+            made.append(made_of(RECORDS[record["is"]], fields))
     return make(data["root"])
+
+
+def made_of(kind: type[T], fields: Mapping[str, Any]) -> T:
+    """Make a dataclass of its fields, also one whose constructor has other arguments."""
+    known = {field.name for field in dataclasses.fields(kind) if field.init}  # type: ignore[arg-type]
+    if fields.keys() != known:
+        others = ", ".join(sorted(fields.keys() ^ known))
+        raise TypeError(f"{kind.__name__}: fields {others} are missing or unknown")
+    record = object.__new__(kind)
+    for name, value in fields.items():
+        object.__setattr__(record, name, value)
+    getattr(record, "__post_init__", lambda: None)()
+    return record
 
 
 # -- comparison ------------------------------------------------------------------------------------

@@ -40,7 +40,7 @@ before (of the same row in the first one), and if forces depend on it."""
 class Connection(NamedTuple):
     """History of a connector.
 
-    Motion, force and rate of a :func:`Bushing` are of all components; (n+1, 2) or (n+1, 3).
+    Motion, force and rate of a :class:`Bushing` are of all components; (n+1, 2) or (n+1, 3).
 
     Attributes:
         motion: Relative motion since the undeformed scene; (n+1,); m or rad.

@@ -301,7 +301,7 @@ class States:
         if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
             raise SceneError(
                 f"{joint}: {a} and {b} share unknowns, so that the force between them is not "
-                "known; make it with measured=True"
+                "known; make it with multipliers=True"
             )
         turns = [self.displacement(place)[:, 2] for place in (a, b)]
         between = self.position(b) - self.position(a)

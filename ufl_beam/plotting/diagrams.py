@@ -105,17 +105,29 @@ def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
     axes.plot(*outlines.T, color=GREY, linewidth=1.2, zorder=1)
 
 
-def plot_state(solution: Solution, what: str, *, n: int, magnify: float, ax: Axes | None) -> Figure:
-    """Draw the frame at a time, with a diagram of a section force; see :func:`plot`."""
-    style.require_choice(what, ("shape", *RESULTANTS), "plot: what")
+def draw_shape(
+    solution: Solution, *, quantity: str = "shape", n: int = -1, magnify: float = 1.0,
+    ax: Axes | None = None,
+) -> Figure:  # fmt: skip
+    """Draw the frame at the n-th kept time, perhaps with the diagram of a section force.
+
+    M is on the side in tension, positive N and V to the left of the beam from start to end;
+    positive values are red, negative ones blue.  Between vertices they follow equilibrium, see
+    :meth:`Solution.diagram`.  Numbers are the peaks of areas, in the unit of the title; the largest
+    and the least value are bold.  Yielded or cracked cells are orange, open hinges circles as in
+    :func:`draw_state_of_damage`.
+
+    Raises:
+        SceneError: No such time, ``magnify`` not positive, or ``ax`` no axes.
+    """
     pose = plane_stage(solution, [n], magnify, ax, MOST)[0].pose(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
-    if what == "shape":
+    if quantity == "shape":
         return draw_frame(ax, solution, n, pose, ("shape", when))
-    found = [(beam, getattr(solution.diagram(beam, n), what)) for beam in solution.scene.beams]
+    found = [(beam, getattr(solution.diagram(beam, n), quantity)) for beam in solution.scene.beams]
     diagrams = [(b, values.reshape(len(solution.grid.cells_of(b)), -1)) for b, values in found]
-    name = f"{RESULTANTS[what][0]} {what}"
-    return draw_frame(ax, solution, n, pose, (name, when), what, diagrams)
+    name = f"{RESULTANTS[quantity][0]} {quantity}"
+    return draw_frame(ax, solution, n, pose, (name, when), quantity, diagrams)
 
 
 def draw_frame(
@@ -292,8 +304,8 @@ def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[
             yield Area(outline, sign * largest, int(places[begin + equal[len(equal) // 2]]))
 
 
-def plot_damage(
-    solution: Solution, n: int = -1, *, magnify: float = 1.0, ax: Axes | None = None
+def draw_state_of_damage(
+    solution: Solution, *, n: int = -1, magnify: float = 1.0, ax: Axes | None = None
 ) -> Figure:
     """Draw yielded cells and opened hinges on the frame at the n-th kept time.
 
@@ -312,7 +324,7 @@ def plot_damage(
             axes.
 
     Example:
-        >>> ub.plot_damage(broken).savefig("damage.png")
+        >>> ub.plot(broken, "damage").savefig("damage.png")
     """
     from matplotlib.collections import LineCollection
 

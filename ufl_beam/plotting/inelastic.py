@@ -56,7 +56,7 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
             found.append((place_of(hinge).beam, points[vertex], law_of(hinge), dissipated))
     return [
         # One that never resisted is a joint.
-        OpenHinge(beam, at, min(lost / law.energy, 1.0) if law.limit > 0.0 else 1.0)
+        OpenHinge(beam, at, min(lost / law.fracture_energy, 1.0) if law.limit > 0.0 else 1.0)
         for beam, at, law, lost in found
     ]
 
@@ -99,7 +99,7 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
 # -- pictures ----------------------------------------------------------------------------------
 
 
-def plot_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
+def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
     The curvature includes the jump of a hinge over the length of the cell; the area of loops is the
@@ -114,7 +114,7 @@ def plot_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
         SceneError: The scene is elastic, the beam of the place is not in it, or ``ax`` is no axes.
 
     Example:
-        >>> ub.plot_moment_curvature(broken, weak.start).savefig("loops.png")
+        >>> ub.plot(broken, "moment-curvature", weak.start).savefig("loops.png")
     """
     M, K = solution.material_at(place).forces[:, 2], solution.strains_at(place)[:, 2]
     with style.panel(ax, (8.0, 5.4)) as axes:
@@ -125,7 +125,7 @@ def plot_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
     return style.figure_of(axes)
 
 
-def plot_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
+def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
     The area between the path and the axis is the energy that the hinge dissipated; the title says
@@ -142,14 +142,14 @@ def plot_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
             scene, or ``ax`` is no axes.
 
     Example:
-        >>> ub.plot_hinge(broken, weak.start).savefig("hinge.png")
+        >>> ub.plot(broken, "hinge", weak.start).savefig("hinge.png")
     """
     kept, grid = solution.material_at(place), solution.grid
     hinge = grid.hinge_at(place)
     in_cell = grid.hinges(place.beam)[grid.cell(place) - int(grid.cells_of(place.beam)[0])]
     law = in_cell if hinge is None else law_of(hinge)
     if law is None or np.isinf(law.limit):
-        raise SceneError(f"plot_hinge: neither {place} nor the cell there has a hinge")
+        raise SceneError(f"plot: neither {place} nor the cell there has a hinge")
     M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
         # Pieces in which the jump only grows or only falls; neighbours share a point
@@ -162,13 +162,14 @@ def plot_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
         style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
         _prefix(axes.xaxis, jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
-        if math.isfinite(law.energy):
-            spent += f", {100 * lost / law.energy:.3g} % of {with_unit(law.energy, 'J')}"
+        if math.isfinite(law.fracture_energy):
+            whole = law.fracture_energy
+            spent += f", {100 * lost / whole:.3g} % of {with_unit(whole, 'J')}"
         axes.set_title(f"hinge at {place}: {spent}", loc="left")
     return style.figure_of(axes)
 
 
-def plot_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
+def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     """Draw the energy losses over time (J) by their sinks, as stacked areas.
 
     The line above them is the supplied work, plus the initial energy of the scene; the gap between
@@ -183,11 +184,11 @@ def plot_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         SceneError: The scene is elastic, and has no connectors; or ``ax`` is no axes.
 
     Example:
-        >>> ub.plot_dissipation(broken).savefig("dissipation.png")
+        >>> ub.plot(broken, "dissipation").savefig("dissipation.png")
     """
     if not solution.scene.connectors:
         if not solution.scene.beams:
-            raise SceneError("plot_dissipation: the scene has neither beams nor connectors")
+            raise SceneError("plot: the scene has neither beams nor connectors")
         solution.material(solution.scene.beams[0])  # or its error
     energy, t = solution.energy, solution.progress
     held = energy.total

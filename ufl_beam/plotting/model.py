@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of a model before a run, and of a solution at one of its times."""
+"""Picture of a model before a run."""
 
 from __future__ import annotations
 
@@ -13,12 +13,10 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import counted, html_of
-from ufl_beam.errors import SceneError
 from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.loads import Gravity, Load, Rayleigh, RotatingFrame
 from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.plotting import notebook, style
-from ufl_beam.plotting.diagrams import plot_state
 from ufl_beam.plotting.layout import Placed, place, segments
 from ufl_beam.plotting.model_sheet import (
     CAPTIONS,
@@ -31,7 +29,6 @@ from ufl_beam.plotting.model_sheet import (
 )
 from ufl_beam.plotting.style import POINTS, RED, TEXT, WHITE, font_size, shade, with_unit
 from ufl_beam.plotting.symbols import draw_strokes
-from ufl_beam.simulation.solution import Solution
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,62 +43,22 @@ Measure = Callable[[str], Array]  # half of width and height of a text; (2,); po
 UNBOUNDED = np.array([-np.inf, -np.inf, np.inf, np.inf])  # frame, before its place is known
 
 
-def plot(
-    shown: Scene | Solution,
-    what: str = "shape",
-    *,
-    n: int = -1,
-    magnify: float = 1.0,
-    ax: Axes | None = None,
-) -> Figure:
-    """Draw a model before any run, or a solution at one of its times.
+def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
+    """Draw the undeformed model, before any run.
 
-    Of a :class:`Scene` it draws the undeformed model: beams, their cells and names, bodies, joints,
-    supports, connectors with their sizes, hinges, loads (red), prescribed motions (orange), masses
-    and initial velocities (green).  Hollow heads of arrows are loads that turn with their place.
-    Names and sizes for which there is no room are left out.
-
-    Of a :class:`Solution` it draws the frame at the n-th kept time, with the diagram of a section
-    force if ``what`` names one: M on the side in tension, positive N and V to the left of the beam
-    from start to end, positive values red, negative ones blue.  Between vertices they follow
-    equilibrium, see :meth:`Solution.diagram`.  Numbers are the peaks of areas, in the unit of the
-    title; the largest and the least value are bold.  Yielded or cracked cells are orange, open
-    hinges circles as in :func:`plot_damage`.
-
-    What is orange drives: filled if it gives the motion, hollow if it gives the force.
-
-    Args:
-        shown: The scene or the solution.
-        what: Of a solution: "shape", "N", "V" or "M".
-        n: Number of the kept time of a solution; negative from the end.
-        magnify: Factor on the displacements of a solution.
-        ax: Axes to draw in; by default those of a new figure.
+    It shows beams, their cells and names, bodies, joints, supports, connectors with their sizes,
+    hinges, loads (red), prescribed motions (orange), masses and initial velocities (green).  Hollow
+    heads of arrows are loads that turn with their place.  What is orange drives: filled if it gives
+    the motion, hollow if it gives the force.  Names and sizes for which there is no room are left
+    out.
 
     Raises:
-        SceneError: Neither a scene nor a solution; a scene whose constraints repeat; anything but
-            the shape of a scene; an unknown ``what``, no such time, ``magnify`` not positive, or
-            ``ax`` no axes.
-
-    Example:
-        >>> ub.plot(scene).savefig("model.png")
-        >>> ub.plot(solution, "M", magnify=10).savefig("moments.png")
+        SceneError: Constraints of the scene repeat, or ``ax`` is no axes.
     """
-    if isinstance(shown, Solution):
-        return plot_state(shown, what, n=n, magnify=magnify, ax=ax)
-    if not isinstance(shown, Scene):
-        raise SceneError(
-            f"plot: {shown!r} is a {type(shown).__name__}; give a Scene, or the Solution of a run"
-        )
-    given = {"what": (what, "shape"), "n": (n, -1), "magnify": (magnify, 1.0)}
-    if said := [f"{name} = {x!r}" for name, (x, default) in given.items() if x != default]:
-        raise SceneError(
-            f"plot: a scene has no {', '.join(said)} before a run; plot(scene) draws the model, "
-            f"plot(solution, {what!r}) what a run found"
-        )
-    require_independent(shown)
-    subject, notes = Subject(shown), notes_of(shown)
+    require_independent(scene)
+    subject, notes = Subject(scene), notes_of(scene)
     cells = (subject.cells, "cell", "cells")
-    beams, bodies = (len(shown.beams), "beam", "beams"), (len(shown.bodies), "body", "bodies")
+    beams, bodies = (len(scene.beams), "beam", "beams"), (len(scene.bodies), "body", "bodies")
     title = f"model: {counted(beams, cells, bodies)}"
     with style.panel(ax, MOST) as axes:
         measure: Measure = cache(lambda text: style.half_size(axes, text, font_size(LABEL_SIZE)))
@@ -120,7 +77,7 @@ def plot(
             around = LEFT + RIGHT, font_size(BELOW + ABOVE + NOTE * len(notes))
             least, most = (POINTS * np.array(size) - around for size in (LEAST, MOST))
             # At least as wide as the words above
-            badges = [2 * measure(text)[0] + BADGE for text, *_ in map(badge, shown.loads) if text]
+            badges = [2 * measure(text)[0] + BADGE for text, *_ in map(badge, scene.loads) if text]
             first = 2 * TITLE_SIZE / LABEL_SIZE * measure(title)[0] + sum(badges)
             above = max([first, *(2 * measure(words)[0] for words in notes)])
             least[0] = min(max(least[0], above), most[0])
@@ -132,7 +89,7 @@ def plot(
         _write(axes, placed, sheet.scale)
         # The loads on the whole scene, right above the axes
         x, y = frame[2:] - frame[:2] + (0.0, 17.0)
-        for text, arrow, angle in filter(any, map(badge, shown.loads)):
+        for text, arrow, angle in filter(any, map(badge, scene.loads)):
             for words, size, turn in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
                 axes.annotate(
                     words, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
@@ -144,8 +101,8 @@ def plot(
 
 @html_of.register
 def of_scene(scene: Scene) -> str:
-    """Write a scene: its parts, and the picture of :func:`plot`."""
-    return notebook.lines(str(scene)) + notebook.image("model", partial(plot, scene))
+    """Write a scene: its parts, and its picture."""
+    return notebook.lines(str(scene)) + notebook.image("model", partial(draw_model, scene))
 
 
 def notes_of(scene: Scene) -> list[str]:
@@ -160,7 +117,9 @@ def notes_of(scene: Scene) -> list[str]:
             beams = damping.beams or ()
             where = " of " + ", ".join(b.name for b in beams[:4]) if beams else ""
             more = " ..." if len(beams) > 4 else ""
-            notes.append(f"Kelvin–Voigt damping, {with_unit(damping.time, 's')}{where}{more}")
+            notes.append(
+                f"Kelvin–Voigt damping, {with_unit(damping.retardation_time, 's')}{where}{more}"
+            )
     for work in scene.works:
         where = "" if work.beams is None else " on " + ", ".join(b.name for b in work.beams[:4])
         notes.append(f"{work.name}: acts as its function says{where}")
@@ -176,7 +135,7 @@ def badge(load: Load) -> tuple[str, str, float]:
     if isinstance(load, Gravity):
         x, y = load.acceleration
         size, angle = math.hypot(x, y), math.degrees(math.atan2(y, x))
-        return in_time(f"g = {size:.4g} m/s²", load.time), "→" if size else "", angle
+        return in_time(f"g = {size:.4g} m/s²", load.amplitude), "→" if size else "", angle
     if isinstance(load, RotatingFrame):
         x, y = load.about
         text = f"frame: {load.rate:.4g} rad/s about ({x:g}, {y:g})".replace("-", "−")

@@ -250,12 +250,12 @@ def _draw_point_load(sheet: Sheet, load: PointLoad | FollowerLoad) -> None:
         way = np.array(load.force) / size
         line = _stand(sheet, load.place, way, size / sheet.subject.force)
         sheet.strokes["loads"] += _arrow(line, RED, unit, hollow=hollow)
-        text = in_time(with_unit(size, "N"), load.time) + more
+        text = in_time(with_unit(size, "N"), load.amplitude) + more
         sheet.write(text, RED, LOADS, _beside(*line))
     if load.moment:
         radius = 1.7 * unit + sheet.stack((load.place.point, "moment"), 0.8 * unit)
         sheet.strokes["loads"] += _arrow(_around(at, radius, load.moment), RED, unit, hollow=hollow)
-        text = in_time(with_unit(abs(load.moment), "N m"), load.time) + more
+        text = in_time(with_unit(abs(load.moment), "N m"), load.amplitude) + more
         sheet.write(text, RED, LOADS, sheet.around(at, radius))
     if not size and not load.moment:
         sheet.write("0 N", RED, LOADS, sheet.around(at, 0.0))
@@ -310,12 +310,12 @@ def _draw_line_load(sheet: Sheet, load: LineLoad) -> None:
                 sheet.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
             gap = (aside + 0.3 * unit) / sheet.scale
             spots = [Spot(at, left, gap) for at, _ in _normals(axis)]
-        sheet.write(in_time(with_unit(size, "N/m"), load.time), RED, LOADS, spots)
+        sheet.write(in_time(with_unit(size, "N/m"), load.amplitude), RED, LOADS, spots)
     if load.moment:
         for at in spaced(3.2 * unit):
             line = _around(at, 0.75 * unit, load.moment)
             sheet.strokes["loads"] += _arrow(line, RED, 0.7 * unit)
-        text = in_time(with_unit(abs(load.moment), "N m/m"), load.time)
+        text = in_time(with_unit(abs(load.moment), "N m/m"), load.amplitude)
         sheet.write(text, RED, LOADS, sheet.along(axis, 0.9 * unit))
     if not size and not load.moment:
         sheet.write("0 N/m", RED, LOADS, sheet.along(axis, 0.0))

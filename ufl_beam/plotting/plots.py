@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ufl_beam.analysis.modes import Shapes
+from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.display import html_of
 from ufl_beam.errors import SceneError, require_number
@@ -41,7 +42,7 @@ LEAST_ERROR = 1e-12  # errors below are drawn there, in the unit of the quantity
 CLASSES = 40  # classes of ranges and of means of cycles in pictures
 
 
-def plot_shapes(
+def draw_shapes(
     solution: Solution,
     times: Sequence[float] = (),
     *,
@@ -65,15 +66,15 @@ def plot_shapes(
             or ``ax`` is no axes.
 
     Example:
-        >>> ub.plot_shapes(solution, count=5, magnify=10).savefig("shapes.png")
+        >>> ub.plot(solution, "shapes", count=5, magnify=10).savefig("shapes.png")
     """
     from matplotlib.colors import to_hex
 
-    require_number(count, "plot_shapes: count", at_least=1)
+    require_number(count, "plot: count", at_least=1)
     if np.ndim(times) != 1:
         raise SceneError(
-            f"plot_shapes: times = {times!r} must be a sequence of times (s); for so many shapes "
-            f"say count={times!r}"
+            f"plot: times = {times!r} must be a sequence of times (s); for so many shapes "
+            f"give count={times!r}"
         )
     kept = solution.times
     nearest = [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
@@ -110,11 +111,11 @@ def of_solution(solution: Solution) -> str:
     moved = solution.q[:, solution.grid.dofs[:, :2]]
     part = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
     magnify = max(x for x in FACTORS if x == 1 or (part > 0.0 and x * part <= VISIBLE))
-    shapes = partial(plot_shapes, solution, count=SHAPES, magnify=magnify)
+    shapes = partial(draw_shapes, solution, count=SHAPES, magnify=magnify)
     return text + notebook.image("shapes", shapes)
 
 
-def plot_history(
+def draw_history(
     solution: Solution,
     places: Anchor | Sequence[Anchor],
     *,
@@ -134,9 +135,9 @@ def plot_history(
             static run, or ``ax`` is no axes.
 
     Example:
-        >>> ub.plot_history(solution, beam.end, component="v").savefig("history.png")
+        >>> ub.plot(solution, "history", beam.end, component="v").savefig("history.png")
     """
-    style.require_choice(component, COMPONENTS, "plot_history: component")
+    style.require_choice(component, COMPONENTS, "plot: component")
     followed = (places,) if isinstance(places, Anchor) else tuple(places)
     number = list(COMPONENTS).index(component)
     motion = solution.displacement if number < 3 else solution.velocity
@@ -152,14 +153,14 @@ def plot_history(
     return style.figure_of(axes)
 
 
-def plot_energy(solution: Solution) -> Figure:
+def draw_energy(solution: Solution) -> Figure:
     """Draw the energy ledger over time or along a path, and below it its imbalance.
 
     Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance as a
     part of the energy that went through, with the machine precision for comparison.
 
     Example:
-        >>> ub.plot_energy(solution).savefig("energy.png")
+        >>> ub.plot(solution, "energy").savefig("energy.png")
     """
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
     along = solution.progress
@@ -192,23 +193,23 @@ def plot_energy(solution: Solution) -> Figure:
 # -- analyses ----------------------------------------------------------------------------------
 
 
-def plot_modes(shapes: Shapes, which: Sequence[int] = (), *, amplitude: float = 0.1) -> Figure:
+def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float = 0.1) -> Figure:
     """Draw modes side by side, in both directions from the grey undeformed scene.
 
     Args:
         shapes: Of :func:`modes` or :func:`buckling`.
-        which: Their numbers; all by default.
+        numbers: Their numbers; all by default.
         amplitude: Largest displacement, as a part of the size of the scene.
 
     Raises:
         SceneError: There is no such shape, or ``amplitude`` is not positive.
 
     Example:
-        >>> ub.plot_modes(ub.modes(scene, 3)).savefig("modes.png")
+        >>> ub.plot(ub.modes(scene, 3)).savefig("modes.png")
     """
-    chosen = list(which) if len(which) else list(range(len(shapes)))
+    chosen = list(numbers) if len(numbers) else list(range(len(shapes)))
     if not chosen:
-        raise SceneError("plot_modes: there is no shape")
+        raise SceneError("plot: there is no shape")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
     stages = [plane_stage(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
     box = np.concatenate([stage.points() for stage in stages])
@@ -239,11 +240,11 @@ def of_shapes(shapes: Shapes) -> str:
     rows = [(str(k), title) for k, title in enumerate(shapes.titles)]
     first = range(min(MODES, len(shapes)))
     return notebook.table((shapes.word, ""), rows) + notebook.image(
-        "modes", partial(plot_modes, shapes, first)
+        "modes", partial(draw_modes, shapes, numbers=first)
     )
 
 
-def plot_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
+def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
     """Draw errors over wall times of all runs, and the recommended run in a ring.
 
     Each kind of scheme, steps and cells has a colour; the line is that of runs that no other one
@@ -259,7 +260,7 @@ def plot_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
     Example:
         >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
         >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
-        >>> ub.plot_tradeoff(found).savefig("tradeoff.png")
+        >>> ub.plot(found).savefig("tradeoff.png")
     """
     errors = {run: max(tradeoff.ratio(run), LEAST_ERROR) for run in tradeoff.runs}
     with style.panel(ax, (9.0, 6.0)) as axes:
@@ -302,33 +303,23 @@ def of_tradeoff(found: Tradeoff) -> str:
         + notebook.table(head, rows)
         + notebook.lines(*found.remarks())
     )
-    return text + notebook.image("errors over wall times", partial(plot_tradeoff, found))
+    return text + notebook.image("errors over wall times", partial(draw_tradeoff, found))
 
 
-def plot_extremes(
-    solution: Solution, extremes: Extremes, what: str = "M", *, ax: Axes | None = None
-) -> Figure:
-    """Draw the envelope of a section force on the frame: maxima red, minima blue.
+def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = None) -> Figure:
+    """Draw the envelope of a section force on the undeformed frame: maxima red, minima blue.
 
-    As in :func:`plot`, on the undeformed axis; the values of each point may be of different times.
-
-    Args:
-        solution: Of the run that the extremes were recorded in.
-        extremes: The recorder.
-        what: "N", "V" or "M".
-        ax: Axes to draw in; by default those of a new figure.
+    The values of each point may be of different times.
 
     Raises:
-        SceneError: Unknown ``what``, the extremes are of another scene or of no run, or ``ax`` is
-            no axes.
+        SceneError: Nothing was run, or ``ax`` is no axes.
 
     Example:
         >>> extremes = ub.Extremes()
-        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, record=extremes)
-        >>> ub.plot_extremes(run, extremes, "M").savefig("extremes.png")
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes)
+        >>> ub.plot(extremes, "M").savefig("extremes.png")
     """
-    style.require_choice(what, style.RESULTANTS, "plot_extremes: what")
-    index = list(style.RESULTANTS).index(what)
+    index, solution = list(style.RESULTANTS).index(quantity), extremes.solution
     reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
     diagrams = [
         (beam, values[:, index].reshape(len(solution.grid.cells_of(beam)), -1))
@@ -336,12 +327,46 @@ def plot_extremes(
         for values in (found.high, found.low)
     ]
     until = f"until {solution.parameter.at(solution.times[-1])}"
-    title = f"extremes of the {style.RESULTANTS[what][0]} {what}", until
+    title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}", until
     pose = plane_stage(solution, [], 1.0, ax, MOST)[0].undeformed
-    return draw_frame(ax, solution, -1, pose, title, what, diagrams)
+    return draw_frame(ax, solution, -1, pose, title, quantity, diagrams)
 
 
-def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
+def draw_study(study: Study) -> Figure:
+    """Draw each result of a study over each number that its cases vary.
+
+    Results of several numbers are drawn by their largest size; cases that failed are left out.
+
+    Raises:
+        SceneError: No case has a number, or no member has a result.
+
+    Example:
+        >>> spans = [{"length": 1.0 + 0.25 * k} for k in range(5)]
+        >>> found = ub.study(lambda length: {"deflection": length**3}, spans)
+        >>> ub.plot(found).savefig("study.png")
+    """
+    varied = {
+        name: np.array([case[name] for case in study.cases], dtype=float)
+        for name, value in (study.cases[0] if len(study) else {}).items()
+        if isinstance(value, int | float)
+    }
+    varied = {n: x for n, x in varied.items() if np.ptp(x) > 0 or len(varied) == 1}
+    if not varied or not study.results:
+        raise SceneError("plot: the study has no results over numbers of its cases")
+    rows, columns = len(study.results), len(varied)
+    with picture((max(6.0, 4.0 * columns), max(4.0, 2.6 * rows))) as figure:
+        grid = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
+        for of_row, (result, values) in zip(grid, study.results.items(), strict=True):
+            of_case = np.abs(values.reshape(len(study), -1)).max(axis=1)
+            of_row[0].set_ylabel(result)
+            for axes, x in zip(of_row, varied.values(), strict=True):
+                axes.plot(x, of_case if values.ndim > 1 else values, "o", color=BLUE, ms=5.0)
+        for axes, name in zip(grid[-1], varied, strict=True):
+            axes.set_xlabel(name)
+    return figure
+
+
+def draw_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
     """Draw rainflow matrix, spectrum and damage of the stress cycles at a place.
 
     On the left the rainflow matrix; in the middle the number of cycles above each range, with the
@@ -357,16 +382,16 @@ def plot_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
     Example:
         >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
         >>> fatigue = ub.Fatigue(spot, ub.SNCurve.eurocode(71e6))
-        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), time=np.sin)
+        >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), amplitude=np.sin)
         >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
         >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
-        >>> ub.plot_cycles(fatigue, spot).savefig("cycles.png")
+        >>> ub.plot(fatigue, "cycles", spot).savefig("cycles.png")
     """
     from matplotlib.colors import LogNorm
 
     cycles, curve = fatigue.cycles(spot), fatigue.curve
     if not len(cycles.range):
-        raise SceneError(f"plot_cycles: the stress at {spot} never turned")
+        raise SceneError(f"plot: the stress at {spot} never turned")
     ranges, means = 1e-6 * cycles.range, 1e-6 * cycles.mean
     done = cycles.count / curve.endurance(cycles.range, cycles.mean)
     edges = np.linspace(0.0, ranges[-1] * (1 + 1e-9), CLASSES + 1)

@@ -127,7 +127,7 @@ def render(
     path: str | Path,
     *,
     n: int = -1,
-    color: str = "M",
+    quantity: str = "M",
     thickness: float = 1.0,
     magnify: float = 1.0,
     camera: Camera = CAMERA,
@@ -143,7 +143,7 @@ def render(
         solution: Solution to draw.
         path: File, ending in ``.png``.
         n: Number of the kept time; negative from the end.
-        color: Quantity that colours the beams: "N", "V", "M" or "rotation".
+        quantity: Quantity that colours the beams: "N", "V", "M" or "rotation".
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
         camera: Where the camera looks, and the place that it follows.
@@ -155,11 +155,11 @@ def render(
         RuntimeError: There is neither a screen nor Xvfb.
 
     Example:
-        >>> ub.render(solution, "beam.png", color="M", size=(640, 360))
+        >>> ub.render(solution, "beam.png", quantity="M", size=(640, 360))
     """
     from matplotlib.image import imsave
 
-    solids = Solids(solution, [n], color, thickness, magnify, size)
+    solids = Solids(solution, [n], quantity, thickness, magnify, size)
     path = _require_suffix(path, (".png",))
     require_kind(camera, Camera, "render: camera")
     camera.origin(solids.stage.pose(n))
@@ -174,7 +174,7 @@ def animate(
     *,
     fps: float = 25.0,
     seconds: float = 4.0,
-    color: str = "M",
+    quantity: str = "M",
     thickness: float = 1.0,
     magnify: float = 1.0,
     camera: Camera = CAMERA,
@@ -191,7 +191,7 @@ def animate(
         path: File, ending in ``.gif``, or in ``.mp4`` if there is ffmpeg, as in imageio-ffmpeg.
         fps: Frames per second; browsers show at most 50 of a GIF.
         seconds: Duration of the film, whatever the duration of the motion; s.
-        color: Quantity that colours the beams: "N", "V", "M" or "rotation".
+        quantity: Quantity that colours the beams: "N", "V", "M" or "rotation".
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
         camera: Where the camera looks, and the place that it follows.
@@ -216,7 +216,7 @@ def animate(
     require_number(fps, "animate: fps", positive=True)
     require_number(seconds, "animate: seconds", positive=True)
     shown = evenly(solution.progress, max(1, round(fps * seconds)))
-    solids = Solids(solution, shown, color, thickness, magnify, size)
+    solids = Solids(solution, shown, quantity, thickness, magnify, size)
     camera.origin(solids.stage.undeformed)
     if active_comm().rank == 0:
         with closing(_frames(solids, camera)) as frames:
@@ -238,7 +238,7 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
     grid, beams = solution.grid, solution.scene.beams
     largest = max(float(np.abs(solids.values(n)).max(initial=0.0)) for n in set(solids.shown))
     factor, prefix = style.decimal_prefix(largest)
-    limit, (quantity, unit) = largest / factor or 1.0, QUANTITIES[solids.color]
+    limit, (words, unit) = largest / factor or 1.0, QUANTITIES[solids.quantity]
     text = {"font_size": size[1] // 40, "color": "black", "viewport": True}
     bar = {
         "title": "values", "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.48,
@@ -255,7 +255,7 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
             if beams:
                 undeformed = _lines([grid.points[grid.vertices_of(beam)] for beam in beams])
                 plotter.add_mesh(undeformed, color="#A0A0A0", reset_camera=False)
-                plotter.add_text(f"{quantity} ({prefix}{unit})", position=(0.02, 0.025), **text)
+                plotter.add_text(f"{words} ({prefix}{unit})", position=(0.02, 0.025), **text)
             for n in solids.shown:
                 plotter.suppress_rendering = True
                 pose = stage.pose(n)
@@ -304,13 +304,13 @@ class Solids:
 
     solution: Solution
     shown: list[int]  # numbers of the kept times
-    color: str
+    quantity: str
     thickness: float
     magnify: float
     size: tuple[int, int]
 
     def __post_init__(self) -> None:
-        style.require_choice(self.color, QUANTITIES, "color")
+        style.require_choice(self.quantity, QUANTITIES, "quantity")
         require_number(self.thickness, "thickness", positive=True)
         require_number(self.magnify, "magnify", positive=True)
         for pixels in self.size:
@@ -335,9 +335,9 @@ class Solids:
     def values(self, n: int) -> Array:
         """Values of the colours at both ends of all cells; (num_cells, 2)."""
         solution, grid = self.solution, self.solution.grid
-        if self.color == "rotation":
+        if self.quantity == "rotation":
             return np.asarray(solution.q[n][grid.dofs[grid.cells, 2]])
-        index = list(RESULTANTS).index(self.color)
+        index = list(RESULTANTS).index(self.quantity)
         beams = solution.scene.beams
         forces = [solution.diagram(beam, n, points=2)[1 + index] for beam in beams]
         return np.concatenate([np.empty(0), *forces]).reshape(-1, 2)

@@ -20,7 +20,7 @@ from ufl_beam.model import connector_laws as laws
 from ufl_beam.model.bodies import GROUND, Anchor, Place, Spot, node
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connectors import Connector
-from ufl_beam.model.joints import Joint
+from ufl_beam.model.joints import Guided, Joint, Link, Prismatic, Release, RigidLink
 from ufl_beam.model.supports import Support
 from ufl_beam.plotting import layout
 from ufl_beam.plotting.layout import Pose, directions, in_frame, left_of, unit_vectors
@@ -256,20 +256,20 @@ def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
         yield Stroke(points, INK, 2.4, layer=FRONT)
 
 
-JOINTS = {
-    "Link": Look(rod=2.6, pins=(0, 1)),
-    "RigidLink": Look(rod=6.0),
-    "Prismatic": Look(pins=(1,), rail=_rail, grounded=False),
-    "Guided": Look(pins=(1,), rail=_guide, grounded=False),
-    "Release": Look(pins=(0,), rail=_sleeve),
+JOINTS: dict[type[Joint], Look] = {
+    Link: Look(rod=2.6, pins=(0, 1)),
+    RigidLink: Look(rod=6.0),
+    Prismatic: Look(pins=(1,), rail=_rail, grounded=False),
+    Guided: Look(pins=(1,), rail=_guide, grounded=False),
+    Release: Look(pins=(0,), rail=_sleeve),
 }
-"""Symbols of joints by their `look`; others have a pin, or a thin rod if their places are apart."""
+"""Symbols of joints by their class or a base; others have a pin, or a thin rod between places."""
 
 
 def look_of(joint: Joint) -> Look:
     """Return the symbol of a joint."""
     plain = Look(pins=(0,)) if joint.meets else Look(rod=1.6)
-    return JOINTS.get(joint.look, plain)
+    return next((JOINTS[kind] for kind in type(joint).__mro__ if kind in JOINTS), plain)
 
 
 def _turns(joint: Joint) -> bool:
@@ -395,8 +395,8 @@ LAWS: dict[type, Glyph] = {  # what drives is orange, filled if its motion is gi
         ],
         _friction_in_words,
     ),
-    laws.Motor: _drive([*_PUSHED, _box(-0.8, 0.35, 0.6, ORANGE)], ORANGE),
-    laws.Actuator: _drive(_CYLINDER, WHITE),
+    laws.PrescribedMotion: _drive([*_PUSHED, _box(-0.8, 0.35, 0.6, ORANGE)], ORANGE),
+    laws.PrescribedForce: _drive(_CYLINDER, WHITE),
     laws.Controller: _drive(
         [*_CYLINDER, _line((0.9, 0), (0.9, 1.15), (-0.25, 1.15), (-0.25, 0.6), weight=1.0)],
         WHITE, -1.4, _box(-2.0, -1.4, 0.5, WHITE),

@@ -16,7 +16,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import mass_form
 from ufl_beam.errors import SceneError
-from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import (
@@ -53,8 +53,11 @@ class ElasticBeams(CellForce):
         r, losses = scheme.resultants(C, e0, e1, of.constant), []
         if scheme.alpha:
             losses.append(2 * of.constant(scheme.alpha) * elastic_energy(e1 - e0, C))
-        self._decays, self._change_before = isinstance(scheme, DecayingMidpoint), of.at_points(3)
-        if isinstance(scheme, DecayingMidpoint):  # c C (Δe - r Δe'), Δe' of the step before
+        self._decays, self._change_before = (
+            isinstance(scheme, EnergyMomentumDecaying),
+            of.at_points(3),
+        )
+        if isinstance(scheme, EnergyMomentumDecaying):  # c C (Δe - r Δe'), Δe' of the step before
             damped = of.constant(scheme.part) * resultants(e1 - e0 - self._change_before, C)
             r = r + damped
             losses.append(virtual_work(damped, e1 - e0))
@@ -266,7 +269,7 @@ class Inertia(MatrixForce):
         pairs = zip_longest(self.scheme.kept, self.more)
         more = [memory.vector(name, known) for name, known in pairs]
         self.more = tuple(known for known in more if known is not None)
-        if isinstance(self.scheme, DecayingMidpoint):
+        if isinstance(self.scheme, EnergyMomentumDecaying):
             self.v_before = memory.vector("velocity before", self.v_before)
             last = memory.vector("last step", np.full(self.size, self.last_dt))
             self.last_dt = float(last[0])
@@ -301,7 +304,11 @@ class KelvinVoigtForce(CellForce):
 
     def __init__(self, damping: KelvinVoigt, numbers: Index, setting: Setting) -> None:
         cells = Cells(setting.grid, numbers)
-        of, self._time, self._rate = cells.element, damping.time, cells.element.constant(1.0)
+        of, self._time, self._rate = (
+            cells.element,
+            damping.retardation_time,
+            cells.element.constant(1.0),
+        )
         change = strain(of.q1, of.axis) - strain(of.q0, of.axis)
         r = self._rate * resultants(change, of.stiffness)
         w_e = setting.scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)

@@ -23,12 +23,12 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
     HELD,
-    Actuator,
     Controller,
     Coulomb,
     Damper,
     ForceLaw,
-    Motor,
+    PrescribedForce,
+    PrescribedMotion,
     RigidPlastic,
     Spring,
 )
@@ -36,7 +36,7 @@ from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.material_law import State
-from ufl_beam.model.material_laws import Hardening
+from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.reference.cells import Setting
 from ufl_beam.reference.points import MaterialPoints, derivative
 
@@ -158,8 +158,8 @@ class _Known(LawInStep):
     """Law whose row is known as the step begins: of what is held, driven, pushed or damped."""
 
     KINDS = {  # noqa: RUF012
-        Motor: ("supplied", "motors", -1.0, "_Driven"),
-        Actuator: ("supplied", "loads", -1.0, "_Pushed"),
+        PrescribedMotion: ("supplied", "motors", -1.0, "_Driven"),
+        PrescribedForce: ("supplied", "loads", -1.0, "_Pushed"),
         Controller: ("supplied", "controllers", -1.0, "_Controlled"),
         Damper: ("lost", "damping", 1.0, "_Damped"),
     }
@@ -169,13 +169,13 @@ class _Known(LawInStep):
         kind = held if link.law is HELD else self.KINDS[type(link.law)]
         self.part, self.entry, self.sign, self.saved_as = kind
         super().__init__(link, setting)
-        self.z = {"reached": 0.0} if isinstance(self.law, Actuator | Controller) else {}
+        self.z = {"reached": 0.0} if isinstance(self.law, PrescribedForce | Controller) else {}
 
     def begin(self, e0: float, step: Step) -> None:
         law, link = self.law, self.link
         if law is HELD:
             self._row = 1.0, 0.0, 0.0
-        elif isinstance(law, Motor):
+        elif isinstance(law, PrescribedMotion):
             wanted = value_at(law.motion, step.motion_time, link)
             self._row = 1.0, 0.0, e0 + step.fraction * (wanted - e0)
         elif isinstance(law, Damper):
@@ -275,7 +275,7 @@ class _Sprung(LawInStep):
 
     def __init__(self, link: Connector, setting: Setting) -> None:
         super().__init__(link, setting)
-        law, softening = self.law.law or Hardening(limit=np.inf), self.law.softening
+        law, softening = self.law.law or ElastoPlastic(yield_limit=np.inf), self.law.softening
         layout = Layout(
             strains=np.eye(1, 3), weights=np.ones(1), stiffness=np.array([self.law.stiffness]),
             laws=((law, 1),), rest=np.zeros(3), breaking=slice(None),
@@ -407,7 +407,7 @@ class _Slipping(LawInStep):
         self._law, self._numbers = law, {name: float(x) for name, x in numbers(law).items()}
         self.z = {"slipped": 0.0, "start": 0.0, "limit": float(law.limit), "back force": 0.0}
         self.z |= {"dissipated": 0.0, "way": 0.0, "stored": 0.0}
-        self.excess, self.released, self._hardens = 0.0, False, isinstance(law, Hardening)
+        self.excess, self.released, self._hardens = 0.0, False, isinstance(law, ElastoPlastic)
         setting.loses("hinges")
         self._loss = 2 * setting.scheme.alpha if self._hardens else 0.0
         if self._loss:

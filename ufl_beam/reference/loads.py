@@ -48,7 +48,7 @@ class LoadForce(Force, ABC):
 
     def __init__(self, load: Load | RotatingFrame, setting: Setting) -> None:
         self.size, self.load, self.scheme = setting.grid.size, load, setting.scheme
-        self.time = (lambda t: 1.0) if isinstance(load, RotatingFrame) else load.time
+        self.time = (lambda t: 1.0) if isinstance(load, RotatingFrame) else load.amplitude
         self.force: Array = np.zeros(self.size)
         self._before: Array = self.force
         self.factor, self._reached, self.supplied = 0.0, 0.0, setting.ledger.supplied

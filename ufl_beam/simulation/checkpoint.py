@@ -37,7 +37,7 @@ from ufl_beam.parallel import on_first
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 
-FORMAT = "checkpoint of ufl_beam, 3"
+FORMAT = "checkpoint of ufl_beam, 4"
 """The number grows whenever the meaning of files changes."""
 
 
@@ -61,7 +61,7 @@ class Checkpoint:
 
     Example:
         >>> backup = ub.Checkpoint("run.checkpoint", every=1000)
-        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05, checkpoint=backup)
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, checkpoint=backup)
         >>> [path.name for path in backup.files]
         ['run.checkpoint', 'run.checkpoint.part']
     """

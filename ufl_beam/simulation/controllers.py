@@ -124,7 +124,7 @@ CONTROLLED = (
 )
 DRIVEN = (
     "it drives a motion that is too fast for the steps. Use smaller ones, or a scheme that damps "
-    "such motions, as Midpoint(alpha=0.05, beta=0.05) does"
+    "such motions, as EnergyMomentum(alpha=0.05, beta=0.05) does"
 )
 """Reasons and remedies, of a controller and of a force law."""
 

@@ -25,7 +25,7 @@ from ufl_beam.model.connector_laws import (
 )
 from ufl_beam.model.constraint_checks import INSTEAD
 from ufl_beam.model.material_law import MaterialLaw, has_quadratic_energies, judges_dissipation
-from ufl_beam.model.material_laws import Hardening
+from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC, WORK
 from ufl_beam.output.states import States
 from ufl_beam.simulation.solution import Solution
@@ -245,11 +245,11 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
         said += f"; {_list(ways)} {give} at no further force"
     layouts = (grid.scene.beams[grid.beam_of_cell[i]].section.layout(None) for i in cells.soft)
     laws = (law for layout in layouts if layout is not None for law, _ in layout.laws)
-    perfect = any(isinstance(law, Hardening) and law.bounded and law.opens for law in laws)
+    perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
     if len(cells.soft) > 1 and perfect:
         said += (
             "; if they are in a row, nothing tells which of them flows: let the law harden a "
-            "little, as Hardening(limit, modulus) with a millionth of the stiffness"
+            "little, as ElastoPlastic(limit, modulus) with a millionth of the stiffness"
         )
     return said
 

@@ -61,7 +61,7 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool) -> tu
         loose = require_no_mechanism(scene)
         warn_of_rates(scene)
         if fresh and scheme.theta < 1:  # it would oscillate about equilibrium for ever
-            instead = "begin with a run by Static() or ExactStatic(theta=1), as start="
+            instead = "begin with a run by Static() or EnergyMomentumStatic(theta=1), as start="
             require_no_prestress(scene, repr(scheme), instead)
     for work in scene.works:
         statement(work, element_of(mesh), scheme)
@@ -79,7 +79,7 @@ def require_scheme(scheme: Any, what: str) -> None:
     tries = hasattr(scheme, "dynamic") or hasattr(scheme, "step")
     if isinstance(scheme, type) or not tries:
         raise SceneError(
-            f"{what} = {shorten(scheme)} must be a scheme, such as Static() or Midpoint()"
+            f"{what} = {shorten(scheme)} must be a scheme, such as Static() or EnergyMomentum()"
         )
     dynamic = getattr(scheme, "dynamic", False)
     if why := unlike(scheme, DynamicScheme if dynamic else Scheme):

@@ -31,7 +31,7 @@ from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Output, reserved
 from ufl_beam.output.recorders import Recorder, recorders_of
-from ufl_beam.parallel import communicator, progress_bar, say
+from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
 from ufl_beam.simulation.diagnosis import ROOM, LedgerWatch
@@ -53,7 +53,7 @@ def simulate(
     dt: float | Adaptive,
     record: Sequence[Recorder] | Recorder = (),
     every: int = 1,
-    most: int = sys.maxsize,
+    max_states: int = sys.maxsize,
     start: Solution | None = None,
     newton: Newton | None = None,
     mesh: Mesh | None = None,
@@ -65,16 +65,16 @@ def simulate(
 
     Args:
         scene: Model.
-        scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
+        scheme: :class:`Static`, :class:`EnergyMomentum` or another one, see docs/schemes.md.
         t: Beginning and end; s.  In statics time is the load parameter.
         dt: Step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A step
             without convergence is cut into parts.  :class:`Adaptive` steps are as long as an
             accuracy allows.
         record: Files to write on the way, such as :class:`XDMF` and :class:`History`.
         every: Keep every so many steps in the solution; the last one always.
-        most: Largest number of states in the solution, besides the initial and the last one.  When
-            it is exceeded, every other state is deleted, and half as many steps are kept from then
-            on.
+        max_states: Largest number of states in the solution, besides the initial and the last one.
+            When it is exceeded, every other state is deleted, and half as many steps are kept from
+            then on.
         start: Solution of the same beams whose last state is the initial state.  Joints may be
             removed, or added where places are together.
         newton: Tolerances and PETSc options.
@@ -92,7 +92,7 @@ def simulate(
         ConvergenceError: A step failed; it carries the solution so far, and files are complete.
 
     Example:
-        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=0.05)
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
         >>> print((1e3 * run.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad
         [ -0.1 -18.9 -14.3]
     """
@@ -113,7 +113,7 @@ def simulate(
             "scheme has none; give a number"
         )
     require_count(every, "simulate: every")
-    require_count(most, "simulate: most")
+    require_count(max_states, "simulate: max_states")
     if start is not None:
         require_kind(start, Solution, "start")
     if checkpoint is not None:
@@ -128,8 +128,8 @@ def simulate(
             require_plain(newton, "recorders" if recorders else "checkpoint")
         number = number_of_steps(t1 - t0, cast(float, dt))
         return simulate_by_reference(
-            scene, scheme, newton, (t0, t1), number, start=start, mesh=mesh, every=every, most=most,
-            comm=comm, progress=progress,
+            scene, scheme, newton, (t0, t1), number, start=start, mesh=mesh, every=every,
+            max_states=max_states, comm=comm, progress=progress,
         )  # fmt: skip
     with ExitStack() as stack:
         keeper: Keeper | None = None
@@ -137,7 +137,7 @@ def simulate(
             step = None if isinstance(dt, Adaptive) else (t1 - t0) / number_of_steps(t1 - t0, dt)
             call = {
                 "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every,
-                "most": most, "newton": newton or Newton(), "start": end_of(start),
+                "max_states": max_states, "newton": newton or Newton(), "start": end_of(start),
                 "mesh": mesh_of(start, mesh), "t[1]": t1 if step is None else "any",
                 "record": [type(recorder).__qualname__ for recorder in recorders],
             }  # fmt: skip
@@ -155,7 +155,9 @@ def simulate(
         else:
             pace = EqualSteps(simulation, t1, dt)
         bar = progress_bar(progress, comm, total=1.0, bar_format=BAR)
-        take_steps(simulation, pace, recorders, bar, most=most, keeper=keeper, begin=begin)
+        take_steps(
+            simulation, pace, recorders, bar, max_states=max_states, keeper=keeper, begin=begin
+        )
     return solution
 
 
@@ -165,7 +167,7 @@ def take_steps(
     recorders: Sequence[Recorder],
     bar: Any,
     *,
-    most: int = sys.maxsize,
+    max_states: int = sys.maxsize,
     until: Callable[[Simulation], bool] | None = None,
     keeper: Keeper | None = None,
     begin: float = 0.0,
@@ -177,7 +179,7 @@ def take_steps(
         pace: Which step comes next: :class:`EqualSteps`, :class:`AdaptiveSteps`, or a path.
         recorders: What is written after each step.
         bar: Progress bar.
-        most: Largest number of kept states, see :func:`simulate`.
+        max_states: Largest number of kept states, see :func:`simulate`.
         until: The run ends after the first step for which this is true.
         keeper: Of checkpoints.
         begin: Value of the clock as the run began, for checkpoints; s.
@@ -192,7 +194,7 @@ def take_steps(
             simulation.copies.settle()  # before anything is written
         if pace.steps % solution.every == 0 or pace.finished:
             simulation.keep()
-            thins = len(solution) > most + 1 and not pace.finished
+            thins = len(solution) > max_states + 1 and not pace.finished
             simulation.warn(watch.judge(solution, solution.every, last=thins or pace.finished))
             if thins:
                 solution.thin()
@@ -206,7 +208,7 @@ def take_steps(
 
     if keeper is not None and keeper.found:
         simulation.together(keeper.resume, simulation, pace)
-        say(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
+        print_once(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
     else:
         for recorder in recorders:
             simulation.together(recorder.open, simulation)
@@ -214,7 +216,7 @@ def take_steps(
     with bar:
         quiet = until is None and keeper is None and all(one.by_itself for one in recorders)
         while not (pace.finished or ended):
-            if quiet and solution.every == 1 and most == sys.maxsize:
+            if quiet and solution.every == 1 and max_states == sys.maxsize:
                 pace.advance(sys.maxsize, keep=True)
                 solution.time_error = pace.error
                 simulation.together(simulation.warn, watch.judge(solution, solution.every))
@@ -303,7 +305,7 @@ def require_times(t: tuple[float, float]) -> tuple[float, float]:
 
 def simulate_by_reference(
     scene: Scene, scheme: Scheme, newton: Newton, times: tuple[float, float], number: int, *,
-    start: Solution | None, mesh: Mesh | None, every: int, most: int, comm: MPI.Intracomm,
+    start: Solution | None, mesh: Mesh | None, every: int, max_states: int, comm: MPI.Intracomm,
     progress: bool,
 ) -> Solution:  # fmt: skip
     """Simulate a scene by so many equal steps; arguments are those of ``simulate``."""
@@ -341,7 +343,7 @@ def simulate_by_reference(
                 solver.step_to(end)
                 if k % solution.every == 0 or k == number:
                     keep()
-                    if len(solution) > most + 1 and k < number:
+                    if len(solution) > max_states + 1 and k < number:
                         solution.thin()
                         solution.every *= 2
                 bar.update(k / number - bar.n)

@@ -52,7 +52,7 @@ class Simulation(Stepper):
 
     Args:
         scene: Model.
-        scheme: :class:`Static`, :class:`Midpoint` or another one, see docs/schemes.md.
+        scheme: :class:`Static`, :class:`EnergyMomentum` or another one, see docs/schemes.md.
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.  Joints may be
             removed, or added where places are together.
@@ -68,13 +68,15 @@ class Simulation(Stepper):
         copies: Comparison of processes that each compute a copy of a small scene.
 
     Example:
-        >>> simulation = ub.Simulation(scene, ub.Midpoint())
+        >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
         >>> while simulation.t < 1:
         ...     simulation.step_to(simulation.t + 0.05)
         >>> print((1e3 * simulation.displacement(beam.end)).round(1))  # mm, mm, mrad
         [ -0.1 -18.9 -14.3]
         >>> simulation.close()
     """
+
+    solution: Solution
 
     def __repr__(self) -> str:
         return f"<Simulation at {self.parameter.at(self.t)}: {self.grid}, {self.scheme!r}>"
@@ -171,7 +173,8 @@ class Simulation(Stepper):
             ConvergenceError: See :meth:`step_to`.
 
         Example:
-            >>> simulation, ends = ub.Simulation(scene, ub.Midpoint()), np.linspace(0, 1, 21)[1:]
+            >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
+            >>> ends = np.linspace(0, 1, 21)[1:]
             >>> while len(ends):
             ...     ends = ends[simulation.steps_to(ends) :]
             >>> print((1e3 * simulation.displacement(beam.end)).round(1))  # mm, mm, mrad
@@ -249,7 +252,7 @@ class Simulation(Stepper):
         Before the first step of a dynamic run, reactions are those of the scene at rest.
 
         Example:
-            >>> simulation = ub.Simulation(scene, ub.Midpoint())
+            >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
             >>> simulation.step_to(0.05)
             >>> print(simulation.now.diagram(beam, points=2).M[:2].round(-3))
             [-5000. -4000.]

@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.display import TIME, Rich
@@ -22,6 +21,7 @@ from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.functions import Curve, nearest, parameter_step
+from ufl_beam.model.joints import NEAR_START
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import (
     Content,
@@ -43,7 +43,7 @@ from ufl_beam.output.serialization import (
     require_no_code,
     to_data,
 )
-from ufl_beam.output.state_rows import BEFORE, FORCES, HINGE
+from ufl_beam.output.state_rows import HINGE
 from ufl_beam.output.states import States
 from ufl_beam.parallel import active_comm, on_first
 
@@ -115,7 +115,7 @@ class Solution(States, Rich):
     # -- files ---------------------------------------------------------------------------------
 
     def save(self, path: str | Path) -> None:
-        """Write a file with a checksum, which :func:`load` reads; all processes call it together.
+        """Write a file with a checksum, which :meth:`load` reads; all processes call it together.
 
         It has all results and the numbers of the scene, but no code: functions of time are saved
         as values at the kept times, curves as points, other functions and laws of a user by name.
@@ -127,6 +127,36 @@ class Solution(States, Rich):
         """
         file = require_path(path, "save")
         on_first(active_comm(), lambda: write(file, FORMAT, self._content()))
+
+    @classmethod
+    def load(cls, path: str | Path, *, scene: Scene | None = None) -> Solution:
+        """Read a solution that :meth:`save` wrote.
+
+        Its places are those of its own scene: ``loaded.displacement(loaded.scene["left"].end)``.
+
+        Args:
+            path: File.
+            scene: The scene of the run, built by the script: the solution has this one then, with
+                its functions and with laws of your own, which files do not contain.  All numbers,
+                classes and names must be those of the file, and functions of time must have the
+                same values.
+
+        Raises:
+            SceneError: There is no such file, or it holds no solution, or is damaged, or is of a
+                version that numbers degrees of freedom otherwise, or of another scene; or it has
+                laws of a user, and no scene is given.
+
+        Example:
+            >>> solution.save("beam.h5")
+            >>> loaded = ub.Solution.load("beam.h5")
+            >>> bool((loaded.q == solution.q).all())
+            True
+        """
+        file = require_path(path, "load")
+        if scene is not None:
+            require_kind(scene, Scene, "load: scene")
+        with decoding(file, FORMAT):
+            return restored(read(file, FORMAT), scene)
 
     def _content(self) -> Content:
         grid = self.grid
@@ -154,8 +184,6 @@ class Solution(States, Rich):
 
     def _take(self, content: Content) -> None:
         require_arrays(content, {"counts": (2,), "history/every": (1,)})
-        if "history/times" in content:
-            content = of_earlier_version(content, self.grid)
         self.resume(below("history/", content))
         self.internal = below("internal/", content)
         self.parts, self.iterations = map(int, content["counts"])
@@ -229,35 +257,6 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
         if differs := difference(now, then):
             raise SceneError(f"it is a solution of another scene: {differs}")
     return solution
-
-
-def load(path: str | Path, *, scene: Scene | None = None) -> Solution:
-    """Read a solution that :meth:`Solution.save` wrote.
-
-    Its places are those of its own scene: ``loaded.displacement(loaded.scene["left"].end)``.
-
-    Args:
-        path: File.
-        scene: The scene of the run, built by the script: the solution has this one then, with its
-            functions and with laws of your own, which files do not contain.  All numbers, classes
-            and names must be those of the file, and functions of time must have the same values.
-
-    Raises:
-        SceneError: There is no such file, or it holds no solution, or is damaged, or is of a
-            version that numbers degrees of freedom otherwise, or of another scene; or it has laws
-            of a user, and no scene is given.
-
-    Example:
-        >>> solution.save("beam.h5")
-        >>> loaded = ub.load("beam.h5")
-        >>> bool((loaded.q == solution.q).all())
-        True
-    """
-    file = require_path(path, "load")
-    if scene is not None:
-        require_kind(scene, Scene, "load: scene")
-    with decoding(file, FORMAT):
-        return restored(read(file, FORMAT), scene)
 
 
 # -- cells that opened -----------------------------------------------------------------------------
@@ -385,7 +384,7 @@ def _fall(layout: Layout | None, scheme: Scheme) -> tuple[float, float]:
     law = None if layout is None else layout.softening
     if layout is None or law is None or law.limit == 0:
         return 0.0, 0.0
-    growth, begins = TINY * law.energy / law.limit, np.array([law.steepest[1]])
+    growth, begins = TINY * law.fracture_energy / law.limit, np.array([law.steepest[1]])
     after = scheme.resistance(law, begins, np.array([growth]))
     (fall,) = (law.traction(begins) - after) / growth
     before = law.mean_traction(0 * begins, begins) * begins * layout.weights[layout.breaking].min()
@@ -394,7 +393,7 @@ def _fall(layout: Layout | None, scheme: Scheme) -> tuple[float, float]:
 
 # -- text in the file ------------------------------------------------------------------------------
 
-FORMAT = "solution of ufl_beam, 3"
+FORMAT = "solution of ufl_beam, 4"
 """The number grows whenever the meaning of files changes."""
 
 NAMED = {
@@ -403,28 +402,8 @@ NAMED = {
 }  # fmt: skip
 """Attributes that are saved as they are, and their types."""
 
-TIME_FUNCTIONS = ("time", "held", "motion", "force", "numbers")
+TIME_FUNCTIONS = ("amplitude", "u", "v", "psi", "motion", "force", "numbers")
 """Fields that are functions of time, but for the forces of controllers and functions."""
-
-
-def of_earlier_version(content: Content, grid: Grid) -> Content:
-    """Content of the formats 1 and 2 in that of this one: names, axes, rows of material."""
-    old = below("history/", content)
-    q, kept = old["q"], {name: values for name, values in old.items() if len(values)}
-    names = {"times": "t", "connections": "connectors", "cells": FORCES}
-    new = {names.get(name, name): values for name, values in kept.items()}
-    new.setdefault(FORCES, np.full((len(q), lib.CELL_NUMBERS, len(grid.cells)), np.nan))
-    for k, support in enumerate(grid.scene.supports):  # reactions were in the axes of the plane
-        cos, sin = np.cos(support.angle), np.sin(support.angle)
-        new["reactions"][:, k, :2] @= [[cos, -sin], [sin, cos]]
-    if "material" in new:  # rows began with the number of the cell
-        rows = new["material"]
-        order = np.argsort(rows[:, :, 0], axis=1)[:, :, None]
-        new["material"] = np.take_along_axis(rows, order, 1)[:, :, 1:]
-    if len(new.get(BEFORE, ())) == 1:  # each step began where the one before ended
-        new[BEFORE] = np.concatenate([new[BEFORE], q[:-1]])
-    others = {name: of for name, of in content.items() if not name.startswith("history/")}
-    return {**others, "begun": BEFORE in new, **above("history/", new)}
 
 
 def _used_curve(solution: Solution, curve: Curve) -> SavedCurve:
@@ -439,4 +418,4 @@ def _used_curve(solution: Solution, curve: Curve) -> SavedCurve:
     first, last = float(np.nanmin(used)), float(np.nanmax(used))
     steps = (parameter_step(curve, s, scene.size) for s in (first, last))
     more = 0.1 * (last - first) + 8 * max(steps)
-    return SavedCurve.of(curve, first - more, last + more, (0.0,))
+    return SavedCurve.of(curve, first - more, last + more, (0.0, *NEAR_START))

@@ -87,7 +87,7 @@ class Adaptive:
 
     Example:
         >>> steps = ub.Adaptive(tolerance=1e-4, stops=[0.5])
-        >>> run = ub.simulate(scene, ub.Midpoint(), t=(0, 1), dt=steps)
+        >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=steps)
         >>> 0.5 in run.times, bool(run.time_error < 0.01)
         (True, True)
     """

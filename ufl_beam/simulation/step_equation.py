@@ -17,7 +17,7 @@ from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Memory, State
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
 from ufl_beam.model.connector_laws import rubs
 from ufl_beam.model.constraint_checks import friction_repeats
@@ -90,14 +90,14 @@ class StepEquation:
                 on_part = Fields(share, part)
                 self.inelastic.append(InelasticBeams(on_part, layout, *setting, search))
         self.beams: list[Cells] = [*self.inelastic]
-        loses = scheme.alpha or isinstance(scheme, DecayingMidpoint)
+        loses = scheme.alpha or isinstance(scheme, EnergyMomentumDecaying)
         if loses and sum(len(cells) for _, cells in share.grid.inelastic) < len(share.grid.cells):
             ledger.lost["numerical"] += 0.0
         others: list[Term] = []
         if elastic.any():
             on_part = fields if elastic.all() else Fields(share, np.flatnonzero(elastic))
             self.beams.append(ElasticBeams(on_part, *setting))
-            if isinstance(scheme, DecayingMidpoint):
+            if isinstance(scheme, EnergyMomentumDecaying):
                 others.append(SecondDifferences(scheme, on_part, A, ledger))
 
         self.controllers = Controllers(share)
@@ -221,7 +221,7 @@ class StepEquation:
 
     def _pass_on_step(self, memory: Memory, q: Array) -> None:
         """State the changes of the last step, if the next one of the scheme depends on them."""
-        if self.inertia is not None and isinstance(self.scheme, DecayingMidpoint):
+        if self.inertia is not None and isinstance(self.scheme, EnergyMomentumDecaying):
             self.inertia.pass_on_step(memory)
             for term in self.terms:
                 if isinstance(term, SecondDifferences):

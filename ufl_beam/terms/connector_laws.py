@@ -26,12 +26,12 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import (
     HELD,
-    Actuator,
     Controller,
     Coulomb,
     Damper,
     Guide,
-    Motor,
+    PrescribedForce,
+    PrescribedMotion,
     RigidPlastic,
     Spring,
 )
@@ -39,7 +39,7 @@ from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.functions import TimeFunction
 from ufl_beam.model.material_law import traced
-from ufl_beam.model.material_laws import Hardening
+from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.base import Callbacks
 from ufl_beam.terms.energy_ledger import Account, Ledger
@@ -187,8 +187,8 @@ class Response:
 # -- laws that give a motion or a force ------------------------------------------------------------
 
 GIVEN = {
-    Motor: ("_Driven", "supplied", "motors", -1.0),
-    Actuator: ("_Pushed", "supplied", "loads", -1.0),
+    PrescribedMotion: ("_Driven", "supplied", "motors", -1.0),
+    PrescribedForce: ("_Pushed", "supplied", "loads", -1.0),
     Controller: ("_Controlled", "supplied", "controllers", -1.0),
     Damper: ("_Damped", "lost", "damping", 1.0),
     Coulomb: ("_Rubbing", "lost", "friction", 1.0),
@@ -210,18 +210,18 @@ class GivenLaws(Response):
             self._enter(entry=(getattr(setting.ledger, part), entry))
             self._in_steps["sign"] = sign
         both = list(zip(self._laws, links, strict=True))
-        if isinstance(law, Motor) and not held:
+        if isinstance(law, PrescribedMotion) and not held:
             self._of_time["wanted_motion"] = [(one.motion, link) for one, link in both]
         elif isinstance(law, Damper):
             self._in_steps["viscosity"] = np.array([one.viscosity for one in self._laws])
         elif isinstance(law, Coulomb):
             self._rub([setting.asked(link) for link in links])
-        elif isinstance(law, Actuator | Controller):
+        elif isinstance(law, PrescribedForce | Controller):
             # The forces at the end of this step, and at that of the last one
             end, reached = np.zeros((2, len(links)))
             self._in_steps.update(end=end, reached=reached)
             self._variables = [reached]
-            if isinstance(law, Actuator):
+            if isinstance(law, PrescribedForce):
                 self._of_time["wanted_force"] = [(one.force, link) for one, link in both]
             else:  # what controllers returned when the step began
                 self._always = np.zeros(1)
@@ -244,7 +244,7 @@ class Springs(Response):
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),
             stiffness=np.array([law.stiffness]),
-            laws=((law.law or Hardening(limit=np.inf), 1),),
+            laws=((law.law or ElastoPlastic(yield_limit=np.inf), 1),),
             rest=np.zeros(3),
             softening=softening if softening is not None and softening.opens else None,
             breaking=slice(0, None),
@@ -312,7 +312,7 @@ law."""
 class SlipForms:
     """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
 
-    def __init__(self, law: SofteningLaw | Hardening, scheme: Scheme) -> None:
+    def __init__(self, law: SofteningLaw | ElastoPlastic, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise((*INPUTS, *numbers(law)))
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
         with traced(law):
@@ -369,7 +369,7 @@ class RigidPlasticLaws(Response):
         super().__init__(links, setting, "CompiledSlips")
         n, ledger, scheme = len(links), setting.ledger, setting.scheme
         self._enter(hinges=(ledger.lost, "hinges"))
-        self._hardens = isinstance(law.law, Hardening)
+        self._hardens = isinstance(law.law, ElastoPlastic)
         loss = 2 * scheme.alpha if self._hardens else 0.0
         if self._hardens:
             self._enter(hardening=(ledger.state, "hardening"))
@@ -382,7 +382,8 @@ class RigidPlasticLaws(Response):
             for name, value in numbers(law_of(link)).items():
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
-        self._limit = self._at["number limit"].copy()
+        self._given_limit = self._at["number yield_limit" if self._hardens else "number limit"]
+        self._limit = self._given_limit.copy()
         back_force, dissipated, excess = np.zeros((3, n))
         self._slipped, self.way, self._way_before = np.zeros((3, n), dtype=np.int32)
         self._stored = np.zeros(1)  # of all together; to whom it belongs does not matter
@@ -391,7 +392,7 @@ class RigidPlasticLaws(Response):
         # Motions without the round-off of those that are held
         self.motion, self.dissipated = self._at["start"], (dissipated,)
 
-        kind = Hardening(1.0) if isinstance(law.law, Hardening) else law.law.kind()
+        kind = ElastoPlastic(1.0) if isinstance(law.law, ElastoPlastic) else law.law.kind()
         self._forms = _slip_forms(kind, scheme)
         self._c = struct(
             "rigid_plastic", number=n, width=len(inputs), w=self._storage,
@@ -429,7 +430,7 @@ class RigidPlasticLaws(Response):
 
     def freeze(self) -> None:
         """Hold from now on, but for connectors that bear nothing any more: these are free."""
-        spent = self._limit <= SPENT * self._at["number limit"]
+        spent = self._limit <= SPENT * self._given_limit
         self._limit[:] = np.where(spent, 0.0, np.inf)
         if not self._hardens:
             self._c.force = self._forms.spent

@@ -133,7 +133,7 @@ class Couplings(Links):
     """Connectors of the same relative motions whose laws are of one kind.
 
     Each is a cell of unit length from one node to the other, with its forces as unknowns after
-    those of the nodes.  Components of a :func:`Bushing` are links that stand one after the other.
+    those of the nodes.  Components of a :class:`Bushing` are links that stand one after the other.
     Forms, and laws of many kinds, are evaluated in C.
 
     Attributes:

@@ -29,7 +29,7 @@ from ufl_beam.discretization.function_spaces import (
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import SceneError
-from ufl_beam.mechanics.energy_momentum import DecayingMidpoint
+from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import (
@@ -222,7 +222,7 @@ class Inertia(Term):
 
 
 def _work_and_loss(
-    of: Element, scheme: Scheme | DecayingMidpoint, factor: Expr, before: Expr
+    of: Element, scheme: Scheme | EnergyMomentumDecaying, factor: Expr, before: Expr
 ) -> tuple[ufl.Form, ufl.Form]:
     """Forms of resultants ``factor C (Δe - before)``, Δe being the changes of the strains."""
     change = strain(of.q1, of.axis) - strain(of.q0, of.axis)
@@ -248,7 +248,7 @@ class KelvinVoigtForces(OfForms):
     ) -> None:
         work, lost, self._rate = _viscous_forms(fields.element, scheme)
         super().__init__(work, [lost], fields, A, ledger)
-        self._time, self._dt = damping.time, np.zeros(1)
+        self._time, self._dt = damping.retardation_time, np.zeros(1)
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Loops over the cells; the step is a number of the forms."""
@@ -326,18 +326,22 @@ def damping_forces(
 
 
 @stated
-def _change_forms(of: Element, scheme: DecayingMidpoint) -> tuple[ufl.Form, ufl.Form, fem.Function]:
+def _change_forms(
+    of: Element, scheme: EnergyMomentumDecaying
+) -> tuple[ufl.Form, ufl.Form, fem.Function]:
     """Virtual work, the energy lost, and the changes of the strains in the step before."""
     before = of.at_points(3)
     return *_work_and_loss(of, scheme, of.constant(scheme.part), before), before
 
 
 class SecondDifferences(OfForms):
-    """Resultants c C (Δe - r Δe'), see :class:`DecayingMidpoint`."""
+    """Resultants c C (Δe - r Δe'), see :class:`EnergyMomentumDecaying`."""
 
     kind, _entry = "beams", "numerical"
 
-    def __init__(self, scheme: DecayingMidpoint, fields: Fields, A: Csr, ledger: Ledger) -> None:
+    def __init__(
+        self, scheme: EnergyMomentumDecaying, fields: Fields, A: Csr, ledger: Ledger
+    ) -> None:
         work, lost, self._before = _change_forms(fields.element, scheme)
         super().__init__(work, [lost], fields, A, ledger)
         self._strains = Strains(fields)

@@ -70,7 +70,7 @@ class _AtDofs(LoadTerm):
         """Make ``dofs`` of those that are not zero in ``loaded``, on any process, and forces."""
         # A process may own degrees of freedom that others load.
         self.dofs: Index = np.flatnonzero(share.added(loaded)).astype(np.int32)
-        self._size, self._in_time = share.size, [(load.time, load) for load in owners]
+        self._size, self._in_time = share.size, [(load.amplitude, load) for load in owners]
         self._forces = np.zeros((rows, len(self.dofs)))
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
 
@@ -94,7 +94,7 @@ class DeadLoads(_AtDofs):
         vectors: dict[int, tuple[Load, Array]] = {}
         in_cells: dict[int, Array] = {}
         for load in loads:
-            key = id(load.time)
+            key = id(load.amplitude)
             _, vector = vectors.setdefault(key, (load, np.zeros(share.size)))
             if (along := _add_forces(load, share, vector)) is not None:
                 in_cells[key] = in_cells.get(key, 0.0) + along

@@ -1,0 +1,107 @@
+# SPDX-License-Identifier: MIT
+"""One function for all pictures in the plane: of models, solutions and results of analyses."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+from ufl_beam.analysis.modes import Shapes
+from ufl_beam.analysis.parameter_study import Study
+from ufl_beam.analysis.tradeoff_result import Tradeoff
+from ufl_beam.errors import SceneError
+from ufl_beam.model.scene import Scene
+from ufl_beam.output.extremes import Extremes
+from ufl_beam.output.fatigue import Fatigue
+from ufl_beam.plotting import diagrams, inelastic, model, plots
+from ufl_beam.plotting.style import RESULTANTS
+from ufl_beam.simulation.solution import Solution
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
+    Scene: {"model": model.draw_model},
+    Solution: {
+        "shape": diagrams.draw_shape,
+        **{name: partial(diagrams.draw_shape, quantity=name) for name in RESULTANTS},
+        "damage": diagrams.draw_state_of_damage,
+        "shapes": plots.draw_shapes,
+        "history": plots.draw_history,
+        "energy": plots.draw_energy,
+        "dissipation": inelastic.draw_dissipation,
+        "hinge": inelastic.draw_hinge,
+        "moment-curvature": inelastic.draw_moment_curvature,
+    },
+    Shapes: {"modes": plots.draw_modes},
+    Extremes: {name: partial(plots.draw_extremes, quantity=name) for name in ("M", "N", "V")},
+    Fatigue: {"cycles": plots.draw_cycles},
+    Study: {"results": plots.draw_study},
+    Tradeoff: {"errors": plots.draw_tradeoff},
+}
+"""Pictures by class and quantity; the first one of a class is drawn by default."""
+
+
+def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure:
+    """Draw a model, a solution, or the result of an analysis.
+
+    | `shown` | `quantity`, the first by default | further arguments |
+    |---|---|---|
+    | `Scene` | "model": all its parts, before any run | `ax` |
+    | `Solution`, `Path` | "shape": the frame at a time | `n`, `magnify`, `ax` |
+    | | "N", "V", "M": diagram of a section force | `n`, `magnify`, `ax` |
+    | | "damage": yielded cells, opened hinges | `n`, `magnify`, `ax` |
+    | | "shapes": successive shapes in one picture | `times` or `count`, `magnify`, `ax` |
+    | | "history": a motion of places over time | `places`, `component`, `ax` |
+    | | "energy": the ledger over time | |
+    | | "dissipation": energy losses over time | `ax` |
+    | | "hinge": moment of a hinge over its jump | `place`, `ax` |
+    | | "moment-curvature": of a cell | `place`, `ax` |
+    | `Modes`, `Buckling` | "modes": shapes side by side | `numbers`, `amplitude` |
+    | `Extremes` | "M", "N", "V": envelope of a section force | `ax` |
+    | `Fatigue` | "cycles": rainflow matrix and spectrum | the `HotSpot` |
+    | `Study` | "results": over the cases | |
+    | `Tradeoff` | "errors": over wall times | `ax` |
+
+    Args:
+        shown: Object to draw.
+        quantity: Quantity to draw, see the table.
+        places: Places of "history" (one or a sequence), "hinge" and "moment-curvature"; the spot of
+            "cycles".
+        options: By name: ``n``, number of the kept time, negative from the end; ``magnify``, factor
+            on displacements; ``times`` (s) of "shapes", each replaced by the nearest that was kept,
+            or ``count`` of them; ``component`` of "history", "u", "v", "psi", "du/dt", "dv/dt" or
+            "dpsi/dt"; ``numbers`` of the modes, and ``amplitude``, their largest displacement as a
+            part of the size of the scene; ``ax``, axes to draw in in the place of a new figure.
+
+    Raises:
+        SceneError: There is no such picture, or an argument of it is wrong; the message says which.
+
+    Example:
+        >>> ub.plot(scene).savefig("model.png")
+        >>> ub.plot(solution, "M", magnify=10).savefig("moments.png")
+        >>> ub.plot(solution, "history", beam.end, component="v").savefig("history.png")
+        >>> ub.plot(ub.modes(scene, 3)).savefig("modes.png")
+    """
+    pictures = next((PICTURES[kind] for kind in PICTURES if isinstance(shown, kind)), None)
+    if pictures is None:
+        raise SceneError(
+            f"plot: {shown!r} is a {type(shown).__name__}; give a Scene, the Solution of a run, or "
+            "the result of an analysis"
+        )
+    if quantity and quantity not in pictures:
+        hint = "; a scene has none before a run" if isinstance(shown, Scene) else ""
+        raise SceneError(
+            f"plot: quantity = {quantity!r} of a {type(shown).__name__} is not one of "
+            f"{', '.join(pictures)}{hint}"
+        )
+    draw = pictures[quantity] if quantity else next(iter(pictures.values()))
+    try:
+        inspect.signature(draw).bind(shown, *places, **options)
+    except TypeError as error:
+        quantity = quantity or next(iter(pictures))
+        takes = ", ".join([*inspect.signature(draw).parameters][1:]) or "no further arguments"
+        raise SceneError(f"plot: {error}; the picture {quantity!r} takes {takes}") from None
+    return draw(shown, *places, **options)
