@@ -7,7 +7,7 @@
 #
 # This demo shows
 #
-# * a softening plastic hinge, `Beam(..., hinges={1.0: Softening(limit, energy)})`,
+# * a softening plastic hinge, `Beam(..., hinges={1.0: Softening(limit, fracture_energy)})`,
 # * logarithmic decrement and damping ratio from a history, `peaks` and `fit_decay`,
 # * the ledger: what the vibration loses is what the hinge dissipates, to round-off,
 # * what "damping ratio" can mean, and what it cannot, where plasticity damps.

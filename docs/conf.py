@@ -145,14 +145,18 @@ def rewrite(app, docname, source):
 # -- reference ------------------------------------------------------------------------------------
 
 
+NAMES = {*ub.__all__, *ub.RESULTS}
+"""Public names, and classes of results."""
+
+
 def pages_of_names(app):
     """Write a page for each public name, and note where names are used."""
     folder = DOCS / "api"
     folder.mkdir(exist_ok=True)
     for old in folder.glob("*.rst"):
-        if old.stem not in ub.__all__:
+        if old.stem not in NAMES:
             old.unlink()
-    for name in ub.__all__:
+    for name in NAMES:
         thing = getattr(ub, name)
         kind = "class" if isinstance(thing, type) else "function" if callable(thing) else "data"
         if kind == "class" and issubclass(thing, BaseException):
@@ -167,7 +171,7 @@ def pages_of_names(app):
             page.write_text(text, encoding="utf-8")
     for page in sorted([*DOCS.glob("*.md"), *(DOCS / "demos").glob("*.py")]):
         words = set(re.findall(r"\bub\.(\w+)", page.read_text(encoding="utf-8")))
-        for name in words & set(ub.__all__):
+        for name in words & NAMES:
             used[name].append(page)
 
 
@@ -195,8 +199,13 @@ def show_colons(app, what, name, obj, options, lines):
 
 
 def parsable(app, what, name, obj, options, signature, returns):
-    """Without this the signature of a dataclass with a factory stays raw text."""
-    return signature and signature.replace("<factory>", "..."), returns
+    """Write a signature as the source has it, without checks of types and addresses of defaults."""
+    if signature:
+        signature = signature.replace("<factory>", "...")
+        signature = re.sub(
+            r"<function ([\w.]+)(?:\.<locals>[^>]*)? at 0x[0-9a-f]+>", r"\1", signature
+        )
+    return signature, returns
 
 
 class NamesAreLinks(SphinxTransform):
@@ -209,7 +218,7 @@ class NamesAreLinks(SphinxTransform):
         for literal in list(self.document.findall(nodes.literal)):
             found = re.match(r"(?:ub\.)?(\w+)(?:$|\()", literal.astext())
             inside = (nodes.reference, pending_xref, nodes.title)
-            if not found or found[1] not in ub.__all__ or isinstance(literal.parent, inside):
+            if not found or found[1] not in NAMES or isinstance(literal.parent, inside):
                 continue
             options = {"refdomain": "py", "reftype": "obj", "refexplicit": True}
             target = pending_xref("", reftarget=f"ufl_beam.{found[1]}", refwarn=False, **options)

@@ -10,7 +10,7 @@ from mpi4py import MPI
 import pytest
 
 from ufl_beam import parallel
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ArgumentError
 
 sys.path.insert(0, str(Path(__file__).parent))
 
@@ -37,7 +37,7 @@ def pytest_pyfunc_call():
     """Skip tests of the reference solver on several ranks, which it refuses by name."""
     try:
         return (yield)
-    except SceneError as error:
+    except ArgumentError as error:
         if COMM.size > 1 and str(error).startswith("Newton: reference=True does not go with"):
             pytest.skip("the reference solver computes on one process")
         raise

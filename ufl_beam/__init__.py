@@ -54,7 +54,15 @@ from ufl_beam.analysis.path_following import Path as Path
 from ufl_beam.analysis.path_following import follow
 from ufl_beam.analysis.tradeoff import tradeoff
 from ufl_beam.analysis.tradeoff_result import Tradeoff as Tradeoff
-from ufl_beam.errors import ConvergenceError, CopiesDiffer, ModelWarning, SceneError, TradeoffError
+from ufl_beam.errors import (
+    ArgumentError,
+    ArgumentTypeError,
+    ConvergenceError,
+    CopiesDiffer,
+    ModelError,
+    ModelWarning,
+    TradeoffError,
+)
 from ufl_beam.mechanics.classical import GeneralizedAlpha, Newmark, Static
 from ufl_beam.mechanics.energy_momentum import (
     EnergyMomentum,
@@ -159,6 +167,8 @@ __all__ = [
     "XDMF",
     "Adaptive",
     "ArcLength",
+    "ArgumentError",
+    "ArgumentTypeError",
     "ArmstrongFrederick",
     "AxialBending",
     "Beam",
@@ -210,6 +220,7 @@ __all__ = [
     "MaterialLaw",
     "Mesh",
     "MidpointLoads",
+    "ModelError",
     "ModelWarning",
     "Newmark",
     "Newton",
@@ -235,7 +246,6 @@ __all__ = [
     "RotatingFrame",
     "SNCurve",
     "Scene",
-    "SceneError",
     "Scheme",
     "Section",
     "Simulation",
@@ -279,6 +289,12 @@ __all__ = [
     "tradeoff",
 ]  # fmt: skip
 
+RESULTS = [
+    "Branch", "Buckling", "CriticalPoint", "Cycles", "Decay", "Diagram", "DolfinxView", "Energy",
+    "Envelope", "Event", "Extent", "Film", "Modes", "Path", "Place", "Spot", "Tradeoff",
+]  # fmt: skip
+"""Classes of results and of places, which functions and other objects return."""
+
 OLD_NAMES = {
     "Actuator": "PrescribedForce",
     "DecayingMidpoint": "EnergyMomentumDecaying",
@@ -290,6 +306,7 @@ OLD_NAMES = {
     "Motor": "PrescribedMotion",
     "Prescribed": "PrescribedDisplacement",
     "PrintedMidpoint": "EnergyMomentumPrinted",
+    "SceneError": "ModelError, or ufl_beam.ArgumentError,",
     "load": "Solution.load",
     "plot_cycles": 'plot(fatigue, "cycles", spot)',
     "plot_damage": 'plot(solution, "damage")',

@@ -31,15 +31,35 @@ PACKAGE = os.path.join(os.path.dirname(__file__), "")
 """The directory of this package."""
 
 
-class SceneError(ValueError):
-    """Error in a scene or a call; raised before any mesh exists.
+class ArgumentError(ValueError):
+    """Wrong argument of a call; raised before any computation begins.
 
-    The message says which object, what is wrong and what to do.
+    The message says which object and argument, what is wrong and what to do.
+
+    Example:
+        >>> ub.Newton(rtol=-1.0)
+        Traceback (most recent call last):
+        ufl_beam.errors.ArgumentError: Newton: rtol = -1 must be positive
+    """
+
+
+class ArgumentTypeError(ArgumentError, TypeError):
+    """Argument of a wrong type.
+
+    Example:
+        >>> ub.Newton(rtol="small")
+        Traceback (most recent call last):
+        ufl_beam.errors.ArgumentTypeError: Newton: rtol = 'small' is not a number
+    """
+
+
+class ModelError(ArgumentError):
+    """Error in a model: in one of its parts, or because parts do not fit together.
 
     Example:
         >>> ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Pinned(beam.start)])
         Traceback (most recent call last):
-        ufl_beam.errors.SceneError: supports in conflict: Clamped at beam.start (0, 0) and ...
+        ufl_beam.errors.ModelError: supports in conflict: Clamped at beam.start (0, 0) and ...
     """
 
 
@@ -69,7 +89,7 @@ class StepFailed(Exception):
         self.reason = ""
 
 
-class NoNumber(StepFailed, SceneError):
+class NoNumber(StepFailed, ModelError):
     """A function of a user returned no finite number; a shorter step may not ask for it."""
 
 
@@ -204,24 +224,24 @@ def require_number(
     at_most: float = math.inf,
     infinite: bool = False,
 ) -> float:
-    """Return ``value`` as a float in range, or raise :class:`SceneError` naming ``what``.
+    """Return ``value`` as a float in range, or raise :class:`ArgumentError` naming ``what``.
 
     It must be finite, unless ``infinite`` lets it be positive infinity.
     """
     try:
         number = as_float(value)
     except (TypeError, ValueError):
-        raise SceneError(f"{what} = {shorten(value)} is not a number") from None
+        raise ArgumentTypeError(f"{what} = {shorten(value)} is not a number") from None
     except OverflowError:
-        raise SceneError(f"{what} = {shorten(value)} is too large for a number") from None
+        raise ArgumentError(f"{what} = {shorten(value)} is too large for a number") from None
     if not math.isfinite(number) and not (infinite and number == math.inf):
-        raise SceneError(f"{what} = {number} is not finite")
+        raise ArgumentError(f"{what} = {number} is not finite")
     if positive and number <= 0:
-        raise SceneError(f"{what} = {number:g} must be positive")
+        raise ArgumentError(f"{what} = {number:g} must be positive")
     if number < at_least:
-        raise SceneError(f"{what} = {number:g} must be at least {at_least:g}")
+        raise ArgumentError(f"{what} = {number:g} must be at least {at_least:g}")
     if number > at_most:
-        raise SceneError(f"{what} = {number:g} must lie between {at_least:g} and {at_most:g}")
+        raise ArgumentError(f"{what} = {number:g} must lie between {at_least:g} and {at_most:g}")
     return number
 
 
@@ -230,42 +250,42 @@ def require_returned(value: object, function: str, at: str, *, finite: bool = Fa
     try:
         number = as_float(value)
     except (TypeError, ValueError, OverflowError):
-        raise SceneError(
+        raise ArgumentError(
             f"{function} returned {shorten(value)} at {at}; it must return a number"
         ) from None
     if finite and not math.isfinite(number):
-        raise SceneError(f"{function} returned {number} at {at}; it must return a finite number")
+        raise ArgumentError(f"{function} returned {number} at {at}; it must return a finite number")
     return number
 
 
 def require_count(value: Any, what: str) -> int:
-    """Return ``value`` as a whole number from 1 on, or raise :class:`SceneError`."""
+    """Return ``value`` as a whole number from 1 on, or raise :class:`ArgumentError`."""
     number = require_number(value, what)
     if number != int(number) or number < 1:
-        raise SceneError(f"{what} = {shorten(value)} must be a whole number, at least 1")
+        raise ArgumentError(f"{what} = {shorten(value)} must be a whole number, at least 1")
     return int(value)
 
 
 def require_sequence(value: Any, what: str) -> tuple[Any, ...]:
-    """Return ``value`` as a tuple, or raise :class:`SceneError` naming ``what``."""
+    """Return ``value`` as a tuple, or raise :class:`ArgumentError` naming ``what``."""
     if not isinstance(value, str | bytes):
         try:
             return tuple(value)
         except TypeError:
             pass
-    raise SceneError(f"{what} = {shorten(value)} must be a list")
+    raise ArgumentTypeError(f"{what} = {shorten(value)} must be a list")
 
 
 def require_kind(value: Any, kind: type | tuple[type, ...], what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is an instance of ``kind``."""
+    """Raise :class:`ArgumentError` naming ``what`` unless ``value`` is an instance of ``kind``."""
     if not isinstance(value, kind):
         kinds = kind if isinstance(kind, tuple) else (kind,)
         names = " or ".join(getattr(k, "called", k.__name__) for k in kinds)
-        raise SceneError(f"{what} = {shorten(value)} is not a {names}")
+        raise ArgumentTypeError(f"{what} = {shorten(value)} is not a {names}")
 
 
 def require_all(value: Any, what: str, kind: type | tuple[type, ...]) -> tuple[Any, ...]:
-    """Return ``value`` as a tuple of instances of ``kind``, or raise :class:`SceneError`."""
+    """Return ``value`` as a tuple of instances of ``kind``, or raise :class:`ArgumentError`."""
     records = require_sequence(value, what)
     for i, record in enumerate(records):
         require_kind(record, kind, f"{what}[{i}]")
@@ -281,7 +301,7 @@ def closed(instead: str) -> Callable[[type[T]], type[T]]:
 
     def close(kind: type[T]) -> type[T]:
         def refuse(cls: type, **_: object) -> None:
-            raise SceneError(
+            raise ModelError(
                 f"{cls.__name__}: {kind.__name__} has no subclasses, because computations would "
                 f"ignore what is theirs; {instead}"
             )
@@ -293,59 +313,59 @@ def closed(instead: str) -> Callable[[type[T]], type[T]]:
 
 
 def require_text(value: Any, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is text that files can have."""
+    """Raise :class:`ArgumentError` naming ``what`` unless ``value`` is text that files can have."""
     if not isinstance(value, str):
-        raise SceneError(f"{what} = {shorten(value)} must be text")
+        raise ArgumentTypeError(f"{what} = {shorten(value)} must be text")
     if any(c == "\0" or "\ud800" <= c <= "\udfff" for c in value):
-        raise SceneError(
+        raise ArgumentError(
             f"{what} = {shorten(value)} has a character that files cannot have, a null or a "
             "surrogate; leave it out"
         )
 
 
 def require_switch(value: Any, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is True or False."""
+    """Raise :class:`ArgumentError` naming ``what`` unless ``value`` is True or False."""
     if not isinstance(value, bool | np.bool_):
-        raise SceneError(f"{what} = {shorten(value)} must be True or False")
+        raise ArgumentTypeError(f"{what} = {shorten(value)} must be True or False")
 
 
 def require_function(value: Any, what: str, of: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``value`` is a function ``of`` something."""
+    """Raise :class:`ArgumentError` naming ``what`` unless ``value`` is a function."""
     if not callable(value):
-        raise SceneError(f"{what} = {shorten(value)} must be a function of {of}")
+        raise ArgumentTypeError(f"{what} = {shorten(value)} must be a function of {of}")
 
 
 def require_memory(cells: int, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` if so many cells cannot be held in memory.
+    """Raise :class:`ArgumentError` naming ``what`` if so many cells cannot be held in memory.
 
     Each process has the numbering of the whole scene.
     """
     needed = cells * BYTES_PER_CELL
     if needed > MEMORY:
-        raise SceneError(
+        raise ArgumentError(
             f"{what} would take {needed / 1e9:.3g} GB of memory; this machine has "
             f"{MEMORY / 1e9:.3g} GB. Take fewer cells"
         )
     if 3 * cells >= 2**31:
-        raise SceneError(
+        raise ArgumentError(
             f"{what} has more degrees of freedom than the 32-bit indices of PETSc can number. "
             "Take fewer cells"
         )
 
 
 def require_vector(value: Any, what: str) -> tuple[float, float]:
-    """Return ``value`` as a pair of finite floats, or raise :class:`SceneError`."""
+    """Return ``value`` as a pair of finite floats, or raise :class:`ArgumentError`."""
     try:
         if isinstance(value, str | bytes):
             raise TypeError
         x, y = value
     except (TypeError, ValueError):
-        raise SceneError(f"{what} = {shorten(value)} must be a pair (x, y)") from None
+        raise ArgumentTypeError(f"{what} = {shorten(value)} must be a pair (x, y)") from None
     return require_number(x, f"{what}[0]"), require_number(y, f"{what}[1]")
 
 
 def require_array(values: Any, what: str) -> npt.NDArray[np.float64]:
-    """Return ``values`` as an array of finite numbers, or raise :class:`SceneError`."""
+    """Return ``values`` as an array of finite numbers, or raise :class:`ArgumentError`."""
     try:
         array = np.asarray(values)
         objects = array.flat if array.dtype.kind == "O" else ()
@@ -355,16 +375,16 @@ def require_array(values: Any, what: str) -> npt.NDArray[np.float64]:
             raise TypeError
         array = array.astype(float)
     except (TypeError, ValueError, OverflowError):
-        raise SceneError(f"{what} = {shorten(values)} must be numbers") from None
+        raise ArgumentTypeError(f"{what} = {shorten(values)} must be numbers") from None
     for i in np.argwhere(~np.isfinite(array)):
         at = ", ".join(map(str, i))
-        raise SceneError(f"{what}{f'[{at}]' if at else ''} = {array[tuple(i)]} is not finite")
+        raise ArgumentError(f"{what}{f'[{at}]' if at else ''} = {array[tuple(i)]} is not finite")
     return array
 
 
 def require_row(values: Any, what: str) -> npt.NDArray[np.float64]:
-    """Return ``values`` as one row of finite numbers, or raise :class:`SceneError`."""
+    """Return ``values`` as one row of finite numbers, or raise :class:`ArgumentError`."""
     row = require_array(values, what)
     if row.ndim != 1:
-        raise SceneError(f"{what} has shape {row.shape}; give one row of numbers")
+        raise ArgumentError(f"{what} has shape {row.shape}; give one row of numbers")
     return row

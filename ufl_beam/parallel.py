@@ -28,7 +28,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import CopiesDiffer, SceneError, StepFailed, shorten, warn
+from ufl_beam.errors import ArgumentError, CopiesDiffer, StepFailed, shorten, warn
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # of a notebook without ipywidgets, where bars are text
@@ -61,7 +61,9 @@ def communicator(comm: MPI.Intracomm | None, what: str) -> MPI.Intracomm:
     if comm is None:
         return active_comm()
     if not isinstance(comm, MPI.Intracomm) or comm == MPI.COMM_NULL:
-        raise SceneError(f"{what} = {shorten(comm)} must be a communicator, such as MPI.COMM_SELF")
+        raise ArgumentError(
+            f"{what} = {shorten(comm)} must be a communicator, such as MPI.COMM_SELF"
+        )
     return comm
 
 

@@ -122,14 +122,14 @@ def mistakes(case):
     make, says = CASES[case]
     try:
         make()
-    except (ub.SceneError, ub.ConvergenceError) as error:
+    except (ub.ArgumentError, ub.ConvergenceError) as error:
         if says not in str(error):
             raise AssertionError(f"{says!r} is not in: {error}") from error
         _require_kept(error)
         raise
     except ZeroDivisionError as error:
         _require_kept(error)
-        raise ub.SceneError(str(error)) from error
+        raise ub.ArgumentError(str(error)) from error
     raise AssertionError("nothing was said")
 
 

@@ -101,7 +101,7 @@ def _judge(one: Row, value: Any) -> dict[str, Any]:
     """The verdict on one value, by comparison."""
     try:
         got = one.experiment(value)
-    except (ub.SceneError, ub.ConvergenceError) as error:
+    except (ub.ArgumentError, ub.ConvergenceError) as error:
         message = str(error).splitlines()[0]
         right = any(part in message for part in one.stops)
         return {"verdict": "stops" if right else "WRONG", "message": message}

@@ -156,7 +156,7 @@ def saved(case):
     for one, other in zip(scene.joints, after.scene.joints, strict=True):
         if one.holders and {one.holders[0].a, one.holders[0].b} == set(one.places[:2]):
             histories = before.joint(one), after.joint(other)
-            if one.kind == "Guided":
+            if isinstance(one, ub.Guided):
                 assert difference(histories[0].force, histories[1].force) < 1e-5
             else:
                 assert_same_bits(*(history._asdict() for history in histories))

@@ -31,7 +31,7 @@ def outcome_of(combination, folder, names):
     case, found = Case(combination, folder), {}
     try:
         assert case.whole.solution is not None
-    except ub.SceneError as error:
+    except ub.ArgumentError as error:
         known = any(words in str(error) for words in REFUSED)
         return {"run": "refused" if known else f"refused: {error}"}
     for name in names:

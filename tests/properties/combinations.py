@@ -26,7 +26,7 @@ DYNAMICS = (
 )  # fmt: skip
 SCHEMES = (*STATICS, *DYNAMICS)
 
-EXACT = ("ub.EnergyMomentumStatic", "ub.EnergyMomentum", "ub.EnergyMomentumDecaying", "Weighted")
+EXACT = ("ub.EnergyMomentumStatic", "ub.EnergyMomentum(", "ub.EnergyMomentumDecaying", "Weighted")
 
 HOLDING = (
     "Link", "Prismatic", "multipliers=", "Guided", "PrescribedMotion", "Release", "Coulomb",

@@ -35,7 +35,7 @@ def largest_gap(solution, size):
 
 def _misses(solution, one):
     """Lengths and angles that should be zero at all times."""
-    kind, zero = one.kind, np.zeros(1)
+    kind, zero = type(one).__name__, np.zeros(1)
     if hasattr(one, "held"):
         yield from _of_support(solution, one)
     elif isinstance(getattr(one, "law", None), PrescribedMotion):

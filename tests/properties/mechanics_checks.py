@@ -95,7 +95,7 @@ def momentum(case):
     """
     words = case.combination
     only(
-        words.has("ub.EnergyMomentum", "ub.EnergyMomentumDecaying", "Weighted"),
+        words.has("ub.EnergyMomentum(", "ub.EnergyMomentumDecaying", "Weighted"),
         "other means of forces",
     )
     only(not words.has("VirtualWork", "Potential", "RotatingFrame", "Rayleigh", "Guided"), "field")

@@ -147,7 +147,7 @@ def test_a_later_end_goes_on(shared_path):
     assert longer.times == pytest.approx(whole.times, rel=1e-14)
     # What a last digit of the time changes, and what Newton's method leaves
     assert np.abs(longer.q - whole.q).max() < 1e-8 * np.abs(whole.q).max()
-    with pytest.raises(ub.SceneError, match=r"is at t = 0.2 s, beyond the end t\[1\] = 0.15"):
+    with pytest.raises(ub.ArgumentError, match=r"is at t = 0.2 s, beyond the end t\[1\] = 0.15"):
         until(0.15, checkpoint=checkpoint)
     assert scene.size > 1
 

@@ -22,13 +22,23 @@ def beam(**more):
 
 
 def raises(*parts):
-    """`pytest.raises` for a SceneError whose message has all `parts`, in this order."""
-    return pytest.raises(ub.SceneError, match=".*".join(map(re.escape, parts)))
+    """`pytest.raises` for an ArgumentError whose message has all `parts`, in this order."""
+    return pytest.raises(ub.ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
-def test_scene_errors_are_value_errors():
-    assert issubclass(ub.SceneError, ValueError)
+def test_errors_are_those_of_python():
+    """A wrong value is a ValueError, a wrong type a TypeError, too; models have their own class."""
+    assert issubclass(ub.ArgumentError, ValueError)
     assert issubclass(ub.ConvergenceError, RuntimeError)
+    with pytest.raises(TypeError, match="Newton: rtol = 'x' is not a number"):
+        ub.Newton(rtol="x")
+    with pytest.raises(ub.ModelError, match="Section: EA = 'x' is not a number"):
+        ub.Section("x", 1.0, 1.0)
+    with pytest.raises(ub.ArgumentError, match="fps = 0 must be positive") as error:
+        ub.animate(
+            ub.simulate(ub.Scene([beam()]), ub.EnergyMomentum(), t=(0, 1), dt=1), "a.gif", fps=0
+        )
+    assert not isinstance(error.value, ub.ModelError | TypeError)
 
 
 # -- sections ----------------------------------------------------------------------------------
@@ -1078,7 +1088,7 @@ class Pulse:
 def test_wrong_kinds_are_scene_errors(call):
     try:
         call()
-    except ub.SceneError:
+    except ub.ArgumentError:
         return
     pytest.fail("no error at all")
 

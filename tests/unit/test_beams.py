@@ -104,7 +104,7 @@ def test_hinges_of_curved_beams(make):
 
 
 def test_hinges_of_curved_beams_are_checked():
-    with pytest.raises(ub.SceneError, match=r"hinge at s = 2 must lie between 0 and 1"):
+    with pytest.raises(ub.ArgumentError, match=r"hinge at s = 2 must lie between 0 and 1"):
         ub.Beam.arc((0, 0), 1.0, (0, 1), SECTION, hinges={2.0: ub.ElastoPlastic(1.0)})
 
 

@@ -64,14 +64,14 @@ def path(shared_path):
     ],
 )
 def test_bad_choices(arguments, message):
-    with pytest.raises(ub.SceneError, match=message):
+    with pytest.raises(ub.ArgumentError, match=message):
         ub.Checkpoint("run.checkpoint", **arguments)
 
 
 def test_a_name_is_no_checkpoint(path):
-    with pytest.raises(ub.SceneError, match="checkpoint = 'x' is not a Checkpoint"):
+    with pytest.raises(ub.ArgumentError, match="checkpoint = 'x' is not a Checkpoint"):
         ub.simulate(scene(), ub.EnergyMomentum(), t=(0, 1), dt=0.1, checkpoint="x")
-    with pytest.raises(ub.SceneError, match="there is no directory"):
+    with pytest.raises(ub.ArgumentError, match="there is no directory"):
         run(path.parent / "nowhere" / "x")
 
 
@@ -106,7 +106,7 @@ OTHERS = {
 def test_the_file_of_another_run(other, path):
     run(path)
     arguments, message = OTHERS[other]
-    with pytest.raises(ub.SceneError, match=message) as refused:
+    with pytest.raises(ub.ArgumentError, match=message) as refused:
         run(path, **arguments)
     assert "Delete the file to begin anew, or name another" in str(refused.value)
 
@@ -115,7 +115,7 @@ def test_another_start(path):
     first = ub.simulate(scene(), ub.Static(), t=(0, 1), dt=1.0, progress=False)
     run(path)
     frame = first.scene
-    with pytest.raises(ub.SceneError, match=r"start is .*, in the file 'nothing'"):
+    with pytest.raises(ub.ArgumentError, match=r"start is .*, in the file 'nothing'"):
         run(path, frame, start=first)
 
 
@@ -258,7 +258,7 @@ def listing(asked):
 )
 def test_what_is_not_told_would_be_lost(force, message, path):
     """Said after the first step and not after the first crash."""
-    with pytest.raises(ub.SceneError, match=message) as error:
+    with pytest.raises(ub.ArgumentError, match=message) as error:
         run(path, steered(force), every=100)
     assert "state() and restore(state)" in str(error.value)
     assert len(error.value.solution.times) == 2
@@ -287,7 +287,9 @@ class Odd(Telling):
 
 
 def test_a_state_must_be_plain(path):
-    with pytest.raises(ub.SceneError, match="something else than numbers, texts, lists and dicts"):
+    with pytest.raises(
+        ub.ArgumentError, match="something else than numbers, texts, lists and dicts"
+    ):
         run(path, steered(Odd()))
 
 
@@ -306,7 +308,7 @@ class Deaf(ub.Recorder):
 
 
 def test_recorders_that_cannot_go_on_are_refused(path):
-    with pytest.raises(ub.SceneError, match="Deaf: this recorder cannot go on"):
+    with pytest.raises(ub.ArgumentError, match="Deaf: this recorder cannot go on"):
         run(path, record=Deaf())
 
 
@@ -314,7 +316,7 @@ def test_a_history_that_is_gone(path, on_first_rank):
     table = path.with_suffix(".csv")
     run(path, record=ub.History(table))
     on_first_rank(lambda: table.write_text("t\n0\n"))
-    with pytest.raises(ub.SceneError, match="it is not what was written up to the checkpoint"):
+    with pytest.raises(ub.ArgumentError, match="it is not what was written up to the checkpoint"):
         run(path, record=ub.History(table))
 
 

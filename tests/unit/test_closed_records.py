@@ -19,7 +19,7 @@ CLOSED = [
 
 @pytest.mark.parametrize("kind", CLOSED, ids=lambda kind: kind.__name__)
 def test_no_subclass_is_ignored(kind):
-    with pytest.raises(ub.SceneError, match=f"Mine: {kind.__name__} has no subclasses"):
+    with pytest.raises(ub.ArgumentError, match=f"Mine: {kind.__name__} has no subclasses"):
         dataclass(frozen=True)(type("Mine", (kind,), {"__annotations__": {"more": float}}))
 
 
@@ -65,6 +65,6 @@ def test_a_subclass_of_hardening_is_followed(more, reference):
 def test_a_hinge_of_zero_length_refuses_it(make):
     """Its equations are those of ElastoPlastic."""
     with pytest.raises(
-        ub.SceneError, match="Saturating is a subclass of ElastoPlastic, and a hinge"
+        ub.ArgumentError, match="Saturating is a subclass of ElastoPlastic, and a hinge"
     ):
         make(Saturating(1.0, more=1.0))

@@ -148,7 +148,7 @@ def test_a_run_goes_on_within_a_sample_by_start():
 
 @pytest.mark.parametrize("sample", [0.0, -1.0, math.nan, "often"])
 def test_bad_sample_times(sample):
-    with pytest.raises(ub.SceneError, match="Controller: sample"):
+    with pytest.raises(ub.ArgumentError, match="Controller: sample"):
         ub.Controller(lambda now: 0.0, sample=sample)
 
 

@@ -89,7 +89,7 @@ def path(tmp_path):
 
 def refused(kind, path, *parts):
     """The error of reading a file names it, has these parts, and says what to do."""
-    with pytest.raises(ub.SceneError) as error:
+    with pytest.raises(ub.ArgumentError) as error:
         kind.read(path)
     what = kind.format.partition(" ")[0]
     assert str(error.value).startswith(f"{what} {path}: "), error.value
@@ -321,7 +321,7 @@ def test_recorders_whose_state_is_missing(name, make, path, tmp_path):
     content = output_files.read(path, format)
     without = {n: x for n, x in content.items() if not n.startswith("recorder 0/")}
     output_files.write(path, format, without)
-    with pytest.raises(ub.SceneError, match=r"checkpoint .* cannot go on from it: KeyError\('"):
+    with pytest.raises(ub.ArgumentError, match=r"checkpoint .* cannot go on from it: KeyError\('"):
         run(checkpoint=checkpoint, record=make(tmp_path / name))
 
 
@@ -333,7 +333,9 @@ def test_extremes_of_another_shape(path):
     content = output_files.read(path, format)
     content["recorder 0/forces low"] = content["recorder 0/forces low"].T
     output_files.write(path, format, content)
-    with pytest.raises(ub.SceneError, match=r"checkpoint .*the array 'forces low' is float64 of"):
+    with pytest.raises(
+        ub.ArgumentError, match=r"checkpoint .*the array 'forces low' is float64 of"
+    ):
         run(checkpoint=checkpoint, record=ub.Extremes())
 
 
@@ -398,7 +400,7 @@ def test_text_that_is_none(kind, text, path):
 def test_what_cannot_be_written_is_said(tmp_path):
     for name, value in (("a", {1j}), ("a", np.array([None])), ("\ud800", np.zeros(2))):
         path, content = tmp_path / "file", {name: value}
-        with pytest.raises(ub.SceneError, match="file of t = 1 s cannot be written: "):
+        with pytest.raises(ub.ArgumentError, match="file of t = 1 s cannot be written: "):
             output_files.write(path, "study of ufl_beam, 2", content, " of t = 1 s")
     assert not [*tmp_path.iterdir()]
 
@@ -442,7 +444,7 @@ def flip_and_resume(name, folder, flips):
             path.write_bytes(data)
             try:
                 recorded(folder, name, 1.0)
-            except ub.SceneError as error:
+            except ub.ArgumentError as error:
                 refusals += "it is not what was written up to the checkpoint" in str(error)
                 errors += 1
                 assert path.read_bytes() == data  # as it was found
@@ -501,7 +503,9 @@ def test_each_number_of_a_time_series_is_checked(name, tmp_path):
         path.write_bytes(data)
     else:
         path.write_text(path.read_text().replace("0.2,", "0.3,", 1))
-    with pytest.raises(ub.SceneError, match="it is missing, or was changed while the run was down"):
+    with pytest.raises(
+        ub.ArgumentError, match="it is missing, or was changed while the run was down"
+    ):
         recorded(tmp_path, name, 1.0)
 
 
@@ -509,7 +513,7 @@ def test_a_history_is_checked_on_all_processes(shared_path, on_first_rank):
     recorded(shared_path, "run.csv", 0.5)
     table = shared_path / "run.csv"
     on_first_rank(lambda: table.write_text(table.read_text().replace("0.2,", "0.3,", 1)))
-    with pytest.raises(ub.SceneError, match="it is not what was written up to the checkpoint"):
+    with pytest.raises(ub.ArgumentError, match="it is not what was written up to the checkpoint"):
         recorded(shared_path, "run.csv", 1.0)
 
 

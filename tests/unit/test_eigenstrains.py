@@ -82,7 +82,7 @@ def test_a_spring_that_is_too_long(reference):
     newton = ub.Newton(reference=reference)
     run = ub.simulate(held, ub.Static(), t=(0, 1), dt=0.5, newton=newton, progress=False)
     assert run.displacement(beam.start)[-1, 0] == pytest.approx(0.02 / 4, rel=1e-5)  # of EA
-    with pytest.raises(ub.SceneError, match=r"modes: Eigenstrain of Stretch\(.*at no strain"):
+    with pytest.raises(ub.ArgumentError, match=r"modes: Eigenstrain of Stretch\(.*at no strain"):
         ub.modes(held, 1)
 
 
@@ -145,10 +145,12 @@ def test_analyses_about_the_undeformed_scene_are_refused():
     push = [ub.PointLoad(one.end, force=(-1e5, 0)) for one in (beam, plain)]
     pushed = ub.Scene([beam], supports=simple.supports, loads=push[:1])
     for analyse in (lambda: ub.modes(simple, 1), lambda: ub.buckling(pushed, 1)):
-        with pytest.raises(ub.SceneError, match="Eigenstrain of girder bears a stress at no strai"):
+        with pytest.raises(
+            ub.ArgumentError, match="Eigenstrain of girder bears a stress at no strai"
+        ):
             analyse()
     with pytest.raises(
-        ub.SceneError, match=r"EnergyMomentumStatic\(theta=0.5\): Eigenstrain of girder"
+        ub.ArgumentError, match=r"EnergyMomentumStatic\(theta=0.5\): Eigenstrain of girder"
     ):
         ub.simulate(simple, ub.EnergyMomentumStatic(0.5), t=(0, 1), dt=0.5, progress=False)
     at = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0, progress=False)

@@ -34,7 +34,7 @@ def names():
     return run("ufl_beam", ub, {})
 
 
-@pytest.mark.parametrize("name", ub.__all__)
+@pytest.mark.parametrize("name", [*ub.__all__, *ub.RESULTS])
 def test_example(name, names, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     made = run(name, getattr(ub, name), dict(names))
@@ -59,7 +59,7 @@ def test_the_common_objects_are_shown_in_one_line(names):
 
 MEMBERS = [
     (name, member)
-    for name in ub.__all__
+    for name in [*ub.__all__, *ub.RESULTS]
     for member, thing in inspect.getmembers_static(getattr(ub, name))
     if inspect.isclass(getattr(ub, name)) and member[0] != "_" and ">>>" in (thing.__doc__ or "")
 ]

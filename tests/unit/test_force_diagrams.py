@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ArgumentError
 
 STIFF = ub.Section(EA=1e10, GA=1e10, EI=1e9, rhoA=100.0, rhoI=1.0)
 SOFT = ub.Section.rectangle(b=0.02, h=0.02, E=1e8, nu=0.3, rho=7850.0)
@@ -175,7 +175,7 @@ def test_yielding_beams_and_hinges(shared_path):
 def test_refused():
     scene, beam = supported(2, lambda b: ub.Gravity())
     solution = static(scene)
-    with pytest.raises(SceneError, match=r"diagram: points = 1 "):
+    with pytest.raises(ArgumentError, match=r"diagram: points = 1 "):
         solution.diagram(beam, points=1)
-    with pytest.raises(SceneError, match="not in the scene"):
+    with pytest.raises(ArgumentError, match="not in the scene"):
         solution.diagram(ub.Beam((0, 0), (1, 0), STIFF))

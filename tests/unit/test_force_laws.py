@@ -307,7 +307,7 @@ def test_the_reference_path():
     ],
 )
 def test_bad_laws(make, says):
-    with pytest.raises(ub.SceneError, match=re.escape(says)):
+    with pytest.raises(ub.ArgumentError, match=re.escape(says)):
         make()
 
 
@@ -316,12 +316,12 @@ def test_what_a_law_with_a_history_must_return(returned):
     law = ub.ForceLaw(lambda x, v, state: returned, [0.0])
     _, scene, _ = floating(law, lambda t: t)
     says = r"Slide\(.*\): the function returned .*; it must return the force and the state, a list"
-    with pytest.raises(ub.SceneError, match=says):
+    with pytest.raises(ub.ArgumentError, match=says):
         run(scene)
 
 
 def test_an_energy_that_is_no_number_is_named():
     law = ub.ForceLaw(lambda x, v: 1e3 * x, stored=lambda x: None)
     _, scene, _ = floating(law, lambda t: t)
-    with pytest.raises(ub.SceneError, match=r"Slide\(.*\): the energy returned None"):
+    with pytest.raises(ub.ArgumentError, match=r"Slide\(.*\): the energy returned None"):
         run(scene)

@@ -14,15 +14,15 @@ from ufl_beam.analysis.free_decay import (
     logarithmic_decrement,
     peaks,
 )
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ArgumentError
 
 OMEGA = 2 * np.pi
 """A period of one second."""
 
 
 def raises(*parts):
-    """`pytest.raises` for a SceneError whose message has all `parts`, in this order."""
-    return pytest.raises(SceneError, match=".*".join(map(re.escape, parts)))
+    """`pytest.raises` for a ArgumentError whose message has all `parts`, in this order."""
+    return pytest.raises(ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
 def viscous(t, decrement, phase=-1.0):

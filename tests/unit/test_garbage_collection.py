@@ -22,6 +22,6 @@ def test_it_is_as_it_was(enabled):
 
 
 def test_after_scenes_that_are_refused():
-    with pytest.raises(ub.SceneError, match="no beams"):
+    with pytest.raises(ub.ArgumentError, match="no beams"):
         ub.Scene()
     assert gc.isenabled()

@@ -143,5 +143,5 @@ def test_energies(law, scheme):
     ],
 )
 def test_numbers_out_of_range_are_refused(make, says):
-    with pytest.raises(ub.SceneError, match=says):
+    with pytest.raises(ub.ArgumentError, match=says):
         make()

@@ -130,5 +130,5 @@ def test_the_ledger_closes():
     ],
 )
 def test_refusals(make, says):
-    with pytest.raises(ub.SceneError, match=says):
+    with pytest.raises(ub.ArgumentError, match=says):
         make()

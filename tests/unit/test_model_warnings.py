@@ -36,7 +36,7 @@ def warns(*parts):
 
 
 def raises(*parts):
-    return pytest.raises(ub.SceneError, match=".*".join(map(re.escape, parts)))
+    return pytest.raises(ub.ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
 def test_warnings_point_at_the_line_of_the_user():

@@ -90,7 +90,9 @@ def test_outputs_that_share_a_file_are_refused(kind, shared_path, on_first_rank)
         os.link(shared_path / "a.csv", shared_path / "hard.csv")
 
     on_first_rank(prepare)
-    with pytest.raises(ub.SceneError, match=r"record\[0\] \((.*)\) and record\[1\] \((.*)\) would"):
+    with pytest.raises(
+        ub.ArgumentError, match=r"record\[0\] \((.*)\) and record\[1\] \((.*)\) would"
+    ):
         run(*COLLISIONS[kind](shared_path))
     names = on_first_rank(lambda: sorted(p.name for p in shared_path.iterdir()))
     assert names == ["a.csv", "hard.csv", "link.csv", "x"]
@@ -99,9 +101,9 @@ def test_outputs_that_share_a_file_are_refused(kind, shared_path, on_first_rank)
 
 def test_the_same_recorder_twice(shared_path):
     table = ub.History(shared_path / "a.csv")
-    with pytest.raises(ub.SceneError, match=r"record\[0\] and record\[2\] are the same History"):
+    with pytest.raises(ub.ArgumentError, match=r"record\[0\] and record\[2\] are the same History"):
         run(table, ub.Events(), table)
-    with pytest.raises(ub.SceneError, match=r"follow: record\[0\] and record\[1\] are the same"):
+    with pytest.raises(ub.ArgumentError, match=r"follow: record\[0\] and record\[1\] are the same"):
         ub.follow(scene(), ub.LoadControl(0.5), record=[table, table])
 
 
@@ -111,9 +113,9 @@ def test_the_same_recorder_twice(shared_path):
 def test_a_checkpoint_shares_no_file(recorder, shared_path):
     path = shared_path / "a.xdmf.bin"
     checkpoint = ub.Checkpoint(path, every=2)
-    with pytest.raises(ub.SceneError, match=rf"and checkpoint would both write {path}"):
+    with pytest.raises(ub.ArgumentError, match=rf"and checkpoint would both write {path}"):
         run(recorder(path), checkpoint=checkpoint)
-    with pytest.raises(ub.SceneError, match="and checkpoint would both write"):
+    with pytest.raises(ub.ArgumentError, match="and checkpoint would both write"):
         run(recorder(path), checkpoint=ub.Checkpoint(f"{path.parent}/./{path.name}", every=2))
 
 
@@ -158,7 +160,7 @@ def test_the_file_of_a_study_is_not_that_of_a_member(shared_path):
 )
 def test_names_that_are_none(path, message, shared_path, monkeypatch):
     monkeypatch.chdir(shared_path)
-    with pytest.raises(ub.SceneError, match=message):
+    with pytest.raises(ub.ArgumentError, match=message):
         run(ub.History(path))
 
 
@@ -170,7 +172,7 @@ def test_a_check_makes_no_file_that_a_kill_could_leave(tmp_path):
 
 def test_names_that_xml_cannot_hold():
     for name in ("a\nb.xdmf", " a.xdmf"):
-        with pytest.raises(ub.SceneError, match="do not survive in XML; take another name"):
+        with pytest.raises(ub.ArgumentError, match="do not survive in XML; take another name"):
             run(ub.XDMF(name))
 
 
@@ -267,7 +269,7 @@ def test_a_file_that_was_removed_before_a_checkpoint(kind, shared_path, on_first
     assert len(error.value.solution.times) == 5
     kept = on_first_rank(lambda: read(shared_path / "a.checkpoint", FORMAT))
     assert len(kept["history/q"]) == 3
-    with pytest.raises(ub.SceneError, match="it is not what was written up to the checkpoint"):
+    with pytest.raises(ub.ArgumentError, match="it is not what was written up to the checkpoint"):
         run(recorder(shared_path / name), Remove(shared_path / gone, 3), checkpoint=checkpoint)
 
 

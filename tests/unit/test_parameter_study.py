@@ -55,7 +55,7 @@ def bits(study):
     return {name: (x.shape, x.tobytes()) for name, x in study.results.items()}
 
 
-def raises(*parts, kind=ub.SceneError):
+def raises(*parts, kind=ub.ArgumentError):
     return pytest.raises(kind, match=".*".join(map(re.escape, parts)))
 
 
@@ -155,7 +155,7 @@ def fragile(x):
             "no equilibrium", time=0.0, dt=1.0, solution=None, residuals={}, forces={}
         )
     if x == 3:
-        raise ub.SceneError("x = 3 is no scene")
+        raise ub.ArgumentError("x = 3 is no scene")
     return square(x)
 
 
@@ -163,7 +163,7 @@ def test_a_failed_member_is_reported_and_not_fatal(capsys):
     study = ub.study(fragile, numbers(1, 2, 3, 4))
     assert study.failed == {
         1: "ConvergenceError: no equilibrium",
-        2: "SceneError: x = 3 is no scene",
+        2: "ArgumentError: x = 3 is no scene",
     }
     assert np.array_equal(study["square"], [1, np.nan, np.nan, 16], equal_nan=True)
     assert np.isnan(study["powers"][[1, 2]]).all()
@@ -171,7 +171,7 @@ def test_a_failed_member_is_reported_and_not_fatal(capsys):
     said = (
         "study of fragile: 4 members, 2 failed\n"
         "  failed: {'x': 2}: ConvergenceError: no equilibrium\n"
-        "  failed: {'x': 3}: SceneError: x = 3 is no scene\n"
+        "  failed: {'x': 3}: ArgumentError: x = 3 is no scene\n"
     )
     assert capsys.readouterr().out == (said if COMM.rank == 0 else "")
     assert active_comm() == COMM

@@ -63,7 +63,7 @@ def test_axes_of_a_part_of_a_figure(bent):
 
 @pytest.mark.parametrize("draw", ONE_PANEL.values(), ids=ONE_PANEL)
 def test_what_is_no_axes_is_refused(bent, draw):
-    with pytest.raises(ub.SceneError, match=r"ax = .* must be axes of Matplotlib"):
+    with pytest.raises(ub.ArgumentError, match=r"ax = .* must be axes of Matplotlib"):
         draw(*bent, ax=Figure())
 
 

@@ -27,7 +27,7 @@ def no_mesh(monkeypatch):
 
 
 def refused(said, scheme=None, **more):
-    with pytest.raises(ub.SceneError) as caught:
+    with pytest.raises(ub.ArgumentError) as caught:
         ub.simulate(SCENE, scheme or ub.EnergyMomentum(), t=(0, 0.1), dt=0.01, **more)
     assert said in str(caught.value)
 
@@ -96,7 +96,7 @@ def test_a_scheme_that_cannot_be_hashed():
 @pytest.mark.parametrize("value", [1.0, "EnergyMomentum", ub.EnergyMomentum, object(), np.zeros(3)])
 def test_no_scheme_at_all(value):
     with pytest.raises(
-        ub.SceneError, match=r"must be a scheme, such as Static\(\) or EnergyMomentum\(\)"
+        ub.ArgumentError, match=r"must be a scheme, such as Static\(\) or EnergyMomentum\(\)"
     ):
         ub.simulate(SCENE, value, t=(0, 0.1), dt=0.01)
 

@@ -321,7 +321,7 @@ def test_history_tells_the_forces_of_a_joint_apart(shared_path, on_first_rank):
     ],
 )
 def test_history_of_something_else_leaves_no_file(shared_path, more, message):
-    with pytest.raises(ub.SceneError, match=message):
+    with pytest.raises(ub.ArgumentError, match=message):
         run(machine(), ub.History(shared_path / "run.csv", **more), steps=1)
     MPI.COMM_WORLD.Barrier()
     assert not (shared_path / "run.csv").exists()

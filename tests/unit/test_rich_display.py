@@ -139,7 +139,7 @@ def test_errors_of_pictures_leave_the_text(solution, monkeypatch):
     # Constraints that repeat are found when the scene is drawn
     joints = [ub.Revolute(BEAM.end, ub.ground(2, 0)), ub.Revolute(BEAM.start, ub.ground(0, 0))]
     over = ub.Scene([BEAM], joints=[*joints, ub.Link(BEAM.start, BEAM.end)])
-    assert "no picture: SceneError" in over._repr_html_()
+    assert "no picture: ModelError" in over._repr_html_()
     assert "1 beam, 3 joints" in over._repr_html_()
 
 

@@ -172,7 +172,7 @@ def test_no_supports_no_reactions():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
     solution = ub.simulate(ub.Scene([beam]), ub.EnergyMomentum(), t=(0, 1), dt=0.5)
     with pytest.raises(
-        ub.SceneError, match=r"reaction: Clamped at beam.end .* is not in the scene"
+        ub.ArgumentError, match=r"reaction: Clamped at beam.end .* is not in the scene"
     ):
         solution.reaction(ub.Clamped(beam.end))
 

@@ -22,7 +22,7 @@ EFFORT = 14
 LINEAR, STRICT = ub.Mesh(), ub.Newton()  # nothing else is tried
 
 
-def raises(*parts, kind=ub.SceneError):
+def raises(*parts, kind=ub.ArgumentError):
     return pytest.raises(kind, match="(?s)" + ".*".join(map(re.escape, parts)))
 
 
@@ -155,7 +155,7 @@ def test_degree_two_is_left_where_the_scene_has_none(law):
 
     def refuse(scene, *, mesh, **others):
         if mesh.degree > 1:
-            raise ub.SceneError("Mesh: degree 2 is not for this scene")
+            raise ub.ArgumentError("Mesh: degree 2 is not for this scene")
         return simulate(scene, mesh=mesh, **others)
 
     tradeoff.simulate = refuse  # the fixture restores it
@@ -296,7 +296,7 @@ def test_schemes_that_converge_to_different_limits_are_named(law):
 def test_dials_that_a_scene_cannot_have_leave_the_others(law):
     def error(h, dt, scheme, newton):
         if scheme.alpha > 0:
-            raise ub.SceneError("EnergyMomentum: not for this scene")
+            raise ub.ArgumentError("EnergyMomentum: not for this scene")
         return smooth(h, dt, scheme, newton)
 
     law(error)

@@ -426,7 +426,9 @@ TABLE = {
     # files
     "XDMF": call(ub.XDMF, path=V("run.xdmf", [*PATH, "run.h5"]), every=V(1, COUNT)),
     "VTKHDF": call(ub.VTKHDF, path=V("run.vtkhdf", [*PATH, "run.h5"]), every=V(1, COUNT)),
-    "load": call(ub.Solution.load, path=V("run.h5", PATH), scene=V(None, optional(OBJECT))),
+    "Solution.load": call(
+        ub.Solution.load, path=V("run.h5", PATH), scene=V(None, optional(OBJECT))
+    ),
     "History": call(
         ub.History,
         path=V("run.csv", PATH), places=V((), LIST), connectors=V((), LIST), every=V(1, COUNT),
@@ -522,6 +524,15 @@ def test_every_parameter_is_in_the_table(name):
     assert names - set(parameters) == set()
 
 
+PLACES = {"places", "place", "follow"}
+"""Of recorders; what is wrong with them is said as of other places."""
+
+
+def of_models(name):
+    """Whether something makes a part of a model."""
+    return getattr(ub, name.split(".")[0]).__module__.startswith("ufl_beam.model.")
+
+
 def _wrong(name):
     _, parameters = TABLE[name]
     good = {parameter: value for parameter, (value, _) in parameters.items()}
@@ -532,7 +543,10 @@ def _wrong(name):
 
 @pytest.mark.parametrize("name", TABLE)
 def test_wrong_values_are_refused_by_name(name, monkeypatch):
-    """Each wrong value of each parameter gives one of the errors that are meant, with a name."""
+    """Each wrong value of each parameter gives one of the errors that are meant, with a name.
+
+    It is a `ModelError` for parts of models and for nothing else.
+    """
 
     def no_mesh(*_, **__):
         raise AssertionError("a mesh was made")
@@ -543,10 +557,12 @@ def test_wrong_values_are_refused_by_name(name, monkeypatch):
     for parameter, value, values in _wrong(name):
         try:
             of(**values)
-        except (ub.SceneError, TypeError) as error:
+        except (ub.ArgumentError, TypeError) as error:
             said = str(error)
-            if not isinstance(error, ub.SceneError):
+            if not isinstance(error, ub.ArgumentError):
                 faults.append(f"{parameter} = {value!r:.60}: {error!r:.100}")
+            elif parameter not in PLACES and isinstance(error, ub.ModelError) != of_models(name):
+                faults.append(f"{parameter} = {value!r:.60}: it is a {type(error).__name__}")
             elif len(said) > 350:
                 faults.append(f"{parameter} = {value!r:.60}: {len(said)} characters")
             elif not any(part in said for part in (name.split(".")[0], parameter, "girder", "hub")):
@@ -611,7 +627,7 @@ OWNERS = {
 def test_functions_that_return_no_number_later(owner, value):
     """The message names the owner; before, most of them were bare errors of NumPy, or silent."""
     scene = OWNERS[owner](value)
-    with pytest.raises(ub.SceneError) as failure:
+    with pytest.raises(ub.ArgumentError) as failure:
         ub.simulate(
             scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False, comm=MPI.COMM_SELF
         )
@@ -634,10 +650,10 @@ def test_numbers_of_numpy_are_numbers():
 
 def test_messages_show_the_beginning_of_long_values():
     records = [ub.Clamped(BEAM.start) for _ in range(40)]
-    with pytest.raises(ub.SceneError, match="joints") as failure:
+    with pytest.raises(ub.ArgumentError, match="joints") as failure:
         ub.Scene([BEAM], joints=BEAM)
     assert len(str(failure.value)) < 150
-    with pytest.raises(ub.SceneError, match="is not a Joint") as failure:
+    with pytest.raises(ub.ArgumentError, match="is not a Joint") as failure:
         ub.Scene([BEAM], joints=records)
     assert len(str(failure.value)) < 150
 

@@ -274,7 +274,7 @@ def falling(law, *, dt=0.01, scheme=None, joint=False, h=0.1, end=0.5):
         beams, joints = [upper, lower], [ub.Revolute(upper.end, lower.start)]
     else:
         weak = replace(stiff, hinge=law)
-        middle = ub.Beam(upper.b, lower.a, weak, cells=1, hinges={0.0: None, 1.0: None})
+        middle = ub.Beam(upper.ends[1], lower.ends[0], weak, cells=1, hinges={0.0: None, 1.0: None})
         beams = [upper, middle, lower]
         joints = [ub.Rigid(upper.end, middle.start), ub.Rigid(middle.end, lower.start)]
     scene = ub.Scene(

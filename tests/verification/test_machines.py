@@ -181,7 +181,7 @@ def test_what_nobody_knows_of_a_joint():
     plate = ub.Body((1, 1), mass=1.0, inertia=0.1)
     corner = ub.Rigid(left.end, right.start, plate.at(1, 0))
     solution = run(ub.Scene([left, right], joints=[corner], bodies=[plate]), 0.02, 0.01)
-    with pytest.raises(ub.SceneError, match="share unknowns, so that the force between them"):
+    with pytest.raises(ub.ArgumentError, match="share unknowns, so that the force between them"):
         solution.joint(corner)
 
 

@@ -231,7 +231,7 @@ def test_eccentric_load_on_a_body():
 def with_arm(ratio):
     """The outrigger in dynamics, its arm a RigidLink or a beam that is so many times as stiff."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    load = {"force": (-20.0, -30.0), "time": ub.ramp(0.1)}
+    load = {"force": (-20.0, -30.0), "amplitude": ub.ramp(0.1)}
     if ratio is None:
         plate = ub.Body((1.0, 0.5), mass=1.0, inertia=0.1, name="plate")
         beams, bodies, masses = [beam], [plate], []

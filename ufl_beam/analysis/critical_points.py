@@ -19,7 +19,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 from ufl_beam.display import bracketed, one_line
-from ufl_beam.errors import SceneError, StepFailed
+from ufl_beam.errors import ArgumentError, StepFailed
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.stepper import Trial
 from ufl_beam.solvers.factorization import Factorisation
@@ -84,12 +84,12 @@ class CriticalPoint:
         """Return the start of the path along the mode, or against it with ``sign = -1``.
 
         Raises:
-            SceneError: ``sign`` is neither 1 nor -1, or nothing branches at a limit point.
+            ArgumentError: ``sign`` is neither 1 nor -1, or nothing branches at a limit point.
         """
         if sign not in (1, -1):
-            raise SceneError(f"branch: sign = {sign!r} must be 1 or -1")
+            raise ArgumentError(f"branch: sign = {sign!r} must be 1 or -1")
         if self.kind != "bifurcation":
-            raise SceneError(f"branch: no other branch begins at a {self.kind} point")
+            raise ArgumentError(f"branch: no other branch begins at a {self.kind} point")
         return Branch(self.state, sign * self.mode)
 
     def __str__(self) -> str:

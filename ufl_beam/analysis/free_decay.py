@@ -11,7 +11,7 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import one_line
-from ufl_beam.errors import SceneError, require_array, require_number, require_row
+from ufl_beam.errors import ArgumentError, require_array, require_number, require_row
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ def damping(
     """Estimate the damping of a free vibration; arguments and errors of :func:`peaks`.
 
     Raises:
-        SceneError: Less than 3 peaks, or not all of them are above ``about``.
+        ArgumentError: Less than 3 peaks, or not all of them are above ``about``.
 
     Example:
         >>> t = np.arange(0, 5, 0.01)
@@ -143,7 +143,7 @@ def damping(
     """
     times, amplitudes = peaks(t, x, about, prominence=prominence)
     if len(times) < 3:
-        raise SceneError(
+        raise ArgumentError(
             f"damping: peaks found: {len(times)}, needed: 3; give a longer history, "
             f"or lower prominence = {prominence:g}"
         )
@@ -169,7 +169,7 @@ def peaks(
             than superposed vibrations of high frequency, less than the last peaks.
 
     Raises:
-        SceneError: t and x are not as many, not finite, or t does not increase.
+        ArgumentError: t and x are not as many, not finite, or t does not increase.
 
     Example:
         >>> t = np.arange(0, 3, 0.01)
@@ -194,7 +194,7 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
     """Compute the mean logarithmic decrement δ of n + 1 amplitudes, and that of each period, (n,).
 
     Raises:
-        SceneError: Less than two amplitudes, or some are not positive.
+        ArgumentError: Less than two amplitudes, or some are not positive.
 
     Example:
         >>> mean, each = ub.logarithmic_decrement([1.0, 0.9, 0.81])
@@ -204,9 +204,9 @@ def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
     Φ = require_row(amplitudes, "logarithmic_decrement: amplitudes")
     n = len(Φ) - 1
     if n < 1:
-        raise SceneError(f"logarithmic_decrement: amplitudes given: {n + 1}, needed: 2")
+        raise ArgumentError(f"logarithmic_decrement: amplitudes given: {n + 1}, needed: 2")
     for i in np.flatnonzero(Φ <= 0):
-        raise SceneError(
+        raise ArgumentError(
             f"logarithmic_decrement: amplitudes[{i}] = {Φ[i]:g} must be positive; "
             "is `about` the equilibrium, and the prominence more than the noise?"
         )
@@ -237,8 +237,8 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
         amplitudes: Their amplitudes; (n,).
 
     Raises:
-        SceneError: t and amplitudes are not as many, at least 3, and finite; t does not increase;
-            an amplitude is not positive; or they scatter so much that nothing fits.
+        ArgumentError: t and amplitudes are not as many, at least 3, and finite; t does not
+            increase; an amplitude is not positive; or they scatter so much that nothing fits.
 
     Example:
         >>> t = np.arange(6.0)
@@ -248,7 +248,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     """
     t, A = _series("fit_decay", t, amplitudes, "amplitudes")
     if len(A) < 3:
-        raise SceneError(f"fit_decay: amplitudes given: {len(A)}, needed: 3")
+        raise ArgumentError(f"fit_decay: amplitudes given: {len(A)}, needed: 3")
     mean, each = logarithmic_decrement(A)
     s = t - t[0]
     line = scipy.stats.linregress(s, A)
@@ -268,7 +268,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
                 ),
             )  # fmt: skip
     except RuntimeError:
-        raise SceneError(
+        raise ArgumentError(
             f"fit_decay: no exponential fits amplitudes from {A.min():g} to {A.max():g}; "
             "are they successive peaks of one free vibration?"
         ) from None
@@ -285,12 +285,14 @@ def _envelope(values: npt.ArrayLike, errors: npt.ArrayLike, residuals: Array) ->
 
 
 def _series(call: str, t: npt.ArrayLike, x: npt.ArrayLike, what: str) -> tuple[Array, Array]:
-    """Increasing times and as many values, or :class:`SceneError`."""
+    """Increasing times and as many values, or :class:`ArgumentError`."""
     times, values = require_row(t, f"{call}: t"), require_row(x, f"{call}: {what}")
     if len(times) != len(values):
-        raise SceneError(f"{call}: {len(times)} t and {len(values)} {what}; give as many of each")
+        raise ArgumentError(
+            f"{call}: {len(times)} t and {len(values)} {what}; give as many of each"
+        )
     for i in np.flatnonzero(np.diff(times) <= 0):
-        raise SceneError(
+        raise ArgumentError(
             f"{call}: t must increase, but t[{i}] = {times[i]:g} is followed by {times[i + 1]:g}"
         )
     return times, values

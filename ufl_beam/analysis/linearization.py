@@ -19,7 +19,7 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.errors import ModelWarning, SceneError
+from ufl_beam.errors import ArgumentError, ModelWarning
 from ufl_beam.mechanics.classical import Newmark, Static
 from ufl_beam.mechanics.time_schemes import Coefficients, Step
 from ufl_beam.model.beams import Mesh
@@ -59,17 +59,17 @@ def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | 
     Loads that a state does not balance have no part in its stiffness.
 
     Raises:
-        SceneError: The scene turns steadily, and the state of that is not given.
+        ArgumentError: The scene turns steadily, and the state of that is not given.
     """
     if any(isinstance(load, RotatingFrame) for load in scene.loads):
-        raise SceneError(
+        raise ArgumentError(
             "modes: the undeformed scene is not at rest in a RotatingFrame; give the state of "
             "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
         )
     if scene.loads and require_no_mechanism(scene):
         simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)  # at rest
         # Where they do not hold it, loads do not count either.
-        with suppress(SceneError), closing(simulation):
+        with suppress(ArgumentError), closing(simulation):
             simulation.step_to(1.0)
             return scene, simulation.snapshot()
     return replace(scene, loads=()), None
@@ -285,14 +285,14 @@ class SmallMotions:
         Z = Q[:, np.setdiff1d(np.arange(len(g)), supports.dofs)]
         rest = Z.T @ (r + T @ g)
         if not rest.any():
-            raise SceneError(
+            raise ArgumentError(
                 f"buckling: nothing acts on the scene at t = {simulation.t:g} s that does not act "
                 "in the state before; give it loads, or another t"
             )
         try:
             return np.asarray(g - Z @ splu((Z.T @ T @ Z).tocsc()).solve(rest))
         except RuntimeError:
-            raise SceneError("buckling: the scene is free to move in its state") from None
+            raise ArgumentError("buckling: the scene is free to move in its state") from None
 
     # -- shapes --------------------------------------------------------------------------------
 

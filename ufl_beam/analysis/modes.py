@@ -22,7 +22,7 @@ from ufl_beam.discretization.function_spaces import Fields, section_forces
 from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Share
 from ufl_beam.display import Rich
-from ufl_beam.errors import SceneError, require_count, require_kind, require_number, warn
+from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number, warn
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Anchor
@@ -84,7 +84,7 @@ class Shapes(Rich, ABC):
         """Return the motion (u, v, ψ) of a place in the k-th mode; (3,).
 
         Raises:
-            SceneError: No such shape, or the place is not in the scene.
+            ArgumentError: No such shape, or the place is not in the scene.
         """
         self._require(k)
         shape: Any = self.shapes[:, k]
@@ -99,7 +99,7 @@ class Shapes(Rich, ABC):
             count: States from the beginning of the period to its end, at times from 0 to 1.
 
         Raises:
-            SceneError: No such shape, or a number that is not positive.
+            ArgumentError: No such shape, or a number that is not positive.
         """
         self._require(k)
         require_number(amplitude, "motion: amplitude", positive=True)
@@ -130,7 +130,7 @@ class Shapes(Rich, ABC):
             amplitude: Largest displacement, as a part of the size of the scene.
 
         Raises:
-            SceneError: The file cannot be written, or there is no shape.
+            ArgumentError: The file cannot be written, or there is no shape.
         """
         require_number(amplitude, "write: amplitude", positive=True)
         self._require(0)
@@ -162,7 +162,7 @@ class Shapes(Rich, ABC):
 
     def _require(self, k: int) -> None:
         if not -len(self) <= k < len(self):
-            raise SceneError(f"there is no shape {k}; there are {len(self)}")
+            raise ArgumentError(f"there is no shape {k}; there are {len(self)}")
 
 
 class _Frame:
@@ -283,8 +283,8 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         mesh: Discretization; as ``at``, or with the cells of the beams.
 
     Raises:
-        SceneError: The call or the scene is wrong, nothing that moves has mass, or the scene turns
-            with a :class:`RotatingFrame` and ``at`` is not given.
+        ArgumentError: The call or the scene is wrong, nothing that moves has mass, or the scene
+            turns with a :class:`RotatingFrame` and ``at`` is not given.
 
     Warns:
         ModelWarning: Works, connectors, or motions of supports make the undeformed scene move.
@@ -305,7 +305,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     if at is None and (said := small.unbalanced()):
         warn(said)
     if not small.M.data.any():
-        raise SceneError("modes: nothing that can move has mass; give sections rho or rhoA")
+        raise ArgumentError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
     exponents, shapes = small.exponents(n)
     return Modes(scene, small.grid, small.q, shapes, exponents)
@@ -329,8 +329,8 @@ def buckling(
         mesh: Discretization; as ``at``, or with the cells of the beams.
 
     Raises:
-        SceneError: The call is wrong, the scene is free to move, nothing acts on it, or what acts
-            has a stiffness of its own.
+        ArgumentError: The call is wrong, the scene is free to move, nothing acts on it, or what
+            acts has a stiffness of its own.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
@@ -344,14 +344,16 @@ def buckling(
     require_number(t, "buckling: t")
     for load in (*scene.loads, *scene.works):
         if isinstance(load, FollowerLoad | RotatingFrame | VirtualWork):
-            raise SceneError(
+            raise ArgumentError(
                 f"buckling: a {type(load).__name__} has a stiffness of its own; use "
                 "modes(..., at=) about states with more and more of it, and see where a frequency "
                 "vanishes or a damping ratio becomes negative"
             )
     if at is None:
         if said := require_no_mechanism(scene):
-            raise SceneError(f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)")
+            raise ArgumentError(
+                f"{said}Where loads hold it, give at=simulate(scene, Static(), ...)"
+            )
         require_no_prestress(scene, "buckling", IN_EQUILIBRIUM)
     else:
         _require_of(at, scene, mesh, "buckling")
@@ -363,7 +365,7 @@ def buckling(
 def _require_of(at: Solution, scene: Scene, mesh: Mesh | None, what: str) -> None:
     require_kind(at, Solution, f"{what}: at")
     if not Grid(scene, mesh_of(at, mesh)).agrees(at.grid):
-        raise SceneError(
+        raise ArgumentError(
             f"{what}: at is a solution of other beams, joints or cells; use the same Beam "
             "objects, joined alike, and the same Mesh"
         )

@@ -24,7 +24,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich
-from ufl_beam.errors import SceneError, require_kind, require_sequence, require_switch, shorten
+from ufl_beam.errors import ArgumentError, require_kind, require_sequence, require_switch, shorten
 from ufl_beam.output.output_files import (
     above,
     below,
@@ -100,7 +100,7 @@ class Study(Rich):
 
     def __getitem__(self, name: str) -> Array:
         if name not in self.results:
-            raise SceneError(f"study: no result {name!r}; there is {', '.join(self.results)}")
+            raise ArgumentError(f"study: no result {name!r}; there is {', '.join(self.results)}")
         return self.results[name]
 
     def __repr__(self) -> str:
@@ -116,7 +116,7 @@ class Study(Rich):
         """Write a file with a checksum; an existing one is replaced once the new one is complete.
 
         Raises:
-            SceneError: The file cannot be written.
+            ArgumentError: The file cannot be written.
             OSError: There is no space for it.
         """
         file = require_path(path, "study")
@@ -131,7 +131,7 @@ class Study(Rich):
         """Read a file that :meth:`save` or :func:`study` wrote.
 
         Raises:
-            SceneError: There is no such file, or it holds no study, or is damaged.
+            ArgumentError: There is no such file, or it holds no study, or is damaged.
         """
         file = require_path(path, "study")
         with decoding(file, FORMAT):
@@ -142,7 +142,7 @@ class Study(Rich):
             for name, values in results.items():
                 require_arrays(results, {name: (len(cases), *values.shape[1:])})
             if len(content["errors"]) != len(cases):
-                raise SceneError("the file is damaged: it has not one 'errors' for each case")
+                raise ArgumentError("the file is damaged: it has not one 'errors' for each case")
             made = tuple(map(json.loads, cases))
             return cls(str(content["member"]), made, results, failed, content["seconds"])
 
@@ -181,8 +181,9 @@ def study(
         Results in the order of the cases.
 
     Raises:
-        SceneError: The call or the file is wrong, or a member returned something else than numbers
-            and arrays, or not the names and shapes of the others; the file has those before.
+        ArgumentError: The call or the file is wrong, or a member returned something else than
+            numbers and arrays, or not the names and shapes of the others; the file has those
+            before.
         RuntimeError: All members failed.
 
     Example:
@@ -207,20 +208,22 @@ def study(
 
     def prepare() -> None:
         if not callable(member):
-            raise SceneError(f"study: member = {shorten(member)} cannot be called; give a function")
+            raise ArgumentError(
+                f"study: member = {shorten(member)} cannot be called; give a function"
+            )
         for i, case in enumerate(require_sequence(cases, "study: cases")):
             key = _text_of(case, f"study: cases[{i}]")
             if key in todo:
-                raise SceneError(f"study: cases[{i}] = {case} is there twice")
+                raise ArgumentError(f"study: cases[{i}] = {case} is there twice")
             todo[key] = case
         if not todo:
-            raise SceneError("study: cases is empty")
+            raise ArgumentError("study: cases is empty")
         require_apart(outputs, "study")
         if path is not None and path.exists():
             old = Study.load(path)
             if not anew:
                 if old.member != name:
-                    raise SceneError(f"study {path} is one of {old.member}, not of {name}")
+                    raise ArgumentError(f"study {path} is one of {old.member}, not of {name}")
                 for key, (outcome, seconds) in old.records().items():
                     if key not in todo or not isinstance(outcome, str):
                         records[key] = outcome, seconds
@@ -334,7 +337,7 @@ def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> 
         if not isinstance(row, str):
             old = {name: row[name].shape for name in sorted(row)}
             if new != old:
-                raise SceneError(
+                raise ArgumentError(
                     f"study: {case} returned names and shapes {new}, but {other} {old}; return "
                     "the same from all members, and begin a new file if they have changed"
                 )
@@ -349,25 +352,27 @@ def _text_of(case: dict[str, Any], what: str = "case") -> str:
     try:
         return json.dumps(case, sort_keys=True, ensure_ascii=False, default=plain)
     except (TypeError, ValueError):
-        raise SceneError(
+        raise ArgumentError(
             f"{what} = {case}: values must be numbers, texts or lists of them; let the member "
             "make of these what else it needs"
         ) from None
 
 
 def _numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
-    """Return the result of a member as arrays of floats, or raise :class:`SceneError`."""
+    """Return the result of a member as arrays of floats, or raise :class:`ArgumentError`."""
     if not isinstance(returned, dict) or not returned:
-        raise SceneError(f"study: {case} returned {returned!r}; return a dict of numbers or arrays")
+        raise ArgumentError(
+            f"study: {case} returned {returned!r}; return a dict of numbers or arrays"
+        )
     arrays = {}
     for name, value in returned.items():
         if not isinstance(name, str) or name in {"", "."} or "/" in name or not name.isprintable():
-            raise SceneError(f"study: {case} returned {name!r}, which is no name of a result")
+            raise ArgumentError(f"study: {case} returned {name!r}, which is no name of a result")
         array = np.asarray(None)  # stays so if rows have different lengths
         with suppress(ValueError):
             array = np.asarray(value)
         if array.dtype.kind not in "biuf":
-            raise SceneError(
+            raise ArgumentError(
                 f"study: {case} returned {name} = {value!r}, which is no number or array of them"
             )
         arrays[name] = array.astype(float)

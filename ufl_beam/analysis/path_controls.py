@@ -17,7 +17,7 @@ import numpy as np
 
 from ufl_beam.analysis.critical_points import Stiffness
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number
+from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number
 from ufl_beam.mechanics.time_schemes import Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
@@ -301,7 +301,7 @@ class Control(ABC):
     def __post_init__(self) -> None:
         require_number(self.step, f"{type(self).__name__}: step")
         if self.step == 0:
-            raise SceneError(f"{type(self).__name__}: step = 0 leads nowhere")
+            raise ArgumentError(f"{type(self).__name__}: step = 0 leads nowhere")
 
     @property
     def factor(self) -> float:
@@ -314,7 +314,7 @@ class Control(ABC):
         return ""
 
     def require(self, scene: Scene) -> None:
-        """Raise :class:`SceneError` if the control does not fit the scene."""
+        """Raise :class:`ArgumentError` if the control does not fit the scene."""
 
     @abstractmethod
     def normal(self, corrector: PathCorrector, way: Array) -> Array:
@@ -368,7 +368,7 @@ class ArcLength(Control):
         factor: Change of the load factor that counts as much as a length of 1.
 
     Raises:
-        SceneError: No step, or ``factor`` is not positive.
+        ArgumentError: No step, or ``factor`` is not positive.
 
     Example:
         >>> rod = ub.Section.circle(d=0.05, E=210e9, nu=0.3)
@@ -410,7 +410,7 @@ class LoadControl(Control):
         step: Change of the load factor; negative downwards.
 
     Raises:
-        SceneError: No step.
+        ArgumentError: No step.
 
     Example:
         >>> path = ub.follow(scene, ub.LoadControl(0.25), steps=4)
@@ -436,7 +436,7 @@ class DisplacementControl(Control):
         step: Change of the component; m or rad.
 
     Raises:
-        SceneError: Not a place of a beam, another component, no step.
+        ArgumentError: Not a place of a beam, another component, no step.
 
     Example:
         >>> control = ub.DisplacementControl(beam.end, "v", -0.05)
@@ -453,16 +453,16 @@ class DisplacementControl(Control):
     def __post_init__(self) -> None:
         require_kind(self.place, Place, "DisplacementControl: place")
         if self.component not in COMPONENTS:
-            raise SceneError(
+            raise ArgumentError(
                 f"DisplacementControl: component = {self.component!r} must be one of "
                 f"{', '.join(COMPONENTS)}"
             )
         super().__post_init__()
 
     def require(self, scene: Scene) -> None:
-        """Raise :class:`SceneError` unless the beam of the place is in the scene."""
+        """Raise :class:`ArgumentError` unless the beam of the place is in the scene."""
         if self.place.beam not in scene.beams:
-            raise SceneError(
+            raise ArgumentError(
                 f"DisplacementControl of {self.place}: {self.place.beam.name} is not in the scene"
             )
 
@@ -492,7 +492,7 @@ class DissipationControl(Control):
         otherwise: Steps where nothing dissipates; arc length.
 
     Raises:
-        SceneError: ``step`` is not positive.
+        ArgumentError: ``step`` is not positive.
 
     Example:
         >>> pull = ub.PointLoad(weak.end, force=(0, -1e5), amplitude=lambda t: t)

@@ -19,7 +19,7 @@ from ufl_beam.analysis.path_controls import Control, Crossing, PathCorrector
 from ufl_beam.arrays import Array
 from ufl_beam.display import FACTOR
 from ufl_beam.errors import (
-    SceneError,
+    ArgumentError,
     StepFailed,
     require_count,
     require_function,
@@ -157,7 +157,7 @@ def follow(
         comm: Processes that share the scene.
 
     Raises:
-        SceneError: The call or the scene is wrong; nothing was computed.
+        ArgumentError: The call or the scene is wrong; nothing was computed.
         ConvergenceError: A step failed; it carries the path so far.
 
     Example:
@@ -170,7 +170,7 @@ def follow(
         require_function(until, "follow: until", "the Simulation")
     require_kind(scene, Scene, "scene")
     if not isinstance(control, Control) or isinstance(control, type):
-        raise SceneError(
+        raise ArgumentError(
             f"follow: control = {control!r} must be ArcLength(...), LoadControl(...), "
             "DisplacementControl(...) or DissipationControl(...)"
         )
@@ -205,9 +205,9 @@ def _require_driven(scene: Scene, t0: float) -> None:
     """Raise unless something depends on the load factor, and nothing on the history of time."""
     for link in scene.links:
         if isinstance(link.law, Controller):
-            raise SceneError(f"{link}: a controller acts in time, and a path has none")
+            raise ArgumentError(f"{link}: a controller acts in time, and a path has none")
         if rubs(link.law):
-            raise SceneError(
+            raise ArgumentError(
                 f"{link}: dry friction sticks or slides in steps of time, and a path has none; use "
                 "simulate(scene, Static(), ...), or a Spring that yields"
             )
@@ -215,14 +215,14 @@ def _require_driven(scene: Scene, t0: float) -> None:
             require_limit(link.law, str(link))
     for work in scene.works:
         if "v" in work.asked:
-            raise SceneError(
+            raise ArgumentError(
                 f"{work}: it depends on the velocity v, and a path has no time; leave v out, or "
                 "use simulate(scene, Static(), ...)"
             )
     times = (t0 + 1e-3, t0 + 1.0, t0 - 1e-3, t0 - 1.0)
     driven = any("t" in work.asked for work in scene.works)
     if not driven and not any(f(t) != f(t0) for _, f in scene.time_functions() for t in times):
-        raise SceneError(
+        raise ArgumentError(
             "follow: no load and no motion depends on time, which is the load factor here; give "
             "the one that is to grow amplitude=lambda t: t"
         )

@@ -20,8 +20,8 @@ from ufl_beam.analysis.richardson import Convergence, Cross, fit_cost, size
 from ufl_beam.analysis.tradeoff_result import Dials, Refinement, Run, Target, Tradeoff
 from ufl_beam.arrays import Array
 from ufl_beam.errors import (
+    ArgumentError,
     ConvergenceError,
-    SceneError,
     TradeoffError,
     require_kind,
     require_number,
@@ -42,7 +42,7 @@ from ufl_beam.solvers.newton_options import Newton
 MESHES = Mesh(degree=2), Mesh()  # that compete unless others are given
 NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
-WRONG = "SceneError: "  # how failures of runs begin that finer dials do not help
+WRONG = "ArgumentError: "  # how failures of runs begin that finer dials do not help
 
 LEAST_USED = 0.3  # part of a tolerance that the error of the answer shall use up at least
 # Limits known to the rest of it: a larger uncertainty leaves no room for such an error.
@@ -113,7 +113,7 @@ def tradeoff(
         The runs with their times and errors, and the recommended arguments.
 
     Raises:
-        SceneError: The call is wrong, or no kind of dials can be used for the scene.
+        ArgumentError: The call is wrong, or no kind of dials can be used for the scene.
         TradeoffError: Self-convergence is not seen, or it would take too long; it says what was
             seen and has the runs.
 
@@ -124,11 +124,11 @@ def tradeoff(
     """
     require_kind(quantities, Mapping, "tradeoff: quantities")
     if not quantities:
-        raise SceneError("tradeoff: quantities is empty; name what is to be accurate")
+        raise ArgumentError("tradeoff: quantities is empty; name what is to be accurate")
     for name, quantity in quantities.items():
         require_text(name, "tradeoff: the name of a quantity")
         if not callable(quantity):
-            raise SceneError(
+            raise ArgumentError(
                 f"tradeoff: quantity {name!r} = {shorten(quantity)} cannot be called; give a "
                 "function of a Solution"
             )
@@ -184,12 +184,12 @@ def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str
     """
     searches: list[_Search] = []
     notes: list[str] = []
-    wrong: list[SceneError] = []
+    wrong: list[ArgumentError] = []
     for k, dials in enumerate(runs.families):
         try:
             runs.begin(k)
             searches.append(_Search(runs, k, target))
-        except SceneError as error:
+        except ArgumentError as error:
             wrong.append(error)
             notes.append(f"{dials}: {error}")
         except TradeoffError as error:
@@ -218,7 +218,7 @@ def _target_of(
 ) -> Target:
     """Return the target of a call for some quantities, checked."""
     if (tolerance is None) == (budget is None):
-        raise SceneError("tradeoff: give either a tolerance or a budget")
+        raise ArgumentError("tradeoff: give either a tolerance or a budget")
     if budget is not None:
         require_number(budget, "tradeoff: budget", positive=True)
         return Target({}, 1.0, budget)
@@ -226,7 +226,7 @@ def _target_of(
         require_number(cast("float", tolerance), "tradeoff: tolerance", positive=True)
         return Target({}, cast("float", tolerance), math.inf)
     if set(tolerance) != set(quantities):
-        raise SceneError(
+        raise ArgumentError(
             f"tradeoff: tolerance is of {', '.join(tolerance)}, quantities are "
             f"{', '.join(quantities)}; name the same"
         )
@@ -241,7 +241,7 @@ def _several(values: One | Sequence[One], kind: type, what: str) -> tuple[One, .
         require_kind(values, kind, f"tradeoff: {what}")
         return (values,)  # type: ignore[return-value]
     if not values:
-        raise SceneError(f"tradeoff: {what} is empty")
+        raise ArgumentError(f"tradeoff: {what} is empty")
     for i, value in enumerate(values):
         require_kind(value, kind, f"tradeoff: {what}[{i}]")
     return tuple(values)
@@ -302,7 +302,7 @@ class _Runs:
         except RuntimeError as error:  # all of them failed
             text = str(error)
             if WRONG in text:
-                raise SceneError(text.partition(WRONG)[2]) from None
+                raise ArgumentError(text.partition(WRONG)[2]) from None
             self.failed |= dict.fromkeys(missing, text)
             return
         finally:
@@ -312,7 +312,7 @@ class _Runs:
             if k not in done.failed:
                 self._take(one, {name: done[name][k] for name in done.results})
             elif done.failed[k].startswith(WRONG):
-                raise SceneError(done.failed[k].removeprefix(WRONG))
+                raise ArgumentError(done.failed[k].removeprefix(WRONG))
             else:
                 self.failed[one] = done.failed[k]
 
@@ -333,7 +333,7 @@ class _Runs:
             try:
                 for beam in scene.beams:
                     finer.vertices(beam, scene.attached[beam])
-            except SceneError:
+            except ArgumentError:
                 continue
             return q
         return 1
@@ -367,10 +367,10 @@ class _Runs:
         for n, (name, quantity) in enumerate(self.quantities.items()):
             value = np.asarray(quantity(solution), dtype=float)
             if not np.isfinite(value).all():
-                raise SceneError(f"tradeoff: quantity {name!r} is not finite")
+                raise ArgumentError(f"tradeoff: quantity {name!r} is not finite")
             before = self._shapes.get(name, value.shape)
             if before != value.shape:
-                raise SceneError(
+                raise ArgumentError(
                     f"tradeoff: quantity {name!r} has shape {before} in a run and {value.shape} "
                     "in another with other steps or cells; give a number, or an array at times "
                     "and places of your own (np.interp)"
@@ -511,7 +511,7 @@ class _Search:
             for name, value in values[-1].items():
                 unit = self._target.absolute.get(name, self._target.relative * size(value))
                 if unit == 0:
-                    raise SceneError(
+                    raise ArgumentError(
                         f"tradeoff: quantity {name!r} is zero, so that no part of it can be a "
                         "tolerance; give tolerances by name, in units of the quantities"
                     )

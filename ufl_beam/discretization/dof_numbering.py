@@ -19,9 +19,10 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.display import counted
-from ufl_beam.errors import SceneError, require_kind, shorten
+from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
+from ufl_beam.model.checks import require_kind
 from ufl_beam.model.connectors import Connector, place_of
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.functions import points_along
@@ -82,7 +83,7 @@ class Grid:
         for cell in np.flatnonzero(self.lengths(np.arange(len(begin))) <= 1e-12 * scene.size)[:1]:
             x, y = self.points[self.cells[cell, 0]]
             name = beams[self.beam_of_cell[cell]].name
-            raise SceneError(f"{name}: zero length of a cell at ({x:g}, {y:g})")
+            raise ModelError(f"{name}: zero length of a cell at ({x:g}, {y:g})")
         self._add_hinges([place_of(hinge) for hinge in scene.hinges])
         self._number()
         scene.release()
@@ -163,8 +164,8 @@ class Grid:
         if number is not None:
             return number
         if not isinstance(beam, Member):
-            raise SceneError(f"beam = {shorten(beam)} is not a Beam")
-        raise SceneError(f"{beam.name} is not in the scene")
+            raise ModelError(f"beam = {shorten(beam)} is not a Beam")
+        raise ModelError(f"{beam.name} is not in the scene")
 
     def parameters(self, beam: Member) -> Array:
         """Parameters of the vertices of a beam."""
@@ -206,7 +207,7 @@ class Grid:
         """Layouts of material points, and the cells that have them.
 
         Raises:
-            SceneError: Their degree is more than one.
+            ModelError: Their degree is more than one.
         """
         groups = dict[Layout, list[int]]()
         sections, of_beam = self.sections
@@ -215,7 +216,7 @@ class Grid:
             if layout is not None and not layout.elastic:
                 if self.mesh.degree > 1:
                     beam = self.scene.beams[int(np.argmax(of_beam == number))]
-                    raise SceneError(
+                    raise ModelError(
                         f"Mesh: degree = {self.mesh.degree} is for elastic beams, and {beam.name} "
                         "may yield or break; use degree=1 with more cells, or an elastic section"
                     )
@@ -254,7 +255,7 @@ class Grid:
         """The cell at a place, and the part of it that lies before the place."""
         require_kind(place, Place, "place")
         if place.beam not in self._number_of_beam:
-            raise SceneError(f"{place}: {place.beam.name} is not in the scene")
+            raise ModelError(f"{place}: {place.beam.name} is not in the scene")
         i = self._number_of_beam[place.beam]
         s = self._parameters[i]
         left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
@@ -328,7 +329,7 @@ class Grid:
         if not isinstance(of, Body):
             return np.asarray(self.dofs[self.vertex(of)])
         if of not in self.scene.rigid_bodies:
-            raise SceneError(f"{anchor}: {of.name} is not in the scene")
+            raise ModelError(f"{anchor}: {of.name} is not in the scene")
         return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(of)])
 
     @cached_property

@@ -22,7 +22,7 @@ from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
-from ufl_beam.errors import SceneError, shorten
+from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
 from ufl_beam.model.beams import Mesh
@@ -312,22 +312,22 @@ def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
     """Integrate a form without arguments, or a scalar expression, over the cells of a mesh.
 
     Raises:
-        SceneError: It is neither, or it is of another mesh.
+        ModelError: It is neither, or it is of another mesh.
     """
     if isinstance(integral, Expr) and not integral.ufl_shape:
         integral = integral * ufl.dx(domain=mesh)
     if not isinstance(integral, ufl.Form) or integral.arguments():
-        raise SceneError(
+        raise ModelError(
             f"dolfinx.total: {shorten(integral)} must be a form of UFL without test functions, "
             "such as expression * view.dx, or a scalar expression"
         )
     if any(one.integral_type() != "cell" for one in integral.integrals()):
-        raise SceneError(
+        raise ModelError(
             "dolfinx.total: the form has integrals over facets, and the mesh of each process has "
             "facets of its own where it ends; integrate over cells, with dx"
         )
     if any(domain != mesh.ufl_domain() for domain in integral.ufl_domains()):
-        raise SceneError("dolfinx.total: the form is of another mesh; state it on view.mesh")
+        raise ModelError("dolfinx.total: the form is of another mesh; state it on view.mesh")
     # One by one, as each compiled form has one quadrature rule.
     forms = (compiled_form(ufl.Form([one]))[0] for one in integral.integrals())
     return float(sum(fem.assemble_scalar(form) for form in forms))

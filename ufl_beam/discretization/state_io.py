@@ -14,7 +14,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.arrays import State as State
 from ufl_beam.discretization.partition import Share
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ModelError
 
 NOWHERE: Array = np.empty(0)
 """In the place of a configuration: of what is remembered, strains and stored energies are not that
@@ -91,11 +91,11 @@ class Memory:
         return self._given is not None and name in self._given
 
     def _found(self, name: str, shape: tuple[int, ...]) -> Array:
-        """Return an array of the state; :class:`SceneError` if it has not the shape; -1 is any."""
+        """Return an array of the state; :class:`ModelError` if it has not the shape; -1 is any."""
         values = (self._given or {}).get(name)
         if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
             found = "missing" if values is None else f"of shape {values.shape}"
-            raise SceneError(f"the array {name!r} of the state is {found}, and must be {shape}")
+            raise ModelError(f"the array {name!r} of the state is {found}, and must be {shape}")
         return values
 
     def state(self) -> State:

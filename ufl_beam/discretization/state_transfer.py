@@ -10,7 +10,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connectors import Connector
 
@@ -54,7 +54,7 @@ class Transfer:
         """Raise unless beams and vertices are the same, and every body is known."""
         old, new = self._old, self._new
         if old.scene.beams != new.scene.beams or old.mesh != new.mesh:
-            raise SceneError(
+            raise ModelError(
                 "start: the solution is of other beams, joints or cells; use the same Beam objects "
                 "in the same order, and the same Mesh. From a file: "
                 "start=ub.Solution.load(path, scene=scene) with the scene that was saved"
@@ -62,13 +62,13 @@ class Transfer:
         if not np.array_equal(old.points, new.points):
             nodes = ((b, old.nodes_of(b)[0], new.nodes_of(b)[0]) for b in new.scene.beams)
             beam = next(b for b, before, now in nodes if not np.array_equal(before, now))
-            raise SceneError(
+            raise ModelError(
                 f"start: {beam.name} has other vertices than in the solution, because something "
                 "is attached at other places; let these be corners=(s, ...) of the beam in both"
             )
         for body in new.scene.bodies:
             if body not in old.scene.bodies:
-                raise SceneError(
+                raise ModelError(
                     f"start: {body.name} is not in the scene of the solution, so that nobody knows "
                     "where it is; let it be in both, held by supports before"
                 )
@@ -95,7 +95,7 @@ class Transfer:
             if part.size and part.max() > allowed(c):
                 where = self._new.describe(int(self._to[c + 3 * int(np.argmax(part))]))
                 unit = units[c == 2]
-                raise SceneError(
+                raise ModelError(
                     f"start: the new scene joins places that {how} {part.max():.3g} {unit} apart "
                     f"at the end of the solution: {where}. Join them by springs, or where they "
                     "are together"

@@ -15,7 +15,7 @@ from ufl.domain import extract_domains
 from ufl_beam.discretization.compiled_forms import stated
 from ufl_beam.discretization.function_spaces import Element
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.errors import SceneError, shorten
+from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.kinematics import split
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.works import VirtualWork, Work
@@ -57,7 +57,7 @@ def statement(work: Work, of: Element, scheme: Scheme) -> Statement:
     """State a work in a time scheme, once for all beams and numbers.
 
     Raises:
-        SceneError: Its function is wrong.
+        ModelError: Its function is wrong.
     """
     names = tuple(work.numbers)
     return _statement(type(work), work.name, _Same(work.density), names, work.degree, of, scheme)
@@ -88,7 +88,7 @@ def _of_virtual_work(
     try:
         check_form_arity(expand_derivatives(density * dx), (w,))
     except (ArityMismatch, ValueError):  # which UFL's own message may raise
-        raise SceneError(
+        raise ModelError(
             f"{work}: the function must return what is linear in w, such as f * w[1]"
         ) from None
     return (-numbers[GROWTH] * density * dx,)
@@ -102,7 +102,7 @@ def _of_potential(
     energy = _returned(work, {"q": q, "axis": of.anywhere, **numbers}, of)
     gradient = expand_derivatives(ufl.derivative(energy, q, w))
     if expand_derivatives(gradient * dx).empty():
-        raise SceneError(f"{work}: the energy must depend on the configuration q")
+        raise ModelError(f"{work}: the energy must depend on the configuration q")
 
     def along(way: Expr, at: Expr) -> Expr:
         return ufl.replace(gradient, {q: at, w: way})
@@ -123,25 +123,25 @@ def _of_potential(
 
 
 def _returned(work: Work, known: Mapping[str, Any], of: Element) -> Expr:
-    """Evaluate the function of a work, or raise :class:`SceneError` naming it."""
+    """Evaluate the function of a work, or raise :class:`ModelError` naming it."""
     try:
         value = work.density(**{name: known[name] for name in work.asked})
-    except SceneError:
+    except ModelError:
         raise
     except Exception as error:
-        raise SceneError(f"{work}: the function fails: {shorten(error)}") from error
+        raise ModelError(f"{work}: the function fails: {shorten(error)}") from error
     if not isinstance(value, Expr):
-        raise SceneError(
+        raise ModelError(
             f"{work}: the function returned {shorten(value)}; it must return an expression of UFL, "
             "an energy per length"
         )
     if value.ufl_shape or value.ufl_free_indices:
-        raise SceneError(
+        raise ModelError(
             f"{work}: the function returned a tensor of shape {value.ufl_shape}; it must return a "
             "scalar, such as a product with a component of w"
         )
     if any(domain != of.space.mesh.ufl_domain() for domain in extract_domains(value)):
-        raise SceneError(
+        raise ModelError(
             f"{work}: the function uses a mesh of its own; let it use axis.x for the place, and "
             "`numbers` for what it needs besides"
         )

@@ -12,7 +12,7 @@ import numpy as np
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.kinematics import Axis
 from ufl_beam.mechanics.time_schemes import Coefficients, Constant
@@ -180,7 +180,7 @@ class Newmark(_Accelerated):
         beta: β; from γ/2, without which the scheme is unstable at large steps.
 
     Raises:
-        SceneError: A number is out of range.  A run raises it if the scene has joints held by
+        ArgumentError: A number is out of range.  A run raises it if the scene has joints held by
             multipliers, motors or moving supports while nothing is damped; dry friction, or a
             rotating frame.
 
@@ -202,7 +202,7 @@ class Newmark(_Accelerated):
         require_number(self.gamma, "Newmark: gamma", at_least=0.5)
         require_number(self.beta, "Newmark: beta")
         if 2 * self.beta < self.gamma:
-            raise SceneError(
+            raise ArgumentError(
                 f"Newmark: beta = {self.beta:g} must be at least gamma/2 = {self.gamma / 2:g}; "
                 "below that the scheme is unstable at large steps"
             )
@@ -230,7 +230,7 @@ class GeneralizedAlpha(_Accelerated):
         rho_inf: Spectral radius at infinite frequency, from 0 (gone in a step) to 1 (undamped).
 
     Raises:
-        SceneError: A number outside [0, 1].  A run raises it for what :class:`Newmark` lists.
+        ArgumentError: A number outside [0, 1].  A run raises it for what :class:`Newmark` lists.
 
     Example:
         >>> run = ub.simulate(scene, ub.GeneralizedAlpha(rho_inf=0.8), t=(0, 1), dt=0.05)

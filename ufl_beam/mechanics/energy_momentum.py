@@ -103,7 +103,7 @@ class EnergyMomentumStatic(EnergyMomentumBase):
             along a beam by (Δψ/2)² of a step.
 
     Raises:
-        SceneError: A number outside [1/2, 1].
+        ArgumentError: A number outside [1/2, 1].
 
     Example:
         >>> run = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.1)
@@ -197,7 +197,7 @@ class EnergyMomentum(EnergyMomentumBase, _Velocities):
         beta: Dissipation by the velocities, from 0 to 1/2.
 
     Raises:
-        SceneError: A number outside [0, 1/2].
+        ArgumentError: A number outside [0, 1/2].
 
     Equations:
         P(77)-P(91); P(82) corrected, see docs/errata.md.
@@ -244,7 +244,7 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
         rho_inf: Spectral radius at infinite frequency, from 1/3 to 1; 1 loses nothing.
 
     Raises:
-        SceneError: A number outside [1/3, 1].
+        ArgumentError: A number outside [1/3, 1].
 
     Example:
         >>> run = ub.simulate(scene, ub.EnergyMomentumDecaying(rho_inf=0.5), t=(0, 1), dt=0.05)

@@ -75,7 +75,7 @@ class Scheme(Protocol):
         ...     dynamic, theta = False, 1.0
         >>> ub.simulate(scene, Mine(), t=(0, 1), dt=0.1)
         Traceback (most recent call last):
-        ufl_beam.errors.SceneError: scheme: Mine is not a time scheme: it lacks advice, ...
+        ufl_beam.errors.ArgumentError: scheme: Mine is not a time scheme: it lacks advice, ...
     """
 
     dynamic: bool  # True if the scene has inertia
@@ -147,7 +147,7 @@ class DynamicScheme(Scheme, Protocol):
         ...     alpha = 0.0
         >>> ub.simulate(scene, Mine(), t=(0, 1), dt=0.1)
         Traceback (most recent call last):
-        ufl_beam.errors.SceneError: scheme: Mine is not a time scheme: it lacks coefficients, ...
+        ufl_beam.errors.ArgumentError: scheme: Mine is not a time scheme: it lacks coefficients, ...
     """
 
     kept: tuple[str, ...]  # names of the rates kept besides velocities, such as accelerations

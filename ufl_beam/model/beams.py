@@ -17,18 +17,16 @@ import numpy.typing as npt
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import one_line
-from ufl_beam.errors import (
-    SceneError,
+from ufl_beam.errors import ModelError, shorten, warn
+from ufl_beam.model.bodies import TOGETHER, Member, Place
+from ufl_beam.model.checks import (
     require_count,
     require_kind,
     require_memory,
     require_number,
     require_sequence,
     require_vector,
-    shorten,
-    warn,
 )
-from ufl_beam.model.bodies import TOGETHER, Member, Place
 from ufl_beam.model.connector_laws import HingeLaw, require_hinge_law
 from ufl_beam.model.functions import Arc, Curve, Point, Polyline, Straight, point_of
 from ufl_beam.model.records import Instance, Record, Text
@@ -55,7 +53,7 @@ class Beam(Record, Member):
             it comes before the law of the section; ``None`` there is an end without a hinge.
 
     Raises:
-        SceneError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
+        ModelError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
             a section of fibres.
 
     Example:
@@ -90,12 +88,12 @@ class Beam(Record, Member):
         for s in self.corners:
             require_number(s, f"{self.name}: corner")
             if not 0.0 < s < 1.0:
-                raise SceneError(f"{self.name}: corner s = {s:g} must lie between 0 and 1")
+                raise ModelError(f"{self.name}: corner s = {s:g} must lie between 0 and 1")
         self._require_hinges()
         if self.curve is None:
             first, last = self.ends
             if first == last:
-                raise SceneError(f"{self.name}: zero length, both ends are at {first}")
+                raise ModelError(f"{self.name}: zero length, both ends are at {first}")
             object.__setattr__(self, "curve", Straight(first, last))
             length = math.dist(first, last)
         else:
@@ -103,7 +101,7 @@ class Beam(Record, Member):
             points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
             for s, there, end in zip((0, 1), (points[0], points[-1]), self.ends, strict=True):
                 if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
-                    raise SceneError(f"{self.name}: curve({s}) = {there} is not the end {end}")
+                    raise ModelError(f"{self.name}: curve({s}) = {there} is not the end {end}")
             length = sum(math.dist(p, q) for p, q in pairwise(points))
         depth = self.section.depth
         if depth > math.sqrt(12) * length > 0.0:  # the radius of gyration is larger
@@ -114,20 +112,20 @@ class Beam(Record, Member):
             )
 
     def _require_hinges(self) -> None:
-        """Raise :class:`SceneError` unless the plastic hinges are complete, and apart."""
+        """Raise :class:`ModelError` unless the plastic hinges are complete, and apart."""
         for s, law in self.hinges.items():
             require_number(s, f"{self.name}: hinge at")
             if not 0.0 <= s <= 1.0:
-                raise SceneError(f"{self.name}: hinge at s = {s:g} must lie between 0 and 1")
+                raise ModelError(f"{self.name}: hinge at s = {s:g} must lie between 0 and 1")
             if law is not None or s not in (0.0, 1.0):
                 require_hinge_law(law, f"{self.name}: hinge at s = {s:g}")
         for first, second in pairwise(sorted(self.hinges)):
             if (second - first) * self.cells <= TOGETHER:
-                raise SceneError(
+                raise ModelError(
                     f"{self.name}: two hinges at s = {first:g}; give one, with the law of both"
                 )
         if self.hinges and self.section.fibres is not None:
-            raise SceneError(
+            raise ModelError(
                 f"{self.name}: hinges are for resultants; here the fibres of the section soften"
             )
 
@@ -155,7 +153,7 @@ class Beam(Record, Member):
         require_number(radius, f"{name}: radius", positive=True)
         first, last = require_vector(angles, f"{name}: angles")
         if first == last:
-            raise SceneError(f"{name}: zero length, both angles of the arc are {first:g}")
+            raise ModelError(f"{name}: zero length, both angles of the arc are {first:g}")
         curve = Arc(middle, float(radius), first, last)
         ends = curve(0), curve(1)
         return cls(*ends, section, cells=cells, name=name, curve=curve, hinges=hinges)
@@ -169,11 +167,11 @@ class Beam(Record, Member):
         points = require_sequence(points, f"{name}: points")
         xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
         if len(xy) < 2:
-            raise SceneError(f"{name}: a polyline needs at least two points, not {len(xy)}")
+            raise ModelError(f"{name}: a polyline needs at least two points, not {len(xy)}")
         lengths = [math.dist(p, q) for p, q in pairwise(xy)]
         if 0.0 in lengths:
             where = xy[lengths.index(0.0)]
-            raise SceneError(f"{name}: zero length between two points at {where}")
+            raise ModelError(f"{name}: zero length between two points at {where}")
         ends = [0.0, *accumulate(lengths)]
         at = tuple(end / ends[-1] for end in ends)
         return cls(
@@ -207,7 +205,7 @@ class Mesh:
             consistent one.
 
     Raises:
-        SceneError: A number that makes no mesh.
+        ModelError: A number that makes no mesh.
 
     Example:
         >>> fine = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=4))
@@ -225,14 +223,14 @@ class Mesh:
     def __post_init__(self) -> None:
         require_kind(self.lumped, bool, "Mesh: lumped")
         if not isinstance(self.refine, Rational) or self.refine <= 0:
-            raise SceneError(
+            raise ModelError(
                 f"Mesh: refine = {shorten(self.refine)} must be a positive whole number or "
                 "Fraction(p, q)"
             )
         require_number(self.refine, "Mesh: refine")
         object.__setattr__(self, "refine", Fraction(self.refine))
         if not isinstance(self.degree, Real) or self.degree not in (1, 2, 3):
-            raise SceneError(f"Mesh: degree = {shorten(self.degree)} must be 1, 2 or 3")
+            raise ModelError(f"Mesh: degree = {shorten(self.degree)} must be 1, 2 or 3")
         object.__setattr__(self, "degree", int(self.degree))
 
     @cached_property
@@ -272,7 +270,7 @@ class Mesh:
         """Parameters of the vertices of a beam, with its ends, corners and ``attached`` places.
 
         Raises:
-            SceneError: Between two of those there are too few cells to be joined.
+            ModelError: Between two of those there are too few cells to be joined.
         """
         given = beam.vertices(attached)
         if self.refine == 1:
@@ -283,7 +281,7 @@ class Mesh:
             if (last - first) * self.refine % 1:
                 common = math.gcd(*(b - a for a, b in pairwise(kept)))
                 least = f"Fraction(1, {common})" if common > 1 else "1"
-                raise SceneError(
+                raise ModelError(
                     f"Mesh: refine = {self.refine} makes no whole number of the {last - first} "
                     f"cells between {beam.at(given[first])} and {beam.at(given[last])}, which "
                     f"must be vertices; {beam.name} can take multiples of {least}"

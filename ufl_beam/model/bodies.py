@@ -14,14 +14,13 @@ from typing import Annotated, Any, ClassVar
 import numpy as np
 
 from ufl_beam.display import bracketed
-from ufl_beam.errors import (
-    SceneError,
+from ufl_beam.errors import ModelError, shorten
+from ufl_beam.model.checks import (
     require_all,
     require_kind,
     require_number,
     require_switch,
     require_vector,
-    shorten,
 )
 from ufl_beam.model.functions import Curve, Point, tangent_within
 from ufl_beam.model.records import NotNegative, Number, Record, Text, Vector
@@ -106,10 +105,10 @@ class Place:
 
     def __post_init__(self) -> None:
         if not isinstance(self.beam, Member):
-            raise SceneError(f"Place: {shorten(self.beam)} is not a Beam")
+            raise ModelError(f"Place: {shorten(self.beam)} is not a Beam")
         require_number(self.s, f"{self.beam.name}.at(s): s")
         if not 0.0 <= self.s <= 1.0:
-            raise SceneError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
+            raise ModelError(f"{self.beam.name}.at({self.s:g}): s must lie between 0 and 1")
         require_switch(self.beyond, f"{self.beam.name}.at({self.s:g}): beyond")
 
     @property
@@ -149,7 +148,7 @@ class Body(Record):
         name: Name in messages and pictures.
 
     Raises:
-        SceneError: Coordinates that are no finite numbers, a negative mass or inertia.
+        ModelError: Coordinates that are no finite numbers, a negative mass or inertia.
 
     Example:
         >>> rotor = ub.Body((2, 0), mass=50.0, inertia=4.0, name="rotor")
@@ -283,22 +282,22 @@ def carries(anchor: Anchor) -> bool:
 
 
 def require_anchors(owner: str, *anchors: object) -> None:
-    """Raise :class:`SceneError` naming ``owner`` unless all are places to attach something to."""
+    """Raise :class:`ModelError` naming ``owner`` unless all are places to attach something to."""
     for anchor in anchors:
         if not isinstance(anchor, Place | Spot):
-            raise SceneError(
+            raise ModelError(
                 f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
                 "body.at(x, y) or ground(x, y)"
             )
 
 
 def require_node(place: object, owner: str) -> None:
-    """Raise :class:`SceneError` naming ``owner`` unless the motion of a place is that of a node."""
+    """Raise :class:`ModelError` naming ``owner`` unless the motion of a place is that of a node."""
     require_anchors(owner, place)
     if isinstance(place, Spot) and place.body is GROUND:
-        raise SceneError(f"{owner}: {place} does not move")
+        raise ModelError(f"{owner}: {place} does not move")
     if not carries(place):  # type: ignore[arg-type]
-        raise SceneError(
+        raise ModelError(
             f"{owner}: {place} is not the centre of the body; hold other points by joints to "
             "ground(x, y), and give masses to the body itself"
         )

@@ -14,15 +14,8 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.errors import (
-    SceneError,
-    closed,
-    require_function,
-    require_number,
-    require_row,
-    require_text,
-    shorten,
-)
+from ufl_beam.errors import ModelError, closed, shorten
+from ufl_beam.model.checks import require_function, require_number, require_row, require_text
 from ufl_beam.model.material_law import (
     State,
     Values,
@@ -184,7 +177,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
 
 
 def require_connector_law(law: ConnectorLaw, what: str) -> None:
-    """Raise :class:`SceneError` unless a law of a connector is complete; it is called at no motion.
+    """Raise :class:`ModelError` unless a law of a connector is complete; it is called at no motion.
 
     Its methods are compiled when a run begins.
     """
@@ -194,28 +187,28 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
         require_number(value, f"{what}: {name}")
     stated = {n for n in CALLED if getattr(type(law), n) is not getattr(ConnectorLaw, n)}
     if not stated & {"energy", "resistance", "limit"}:
-        raise SceneError(
+        raise ModelError(
             f"{what} has neither energy nor resistance, nor a limit; define one of these methods"
         )
     if law.holds and (stated & {"energy", "resistance"} or law.components > 1):
-        raise SceneError(
+        raise ModelError(
             f"{what} has a limit, which is for laws of one component without energy and "
             "resistance; let another connector beside it have these"
         )
     if "sliding" in stated and not law.holds:
-        raise SceneError(f"{what} has a sliding force and no limit; define this method")
+        raise ModelError(f"{what} has a sliding force and no limit; define this method")
     if law.variables and "increments" not in stated:
-        raise SceneError(f"{what} has variables and no increments; define this method")
+        raise ModelError(f"{what} has variables and no increments; define this method")
     require_text(law.entry, f"{what}.entry")
     if not law.entry or (law.entry in ENTRIES and law.entry not in LOSSES):
-        raise SceneError(
+        raise ModelError(
             f"{what}.entry = {law.entry!r} is no name for what is lost; there are "
             f"{', '.join(LOSSES)}, or take a name of your own"
         )
     for name, value in law.variables.items():
         require_number(value, f"{what}.variables[{name!r}]")
     if law.components not in (1, 2, 3):
-        raise SceneError(f"{what}.components = {law.components!r} must be 1, 2 or 3")
+        raise ModelError(f"{what}.components = {law.components!r} must be 1, 2 or 3")
     motion, state = law.given([np.zeros(1)] * law.components), initial_state(law)
     calls = {"energy": (motion, state), "limit": (state,)}
     calls |= dict.fromkeys(CALLED[2:], (motion, motion, state, 1.0))
@@ -224,14 +217,14 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
             with np.errstate(all="ignore"):
                 found = getattr(law, name)(*arguments)
         except Exception as error:
-            raise SceneError(
+            raise ModelError(
                 f"{what}.{name} fails at no motion: {error}{stated_at(law)}"
             ) from error
         if name == "increments":
             require_names(found, law, f"{what}.{name}")
         if name == "resistance" and law.components > 1:
             if not isinstance(found, tuple | list) or len(found) != law.components:
-                raise SceneError(
+                raise ModelError(
                     f"{what}.resistance returns {shorten(found)}; it must return a tuple of "
                     f"{law.components} forces{stated_at(law)}"
                 )
@@ -241,7 +234,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
         for of, value in values:
             number = isinstance(value, Real) or np.shape(value) == (1,)
             if not number or not np.all(np.isfinite(value)):
-                raise SceneError(
+                raise ModelError(
                     f"{what}.{name} returns {f'{of} = ' * bool(of)}{shorten(value)} at no motion; "
                     f"it must return a number there{stated_at(law)}"
                 )
@@ -252,13 +245,13 @@ CALLED = ("energy", "limit", "resistance", "sliding", "increments")
 
 
 def require_limit(law: ConnectorLaw, what: str) -> None:
-    """Raise :class:`SceneError` unless increments of a law have a limit for ever longer steps."""
+    """Raise :class:`ModelError` unless increments of a law have a limit for ever longer steps."""
     motion, rest = (law.given([np.full(1, x)] * law.components) for x in (0.5, 0.0))
     with np.errstate(all="ignore"):
         changes = law.increments(motion, rest, initial_state(law), np.inf) if law.variables else {}
     for name, change in changes.items():
         if not np.all(np.isfinite(change)):
-            raise SceneError(
+            raise ModelError(
                 f"{what}: {type(law).__name__}.increments returns {name} = {shorten(change)} for "
                 "dt = inf, and steps of a path are infinitely slow; state it so that it has a "
                 f"limit, as a / (b / dt + c), or use simulate(scene, Static(), ...){stated_at(law)}"
@@ -313,7 +306,7 @@ class ForceLaw(Record):
             in the entry "functions"; without it all of the work.
 
     Raises:
-        SceneError: A parameter that is not known; a state that the function does not ask for, or
+        ModelError: A parameter that is not known; a state that the function does not ask for, or
             that it does and is not there.
 
     Example:
@@ -347,7 +340,7 @@ class ForceLaw(Record):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.state and "state" not in self.asked:
-            raise SceneError(
+            raise ModelError(
                 "ForceLaw: the function does not ask for the state; let it have a parameter state, "
                 "and return the force and the state after the step"
             )

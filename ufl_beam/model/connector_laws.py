@@ -10,14 +10,8 @@ from functools import partial
 from numbers import Real
 from typing import Annotated, Any, ClassVar, Protocol
 
-from ufl_beam.errors import (
-    SceneError,
-    closed,
-    require_function,
-    require_kind,
-    require_number,
-    require_returned,
-)
+from ufl_beam.errors import ModelError, closed
+from ufl_beam.model.checks import require_function, require_kind, require_number, require_returned
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_law import ForceLaw as ForceLaw
 from ufl_beam.model.functions import Constant, Curve, Timed
@@ -139,7 +133,7 @@ class Spring(Record):
         softening: How it breaks; energy in J.
 
     Raises:
-        SceneError: A stiffness that is not positive.
+        ModelError: A stiffness that is not positive.
 
     Example:
         >>> spring = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))  # N/m
@@ -190,7 +184,7 @@ class Stop(Record, ConnectorLaw):
             1 - 2/3 damping v of it.
 
     Raises:
-        SceneError: An interval that does not contain the undeformed scene, no stiffness, or a
+        ModelError: An interval that does not contain the undeformed scene, no stiffness, or a
             negative damping.
 
     Example:
@@ -235,7 +229,7 @@ class Stop(Record, ConnectorLaw):
             if not isinstance(end, Real) or abs(end) != math.inf:
                 require_number(end, f"Stop: {name}")
         if not self.low <= 0.0 <= self.high or (math.isinf(self.low) and math.isinf(self.high)):
-            raise SceneError(
+            raise ModelError(
                 f"Stop: the interval from low = {self.low:g} to high = {self.high:g} must contain "
                 "0, the undeformed scene, and have at least one end"
             )
@@ -259,7 +253,7 @@ class Clearance(Record, ConnectorLaw):
         radius: Of the pin; m.
 
     Raises:
-        SceneError: No stiffness, no gap, a negative number, or friction without a radius.
+        ModelError: No stiffness, no gap, a negative number, or friction without a radius.
 
     Example:
         >>> hole = ub.Clearance(stiffness=1e8, gap=1e-3, friction=0.2, radius=0.02)
@@ -284,7 +278,7 @@ class Clearance(Record, ConnectorLaw):
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.friction > 0.0) != (self.radius > 0.0):
-            raise SceneError("Clearance: give friction and radius together, the latter of the pin")
+            raise ModelError("Clearance: give friction and radius together, the latter of the pin")
 
     @property
     def rubs(self) -> bool:
@@ -358,7 +352,7 @@ class Coulomb(Record):
             hold their places with forces anyway, as :class:`Prismatic` and :class:`Link` do.
 
     Raises:
-        SceneError: No limit, or a coefficient without a joint.
+        ModelError: No limit, or a coefficient without a joint.
 
     Example:
         >>> brake = ub.Turn(ub.ground(0, 0), beam.start, ub.Coulomb(1e3))  # N m
@@ -379,9 +373,9 @@ class Coulomb(Record):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.force == self.coefficient == 0.0:
-            raise SceneError("Coulomb: force and coefficient are both zero; leave it out")
+            raise ModelError("Coulomb: force and coefficient are both zero; leave it out")
         if (self.coefficient > 0) != (self.joint is not None):
-            raise SceneError("Coulomb: give coefficient and joint together")
+            raise ModelError("Coulomb: give coefficient and joint together")
 
     def ask(self, simulation: Running, link: object) -> float:
         """Return the limit of the next step; all processes call it together."""
@@ -399,9 +393,9 @@ HingeLaw = SofteningLaw | ElastoPlastic
 
 
 def require_hinge_law(law: object, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless a rigid-plastic hinge can follow a law."""
+    """Raise :class:`ModelError` naming ``what`` unless a rigid-plastic hinge can follow a law."""
     if isinstance(law, MaterialLaw) and not isinstance(law, ElastoPlastic):
-        raise SceneError(
+        raise ModelError(
             f"{what}: {type(law).__name__} is the law of an elastic stiffness, and a hinge of zero "
             "length has none; use it as Section(bending=), or join both sides by "
             "Turn(a, b, Spring(stiffness, law=))"
@@ -412,13 +406,13 @@ def require_hinge_law(law: object, what: str) -> None:
     require_kind(law, (Softening, ElastoPlastic, LinearSoftening, SofteningLaw), what)
     if isinstance(law, ElastoPlastic):
         if type(law) is not ElastoPlastic:
-            raise SceneError(
+            raise ModelError(
                 f"{what}: {type(law).__name__} is a subclass of ElastoPlastic, and a hinge of zero "
                 f"length would ignore what is its own; {OWN_HINGE}"
             )
         require_number(law.limit, f"{what}: limit", at_least=0.0, infinite=True)
         if isinstance(law.viscosity, DuvautLions):
-            raise SceneError(
+            raise ModelError(
                 f"{what}: DuvautLions relaxes an elastic stress, and a hinge of zero length is "
                 "rigid before it flows; use Perzyna(eta)"
             )
@@ -438,7 +432,7 @@ class RigidPlastic(Record):
             or N/m, fracture energy in J.
 
     Raises:
-        SceneError: A law of another kind, or one that relaxes an elastic stress.
+        ModelError: A law of another kind, or one that relaxes an elastic stress.
 
     Example:
         >>> fuse = ub.RigidPlastic(ub.ElastoPlastic(yield_limit=5e4))  # N m

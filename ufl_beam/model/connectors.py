@@ -4,14 +4,16 @@
 from __future__ import annotations
 
 import math
+import sys
 from abc import ABC
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 
 from ufl_beam.display import bracketed
-from ufl_beam.errors import SceneError, require_kind, require_vector
+from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import Anchor, Node, NodeDof, Place, arm, merged, node, require_anchors
+from ufl_beam.model.checks import require_kind, require_vector
 from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
 from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic
 from ufl_beam.model.functions import Point
@@ -65,7 +67,7 @@ class Connector(ABC):
             if not isinstance(self.law, Record):
                 require_connector_law(self.law, f"{self}: law")
             if self.law.components > 1 and self.kind != "Bushing":
-                raise SceneError(
+                raise ModelError(
                     f"{self}: {type(self.law).__name__} acts on {self.law.components} components "
                     "of a relative motion; use Bushing(a, b, law)"
                 )
@@ -138,7 +140,7 @@ class Stretch(Connector):
     """Connector of the distance between ``a`` and ``b``: springs, dampers, actuators; m, N.
 
     Raises:
-        SceneError: Both are at the same point, so that there is no direction.
+        ModelError: Both are at the same point, so that there is no direction.
 
     Example:
         >>> rod = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))
@@ -166,7 +168,7 @@ class Slide(Connector):
         axis: Direction in the undeformed scene; from ``a`` to ``b`` by default.
 
     Raises:
-        SceneError: An axis of zero length.
+        ModelError: An axis of zero length.
 
     Example:
         >>> spring = ub.Slide(ub.ground(2, 0), beam.end, ub.Spring(1e6), axis=(0, 1))
@@ -200,7 +202,7 @@ class Bushing(Connector):
         axis: Direction of the first component in the undeformed scene.
 
     Raises:
-        SceneError: A law of one component, or an axis of zero length.
+        ModelError: A law of one component, or an axis of zero length.
 
     Example:
         >>> hole = ub.Clearance(stiffness=1e9, gap=1e-3)  # N/m; m
@@ -223,7 +225,7 @@ class Bushing(Connector):
         object.__setattr__(self, "axis", unit_axis(self.a, self.b, axis, "Bushing"))
         require_kind(self.law, ConnectorLaw, f"{self}: law")
         if self.law.components == 1:
-            raise SceneError(
+            raise ModelError(
                 f"{self}: {type(self.law).__name__} acts on one component of a relative motion; "
                 "use Turn, Stretch or Slide, or give the law components = 2 or 3"
             )
@@ -259,6 +261,10 @@ class Component(Connector):
         return self.owner
 
 
+UNIT = 4 * sys.float_info.epsilon
+"""Round-off of the length of a unit vector."""
+
+
 def unit_axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
     """Unit vector along an axis, by default from ``a`` to ``b``."""
     require_anchors(kind, a, b)
@@ -266,17 +272,19 @@ def unit_axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
     x, y = (bx - ax, by - ay) if axis is None else require_vector(axis, f"{kind}: axis")
     length = math.hypot(x, y)
     if length == 0.0:
-        raise SceneError(
+        raise ModelError(
             f"{kind}({a}, {b}): the axis has zero length; give axis = (x, y), a direction in the "
             "undeformed scene"
         )
+    if abs(length - 1.0) <= UNIT:  # of a file: it must not change
+        return x, y
     return x / length, y / length
 
 
 def require_apart(connector: Connector) -> None:
-    """Raise :class:`SceneError` if both ends of a connector are at the same point."""
+    """Raise :class:`ModelError` if both ends of a connector are at the same point."""
     if math.hypot(*connector.apart) == 0.0:
-        raise SceneError(
+        raise ModelError(
             f"{connector}: zero length, both ends are at the same point; join them with Revolute, "
             "use Slide with an axis, or Bushing(a, b, Clearance(...)) for a pin in a round hole"
         )
@@ -329,14 +337,14 @@ def plastic_hinges(
 def law_of(link: Connector) -> HingeLaw:
     """Return the law of a plastic hinge, or of another rigid-plastic connector."""
     if not isinstance(link.law, RigidPlastic):
-        raise SceneError(f"{link}: its law is not rigid-plastic")
+        raise ModelError(f"{link}: its law is not rigid-plastic")
     return link.law.law
 
 
 def place_of(hinge: Connector) -> Place:
     """Return the place of a plastic hinge, on the side that joints and loads are attached to."""
     if not isinstance(hinge.a, Place):
-        raise SceneError(f"{hinge}: it is not a plastic hinge of a beam")
+        raise ModelError(f"{hinge}: it is not a plastic hinge of a beam")
     return hinge.a.beam.at(hinge.a.s)
 
 

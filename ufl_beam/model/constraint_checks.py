@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.linalg import eigsh
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, NodeDof, node
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
@@ -45,7 +45,7 @@ DENSE = 90
 
 
 def require_masses(scene: Scene) -> None:
-    """Raise :class:`SceneError` if a body that may move has no mass, unless a beam carries it."""
+    """Raise :class:`ModelError` if a body that may move has no mass, unless a beam carries it."""
     if not scene.bodies:
         return
     same, moved = scene.representatives, _fixed(scene)
@@ -55,14 +55,14 @@ def require_masses(scene: Scene) -> None:
         for name, components in (("mass", (0, 1)), ("inertia", (2,))):
             free = any(same[body, component] not in moved for component in components)
             if free and getattr(body, name) == 0.0:
-                raise SceneError(
+                raise ModelError(
                     f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
                     "or Link for what has no mass"
                 )
 
 
 def require_inertia(scene: Scene) -> None:
-    """Raise :class:`SceneError` if a part of the scene has no mass and nothing determines it.
+    """Raise :class:`ModelError` if a part of the scene has no mass and nothing determines it.
 
     Its rigid motions must be held, by stiffness, damping or constraints, or have inertia: else the
     equations of motion are singular.
@@ -91,7 +91,7 @@ def require_inertia(scene: Scene) -> None:
     mode = np.zeros(rows.shape[1])
     mode[loose] = free[:, 0]
     parts = "; ".join(_moving(scene, mode)[:4])
-    raise SceneError(
+    raise ModelError(
         f"dynamics needs mass or something that holds: {parts}, without mass (rhoA or mass = "
         "0), and nothing determines this motion. Give it mass (a section rho or rhoA), or hold or "
         "join it"
@@ -110,7 +110,7 @@ Row = list[tuple[Node, Array]]
 
 
 def require_independent(scene: Scene) -> None:
-    """Raise :class:`SceneError` if constraints repeat or contradict each other.
+    """Raise :class:`ModelError` if constraints repeat or contradict each other.
 
     They do if their gradients in the undeformed scene, by what moves freely, are dependent.  What
     is rigid-plastic is a constraint below its limit.
@@ -127,7 +127,7 @@ def require_independent(scene: Scene) -> None:
         for owner in {id(owner): owner for owner in owners}.values()
     ]
     rigid = any(isinstance(getattr(owner, "law", None), RigidPlastic) for owner in owners)
-    raise SceneError(
+    raise ModelError(
         f"constraints repeat or contradict each other: {within.shape[1]} of those of "
         f"{'; '.join(names)} can be left out. Remove one, or make it elastic: "
         + (
@@ -207,7 +207,7 @@ def _dependences(scene: Scene, rubbing: bool = False) -> tuple[list[tuple[object
 
 
 def require_no_mechanism(scene: Scene) -> str:
-    """Raise :class:`SceneError` if a part of the scene is free to move in statics.
+    """Raise :class:`ModelError` if a part of the scene is free to move in statics.
 
     An elastic beam resists every motion but the three rigid ones, so a motion without strain moves
     each beam as a rigid body; it exists if joints and supports leave those motions a null space.
@@ -225,7 +225,7 @@ def require_no_mechanism(scene: Scene) -> str:
         f"{'; '.join(moving[:4])}{more}. "
     )
     if not scene.loads:
-        raise SceneError(said + INSTEAD)
+        raise ModelError(said + INSTEAD)
     return said
 
 
@@ -320,7 +320,7 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
 
 
 def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
-    """Raise :class:`SceneError` if a law bears a stress at no strain, as with an eigenstrain.
+    """Raise :class:`ModelError` if a law bears a stress at no strain, as with an eigenstrain.
 
     The undeformed scene is no state of equilibrium then; ``what`` begins with it.
     """
@@ -349,13 +349,13 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
             state = initial_state(link.law)
             here, there = (link.law.elastic_forces(e, state)[i][0] for e in ends)
             if abs(here) > abs(there - here):
-                raise SceneError(
+                raise ModelError(
                     f"{what}: {type(link.law).__name__} of {link} bears a force at no motion, "
                     f"so that the undeformed scene is not in equilibrium; {instead}"
                 )
     for owner, law, C, strains in laws:
         if law.stressed(tuple(C), tuple(LAST_DIGITS * strains)):
-            raise SceneError(
+            raise ModelError(
                 f"{what}: {type(law).__name__} of {owner} bears a stress at no strain, so that "
                 f"the undeformed scene is not in equilibrium; {instead}"
             )
@@ -369,18 +369,18 @@ class Rated(Protocol):
 
 
 def require_rates(scene: Scene, scheme: Rated) -> None:
-    """Raise :class:`SceneError` if a time scheme has not the rates that a scene needs."""
+    """Raise :class:`ModelError` if a time scheme has not the rates that a scene needs."""
     name = type(scheme).__name__
     for owner, what in [*((c, c.law) for c in scene.links), *((x, x) for x in scene.loads)]:
         if (isinstance(what, RotatingFrame) or rubs(what)) and not scheme.has_mean_velocity:
-            raise SceneError(
+            raise ModelError(
                 f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
                 "here; use EnergyMomentum() or EnergyMomentumDecaying()"
             )
     given = [str(c) for c in scene.links if isinstance(c.law, HOLDING)]
     given += [f"the support of {s.place}" for s in scene.supports if s.moving]
     if given and scheme.rings:
-        raise SceneError(
+        raise ModelError(
             f"{name}: {given[0]} prescribes a motion, whose accelerations ring for ever "
             "without numerical damping; use GeneralizedAlpha(0.8), or EnergyMomentum()"
         )

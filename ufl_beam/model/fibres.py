@@ -16,7 +16,8 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import one_line
-from ufl_beam.errors import SceneError, require_count, require_kind, shorten
+from ufl_beam.errors import ModelError, shorten
+from ufl_beam.model.checks import require_count, require_kind
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, uniform
 from ufl_beam.model.records import Positive, Record
@@ -73,11 +74,11 @@ class Layout:
             kinds[Kind(law.of(1.0, dict.fromkeys(names, 1.0)), names)] = law
         if len(kinds) > 1:
             different = " and ".join(map(repr, kinds.values()))
-            raise SceneError(f"Section: its laws must be of one class, not {different}")
+            raise ModelError(f"Section: its laws must be of one class, not {different}")
         kind = next(iter(kinds))
         for law, _ in self.laws:
             if type(law) is not type(kind.law):
-                raise SceneError(
+                raise ModelError(
                     f"Section: beside {type(kind.law).__name__}, a resultant that yields or hinges "
                     "needs a law of the same kind, with numbers at which it stays elastic"
                 )
@@ -112,7 +113,7 @@ class Fibres(Record):
             J/m².
 
     Raises:
-        SceneError: A law is none, or ``number`` is no whole number from 1.
+        ModelError: A law is none, or ``number`` is no whole number from 1.
 
     Example:
         >>> steel = ub.Fibres(ub.ElastoPlastic(355e6, isotropic=2e9), number=16)
@@ -147,7 +148,7 @@ class PlacedFibres:
             return None
         require_kind(fibres, Fibres, "Section: fibres")
         if fibres.number < 2:
-            raise SceneError("Fibres: number = 1 has no bending stiffness; use 2 or more")
+            raise ModelError("Fibres: number = 1 has no bending stiffness; use 2 or more")
         cuts = np.union1d(np.linspace(-h / 2, h / 2, fibres.number + 1), np.array(edges))
         cuts = cuts[np.insert(np.diff(cuts) > 1e-9 * h, 0, True)]
         A, S = np.diff(below(cuts))
@@ -182,7 +183,7 @@ class PlacedFibres:
 
 def _require_seed(value: Any, what: str) -> None:
     if isinstance(value, bool) or not isinstance(value, Integral) or value < 0:
-        raise SceneError(f"{what} = {shorten(value)} must be a whole number, 0 or more")
+        raise ModelError(f"{what} = {shorten(value)} must be a whole number, 0 or more")
 
 
 @dataclass(frozen=True)
@@ -223,7 +224,7 @@ class Normal(_ByMoments):
         seed: The same seed gives the same scene again.
 
     Raises:
-        SceneError: Mean or deviation are not positive, or the seed is no whole number.
+        ModelError: Mean or deviation are not positive, or the seed is no whole number.
 
     Example:
         >>> limit = ub.Normal(mean=355e6, deviation=25e6, seed=1)
@@ -271,7 +272,7 @@ class Weibull(Distribution):
         seed: The same seed gives the same scene again.
 
     Raises:
-        SceneError: Scale or shape are not positive, or the seed is no whole number.
+        ModelError: Scale or shape are not positive, or the seed is no whole number.
 
     Example:
         >>> limit = ub.Weibull(scale=355e6, shape=20.0, seed=1)

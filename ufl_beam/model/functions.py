@@ -14,16 +14,13 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.display import one_line
-from ufl_beam.errors import (
-    NoNumber,
-    SceneError,
-    closed,
+from ufl_beam.errors import ModelError, NoNumber, closed, shorten
+from ufl_beam.model.checks import (
     require_function,
     require_number,
     require_returned,
     require_sequence,
     require_vector,
-    shorten,
 )
 
 Point = tuple[float, float]
@@ -96,12 +93,12 @@ def between(p: Point, q: Point, s: float) -> Point:
 
 
 def point_of(curve: Curve, s: float, what: str) -> Point:
-    """Evaluate a curve of a user, or raise :class:`SceneError` naming ``what``."""
+    """Evaluate a curve of a user, or raise :class:`ModelError` naming ``what``."""
     require_function(curve, what, "s that returns (x, y)")
     try:
         point = curve(s)
     except Exception as error:
-        raise SceneError(f"{what}({s:g}) fails: {shorten(error)}") from error
+        raise ModelError(f"{what}({s:g}) fails: {shorten(error)}") from error
     return require_vector(point, f"{what}({s:g})")
 
 
@@ -248,7 +245,7 @@ class Table:
         values: Value at each time.
 
     Raises:
-        SceneError: Different lengths, or times that do not increase.
+        ModelError: Different lengths, or times that do not increase.
 
     Example:
         >>> pulse = ub.Table([0, 0.1, 0.2], [0, 5, 0])
@@ -268,13 +265,13 @@ class Table:
             for i, number in enumerate(numbers):
                 require_number(number, f"Table: {name}[{i}]")
         if len(self.times) != len(self.values) or len(self.times) < 1:
-            raise SceneError(
+            raise ModelError(
                 f"Table: {len(self.times)} times and {len(self.values)} values; "
                 "give as many of each"
             )
         for i, (before, after) in enumerate(pairwise(self.times)):
             if after <= before:
-                raise SceneError(
+                raise ModelError(
                     f"Table: times must increase, but times[{i}] = {before:g} is followed "
                     f"by {after:g}"
                 )
@@ -290,16 +287,16 @@ class Table:
 
 
 def require_time_function(function: TimeFunction, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``function`` gives a number at t = 0."""
+    """Raise :class:`ModelError` naming ``what`` unless ``function`` gives a number at t = 0."""
     if not callable(function):
-        raise SceneError(f"{what} = {shorten(function)} must be a function of t, such as ub.Table")
+        raise ModelError(f"{what} = {shorten(function)} must be a function of t, such as ub.Table")
     try:
         value = function(0.0)
     except Exception as error:
-        raise SceneError(f"{what}: the time function fails at t = 0: {shorten(error)}") from error
+        raise ModelError(f"{what}: the time function fails at t = 0: {shorten(error)}") from error
     number = require_returned(value, f"{what}: the time function", "t = 0")
     if not math.isfinite(number):
-        raise SceneError(f"{what}: the time function is {number} at t = 0")
+        raise ModelError(f"{what}: the time function is {number} at t = 0")
 
 
 Timed = Annotated[TimeFunction, require_time_function]
@@ -311,7 +308,7 @@ def value_at(function: TimeFunction, t: float, owner: object) -> float:
 
     Raises:
         NoNumber: The value is not finite.
-        SceneError: It is no number.
+        ModelError: It is no number.
     """
     value = function(t)
     if type(value) is not float:

@@ -9,7 +9,7 @@ from dataclasses import KW_ONLY, dataclass
 from functools import cached_property
 
 from ufl_beam.display import bracketed
-from ufl_beam.errors import SceneError, require_kind, require_switch, require_text
+from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
     Anchor,
     NodeDof,
@@ -20,6 +20,7 @@ from ufl_beam.model.bodies import (
     node,
     require_anchors,
 )
+from ufl_beam.model.checks import require_kind, require_switch, require_text
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Component, Connector, require_apart, unit_axis
 from ufl_beam.model.functions import Curve, Point, point_of
@@ -81,7 +82,7 @@ class _AtPoint(Joint):
     def __init__(self, *places: Anchor, multipliers: bool = False) -> None:
         kind = type(self).__name__
         if len(places) < 2:
-            raise SceneError(f"{kind}: a joint needs at least two places")
+            raise ModelError(f"{kind}: a joint needs at least two places")
         require_anchors(kind, *places)
         require_switch(multipliers, f"{kind}: multipliers")
         object.__setattr__(self, "places", places)
@@ -163,7 +164,7 @@ class Prismatic(Joint):
         turning: Whether the slider may turn on the rail, like a pin in a slot.
 
     Raises:
-        SceneError: An axis of zero length.
+        ModelError: An axis of zero length.
 
     Example:
         >>> slider = ub.Body((2, 0), mass=10.0, inertia=1.0, name="slider")
@@ -206,7 +207,7 @@ class RigidLink(Joint):
     """Massless rigid link: ``b`` moves as if it were a point of the cross-section or body of ``a``.
 
     Raises:
-        SceneError: Both are at the same point.
+        ModelError: Both are at the same point.
 
     Example:
         >>> flange = ub.Beam((0, 0.5), (2, 0.5), section, name="flange")
@@ -222,7 +223,7 @@ class RigidLink(Joint):
     def __post_init__(self) -> None:
         require_anchors("RigidLink", self.a, self.b)
         if self.a.point == self.b.point:
-            raise SceneError(f"{self}: zero length; join them with Rigid")
+            raise ModelError(f"{self}: zero length; join them with Rigid")
 
     @property
     def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
@@ -243,7 +244,7 @@ class Link(Joint):
     """Massless rigid rod with a revolute joint at both ends: keeps the distance.
 
     Raises:
-        SceneError: Zero length.
+        ModelError: Zero length.
 
     Example:
         >>> hanger = ub.Link(ub.ground(2, 3), beam.end)
@@ -282,7 +283,7 @@ class Guided(Joint):
         curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
 
     Raises:
-        SceneError: The curve stands still at s = 0.  A scene raises it where ``curve(0)`` is not at
+        ModelError: The curve stands still at s = 0.  A scene raises it where ``curve(0)`` is not at
             the place.
 
     Example:
@@ -300,7 +301,7 @@ class Guided(Joint):
     def __post_init__(self) -> None:
         require_anchors("Guided", self.place)
         if not carries(self.place):
-            raise SceneError(f"Guided({self.place}): it must be the centre of the body")
+            raise ModelError(f"Guided({self.place}): it must be the centre of the body")
         _ = self.holders  # which look at the curve
 
     @cached_property
@@ -320,7 +321,7 @@ class Guided(Joint):
         (x0, y0), (x1, y1) = (point_of(self.curve, s, name) for s in NEAR_START)
         length = math.hypot(x1 - x0, y1 - y0)
         if length == 0.0:
-            raise SceneError(f"Guided({self.place}): the curve stands still at s = 0")
+            raise ModelError(f"Guided({self.place}): the curve stands still at s = 0")
         across = (y0 - y1) / length, (x1 - x0) / length
         return (Component("Guided", "guided", start, self.place, law, across),)
 
@@ -340,7 +341,7 @@ class Release(Joint):
         multipliers: As in :class:`Rigid`.
 
     Raises:
-        SceneError: Other letters, or none.
+        ModelError: Other letters, or none.
 
     Example:
         >>> girder = ub.Beam((2, 0), (4, 0), section, name="girder")
@@ -362,7 +363,7 @@ class Release(Joint):
         require_text(self.free, f"{self}: free")
         require_switch(self.multipliers, f"{self}: multipliers")
         if not self.free or set(self.free) - set("NVM"):
-            raise SceneError(f"{self}: free = {self.free!r} must be letters of 'NVM'")
+            raise ModelError(f"{self}: free = {self.free!r} must be letters of 'NVM'")
 
     @property
     def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]

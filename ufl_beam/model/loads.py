@@ -6,8 +6,9 @@ from __future__ import annotations
 from abc import ABC
 from dataclasses import KW_ONLY, dataclass
 
-from ufl_beam.errors import SceneError, closed, require_kind
+from ufl_beam.errors import ModelError, closed
 from ufl_beam.model.bodies import Anchor, Beams, Member, carries, require_anchors
+from ufl_beam.model.checks import require_kind
 from ufl_beam.model.functions import Timed, TimeFunction, steady
 from ufl_beam.model.records import NotNegative, Number, Positive, Record, Vector
 
@@ -75,7 +76,7 @@ class FollowerLoad(LoadAtPlace):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not carries(self.place):
-            raise SceneError(
+            raise ModelError(
                 f"{self}: not the centre of the body; act on the centre, "
                 "with the moment that this makes"
             )
@@ -186,7 +187,7 @@ class Rayleigh(Record):
         stiffness: a1; s.
 
     Raises:
-        SceneError: A negative number, or both zero.
+        ModelError: A negative number, or both zero.
 
     Example:
         >>> damping = ub.Rayleigh(mass=1.0, stiffness=1e-5)  # 1/s, s
@@ -203,7 +204,7 @@ class Rayleigh(Record):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.mass == self.stiffness == 0.0:
-            raise SceneError("Rayleigh: mass and stiffness are both zero; leave damping out")
+            raise ModelError("Rayleigh: mass and stiffness are both zero; leave damping out")
 
 
 @closed("state other damping as a VirtualWork of v")
@@ -220,7 +221,7 @@ class KelvinVoigt(Record):
         beams: The beams that are damped; all by default.
 
     Raises:
-        SceneError: A time that is not positive.
+        ModelError: A time that is not positive.
 
     Example:
         >>> damped = ub.Scene([beam], supports=scene.supports, damping=[ub.KelvinVoigt(1e-4)])

@@ -14,7 +14,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, raised_at, shorten
+from ufl_beam.errors import ModelError, raised_at, shorten
 
 Values = Any
 """Array of real or complex numbers, or a UFL expression; for interacting resultants a tuple."""
@@ -191,38 +191,38 @@ def initial_state(law: Any) -> State:
 
 
 def require_bulk_law(law: object, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless a bulk can follow a law."""
+    """Raise :class:`ModelError` naming ``what`` unless a bulk can follow a law."""
     require_law(law, what)
     if resultants := law.resultants:  # type: ignore[attr-defined]
-        raise SceneError(
+        raise ModelError(
             f"{what} = {shorten(law)} is a law of {resultants} together; use it as "
             "Section(interaction=)"
         )
 
 
 def require_interaction(law: object, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless resultants of a section can follow a law."""
+    """Raise :class:`ModelError` naming ``what`` unless resultants of a section can follow a law."""
     require_law(law, what)
     if law.resultants not in ("NM", "NVM"):  # type: ignore[attr-defined]
-        raise SceneError(
+        raise ModelError(
             f"{what} = {shorten(law)} is no law of N and M together, with resultants = 'NM' or "
             "'NVM'; use it as axial, shear or bending"
         )
 
 
 def require_law(law: object, what: str) -> None:
-    """Raise :class:`SceneError` unless a law is complete; it is called with numbers."""
+    """Raise :class:`ModelError` unless a law is complete; it is called with numbers."""
     if not isinstance(law, MaterialLaw):
-        raise SceneError(f"{what} = {shorten(law)} is not a ElastoPlastic or another MaterialLaw")
+        raise ModelError(f"{what} = {shorten(law)} is not a ElastoPlastic or another MaterialLaw")
     kind = f"{what}: {type(law).__name__}"
     require_fields(law, MaterialLaw, kind)
     ways = [w for w in WAYS if getattr(type(law), w) is not getattr(MaterialLaw, w)]
     if len(ways) != (1 if law.variables else len(ways)):
         has = "both increments and residuals" if ways else "neither increments nor residuals"
-        raise SceneError(f"{kind} has {has}; define one of both methods")
+        raise ModelError(f"{kind} has {has}; define one of both methods")
     numbers = law.numbers(uniform(law, np.ones(1)))
     if "C" in numbers:
-        raise SceneError(f"{kind}.numbers has the name C, that of the elastic stiffness")
+        raise ModelError(f"{kind}.numbers has the name C, that of the elastic stiffness")
     for name, value in numbers.items():
         if not hasattr(value, "draw"):
             require_field(value, f"{kind}: {name}", Real | np.ndarray)
@@ -241,38 +241,38 @@ def require_law(law: object, what: str) -> None:
             with np.errstate(all="ignore"):
                 found = getattr(tried, name)(*arguments)
         except Exception as error:
-            raise SceneError(
+            raise ModelError(
                 f"{kind}.{name} fails at no strain: {error}{raised_at(error)}"
             ) from error
         if name == way:
             require_names(found, law, f"{kind}.{name}")
         elif name == "stress" and not np.all(np.isfinite(law.as_tuple(found))):
-            raise SceneError(f"{kind}.stress is {shorten(found)} at no strain; it must be a number")
+            raise ModelError(f"{kind}.stress is {shorten(found)} at no strain; it must be a number")
         elif name == "stress" and len(law.as_tuple(found)) != len(law.resultants or "x"):
-            raise SceneError(f"{kind}.stress must return one stress for each of {law.resultants}")
+            raise ModelError(f"{kind}.stress must return one stress for each of {law.resultants}")
 
 
 def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -> None:
-    """Raise :class:`SceneError` unless a law is a frozen dataclass whose fields have free names.
+    """Raise :class:`ModelError` unless a law is a frozen dataclass whose fields have free names.
 
     A field cannot have the name of a member of the base, except those in ``but``.
     """
     parameters = getattr(type(law), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen or not parameters.eq:
-        raise SceneError(f"{what} must be a dataclass: @dataclass(frozen=True)")
+        raise ModelError(f"{what} must be a dataclass: @dataclass(frozen=True)")
     reserved = {*vars(base), *base.__annotations__} - {*but}
     if taken := sorted(reserved & {field.name for field in fields(law)}):
         used = ": C is the elastic stiffness at the point, others are its methods and attributes"
-        raise SceneError(
+        raise ModelError(
             f"{what}: a field cannot have the name {' or '.join(taken)}, which every "
             f"{base.__name__} gives to something else{used if base is MaterialLaw else ''}"
         )
 
 
 def require_field(value: object, what: str, kinds: Any = Real) -> None:
-    """Raise :class:`SceneError` unless a field of a law is a number."""
+    """Raise :class:`ModelError` unless a field of a law is a number."""
     if not isinstance(value, kinds) or isinstance(value, bool):
-        raise SceneError(
+        raise ModelError(
             f"{what} = {shorten(value)} is no number; fields of a law are its numbers, what else "
             "it knows can be a class variable"
         )
@@ -284,11 +284,11 @@ WAYS = ("increments", "residuals")
 
 @contextmanager
 def traced(law: object) -> Iterator[None]:
-    """Raise :class:`SceneError` naming a law that cannot be called with symbols of UFL."""
+    """Raise :class:`ModelError` naming a law that cannot be called with symbols of UFL."""
     try:
         yield
     except Exception as error:
-        raise SceneError(
+        raise ModelError(
             f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}"
             f"{raised_at(error)}. Laws are written with + - * / ** and the functions of "
             "ub.law_functions"
@@ -296,9 +296,9 @@ def traced(law: object) -> Iterator[None]:
 
 
 def require_names(found: object, law: Any, what: str) -> None:
-    """Raise :class:`SceneError` unless a method returned the variables of a law by name."""
+    """Raise :class:`ModelError` unless a method returned the variables of a law by name."""
     if not isinstance(found, Mapping):
-        raise SceneError(
+        raise ModelError(
             f"{what} returns {shorten(found)}; it must return a dict with the names "
             f"{', '.join(law.variables)}"
         )
@@ -309,7 +309,7 @@ def require_names(found: object, law: Any, what: str) -> None:
     if missing or unknown:
         wrong = [f"lacks {', '.join(missing)}"] * bool(missing)
         wrong += [f"has {', '.join(unknown)}, which `variables` does not name"] * bool(unknown)
-        raise SceneError(f"{what}: what it returns {' and '.join(wrong)}")
+        raise ModelError(f"{what}: what it returns {' and '.join(wrong)}")
 
 
 def judges_dissipation(law: MaterialLaw) -> bool:

@@ -17,7 +17,8 @@ from typing import Annotated, Any, ClassVar
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, closed, require_kind, require_number
+from ufl_beam.errors import ModelError, closed
+from ufl_beam.model.checks import require_kind, require_number
 from ufl_beam.model.law_functions import (
     Values,
     absolute,
@@ -82,14 +83,14 @@ class DuvautLions(Record):
 
 
 def _require_limit(value: Any, what: str, **limits: Any) -> None:
-    """Raise :class:`SceneError` unless a limit is a number in range, or a distribution."""
+    """Raise :class:`ModelError` unless a limit is a number in range, or a distribution."""
     if not hasattr(value, "draw"):
         require_number(value, what, **limits)
 
 
 def _require_modulus(value: Any, what: str) -> None:
     if require_number(value, what) < 0.0:
-        raise SceneError(
+        raise ModelError(
             f"{what} = {value:g} must not be negative: a softening bulk has no size, and results "
             "would depend on the mesh; use Softening(limit, fracture_energy)"
         )
@@ -124,7 +125,7 @@ class ElastoPlastic(_Plastic):
         viscosity: :class:`Perzyna` or :class:`DuvautLions`; rate-independent by default.
 
     Raises:
-        SceneError: A number is negative or none; infinity is allowed for the limit.
+        ModelError: A number is negative or none; infinity is allowed for the limit.
 
     Example:
         >>> law = ub.ElastoPlastic(3e5, isotropic=1e6)  # N m, N m²
@@ -209,7 +210,7 @@ class RambergOsgood(_Plastic):
         exponent: At least 1.
 
     Raises:
-        SceneError: A number is not positive, or the exponent is less than 1.
+        ModelError: A number is not positive, or the exponent is less than 1.
 
     Example:
         >>> law = ub.RambergOsgood(yield_limit=250e6, offset=0.002, exponent=8)  # Pa, 1
@@ -246,7 +247,7 @@ class ArmstrongFrederick(_Plastic):
             :class:`ElastoPlastic` with ``kinematic``.
 
     Raises:
-        SceneError: A number is not positive.
+        ModelError: A number is not positive.
 
     Example:
         >>> law = ub.ArmstrongFrederick(  # Pa, Pa, 1
@@ -298,7 +299,7 @@ class BoucWen(Record, MaterialLaw):
         strength: Degradation per dissipated energy; zero by default.
 
     Raises:
-        SceneError: A number is out of its range.
+        ModelError: A number is out of its range.
 
     Example:
         >>> law = ub.BoucWen(yield_limit=5e4, hardening=0.05, exponent=2, strength=0.01)  # N m
@@ -357,7 +358,7 @@ class AxialBending(Record, MaterialLaw):
         rounding: Width w of the ridge.
 
     Raises:
-        SceneError: A number is not positive.
+        ModelError: A number is not positive.
 
     Example:
         >>> law = ub.AxialBending(axial=5e6, bending=2.5e5)  # N, N m

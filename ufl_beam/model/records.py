@@ -8,11 +8,28 @@ from abc import ABC
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from functools import cache, lru_cache, partial
-from typing import Annotated, Any, Generic, Protocol, TypeVar, get_args, get_origin, get_type_hints
+from typing import (
+    Annotated,
+    Any,
+    ClassVar,
+    Generic,
+    Protocol,
+    TypeVar,
+    get_args,
+    get_origin,
+    get_type_hints,
+)
 from weakref import WeakKeyDictionary
 
 from ufl_beam.display import one_line
-from ufl_beam.errors import SceneError, require_kind, require_number, require_text, require_vector
+from ufl_beam.errors import (
+    ArgumentError,
+    ModelError,
+    require_kind,
+    require_number,
+    require_text,
+    require_vector,
+)
 
 T = TypeVar("T")
 
@@ -36,6 +53,9 @@ class Record:
     text that follows the check in the annotation.
     """
 
+    _refused: ClassVar[type[ArgumentError]] = ModelError
+    """Error of wrong fields; ArgumentError of records that are no parts of models."""
+
     def __repr__(self) -> str:
         return one_line(self)  # of dataclasses with ``repr=False``
 
@@ -44,7 +64,12 @@ class Record:
             value = getattr(self, name)
             if value is not default:
                 owner = type(self).__name__ if name == "name" else self._label()
-                kept = check(value, what=f"{owner}: {word}")
+                try:
+                    kept = check(value, what=f"{owner}: {word}")
+                except ArgumentError as error:
+                    if isinstance(error, self._refused):
+                        raise
+                    raise self._refused(str(error)) from None
                 object.__setattr__(self, name, value if kept is None else kept)
 
     def _label(self) -> str:
@@ -84,7 +109,7 @@ def parameters_by_name(
     A function with ``**more`` asks for all that is known; None if the function does not tell.
 
     Raises:
-        SceneError: ``what`` has a parameter that is not known, without which it cannot be called.
+        ModelError: ``what`` has a parameter that is not known, without which it cannot be called.
     """
     try:
         parameters = [*inspect.signature(function).parameters.values()]
@@ -95,7 +120,7 @@ def parameters_by_name(
     named = [p for p in parameters[after:] if p.kind is not p.VAR_POSITIONAL]
     for p in named:
         if p.name not in known and p.default is p.empty:
-            raise SceneError(
+            raise ModelError(
                 f"{what} has a parameter {p.name!r}, which nobody knows; there are "
                 f"{', '.join(known)}{more}"
             )

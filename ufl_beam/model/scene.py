@@ -12,7 +12,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ufl_beam.display import Rich, counted
-from ufl_beam.errors import SceneError, clip, require_all
+from ufl_beam.errors import ModelError, clip
 from ufl_beam.memory import no_garbage_collection
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import (
@@ -31,6 +31,7 @@ from ufl_beam.model.bodies import (
     merged,
     node,
 )
+from ufl_beam.model.checks import require_all
 from ufl_beam.model.connector_laws import Bearing, Coulomb, PrescribedForce, PrescribedMotion
 from ufl_beam.model.connectors import Component, Connector, plastic_hinges
 from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_along, value_at
@@ -75,7 +76,7 @@ class Scene(Record, Rich):
         works: :class:`VirtualWork`, :class:`Potential`: effects along beams that you state in UFL.
 
     Raises:
-        SceneError: The parts do not fit together; the message names them.
+        ModelError: The parts do not fit together; the message names them.
 
     Example:
         >>> frame = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
@@ -98,31 +99,31 @@ class Scene(Record, Rich):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.beams and not self.bodies:
-            raise SceneError("Scene: no beams and no bodies")
+            raise ModelError("Scene: no beams and no bodies")
         if GROUND in self.bodies:
-            raise SceneError("Scene: the ground is in every scene; leave it out of bodies")
+            raise ModelError("Scene: the ground is in every scene; leave it out of bodies")
         for work in self.works[:1] if not self.beams else ():
-            raise SceneError(f"{work}: there is no beam that it could act on")
+            raise ModelError(f"{work}: there is no beam that it could act on")
         self._require_once()
         known = {GROUND, *self.beams, *self.bodies}
         for owner, place in self.attachments():
             one = place.beam if isinstance(place, Place) else place.body
             if one not in known:
                 part = "beams" if isinstance(one, Beam) else "bodies"
-                raise SceneError(f"{owner}: {one.name} is not in the scene; add it to {part}")
+                raise ModelError(f"{owner}: {one.name} is not in the scene; add it to {part}")
         for joint in self.joints:
             for i, other in enumerate(joint.places[1:], start=1):
                 if other in joint.places[:i]:
-                    raise SceneError(f"{joint}: the same place twice")
+                    raise ModelError(f"{joint}: the same place twice")
                 gap = math.dist(joint.places[0].point, other.point)
                 if joint.meets and gap > 1e-9 * self.size:
-                    raise SceneError(
+                    raise ModelError(
                         f"{type(joint).__name__}: joint ends lie {gap:.6g} m apart: "
                         f"{joint.places[0]} and {other}; {joint.advice}"
                     )
         for connector in self.links:
             if node(connector.a) == node(connector.b):
-                raise SceneError(f"{connector}: both ends are at the same body or cross-section")
+                raise ModelError(f"{connector}: both ends are at the same body or cross-section")
             if isinstance(connector.law, Coulomb) and connector.law.joint is not None:
                 self._require_pressing(connector, connector.law.joint)
         self._require_single_supports()
@@ -131,13 +132,13 @@ class Scene(Record, Rich):
         """The beam or body of a name, as in ``scene["left"].end``.
 
         Raises:
-            SceneError: There is none, or more than one.
+            ModelError: There is none, or more than one.
         """
         everything: tuple[Beam | Body, ...] = (*self.beams, *self.bodies)
         found = [one for one in everything if one.name == name]
         if len(found) != 1:
             there = ", ".join(dict.fromkeys(str(one.name) for one in everything))
-            raise SceneError(
+            raise ModelError(
                 f"Scene: {len(found) or 'no'} beams and bodies are called {name!r}; "
                 f"there is {there}; scene.beams[i] and scene.bodies[i] are those of a number"
             )
@@ -256,10 +257,10 @@ class Scene(Record, Rich):
     def _require_once(self) -> None:
         """Raise if a record is in a list twice, or if two joints are the same."""
         for one, twice in (*_again("beams", self.beams), *_again("bodies", self.bodies)):
-            raise SceneError(f"Scene: {one.name} is in the scene {twice}")
+            raise ModelError(f"Scene: {one.name} is in the scene {twice}")
         for part in ("joints", "connectors", "loads", "masses", "initial", "damping", "works"):
             for record, twice in _again(part, getattr(self, part)):
-                raise SceneError(
+                raise ModelError(
                     f"Scene: {clip(str(record))} is there {twice}; remove one, or make two of them"
                 )
         for joint, twice in _again(
@@ -269,22 +270,22 @@ class Scene(Record, Rich):
                 *((link.motion, link.axis, id(link.law)) for link in joint.holders),
             ),
         ):  # fmt: skip
-            raise SceneError(f"Scene: {joint} is there {twice}; remove one")
+            raise ModelError(f"Scene: {joint} is there {twice}; remove one")
         for work, twice in _again("works", self.works, key=lambda work: work.name):
-            raise SceneError(
+            raise ModelError(
                 f"Scene: a work is called {work.name!r} {twice}, the name of its entry in the "
                 "energy ledger; give one of them another name"
             )
         of_time = {work.in_time: work for work in self.works if isinstance(work, Potential)}
         for work in self.works:
             if work.name in of_time:
-                raise SceneError(
+                raise ModelError(
                     f"Scene: {work} has the name of another entry of the energy ledger, of what "
                     f"{of_time[work.name]} gains in time; give one of them another name"
                 )
         frames = [load for load in self.loads if isinstance(load, RotatingFrame)]
         if len(frames) > 1:
-            raise SceneError(
+            raise ModelError(
                 f"Scene: {len(frames)} rotating frames, {frames[0]} and {frames[1]}: a scene is in "
                 "one frame, whose forces go with the square of its rate; give one, of the whole "
                 "rate"
@@ -300,7 +301,7 @@ class Scene(Record, Rich):
             why = "shares unknowns, so that its force is not known; make it with multipliers=True"
         else:
             return
-        raise SceneError(f"{connector}: {pressing}, which presses on its friction, {why}")
+        raise ModelError(f"{connector}: {pressing}, which presses on its friction, {why}")
 
     @property
     def shared_by_joints(self) -> list[list[NodeDof]]:
@@ -327,7 +328,7 @@ class Scene(Record, Rich):
             for component in sorted(components):
                 dof = same[node(support.place), component]
                 if dof in holders:
-                    raise SceneError(
+                    raise ModelError(
                         f"supports in conflict: {holders[dof]} and {support} both hold "
                         f"{COMPONENTS[component]}; remove one"
                     )

@@ -14,7 +14,8 @@ from typing import Annotated, Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_array, require_kind, require_number
+from ufl_beam.errors import ModelError
+from ufl_beam.model.checks import require_array, require_kind, require_number
 from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
 from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, require_interaction
 from ufl_beam.model.material_laws import ElastoPlastic
@@ -48,7 +49,7 @@ class Section(Record):
             of single resultants and the hinge.
 
     Raises:
-        SceneError: A stiffness is not positive, a number is not finite, a law is none, or laws of
+        ModelError: A stiffness is not positive, a number is not finite, a law is none, or laws of
             resultants stand beside fibres.
 
     Example:
@@ -83,12 +84,12 @@ class Section(Record):
             object.__setattr__(self, "depth", math.sqrt(12 * self.EI / self.EA))
         laws = [n for n in ("axial", "shear", "bending", "hinge") if getattr(self, n) is not None]
         if laws and self.fibres is not None:
-            raise SceneError(
+            raise ModelError(
                 f"Section: a law {laws[0]} beside fibres; the fibres bear N and M, shear is elastic"
             )
         if self.interaction is not None and (laws or self.fibres is not None):
             other = laws[0] if laws else "fibres"
-            raise SceneError(
+            raise ModelError(
                 f"Section: {other} beside interaction, the law of N and M; give one of both"
             )
         self.layout(self.hinge)  # refuses laws that do not go together
@@ -101,7 +102,7 @@ class Section(Record):
         if self.interaction is not None:
             together = np.array([name in self.interaction.resultants for name in "NVM"])
             if hinge is not None and hinge.opens:
-                raise SceneError("Section: a hinge in a cell whose N and M interact; leave one out")
+                raise ModelError("Section: a hinge in a cell whose N and M interact; leave one out")
             return Layout(
                 strains=np.eye(3)[together],
                 weights=np.ones(1),
@@ -153,7 +154,7 @@ class Section(Record):
         if rho is not None:
             require_number(rho, "Section: rho", at_least=0.0)
         if not -1.0 < require_number(nu, "Section: nu") <= 0.5:
-            raise SceneError(f"Section: nu = {nu} must lie in (-1, 0.5]")
+            raise ModelError(f"Section: nu = {nu} must lie in (-1, 0.5]")
         if fibres is not None:
             require_kind(fibres, PlacedFibres, "Section: fibres")
         GA = shear_factor * A * E / (2 * (1 + nu))
@@ -172,7 +173,7 @@ class Section(Record):
         The axis of the beam runs through their centroid.
 
         Raises:
-            SceneError: The lists do not fit, or all fibres lie at one y.
+            ModelError: The lists do not fit, or all fibres lie at one y.
         """
         require_kind(fibres, Fibres, "Section.of_fibres: fibres")
         require_number(E, "Section: E", positive=True)
@@ -180,15 +181,15 @@ class Section(Record):
             require_array(x, f"Section.of_fibres: {name}") for name, x in (("y", y), ("A", A))
         )
         if at.ndim != 1 or at.shape != areas.shape or not len(at):
-            raise SceneError(
+            raise ModelError(
                 f"Section.of_fibres: y and A must be lists of one length, not {at.shape} and "
                 f"{areas.shape}"
             )
         if not (areas > 0).all():
-            raise SceneError("Section.of_fibres: y must be finite, and all A positive")
+            raise ModelError("Section.of_fibres: y must be finite, and all A positive")
         total, depth = float(areas.sum()), float(np.ptp(at))
         if depth == 0.0:
-            raise SceneError(
+            raise ModelError(
                 "Section.of_fibres: all fibres at one y have no bending stiffness; spread them"
             )
         placed = PlacedFibres(fibres, E, at - (areas @ at) / total, areas)
@@ -231,7 +232,7 @@ class Section(Record):
         """Circular tube of outer diameter ``d`` and wall thickness ``t``; m."""
         _require_positive("Section.tube", d=d, t=t)
         if 2 * t > d:
-            raise SceneError(
+            raise ModelError(
                 f"Section.tube: wall t = {t} m is thicker than the radius of d = {d} m"
             )
         inner = d - 2 * t
@@ -255,7 +256,7 @@ class Section(Record):
         """
         _require_positive("Section.i_shape", h=h, b=b, tw=tw, tf=tf)
         if 2 * tf >= h or tw > b:
-            raise SceneError(
+            raise ModelError(
                 f"Section.i_shape: web and flanges do not fit: h = {h}, b = {b}, tw = {tw}, "
                 f"tf = {tf} m"
             )

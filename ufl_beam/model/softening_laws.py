@@ -13,7 +13,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, closed, raised_at, require_kind, shorten
+from ufl_beam.errors import ModelError, closed, raised_at, shorten
+from ufl_beam.model.checks import require_kind
 from ufl_beam.model.law_functions import Values, below, exp, positive, where
 from ufl_beam.model.material_law import require_field, require_fields
 from ufl_beam.model.records import FromZero, Positive, Record
@@ -165,7 +166,7 @@ class Softening(_OfLimitAndEnergy):
         fracture_energy: Energy dissipated by a complete opening: J; for fibres J/m².
 
     Raises:
-        SceneError: A negative limit, or an energy that is not positive.
+        ModelError: A negative limit, or an energy that is not positive.
 
     Example:
         >>> law = ub.Softening(limit=5e4, fracture_energy=1e3)  # N m, J
@@ -218,7 +219,7 @@ def _mean_of_decay(x: Values) -> Values:
 
 
 def require_softening(law: object, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless a discontinuity can follow a law."""
+    """Raise :class:`ModelError` naming ``what`` unless a discontinuity can follow a law."""
     require_kind(law, (Softening, LinearSoftening, SofteningLaw), what)
     if isinstance(law, _OfLimitAndEnergy):
         return
@@ -227,15 +228,15 @@ def require_softening(law: object, what: str) -> None:
     for field in fields(law):  # type: ignore[arg-type]
         value = getattr(law, field.name)
         if hasattr(value, "draw"):
-            raise SceneError(
+            raise ModelError(
                 f"{kind}: {field.name} = {shorten(value)} is a distribution; numbers of softening "
                 "are the same in all cells; draw those of the bulk, ElastoPlastic(limit)"
             )
         require_field(value, f"{kind}: {field.name}")
     try:
         course(law)
-    except SceneError as error:
-        raise SceneError(f"{what}: {error}") from error.__cause__
+    except ModelError as error:
+        raise ModelError(f"{what}: {error}") from error.__cause__
 
 
 # -- numbers that follow from the traction -------------------------------------------------------
@@ -252,13 +253,13 @@ class Course(NamedTuple):
 
 @lru_cache(maxsize=256)
 def course(law: SofteningLaw) -> Course:
-    """Follow a law from zero to full opening; raise :class:`SceneError` if it cannot soften so."""
+    """Follow a law from zero to full opening; raise :class:`ModelError` if it cannot soften so."""
     kind = type(law).__name__
     edges = np.append(0.0, np.logspace(-DECADES, DECADES, 16 * DECADES + 1))
     t = _called(law, "traction", edges)
     limit = float(t[0])
     if limit <= 0:
-        raise SceneError(
+        raise ModelError(
             f"{kind}: its traction is {limit:g} at zero opening; it must be positive, as nothing "
             "opens below it. For a hinge that never resists give Softening(0.0, 1.0)"
         )
@@ -267,7 +268,7 @@ def course(law: SofteningLaw) -> Course:
     if t[-1] > 0:  # beyond, by the power with which it falls
         power = np.log(t[-17] / t[-1]) / np.log(edges[-1] / edges[-17])
         if power <= 1.01:
-            raise SceneError(
+            raise ModelError(
                 f"{kind}: its traction is still {t[-1]:.6g} at the opening {edges[-1]:g}, so that "
                 "its energy is not finite; let it fall to zero, or faster than 1/opening. For a "
                 "hinge that never breaks give ElastoPlastic(limit)"
@@ -281,7 +282,7 @@ def course(law: SofteningLaw) -> Course:
     with np.errstate(all="ignore"):
         slope = _called(law, "traction", np.array([1j * tiny])).imag[0] / tiny
     if not abs(slope) * unit < 1e9 * limit:
-        raise SceneError(
+        raise ModelError(
             f"{kind}: its traction has an infinite slope at zero opening, for which there is no "
             "tangent; let it begin with a finite one"
         )
@@ -293,9 +294,9 @@ def course(law: SofteningLaw) -> Course:
 
 
 def _require_no_drive(kind: str, openings: Array, t: Array) -> None:
-    """Raise :class:`SceneError` where a traction is negative."""
+    """Raise :class:`ModelError` where a traction is negative."""
     if (negative := t < 0).any():
-        raise SceneError(
+        raise ModelError(
             f"{kind}: its traction is {t[negative][0]:.6g} at the opening "
             f"{openings[negative][0]:.6g}, and a hinge would drive its opening; let it end at "
             "zero, such as by ub.law_functions.positive"
@@ -303,23 +304,23 @@ def _require_no_drive(kind: str, openings: Array, t: Array) -> None:
 
 
 def _called(law: SofteningLaw, method: str, openings: Array) -> Array:
-    """Call a method of a law with openings; raise :class:`SceneError` unless it returns numbers."""
+    """Call a method of a law with openings; raise :class:`ModelError` unless it returns numbers."""
     what = f"{type(law).__name__}.{method}"
     try:
         with np.errstate(all="ignore"):
             found = getattr(law, method)(openings) + 0 * openings
     except Exception as error:
-        raise SceneError(
+        raise ModelError(
             f"{what} fails: {error}{raised_at(error)}. It is called with arrays of openings, real "
             "or complex, and written with + - * / ** and the functions of ub.law_functions"
         ) from error
     if np.shape(found) != openings.shape:
-        raise SceneError(
+        raise ModelError(
             f"{what} answers {len(openings)} openings with an array of shape {np.shape(found)}; it "
             "must return one number for each"
         )
     if (bad := ~np.isfinite(found)).any():
-        raise SceneError(
+        raise ModelError(
             f"{what} is {found[bad][0]} at the opening {openings[bad][0]:.6g}; it must be a number "
             "at all openings from zero on"
         )
@@ -353,14 +354,14 @@ def _integral(law: SofteningLaw, edges: Array) -> float:
 
 
 def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:
-    """Raise :class:`SceneError` unless ``energy_to`` and stated numbers are of the traction."""
+    """Raise :class:`ModelError` unless ``energy_to`` and stated numbers are of the traction."""
     kind = type(law).__name__
     if law.energy_to(np.zeros(1)) is not None:
         for opening in (0.0, *(unit * np.array([0.1, 0.5, 1.0, 2.0, 5.0]))):
             (stated,) = _called(law, "energy_to", np.array([opening]))
             found = _integral(law, np.linspace(0.0, opening, 17)) if opening else 0.0
             if abs(stated - found) > 1e-6 * energy:
-                raise SceneError(
+                raise ModelError(
                     f"{kind}: energy_to is {stated:.6g} at the opening {opening:.6g}, but the "
                     f"integral of the traction is {found:.6g}; make both agree, or leave it out"
                 )
@@ -370,7 +371,7 @@ def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:
             stated = getattr(law, name)
             if not abs(stated - found) <= 1e-6 * found:
                 means = "traction at zero opening" if name == "limit" else "integral of it"
-                raise SceneError(
+                raise ModelError(
                     f"{kind}: {name} = {stated:.6g}, but the {means} is {found:.6g}; make both "
                     "agree, or call the number otherwise"
                 )
@@ -386,7 +387,7 @@ def _slope(law: SofteningLaw, a: float, b: float, limit: float, unit: float) -> 
     while b - a > 1e-6 * unit or abs(at_b - at_a) > 1e-3 * limit:
         middle = (a + b) / 2
         if not a < middle < b:
-            raise SceneError(
+            raise ModelError(
                 f"{type(law).__name__}: its traction jumps from {at_a:.6g} to {at_b:.6g} at the "
                 f"opening {a:.6g}, for which there is no tangent; let it change over an opening"
             )

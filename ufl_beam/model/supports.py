@@ -10,8 +10,9 @@ from functools import cached_property
 from typing import ClassVar
 
 from ufl_beam.display import bracketed
-from ufl_beam.errors import SceneError, require_number, require_vector
+from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import Anchor, require_node
+from ufl_beam.model.checks import require_number, require_vector
 from ufl_beam.model.connector_laws import Bearing
 from ufl_beam.model.functions import Constant, Point, TimeFunction, require_time_function
 
@@ -54,7 +55,7 @@ class Support(Bearing, ABC):
     def __post_init__(self) -> None:
         require_node(self.place, type(self).__name__)
         if not self.held:
-            raise SceneError(f"{self} holds nothing; give at least one of u, v, psi")
+            raise ModelError(f"{self} holds nothing; give at least one of u, v, psi")
         for component, value in self.held.items():
             require_time_function(value, f"{self}, {COMPONENTS[component]}")
 
@@ -117,7 +118,7 @@ class Roller(Support):
     def __post_init__(self) -> None:
         x, y = require_vector(self.along, f"{self}: along")
         if x == y == 0.0:
-            raise SceneError(f"{self}: along = (0, 0) is no direction")
+            raise ModelError(f"{self}: along = (0, 0) is no direction")
         object.__setattr__(self, "along", (x, y))
         super().__post_init__()
 

@@ -8,16 +8,9 @@ from dataclasses import KW_ONLY, dataclass, field
 from typing import Annotated, Any, ClassVar
 
 from ufl_beam.display import bracketed
-from ufl_beam.errors import (
-    SceneError,
-    closed,
-    require_count,
-    require_function,
-    require_number,
-    require_text,
-    shorten,
-)
+from ufl_beam.errors import ModelError, closed, shorten
 from ufl_beam.model.bodies import Beams, Member
+from ufl_beam.model.checks import require_count, require_function, require_number, require_text
 from ufl_beam.model.connector_law import ENTRIES
 from ufl_beam.model.functions import TimeFunction, require_time_function
 from ufl_beam.model.records import Record, parameters_by_name
@@ -26,7 +19,7 @@ from ufl_beam.model.records import Record, parameters_by_name
 def _require_name(name: Any, what: str) -> None:
     require_text(name, what)
     if not name or name in ENTRIES:
-        raise SceneError(
+        raise ModelError(
             f"{what} = {name!r} is an entry of the energy ledger already; give the work a name of "
             "its own"
         )
@@ -52,16 +45,16 @@ class Work(Record):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.beams is not None and not self.beams:
-            raise SceneError(f"{self}: beams is empty; leave it out for all beams")
+            raise ModelError(f"{self}: beams is empty; leave it out for all beams")
         if not isinstance(self.numbers, Mapping):
-            raise SceneError(
+            raise ModelError(
                 f"{self}: numbers = {shorten(self.numbers)} must be numbers by name, as {{'c': 1}}"
             )
         object.__setattr__(self, "numbers", dict(self.numbers))
         for name, value in self.numbers.items():
             what = f"{self}: numbers[{shorten(name)}]"
             if name in self.arguments:
-                raise SceneError(f"{what}: the name has a meaning already; take another one")
+                raise ModelError(f"{what}: the name has a meaning already; take another one")
             if callable(value):
                 require_time_function(value, what)
             else:
@@ -70,7 +63,7 @@ class Work(Record):
         asked = self.asked
         for name in self.numbers:
             if name not in asked:
-                raise SceneError(f"{self}: numbers[{name!r}] is no parameter of the function")
+                raise ModelError(f"{self}: numbers[{name!r}] is no parameter of the function")
 
     def __str__(self) -> str:
         return f"{type(self).__name__} {self.name!r}"
@@ -85,7 +78,7 @@ class Work(Record):
             self.density, known, f"{self}: the function", more=", and what `numbers` names"
         )
         if asked is None:
-            raise SceneError(
+            raise ModelError(
                 f"{self}: the parameters of {shorten(self.density)} have no names; write a "
                 f"function of some of {', '.join(known)}"
             )
@@ -138,7 +131,7 @@ class VirtualWork(Work):
             that cells have more adds two.
 
     Raises:
-        SceneError: The function is not linear in w, or no scalar of UFL; the name is taken.
+        ModelError: The function is not linear in w, or no scalar of UFL; the name is taken.
 
     Example:
         >>> def drag(v, w, c):
@@ -171,7 +164,7 @@ class Potential(Work):
     Args are those of :class:`VirtualWork`.
 
     Raises:
-        SceneError: The function does not depend on q, or is no scalar of UFL; the name is taken.
+        ModelError: The function does not depend on q, or is no scalar of UFL; the name is taken.
 
     Example:
         >>> soil = ub.Potential("soil", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": 1e6})  # N/m²

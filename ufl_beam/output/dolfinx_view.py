@@ -20,7 +20,7 @@ from ufl_beam.discretization.function_spaces import (
 )
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ArgumentError
 from ufl_beam.mechanics.time_schemes import has_inertia
 from ufl_beam.terms.beams import elastic_forms, inelastic_forms
 
@@ -152,7 +152,7 @@ class DolfinxView:
                 with the degree that UFL estimates.
 
         Raises:
-            SceneError: It is neither, or it is of another mesh.
+            ArgumentError: It is neither, or it is of another mesh.
 
         Example:
             >>> length = view.total(1.0 * view.dx)
@@ -190,10 +190,10 @@ class DolfinxView:
         """Velocity of the configuration in the accepted state; m/s, m/s, rad/s.
 
         Raises:
-            SceneError: The scheme is a static one.
+            ArgumentError: The scheme is a static one.
         """
         if not has_inertia(self._of.scheme):
-            raise SceneError("dolfinx.velocity: a static scheme has no velocities; run dynamics")
+            raise ArgumentError("dolfinx.velocity: a static scheme has no velocities; run dynamics")
         return self._function("velocity", self._of.velocities()[0][self._fields.cell_dofs])
 
     @property
@@ -223,7 +223,7 @@ class DolfinxView:
         first one; of several jumps of a cell it is the largest.
 
         Raises:
-            SceneError: Nothing in the scene can hinge.
+            ArgumentError: Nothing in the scene can hinge.
 
         Example:
             >>> opening = ub.Simulation(hinged, ub.Static())
@@ -233,7 +233,7 @@ class DolfinxView:
         """
         scene = self._of.scene
         if not scene.hinges and all(beam.section.hinge is None for beam in scene.beams):
-            raise SceneError(
+            raise ArgumentError(
                 "dolfinx.jump: nothing in the scene can hinge; give a beam "
                 "hinges={0.5: Softening(...)}, or a section hinge=Softening(...)"
             )

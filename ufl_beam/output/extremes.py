@@ -17,7 +17,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.display import in_one_line
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.output.output_files import require_arrays
@@ -190,7 +190,7 @@ class Extremes(Restartable):
         points: Number of points of a cell, at least 2.
 
     Raises:
-        SceneError: ``points`` is less than 2.
+        ArgumentError: ``points`` is less than 2.
 
     Example:
         >>> extremes = ub.Extremes()
@@ -263,10 +263,10 @@ class Extremes(Restartable):
         """Vertices and cells of the scene.
 
         Raises:
-            SceneError: Nothing was run.
+            ArgumentError: Nothing was run.
         """
         if not hasattr(self, "_grid"):
-            raise SceneError("Extremes: nothing was run; give it to simulate(..., record=)")
+            raise ArgumentError("Extremes: nothing was run; give it to simulate(..., record=)")
         return self._grid
 
     @property
@@ -274,7 +274,7 @@ class Extremes(Restartable):
         """The :class:`Solution` of the run.
 
         Raises:
-            SceneError: Nothing was run.
+            ArgumentError: Nothing was run.
         """
         _ = self.grid  # or its error
         return self._solution
@@ -285,7 +285,7 @@ class Extremes(Restartable):
         They are in the order of a :class:`Diagram` with as many points; (num_cells points, 3).
 
         Raises:
-            SceneError: The beam is not in the scene, or nothing was run.
+            ArgumentError: The beam is not in the scene, or nothing was run.
         """
         cells = self.grid.cells_of(beam)
         return Extent(*(x.reshape(-1, 3) for x in self._extents[0].of(cells)))
@@ -297,7 +297,7 @@ class Extremes(Restartable):
         of higher degree.  At a hinge ψ is that of :meth:`Solution.displacement` at the place.
 
         Raises:
-            SceneError: It is not in the scene, or nothing was run.
+            ArgumentError: It is not in the scene, or nothing was run.
         """
         if isinstance(one, Body):
             return self._extents[1].of(self.grid.node(one.middle).reshape(1, 3))

@@ -17,7 +17,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array, State
 from ufl_beam.display import one_line
 from ufl_beam.errors import (
-    SceneError,
+    ArgumentError,
     require_function,
     require_kind,
     require_number,
@@ -48,6 +48,8 @@ class Goodman(Record):
         >>> print(curve.endurance(71e6, mean=0.0), curve.endurance(71e6, mean=250e6))
         2000000.0 250000.0
     """
+
+    _refused = ArgumentError
 
     ultimate: Positive
     _power: ClassVar[int] = 1
@@ -100,13 +102,15 @@ class SNCurve(Record):
         mean: Equivalent range of ranges about mean stresses, such as :class:`Goodman`.
 
     Raises:
-        SceneError: A number is not positive, or ``limit`` is less than ``knee``.
+        ArgumentError: A number is not positive, or ``limit`` is less than ``knee``.
 
     Example:
         >>> curve = ub.SNCurve.eurocode(71e6)
         >>> print(curve.endurance([142e6, 71e6, 10e6]))  # cycles to failure
         [ 250000. 2000000.      inf]
     """
+
+    _refused = ArgumentError
 
     range: Positive
     cycles: Positive = 2e6
@@ -121,7 +125,7 @@ class SNCurve(Record):
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.limit < self.knee < math.inf:
-            raise SceneError(
+            raise ArgumentError(
                 f"SNCurve: limit = {self.limit:g} cycles lies before the knee, {self.knee:g}"
             )
 
@@ -195,7 +199,7 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
         series: Stresses, or whatever goes to and fro; (n,).
 
     Raises:
-        SceneError: It is not one row of finite numbers.
+        ArgumentError: It is not one row of finite numbers.
 
     Example:
         >>> cycles = ub.rainflow([0, 3, 1, 2, 0])
@@ -271,7 +275,7 @@ class HotSpot(Record):
         stress: Stress from N, V (N) and M (N m) at many times; (n,) each; Pa.
 
     Raises:
-        SceneError: The place is none, or the stress no function.
+        ArgumentError: The place is none, or the stress no function.
 
     Example:
         >>> nominal = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9, factor=1.5)
@@ -279,6 +283,8 @@ class HotSpot(Record):
         >>> np.allclose(nominal.stress(0.0, 0.0, 1e4), 1.5 * own.stress(0.0, 0.0, 1e4), rtol=1e-3)
         True
     """
+
+    _refused = ArgumentError
 
     place: Instance[Place]
     stress: Callable[[Array, Array, Array], Array]
@@ -288,7 +294,7 @@ class HotSpot(Record):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not callable(self.stress):
-            raise SceneError(f"HotSpot {self.place}: stress = {self.stress!r} is not a function")
+            raise ArgumentError(f"HotSpot {self.place}: stress = {self.stress!r} is not a function")
 
     @classmethod
     def fibre(cls, place: Place, *, y: float, E: float, factor: float = 1.0) -> HotSpot:
@@ -325,7 +331,7 @@ class Fatigue(Restartable):
             range that the curve is named by.
 
     Raises:
-        SceneError: A spot or the curve is none, or the resolution is not positive.
+        ArgumentError: A spot or the curve is none, or the resolution is not positive.
 
     Example:
         >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
@@ -381,7 +387,7 @@ class Fatigue(Restartable):
             N, V, M = (forces[k, i] for i in range(3))
             stress = np.asarray(spot.stress(N, V, M), dtype=np.float64)
             if stress.shape != N.shape or not np.isfinite(stress).all():
-                raise SceneError(f"HotSpot {spot}: stress(N, V, M) must be a finite number each")
+                raise ArgumentError(f"HotSpot {spot}: stress(N, V, M) must be a finite number each")
             self._counters[spot].add(stress)
 
     def close(self) -> None:
@@ -406,10 +412,10 @@ class Fatigue(Restartable):
         """Return the cycles at a spot.
 
         Raises:
-            SceneError: The spot is not one of these, or nothing was run.
+            ArgumentError: The spot is not one of these, or nothing was run.
         """
         if spot not in self._counters:
-            raise SceneError(f"Fatigue: nothing was counted at {spot}; name it, and run")
+            raise ArgumentError(f"Fatigue: nothing was counted at {spot}; name it, and run")
         return self._counters[spot].cycles()
 
     def damage(self, spot: HotSpot) -> float:

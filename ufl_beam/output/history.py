@@ -16,7 +16,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import State
 from ufl_beam.display import TIME, Parameter, bracketed
 from ufl_beam.errors import (
-    SceneError,
+    ArgumentError,
     require_count,
     require_function,
     require_kind,
@@ -58,7 +58,7 @@ class History(Restartable):
             row is deleted, and half as many steps are written from then on.
 
     Raises:
-        SceneError: ``every`` or ``max_rows`` is no whole number, at least 1.
+        ArgumentError: ``every`` or ``max_rows`` is no whole number, at least 1.
 
     Example:
         >>> table = ub.History("tip.csv", [beam.end])
@@ -105,7 +105,7 @@ class History(Restartable):
             names += [f"{c} {name} [{unit}]" for c, unit in zip(CONNECTOR, units, strict=True)]
         energies = [f"{name} [J]" for group in simulation.entries() for name in group]
         for twice in {*names} & {*energies}:
-            raise SceneError(
+            raise ArgumentError(
                 f"History {self._path}: {twice!r} would be a column of a connector and of the "
                 "energy ledger; give the work that is called so another name"
             )

@@ -28,7 +28,7 @@ from typing import Any
 
 import numpy as np
 
-from ufl_beam.errors import SceneError, shorten
+from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.file_system import is_at, sync
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
@@ -38,14 +38,14 @@ BLOCK = 1 << 20  # bytes that are read at once for a checksum
 
 
 def require_path(path: str | Path, what: str) -> Path:
-    """Return ``path`` as a :class:`Path`, or raise :class:`SceneError` naming ``what``."""
+    """Return ``path`` as a :class:`Path`, or raise :class:`ArgumentError` naming ``what``."""
     if not isinstance(path, str | os.PathLike) or not os.fspath(path):
-        raise SceneError(f"{what}: path = {shorten(path)} must be the name of a file")
+        raise ArgumentError(f"{what}: path = {shorten(path)} must be the name of a file")
     return Path(path)
 
 
 def require_writable(path: Path) -> None:
-    """Raise :class:`SceneError` if a file cannot be written.
+    """Raise :class:`ArgumentError` if a file cannot be written.
 
     Its content stays as it is, and no file is made, as a kill would leave an empty one.
     """
@@ -62,11 +62,11 @@ def require_writable(path: Path) -> None:
     except (OSError, ValueError) as error:  # a ValueError at a null character
         why = f" cannot be written: {getattr(error, 'strerror', error)}"
     if why:
-        raise SceneError(f"output {path}{why}")
+        raise ArgumentError(f"output {path}{why}")
 
 
 def require_apart(outputs: Sequence[Output], call: str) -> None:
-    """Raise :class:`SceneError` if two outputs, or an outer run's and one of these, share a file.
+    """Raise :class:`ArgumentError` if two outputs, one perhaps of an outer run, share a file.
 
     Files are compared through symbolic and hard links; devices such as ``/dev/null`` may be shared.
     """
@@ -81,11 +81,11 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
         except OSError:
             pass  # there is no file yet
         except ValueError as error:  # a null character
-            raise SceneError(f"output {path} cannot be written: {error}") from None
+            raise ArgumentError(f"output {path} cannot be written: {error}") from None
         for identity in identities:
             other = owners.setdefault(identity, owner)
             if other is not owner:
-                raise SceneError(
+                raise ArgumentError(
                     f"{call}: {other} and {owner} would both write {os.path.realpath(path)}; "
                     "give one of them another path"
                 )
@@ -231,9 +231,9 @@ def put_in_place(path: Path, data: bytes | memoryview) -> None:
     sync(path.parent)
 
 
-def changed(what: str) -> SceneError:
+def changed(what: str) -> ArgumentError:
     """Return the error of an output that is not as the checkpoint knows it."""
-    return SceneError(
+    return ArgumentError(
         f"{what}: it is not what was written up to the checkpoint: it is missing, or was changed "
         "while the run was down; bring it back, or delete the checkpoint to begin anew"
     )
@@ -291,7 +291,7 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
     whenever the meaning of files changes.  ``at`` is a part of messages, such as the time.
 
     Raises:
-        SceneError: The file cannot be written, or the content is something else than numbers,
+        ArgumentError: The file cannot be written, or the content is something else than numbers,
             texts, lists and dicts.
         OSError: There is no space for it.
     """
@@ -309,7 +309,7 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
                 with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
                     NPY.write_array(member, values, allow_pickle=False)
     except (TypeError, ValueError) as error:
-        raise SceneError(
+        raise ArgumentError(
             f"{what} {path}{at} cannot be written: a state() has something else than numbers, "
             f"texts, lists and dicts: {error}"
         ) from None
@@ -336,14 +336,14 @@ def plain(value: Any) -> Any:
 
 @contextmanager
 def decoding(path: Path, format: str) -> Iterator[None]:
-    """Make every error of reading a file a :class:`SceneError` with its name and what to do."""
+    """Make every error of reading a file a :class:`ArgumentError` with its name and what to do."""
     what = format.partition(" ")[0]
     try:
         yield
-    except SceneError as error:
-        raise SceneError(f"{what} {path}: {error}. {ADVICE[what]}") from None
+    except ArgumentError as error:
+        raise ArgumentError(f"{what} {path}: {error}. {ADVICE[what]}") from None
     except Exception as error:  # of any library, as a file may have anything
-        raise SceneError(
+        raise ArgumentError(
             f"{what} {path}: the file is damaged: {error!r}. {ADVICE[what]}"
         ) from error
 
@@ -353,26 +353,26 @@ def read(path: Path, format: str) -> Content:
     try:
         data = path.read_bytes()
     except FileNotFoundError:
-        raise SceneError("there is no such file") from None
+        raise ArgumentError("there is no such file") from None
     except OSError as error:
-        raise SceneError(f"the file cannot be read: {error.strerror}") from None
+        raise ArgumentError(f"the file cannot be read: {error.strerror}") from None
     kind = format.rpartition(", ")[0]
     found = by = ""
     if end := END.fullmatch(data[-256:]):
         if hashlib.sha256(data[:-DIGEST]).hexdigest().encode() != data[-DIGEST:]:
-            raise SceneError("the file is damaged: its checksum is not that of its content")
+            raise ArgumentError("the file is damaged: its checksum is not that of its content")
         found, by = end[1].decode(), end[2].decode()
     if not found:
         why = "its end is not that of such a file" if data else "it is empty"
-        raise SceneError(f"the file holds no {kind}, or is damaged: {why}")
+        raise ArgumentError(f"the file holds no {kind}, or is damaged: {why}")
     if found != format:
-        raise SceneError(
+        raise ArgumentError(
             f"the file is a {found}, written by version {by} of ufl_beam; this version, "
             f"{version()}, reads a {format}"
         )
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         if sum(member.file_size for member in archive.infolist()) > len(data):
-            raise SceneError("the file is damaged: what it contains is larger than itself")
+            raise ArgumentError("the file is damaged: what it contains is larger than itself")
         content: Content = json.loads(archive.read("text.json"))
         for member in archive.namelist():
             name, _, ending = member.rpartition(".")
@@ -383,7 +383,7 @@ def read(path: Path, format: str) -> Content:
 
 
 def require_arrays(found: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> None:
-    """Raise :class:`SceneError` unless arrays of numbers have these shapes; -1 is any length."""
+    """Raise :class:`ArgumentError` unless arrays of numbers have these shapes; -1 is any length."""
     for name, shape in shapes.items():
         values = np.asarray(found.get(name))
         same = len(values.shape) == len(shape) and all(
@@ -391,7 +391,7 @@ def require_arrays(found: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...
         )
         if not same or values.dtype.kind not in "fi" or values.dtype.itemsize != 8:
             is_ = f"{values.dtype} of shape {values.shape}" if name in found else "missing"
-            raise SceneError(
+            raise ArgumentError(
                 f"the file is damaged: the array {name!r} is {is_}, and must be numbers of 64 bits "
                 f"of shape {shape}"
             )

@@ -16,7 +16,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
-from ufl_beam.errors import SceneError, require_count
+from ufl_beam.errors import ArgumentError, require_count
 from ufl_beam.model.bodies import Anchor, arm
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Link, RigidLink
@@ -472,7 +472,7 @@ class TimeSeries(Restartable):
         require_count(every, f"{kind} {path}: every")
         self._every, self._count = every, 0
         if self._path.suffix != self.ending:
-            raise SceneError(f"{kind} {path}: the name of the file must end in {self.ending}")
+            raise ArgumentError(f"{kind} {path}: the name of the file must end in {self.ending}")
         self._writers: list[Any] = []  # on the first process one, while it is open
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
@@ -539,7 +539,7 @@ class XDMF(TimeSeries):
         every: Write every so many steps.
 
     Raises:
-        SceneError: ``every`` is no whole number of steps, or the path does not end in ``.xdmf``.
+        ArgumentError: ``every`` is no whole number of steps, or the path does not end in ``.xdmf``.
 
     Example:
         >>> film = ub.XDMF("beam.xdmf", every=5)
@@ -552,10 +552,10 @@ class XDMF(TimeSeries):
     writer = XdmfWriter
 
     def require_writable(self) -> None:
-        """Raise :class:`SceneError` if a file cannot be written, or its name stand in XML."""
+        """Raise :class:`ArgumentError` if a file cannot be written, or its name stand in XML."""
         name = self._path.name
         if name != name.strip() or not name.isprintable():
-            raise SceneError(
+            raise ArgumentError(
                 f"XDMF {name!r}: spaces at the ends and characters that cannot be printed do not "
                 "survive in XML; take another name"
             )
@@ -574,7 +574,7 @@ class VTKHDF(TimeSeries):
         every: Write every so many steps.
 
     Raises:
-        SceneError: ``every`` is no whole number of steps, or the path does not end in
+        ArgumentError: ``every`` is no whole number of steps, or the path does not end in
             ``.vtkhdf``.
 
     Example:

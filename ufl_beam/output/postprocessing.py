@@ -19,7 +19,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.display import in_one_line
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ArgumentError
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -56,12 +56,12 @@ def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
     if isinstance(of, Connector):
         links = of.components or (of,)
         if links[0] not in scene.links:
-            raise SceneError(f"{of} is not in the scene")
+            raise ArgumentError(f"{of} is not in the scene")
         return [scene.links.index(link) for link in links]
     if of not in scene.joints:
-        raise SceneError(f"{of} is not in the scene")
+        raise ArgumentError(f"{of} is not in the scene")
     if not of.holders:
-        raise SceneError(
+        raise ArgumentError(
             f"{of} shares unknowns, so that its force is not known; make it with multipliers=True"
         )
     return [scene.links.index(holder) for holder in of.holders]

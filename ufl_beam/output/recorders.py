@@ -17,7 +17,7 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.display import Parameter
-from ufl_beam.errors import SceneError, require_sequence, shorten
+from ufl_beam.errors import ArgumentError, require_sequence, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.model.connectors import Connector
@@ -63,7 +63,7 @@ class PresentState(ABC):
         """Return motion, force, work and rate of a connector at the end of the last step.
 
         Raises:
-            SceneError: It is not in the scene.
+            ArgumentError: It is not in the scene.
         """
         return connection(self.connections()[links_of(self.scene, connector)])
 
@@ -75,10 +75,10 @@ class PresentState(ABC):
         """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s.
 
         Raises:
-            SceneError: The run is static; it has no velocities.
+            ArgumentError: The run is static; it has no velocities.
         """
         if not has_inertia(self.scheme):
-            raise SceneError(
+            raise ArgumentError(
                 f"velocity of {place}: the run is static; there is none. A controller for both "
                 "kinds of runs can ask now.scheme.dynamic"
             )
@@ -88,7 +88,7 @@ class PresentState(ABC):
         """Size of the force of a joint or a support at the end of the last step; N.
 
         Raises:
-            SceneError: The joint shares its displacement; make it with ``multipliers=True``.
+            ArgumentError: The joint shares its displacement; make it with ``multipliers=True``.
         """
         if isinstance(joint, Support):
             number = self.scene.supports.index(joint)
@@ -200,7 +200,7 @@ class Recorder(ABC):
         return f"<{' '.join([type(self).__name__, *map(str, self.files)])}>"
 
     def require_writable(self) -> None:
-        """Raise :class:`SceneError` if a file cannot be written; the first process asks."""
+        """Raise :class:`ArgumentError` if a file cannot be written; the first process asks."""
         for path in self.files:
             require_writable(path)
 
@@ -219,9 +219,9 @@ class Recorder(ABC):
         """Return the arrays for :meth:`resume`, by name; those of the first process count.
 
         Raises:
-            SceneError: The recorder has none.
+            ArgumentError: The recorder has none.
         """
-        raise SceneError(
+        raise ArgumentError(
             f"{type(self).__name__}: this recorder cannot go on from a checkpoint; give it methods "
             "state() and resume(simulation, state), or run without a checkpoint"
         )
@@ -230,7 +230,7 @@ class Recorder(ABC):
         """Go on from a :meth:`state`, in the place of :meth:`open`; nothing is recorded yet.
 
         Raises:
-            SceneError: What was written before is not there any more.
+            ArgumentError: What was written before is not there any more.
         """
         self.state()
 
@@ -260,16 +260,16 @@ def recorders_of(
     for i, recorder in enumerate(recorders):
         name = f"record[{i}]"
         if not isinstance(recorder, Recorder):
-            raise SceneError(
+            raise ArgumentError(
                 f"{call}: {name} = {shorten(recorder)} is not a Recorder; classes of your own are "
                 "derived from ub.Recorder"
             )
         if why := unlike(recorder, Recorder):
             kind = type(recorder).__name__
-            raise SceneError(f"{call}: {name}: {kind} is not a recorder: {why}")
+            raise ArgumentError(f"{call}: {name}: {kind} is not a recorder: {why}")
         first = next(k for k, one in enumerate(recorders) if one is recorder)
         if first != i:
-            raise SceneError(
+            raise ArgumentError(
                 f"{call}: record[{first}] and {name} are the same {type(recorder).__name__}; "
                 "leave one out"
             )

@@ -23,7 +23,7 @@ from typing import Any, NoReturn, TypeVar
 import numpy as np
 from scipy.interpolate import KroghInterpolator
 
-from ufl_beam.errors import ModelWarning, SceneError
+from ufl_beam.errors import ArgumentError, ModelWarning
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connector_laws import HELD
 from ufl_beam.model.functions import Point, steady
@@ -52,10 +52,10 @@ class SavedFunction:
         return cls(name_of(function), tuple(known), tuple(known.values()))
 
     def __call__(self, t: float) -> float:
-        """The value at one of the times, or :class:`SceneError` at others."""
+        """The value at one of the times, or :class:`ArgumentError` at others."""
         n = bisect_left(self.times, t)
         if n == len(self.times) or self.times[n] != t:
-            raise SceneError(
+            raise ArgumentError(
                 f"the function {self.name} is not known at t = {t:g}: a file of a solution has "
                 "the values of functions at its times only; load it with your own scene, which has "
                 "the function: ub.Solution.load(path, scene=scene)"
@@ -104,8 +104,8 @@ class LostFunction:
     name: str  # that of the function
 
     def __call__(self, *arguments: object, **named: object) -> NoReturn:
-        """Raise :class:`SceneError`, as the function is not there."""
-        raise SceneError(
+        """Raise :class:`ArgumentError`, as the function is not there."""
+        raise ArgumentError(
             f"the function {self.name} is not in the file of the solution, which has results and "
             "numbers; build the scene with the function to simulate it"
         )
@@ -173,7 +173,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
                     known = sampling(owner, field, value) if sampling else None
                     record = LostFunction(name_of(value)) if known is None else known
                 elif not dataclasses.is_dataclass(value):
-                    raise SceneError(
+                    raise ArgumentError(
                         f"{value!r} cannot be saved: {type(value).__name__} is no record of "
                         "numbers and names; make it a dataclass"
                     )
@@ -194,11 +194,11 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
 
 
 def require_no_code(data: Data) -> None:
-    """Raise :class:`SceneError` if a scene has records of classes that the package has not."""
+    """Raise :class:`ArgumentError` if a scene has records of classes that the package has not."""
     for record in data["records"]:
         if "from" in record:
             kind = f"the class {record['is']} of your own (module {record['from']})"
-            raise SceneError(
+            raise ArgumentError(
                 f"the scene has {kind}, and files have no code; load it with the scene of the "
                 "script, ub.Solution.load(path, scene=scene)"
             )

@@ -15,7 +15,7 @@ from ufl_beam.compiled.csr import Product
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
 from ufl_beam.discretization.partition import Share
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import Anchor, Member, Place, Spot, arm
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
@@ -190,7 +190,7 @@ class States:
         if FORCES in columns.at:
             return columns.of_rows(FORCES, row)
         if self.of_record is None:
-            raise SceneError("section forces: these states were kept without them")
+            raise ArgumentError("section forces: these states were kept without them")
         record, q = (columns.of_rows(name, row) for name in (RECORD, "q"))
         return self.of_record(record, q, self.before(n))
 
@@ -213,7 +213,7 @@ class States:
         """Go on after :meth:`history`; arrays of a scene that it lacks are zero.
 
         Raises:
-            SceneError: They have other shapes than those that the scene implies.
+            ArgumentError: They have other shapes than those that the scene implies.
         """
         require_arrays(history, {"t": (-1,)})
         n, begins = len(history["t"]), BEFORE in history
@@ -252,7 +252,7 @@ class States:
         Interpolated in cells with their degree; of points of bodies exact.
 
         Raises:
-            SceneError: The beam of the place is not in the scene.
+            ArgumentError: The beam of the place is not in the scene.
         """
         motion = values_at(self.grid, place, self.column("q"))
         if isinstance(place, Spot):
@@ -263,10 +263,10 @@ class States:
         """Velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
 
         Raises:
-            SceneError: The run was static, or the beam of the place is not in the scene.
+            ArgumentError: The run was static, or the beam of the place is not in the scene.
         """
         if not len(v := self.column("v")):
-            raise SceneError("velocity: the run was static; there is none")
+            raise ArgumentError("velocity: the run was static; there is none")
         return velocity_of(self.grid, place, self.column("q"), v)
 
     def position(self, place: Anchor) -> Array:
@@ -287,7 +287,7 @@ class States:
         """Relative motion, force and work of a connector.
 
         Raises:
-            SceneError: It is not in the scene.
+            ArgumentError: It is not in the scene.
         """
         return connection(self.column("connectors")[:, links_of(self.scene, connector)])
 
@@ -295,11 +295,11 @@ class States:
         """Return the relative motion and the forces of the first two places of a joint.
 
         Raises:
-            SceneError: It is not in the scene.
+            ArgumentError: It is not in the scene.
         """
         numbers, (a, b, *_) = links_of(self.scene, joint), joint.places
         if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
-            raise SceneError(
+            raise ArgumentError(
                 f"{joint}: {a} and {b} share unknowns, so that the force between them is not "
                 "known; make it with multipliers=True"
             )
@@ -347,10 +347,10 @@ class States:
         dynamics they act during the step that ends at each time; the first row is NaN.
 
         Raises:
-            SceneError: The support is not in the scene.
+            ArgumentError: The support is not in the scene.
         """
         if support not in self.scene.supports:
-            raise SceneError(f"reaction: {support} is not in the scene")
+            raise ArgumentError(f"reaction: {support} is not in the scene")
         forces = self.column("reactions")[:, self.scene.supports.index(support)]
         if support.angle:
             forces[:, :2] = turned(forces[:, :2], np.full(len(forces), support.angle))
@@ -385,7 +385,7 @@ class States:
         At a vertex they are those at the end of the cell before it.
 
         Raises:
-            SceneError: The beam of the place is not in the scene.
+            ArgumentError: The beam of the place is not in the scene.
         """
         cell, part = self.grid.cell_and_part(place)
         n, dofs = range(len(self)), self.cells.along.dofs[cell]
@@ -409,7 +409,7 @@ class States:
         dynamic one has the forces of the last step of ``start=``, or those of its strains.
 
         Raises:
-            SceneError: The beam is not in the scene, or ``points`` is less than 2.
+            ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
         """
         require_number(points, "diagram: points", at_least=2)
         s, cells, parts = self.grid.parameters(beam), self.grid.cells_of(beam), int(points)
@@ -439,13 +439,13 @@ class States:
         """Forces, jumps and dissipated energies in the cells of a beam at the n-th kept time.
 
         Raises:
-            SceneError: The scene is elastic.
+            ArgumentError: The scene is elastic.
         """
         return self._material(n, self.grid.cells_of(beam))
 
     def _material(self, n: int, cells: Index | int) -> Material:
         if not len(self.grid.inelastic_cells) and not self.scene.hinges:
-            raise SceneError("material: nothing in the scene yields or breaks; it is elastic")
+            raise ArgumentError("material: nothing in the scene yields or breaks; it is elastic")
         chosen = self.cells_of(n, self.cell_forces(n)[:, 0])[cells].T
         return Material(chosen[:3].T, *chosen[3:])
 
@@ -464,7 +464,7 @@ class States:
         dissipated.  The other forces are those in the middle of the cell.
 
         Raises:
-            SceneError: The scene is elastic, or the beam of the place is not in it.
+            ArgumentError: The scene is elastic, or the beam of the place is not in it.
         """
         cell, hinge = self.grid.cell(place), self.grid.hinge_at(place)
         states = zip(*(self._material(n, cell) for n in range(len(self))), strict=True)
@@ -513,10 +513,10 @@ class States:
         """(p_x, p_y, L), L about the origin; (n+1, 3); N s, N s, N m s.
 
         Raises:
-            SceneError: The run was static.
+            ArgumentError: The run was static.
         """
         if not len(self.column("v")):
-            raise SceneError("momentum: the run was static; there is none")
+            raise ArgumentError("momentum: the run was static; there is none")
         times, grid = Product(mass_matrix(self.cells.fields)), self.grid
         dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])
         centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)

@@ -118,7 +118,7 @@ def draw_shape(
     :func:`draw_state_of_damage`.
 
     Raises:
-        SceneError: No such time, ``magnify`` not positive, or ``ax`` no axes.
+        ArgumentError: No such time, ``magnify`` not positive, or ``ax`` no axes.
     """
     pose = plane_stage(solution, [n], magnify, ax, MOST)[0].pose(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
@@ -320,8 +320,8 @@ def draw_state_of_damage(
         ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: The scene is elastic, no such time, ``magnify`` is not positive, or ``ax`` is no
-            axes.
+        ArgumentError: The scene is elastic, no such time, ``magnify`` is not positive, or ``ax`` is
+            no axes.
 
     Example:
         >>> ub.plot(broken, "damage").savefig("damage.png")

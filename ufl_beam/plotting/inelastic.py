@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ArgumentError
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_laws import HingeLaw
 from ufl_beam.model.connectors import law_of, place_of
@@ -111,7 +111,8 @@ def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
         ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: The scene is elastic, the beam of the place is not in it, or ``ax`` is no axes.
+        ArgumentError: The scene is elastic, the beam of the place is not in it, or ``ax`` is no
+            axes.
 
     Example:
         >>> ub.plot(broken, "moment-curvature", weak.start).savefig("loops.png")
@@ -138,7 +139,7 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
         ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: The scene is elastic, there is no hinge, the beam of the place is not in the
+        ArgumentError: The scene is elastic, there is no hinge, the beam of the place is not in the
             scene, or ``ax`` is no axes.
 
     Example:
@@ -149,7 +150,7 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     in_cell = grid.hinges(place.beam)[grid.cell(place) - int(grid.cells_of(place.beam)[0])]
     law = in_cell if hinge is None else law_of(hinge)
     if law is None or np.isinf(law.limit):
-        raise SceneError(f"plot: neither {place} nor the cell there has a hinge")
+        raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
     M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
         # Pieces in which the jump only grows or only falls; neighbours share a point
@@ -181,14 +182,14 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: The scene is elastic, and has no connectors; or ``ax`` is no axes.
+        ArgumentError: The scene is elastic, and has no connectors; or ``ax`` is no axes.
 
     Example:
         >>> ub.plot(broken, "dissipation").savefig("dissipation.png")
     """
     if not solution.scene.connectors:
         if not solution.scene.beams:
-            raise SceneError("plot: the scene has neither beams nor connectors")
+            raise ArgumentError("plot: the scene has neither beams nor connectors")
         solution.material(solution.scene.beams[0])  # or its error
     energy, t = solution.energy, solution.progress
     held = energy.total

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import GROUND, Anchor, Body
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
@@ -132,11 +132,13 @@ class Stage:
         return Pose(self, lambda anchor: np.zeros(3), nodes)
 
     def pose(self, n: int) -> Pose:
-        """Return the pose at the n-th kept time of the solution, or raise SceneError."""
+        """Return the pose at the n-th kept time of the solution, or raise ArgumentError."""
         assert self._solution is not None
         grid, kept = self._solution.grid, len(self._solution.times)
         if not -kept <= n < kept:
-            raise SceneError(f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}")
+            raise ArgumentError(
+                f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}"
+            )
         state = self._solution.part(n % kept, n % kept + 1)
         nodes = grid.points + self.magnify * state.q[0, grid.dofs[:, :2]]
         return Pose(self, lambda anchor: state.displacement(anchor)[0], nodes)

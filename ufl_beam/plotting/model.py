@@ -53,7 +53,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     out.
 
     Raises:
-        SceneError: Constraints of the scene repeat, or ``ax`` is no axes.
+        ArgumentError: Constraints of the scene repeat, or ``ax`` is no axes.
     """
     require_independent(scene)
     subject, notes = Subject(scene), notes_of(scene)

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ArgumentError
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
@@ -77,7 +77,8 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             part of the size of the scene; ``ax``, axes to draw in in the place of a new figure.
 
     Raises:
-        SceneError: There is no such picture, or an argument of it is wrong; the message says which.
+        ArgumentError: There is no such picture, or an argument of it is wrong; the message says
+            which.
 
     Example:
         >>> ub.plot(scene).savefig("model.png")
@@ -87,13 +88,13 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     """
     pictures = next((PICTURES[kind] for kind in PICTURES if isinstance(shown, kind)), None)
     if pictures is None:
-        raise SceneError(
+        raise ArgumentError(
             f"plot: {shown!r} is a {type(shown).__name__}; give a Scene, the Solution of a run, or "
             "the result of an analysis"
         )
     if quantity and quantity not in pictures:
         hint = "; a scene has none before a run" if isinstance(shown, Scene) else ""
-        raise SceneError(
+        raise ArgumentError(
             f"plot: quantity = {quantity!r} of a {type(shown).__name__} is not one of "
             f"{', '.join(pictures)}{hint}"
         )
@@ -103,5 +104,5 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
     except TypeError as error:
         quantity = quantity or next(iter(pictures))
         takes = ", ".join([*inspect.signature(draw).parameters][1:]) or "no further arguments"
-        raise SceneError(f"plot: {error}; the picture {quantity!r} takes {takes}") from None
+        raise ArgumentError(f"plot: {error}; the picture {quantity!r} takes {takes}") from None
     return draw(shown, *places, **options)

@@ -14,7 +14,7 @@ from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.display import html_of
-from ufl_beam.errors import SceneError, require_number
+from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
@@ -62,8 +62,8 @@ def draw_shapes(
         ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: ``times`` is one number, ``count`` is less than 1, ``magnify`` is not positive,
-            or ``ax`` is no axes.
+        ArgumentError: ``times`` is one number, ``count`` is less than 1, ``magnify`` is not
+            positive, or ``ax`` is no axes.
 
     Example:
         >>> ub.plot(solution, "shapes", count=5, magnify=10).savefig("shapes.png")
@@ -72,7 +72,7 @@ def draw_shapes(
 
     require_number(count, "plot: count", at_least=1)
     if np.ndim(times) != 1:
-        raise SceneError(
+        raise ArgumentError(
             f"plot: times = {times!r} must be a sequence of times (s); for so many shapes "
             f"give count={times!r}"
         )
@@ -131,7 +131,7 @@ def draw_history(
         ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: Unknown ``component``, a place that is not in the scene, the velocity of a
+        ArgumentError: Unknown ``component``, a place that is not in the scene, the velocity of a
             static run, or ``ax`` is no axes.
 
     Example:
@@ -202,14 +202,14 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
         amplitude: Largest displacement, as a part of the size of the scene.
 
     Raises:
-        SceneError: There is no such shape, or ``amplitude`` is not positive.
+        ArgumentError: There is no such shape, or ``amplitude`` is not positive.
 
     Example:
         >>> ub.plot(ub.modes(scene, 3)).savefig("modes.png")
     """
     chosen = list(numbers) if len(numbers) else list(range(len(shapes)))
     if not chosen:
-        raise SceneError("plot: there is no shape")
+        raise ArgumentError("plot: there is no shape")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
     stages = [plane_stage(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
     box = np.concatenate([stage.points() for stage in stages])
@@ -255,7 +255,7 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
         ax: Axes to draw in; by default those of a new figure.
 
     Raises:
-        SceneError: ``ax`` is no axes.
+        ArgumentError: ``ax`` is no axes.
 
     Example:
         >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
@@ -312,7 +312,7 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
     The values of each point may be of different times.
 
     Raises:
-        SceneError: Nothing was run, or ``ax`` is no axes.
+        ArgumentError: Nothing was run, or ``ax`` is no axes.
 
     Example:
         >>> extremes = ub.Extremes()
@@ -338,7 +338,7 @@ def draw_study(study: Study) -> Figure:
     Results of several numbers are drawn by their largest size; cases that failed are left out.
 
     Raises:
-        SceneError: No case has a number, or no member has a result.
+        ArgumentError: No case has a number, or no member has a result.
 
     Example:
         >>> spans = [{"length": 1.0 + 0.25 * k} for k in range(5)]
@@ -352,7 +352,7 @@ def draw_study(study: Study) -> Figure:
     }
     varied = {n: x for n, x in varied.items() if np.ptp(x) > 0 or len(varied) == 1}
     if not varied or not study.results:
-        raise SceneError("plot: the study has no results over numbers of its cases")
+        raise ArgumentError("plot: the study has no results over numbers of its cases")
     rows, columns = len(study.results), len(varied)
     with picture((max(6.0, 4.0 * columns), max(4.0, 2.6 * rows))) as figure:
         grid = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
@@ -377,7 +377,7 @@ def draw_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
         spot: One of its places.
 
     Raises:
-        SceneError: The spot is none of them, nothing was run, or the stress never turned.
+        ArgumentError: The spot is none of them, nothing was run, or the stress never turned.
 
     Example:
         >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
@@ -391,7 +391,7 @@ def draw_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
 
     cycles, curve = fatigue.cycles(spot), fatigue.curve
     if not len(cycles.range):
-        raise SceneError(f"plot: the stress at {spot} never turned")
+        raise ArgumentError(f"plot: the stress at {spot} never turned")
     ranges, means = 1e-6 * cycles.range, 1e-6 * cycles.mean
     done = cycles.count / curve.endurance(cycles.range, cycles.mean)
     edges = np.linspace(0.0, ranges[-1] * (1 + 1e-9), CLASSES + 1)

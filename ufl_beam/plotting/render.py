@@ -15,7 +15,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, require_kind, require_number, require_row, require_switch
+from ufl_beam.errors import ArgumentError, require_kind, require_number, require_row, require_switch
 from ufl_beam.model.bodies import Anchor, Member, Place, Spot, require_anchors
 from ufl_beam.model.records import Record
 from ufl_beam.parallel import active_comm, progress_bar
@@ -47,7 +47,7 @@ Direction = tuple[float, float, float]
 def _require_direction(value: Any, what: str) -> Direction:
     direction = require_row(value, what)
     if direction.shape != (3,) or not np.cross(direction, UP).any():
-        raise SceneError(
+        raise ArgumentError(
             f"{what} = {value} must be three numbers (x, y, z), and not along y, which is upwards "
             "in the picture; (0, 0, -1) is the front view"
         )
@@ -73,13 +73,15 @@ class Camera(Record):
             m.  By default all that moves stays in the picture.
 
     Raises:
-        SceneError: A direction along y, or a wrong argument; the message says which.
+        ArgumentError: A direction along y, or a wrong argument; the message says which.
 
     Example:
         >>> front = ub.Camera((0, 0, -1))
         >>> ub.render(solution, "front.png", camera=front, size=(640, 360))
         >>> ub.render(solution, "tip.png", camera=ub.Camera(follow=beam.end, width=0.5))
     """
+
+    _refused = ArgumentError
 
     direction: Annotated[Direction, _require_direction] = (-0.20, -0.28, -1.0)
     follow: Annotated[Anchor | None, _require_place] = None
@@ -150,7 +152,7 @@ def render(
         size: Width and height; pixels.
 
     Raises:
-        SceneError: A wrong argument; the message says which.
+        ArgumentError: A wrong argument; the message says which.
         ImportError: PyVista is missing.
         RuntimeError: There is neither a screen nor Xvfb.
 
@@ -202,7 +204,7 @@ def animate(
         The film: a path that a notebook plays.
 
     Raises:
-        SceneError: A wrong argument; the message says which.
+        ArgumentError: A wrong argument; the message says which.
         ImportError: PyVista is missing, or ffmpeg for MP4; the message says how to install it.
         RuntimeError: There is neither a screen nor Xvfb, or ffmpeg failed.
 
@@ -286,12 +288,12 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
 
 
 def _require_suffix(path: str | Path, suffixes: Collection[str]) -> Path:
-    """Return the path of a picture, or raise :class:`SceneError`."""
+    """Return the path of a picture, or raise :class:`ArgumentError`."""
     path = Path(path)
     if path.suffix.lower() not in suffixes:
-        raise SceneError(f"{path}: the name must end in {' or '.join(suffixes)}")
+        raise ArgumentError(f"{path}: the name must end in {' or '.join(suffixes)}")
     if not path.parent.is_dir():
-        raise SceneError(f"{path}: there is no directory {path.parent}; make it first")
+        raise ArgumentError(f"{path}: there is no directory {path.parent}; make it first")
     return path
 
 

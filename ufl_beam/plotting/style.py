@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import SceneError, shorten
+from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.parallel import active_comm
 
 if TYPE_CHECKING:
@@ -78,10 +78,10 @@ def magnified(factor: float, before: str = ", ") -> str:
 
 
 def require_choice(choice: str, choices: Iterable[str], what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless ``choice`` is one of ``choices``."""
+    """Raise :class:`ArgumentError` naming ``what`` unless ``choice`` is one of ``choices``."""
     if choice not in choices:
         names = ", ".join(f'"{name}"' for name in choices)
-        raise SceneError(f"{what} = {choice!r} is not one of {names}")
+        raise ArgumentError(f"{what} = {choice!r} is not one of {names}")
 
 
 @contextmanager
@@ -141,11 +141,13 @@ def panel(ax: Axes | None, size: tuple[float, float]) -> Iterator[Axes]:
 
 
 def require_axes(ax: Any) -> None:
-    """Raise :class:`SceneError` for what is no axes of Matplotlib."""
+    """Raise :class:`ArgumentError` for what is no axes of Matplotlib."""
     from matplotlib.axes import Axes
 
     if not isinstance(ax, Axes):
-        raise SceneError(f"ax = {shorten(ax)} must be axes of Matplotlib, as plt.subplots() makes")
+        raise ArgumentError(
+            f"ax = {shorten(ax)} must be axes of Matplotlib, as plt.subplots() makes"
+        )
 
 
 def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import mass_form
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ModelError
 from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
@@ -162,7 +162,7 @@ def inelastic_cells(grid: Grid) -> dict[Layout, Index]:
         if layout is not None and not layout.elastic:
             if grid.mesh.degree > 1:
                 beam = grid.scene.beams[int(np.argmax(of_beam == number))]
-                raise SceneError(
+                raise ModelError(
                     f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
                     "may yield or break; use degree=1 with more cells, or an elastic section"
                 )
@@ -334,7 +334,7 @@ def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:
                 numbers = np.unique(np.concatenate(cells))
                 forces.append(KelvinVoigtForce(damping, numbers, setting))
         elif inertia is None:
-            raise SceneError(
+            raise ModelError(
                 "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
                 "use KelvinVoigt, which acts in the time of a static run"
             )

@@ -16,10 +16,11 @@ import numpy as np
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
-from ufl_beam.errors import NoNumber, SceneError, require_returned
+from ufl_beam.errors import ModelError, NoNumber
 from ufl_beam.mechanics.connector_equations import Slip, numbers, slip
 from ufl_beam.mechanics.time_schemes import Step, way_to_rest
 from ufl_beam.model.bodies import Place
+from ufl_beam.model.checks import require_returned
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
     HELD,
@@ -519,7 +520,7 @@ class _Asked(LawInStep):
                 value, after = value
                 after = np.array(after, dtype=np.float64).reshape(len(self.z))
             except (TypeError, ValueError):
-                raise SceneError(
+                raise ModelError(
                     f"{self.link}: the function must return the force and the state, a list of "
                     f"{len(self.z)} numbers"
                 ) from None

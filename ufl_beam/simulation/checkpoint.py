@@ -17,7 +17,7 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.errors import SceneError, require_count, require_number, require_sequence, shorten
+from ufl_beam.errors import ArgumentError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_system import Lock
 from ufl_beam.output.output_files import (
     ADVICE,
@@ -57,7 +57,7 @@ class Checkpoint:
             state consists of numbers, texts, lists and dicts.
 
     Raises:
-        SceneError: Neither ``every`` nor ``minutes``, or a bad number; no state in ``also``.
+        ArgumentError: Neither ``every`` nor ``minutes``, or a bad number; no state in ``also``.
 
     Example:
         >>> backup = ub.Checkpoint("run.checkpoint", every=1000)
@@ -75,7 +75,7 @@ class Checkpoint:
         require_path(self.path, "Checkpoint")
         what = f"Checkpoint {self.path}"
         if self.every is None and self.minutes is None:
-            raise SceneError(f"{what}: say how often, every=1000 (steps), minutes=10, or both")
+            raise ArgumentError(f"{what}: say how often, every=1000 (steps), minutes=10, or both")
         if self.every is not None:
             require_count(self.every, f"{what}: every")
         if self.minutes is not None:
@@ -83,7 +83,7 @@ class Checkpoint:
         object.__setattr__(self, "also", require_sequence(self.also, f"{what}: also"))
         for i, one in enumerate(self.also):
             if not has_state(one):
-                raise SceneError(
+                raise ArgumentError(
                     f"{what}: also[{i}] = {shorten(one)} has no state; give a random generator of "
                     "NumPy, or an object with methods state() and restore(state)"
                 )
@@ -136,18 +136,18 @@ class Keeper:
         """Lock the file, and read it if it exists."""
         folder = self.path.parent
         if not folder.is_dir():
-            raise SceneError(f"checkpoint {self.path}: there is no directory {folder}; make it")
+            raise ArgumentError(f"checkpoint {self.path}: there is no directory {folder}; make it")
         if not os.access(folder, os.W_OK):
-            raise SceneError(f"checkpoint {self.path}: the directory cannot be written to")
+            raise ArgumentError(f"checkpoint {self.path}: the directory cannot be written to")
         try:
             owner = self.lock.take()
             exists = self.path.exists()
         except OSError as error:
-            raise SceneError(
+            raise ArgumentError(
                 f"checkpoint {self.path}: {self.lock.path} cannot be written: {error.strerror}"
             ) from None
         if owner:
-            raise SceneError(
+            raise ArgumentError(
                 f"checkpoint {self.path} is in use: {owner} writes it. Let that run end, or stop "
                 "it, or name another file"
             )
@@ -168,10 +168,10 @@ class Keeper:
                 if not differs and [*self._stateful] != [*self.found["stateful"]]:
                     differs = "other objects have a state"
                 if differs:
-                    raise SceneError(f"it is of another run: {differs}")
+                    raise ArgumentError(f"it is of another run: {differs}")
                 t, t1 = float(self.found["state/t"][0]), self._t1
                 if t > t1 and t - t1 > 1e-9 * (self._step or 0.0):
-                    raise SceneError(f"it is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s")
+                    raise ArgumentError(f"it is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s")
         require_writable(self.path)
 
     def resume(self, simulation: Simulation, pace: Any) -> None:
@@ -196,11 +196,11 @@ class Keeper:
         for i, recorder in enumerate(self._recorders):
             try:
                 recorder.resume(simulation, below(f"recorder {i}/", found))
-            except SceneError as error:
-                raise SceneError(f"checkpoint {self.path}: {error}") from None
+            except ArgumentError as error:
+                raise ArgumentError(f"checkpoint {self.path}: {error}") from None
             except (LookupError, TypeError, ValueError) as error:
                 why = f"checkpoint {self.path}: {recorder} cannot go on from it: {error!r}"
-                raise SceneError(f"{why}. {ADVICE['checkpoint']}") from error
+                raise ArgumentError(f"{why}. {ADVICE['checkpoint']}") from error
         self._last_step, self.found = pace.steps, {}
 
     # -- writing -------------------------------------------------------------------------------
@@ -254,7 +254,7 @@ class Keeper:
         """Raise if what functions use changes without their saying so: it would be lost."""
         changed = difference(Description(self._call).texts, self._described.texts)
         if changed:
-            raise SceneError(
+            raise ArgumentError(
                 f"checkpoint {self.path}: a function of the scene remembers what no checkpoint "
                 f"knows of: {changed.replace(', in the file', ', at the beginning')}. Make it an "
                 "object with methods state() and restore(state), see docs/restart.md"

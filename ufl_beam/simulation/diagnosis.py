@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.errors import ConvergenceError, NoNumber, SceneError, StepFailed
+from ufl_beam.errors import ArgumentError, ConvergenceError, ModelError, NoNumber, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.connector_law import ENTRIES, ConnectorLaw, judges_loss
 from ufl_beam.model.connector_laws import (
@@ -78,13 +78,13 @@ def no_equilibrium(
     times: tuple[float, float],
     advice: str,
     loose: str,
-) -> ConvergenceError | SceneError:
+) -> ConvergenceError | ArgumentError:
     """Describe why even the smallest step, from ``q0``, failed; all processes call it together.
 
     In the first step a motion without strain may be ``loose``, which no equilibrium has held yet.
     """
     if loose:
-        return SceneError(f"{loose}{NOT_HELD}{failure}")
+        return ModelError(f"{loose}{NOT_HELD}{failure}")
     (t, end), named = times, solution.parameter
     q1 = equation.supports.in_plane(newton.unknowns.copy())
     vectors = {kind: np.zeros(equation.share.size) for kind in KINDS}

@@ -21,7 +21,7 @@ from ufl_beam.discretization.model_warnings import (
 from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.discretization.work_forms import statement
-from ufl_beam.errors import SceneError, require_kind, shorten, warn
+from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
 from ufl_beam.memory import no_garbage_collection
 from ufl_beam.model.beams import Mesh
@@ -75,19 +75,19 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool) -> tu
 
 
 def require_scheme(scheme: Any, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` unless it is a complete time scheme."""
+    """Raise :class:`ArgumentError` naming ``what`` unless it is a complete time scheme."""
     tries = hasattr(scheme, "dynamic") or hasattr(scheme, "step")
     if isinstance(scheme, type) or not tries:
-        raise SceneError(
+        raise ArgumentError(
             f"{what} = {shorten(scheme)} must be a scheme, such as Static() or EnergyMomentum()"
         )
     dynamic = getattr(scheme, "dynamic", False)
     if why := unlike(scheme, DynamicScheme if dynamic else Scheme):
-        raise SceneError(f"{what}: {type(scheme).__name__} is not a time scheme: {why}")
+        raise ArgumentError(f"{what}: {type(scheme).__name__} is not a time scheme: {why}")
     try:
         hash(scheme)
     except TypeError:
-        raise SceneError(
+        raise ArgumentError(
             f"{what}: {type(scheme).__name__} cannot be hashed, and forms are kept by scheme; "
             "decorate the class with @dataclass(frozen=True)"
         ) from None
@@ -126,7 +126,7 @@ def _initial_velocity(grid: Grid) -> Array:
             apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, turning])
             if apart.any():
                 x, y = points[np.flatnonzero(apart.any(axis=1))[0]]
-                raise SceneError(
+                raise ArgumentError(
                     f"Velocity: {beam.name} gets two different velocities at ({x:g}, {y:g}), "
                     "from itself or from a beam that it is joined to"
                 )
@@ -149,7 +149,7 @@ def _require_agreement(grid: Grid, v: Array) -> None:
         by_a, by_b = link.rigidly()
         rate = float(np.dot(by_a, a) + np.dot(by_b, b))
         if link.law is HELD and abs(rate) > 1e-9 * fastest / (size if link.turns else 1.0):
-            raise SceneError(
+            raise ArgumentError(
                 f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
                 "or rad/s; give all that is joined a Velocity that agrees"
             )
@@ -168,7 +168,7 @@ def _require_agreement(grid: Grid, v: Array) -> None:
             continue
         support = held[int(lost[0])]
         if len(lost) == len(dofs):
-            raise SceneError(
+            raise ArgumentError(
                 f"Velocity: {beam.name} does not move, because {support} holds it; remove the "
                 "support or the velocity"
             )

@@ -17,8 +17,8 @@ import numpy as np
 
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import (
+    ArgumentError,
     ConvergenceError,
-    SceneError,
     StepFailed,
     require_count,
     require_kind,
@@ -88,7 +88,7 @@ def simulate(
         The motion, the forces and the ledger.
 
     Raises:
-        SceneError: The call or the scene is wrong; nothing was computed.
+        ArgumentError: The call or the scene is wrong; nothing was computed.
         ConvergenceError: A step failed; it carries the solution so far, and files are complete.
 
     Example:
@@ -103,12 +103,12 @@ def simulate(
         require_number(dt, "simulate: dt", positive=True)
         least = MOST_PARTS * math.ulp(max(abs(t0), abs(t1)))
         if dt < least:
-            raise SceneError(
+            raise ArgumentError(
                 f"simulate: dt = {dt:g} s is too small: steps from t = {t0:g} to {t1:g} s can "
                 f"be told apart, and cut, from {least:.1e} s on; use a larger one, or begin at 0"
             )
     elif not has_inertia(scheme):
-        raise SceneError(
+        raise ArgumentError(
             "simulate: dt = Adaptive(...) estimates the error of accelerations, and a static "
             "scheme has none; give a number"
         )
@@ -292,11 +292,11 @@ def require_times(t: tuple[float, float]) -> tuple[float, float]:
     try:
         t0, t1 = t
     except (TypeError, ValueError):
-        raise SceneError(f"simulate: t = {t!r} must be a pair (beginning, end)") from None
+        raise ArgumentError(f"simulate: t = {t!r} must be a pair (beginning, end)") from None
     require_number(t0, "simulate: t[0]")
     require_number(t1, "simulate: t[1]")
     if t1 <= t0:
-        raise SceneError(f"simulate: the end t[1] = {t1:g} must come after the beginning {t0:g}")
+        raise ArgumentError(f"simulate: the end t[1] = {t1:g} must come after the beginning {t0:g}")
     return float(t0), float(t1)
 
 

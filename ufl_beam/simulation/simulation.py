@@ -17,7 +17,7 @@ from ufl_beam.discretization.model_warnings import warn_of_jumps
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.discretization.state_transfer import same_unknowns
-from ufl_beam.errors import SceneError, StepFailed, require_kind, require_number, shorten
+from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.loads import RotatingFrame
@@ -98,7 +98,9 @@ class Simulation(Stepper):
         newton = checked_newton(newton, comm)
         require_plain(newton, "Simulation" if kind is Solution else "follow")
         if not (isinstance(kind, type) and issubclass(kind, Solution)):
-            raise SceneError(f"kind = {shorten(kind)} must be a class of solutions, such as Path")
+            raise ArgumentError(
+                f"kind = {shorten(kind)} must be a class of solutions, such as Path"
+            )
         if start is not None:
             require_kind(start, Solution, "start")
         fresh = start is None
@@ -286,7 +288,7 @@ class Simulation(Stepper):
     def _gathered_forces(self, parts: int, *_: Array) -> Array:
         """``cell_number`` of loops.h of all cells after so many steps, which are the present."""
         if parts != self.parts:
-            raise SceneError("section forces of an earlier state: ask for simulation.now again")
+            raise ArgumentError("section forces of an earlier state: ask for simulation.now again")
         forces = self._put_forces(np.empty((lib.CELL_NUMBERS, len(self.grid.cells))))
         if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, forces)

@@ -14,7 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.state_io import State
 from ufl_beam.display import TIME, Rich
-from ufl_beam.errors import SceneError, require_kind, warn
+from ufl_beam.errors import ArgumentError, require_kind, warn
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_law import ForceLaw
@@ -122,7 +122,7 @@ class Solution(States, Rich):
         A file that is there is replaced once the new one is complete.
 
         Raises:
-            SceneError: The file cannot be written, or an object of the scene is no dataclass.
+            ArgumentError: The file cannot be written, or an object of the scene is no dataclass.
             OSError: There is no space for it.
         """
         file = require_path(path, "save")
@@ -142,7 +142,7 @@ class Solution(States, Rich):
                 same values.
 
         Raises:
-            SceneError: There is no such file, or it holds no solution, or is damaged, or is of a
+            ArgumentError: There is no such file, or it holds no solution, or is damaged, or is of a
                 version that numbers degrees of freedom otherwise, or of another scene; or it has
                 laws of a user, and no scene is given.
 
@@ -241,10 +241,10 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
     grid = Grid(of, from_data(content["mesh"]))
     if grid.checksum() != content["numbering"]:
         if scene is not None:
-            raise SceneError(
+            raise ArgumentError(
                 "it is a solution of another scene: its beams, cells, bodies or joints are others"
             )
-        raise SceneError(
+        raise ArgumentError(
             f"it was written by version {content['version']} of ufl_beam, which numbers degrees of "
             f"freedom otherwise than this one, {version()}; load it with that version"
         )
@@ -255,7 +255,7 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
         scenes = solution._content()["scene"], content["scene"]
         now, then = (Description({"scene": json.loads(json.dumps(d))}).texts for d in scenes)
         if differs := difference(now, then):
-            raise SceneError(f"it is a solution of another scene: {differs}")
+            raise ArgumentError(f"it is a solution of another scene: {differs}")
     return solution
 
 

@@ -83,7 +83,7 @@ class Adaptive:
         stops: More times at which steps must end; s.
 
     Raises:
-        SceneError: A number is out of range.
+        ArgumentError: A number is out of range.
 
     Example:
         >>> steps = ub.Adaptive(tolerance=1e-4, stops=[0.5])

@@ -14,7 +14,7 @@ from petsc4py import PETSc
 from ufl_beam.compiled.c_library import ffi, petsc
 from ufl_beam.display import one_line
 from ufl_beam.errors import (
-    SceneError,
+    ArgumentError,
     require_count,
     require_kind,
     require_number,
@@ -38,7 +38,7 @@ class Newton:
             ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option PETSc's Newton method
             is used, otherwise an equivalent one in C, which is faster for few cells.  A
             ``snes_linesearch_type`` replaces the line search after full steps.  A run raises
-            :class:`SceneError` for options that PETSc has no use for.
+            :class:`ArgumentError` for options that PETSc has no use for.
         reference: Let the reference solver compute the run: the equations of the paper with forms
             of DOLFINx, a return map in NumPy and PETSc's SNES, to compare with, or to read.  It is
             ten to a thousand times slower; :func:`simulate` takes it with equal steps, on one
@@ -67,9 +67,9 @@ class Newton:
 
 
 def require_plain(newton: Newton | None, what: str) -> None:
-    """Raise :class:`SceneError` naming ``what`` the reference solver does not compute."""
+    """Raise :class:`ArgumentError` naming ``what`` the reference solver does not compute."""
     if newton is not None and newton.reference:
-        raise SceneError(
+        raise ArgumentError(
             f"Newton: reference=True does not go with {what}: the reference solver computes equal "
             "steps of simulate, on one process and without files; leave it out"
         )
@@ -145,8 +145,8 @@ def _require_known(newton: Newton) -> None:
     """Refuse options that PETSc would not use, before there is anything to solve.
 
     Raises:
-        SceneError: An option of ``newton`` or of ``PETSC_OPTIONS`` has no effect, or PETSc refuses
-            its value.
+        ArgumentError: An option of ``newton`` or of ``PETSC_OPTIONS`` has no effect, or PETSc
+            refuses its value.
     """
     given = database()
     chosen = {**given, **newton.petsc}
@@ -163,7 +163,7 @@ def _require_known(newton: Newton) -> None:
         unused = take_options(snes, chosen)
     except PETSc.Error as error:
         spelt = (f"-{PREFIX}{k}" + ("" if v is None else f" {v}") for k, v in chosen.items())
-        raise SceneError(f"PETSc refuses the options {' '.join(spelt)}: {error}") from None
+        raise ArgumentError(f"PETSc refuses the options {' '.join(spelt)}: {error}") from None
     finally:
         snes.destroy()
         ksp.destroy()
@@ -178,4 +178,4 @@ def _require_known(newton: Newton) -> None:
         hint = f"; did you mean {' or '.join(near)}?" if near else "; leave it out"
         if name in WHILE_SOLVING:
             hint = "; such options must stand in PETSC_OPTIONS"
-        raise SceneError(f"{where}: PETSc has no use for the option {PREFIX}{name}{hint}")
+        raise ArgumentError(f"{where}: PETSc has no use for the option {PREFIX}{name}{hint}")

@@ -21,9 +21,10 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
-from ufl_beam.errors import NoNumber, SceneError, require_returned, shorten
+from ufl_beam.errors import ModelError, NoNumber, shorten
 from ufl_beam.mechanics.connector_equations import law_step
 from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.model.checks import require_returned
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, stated_at
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_law import State
@@ -64,7 +65,7 @@ class LawForms:
             numbers_of_law = {name: at[f"number {name}"] for name in law.numbers()}
             self.limit = self._compile(ufl.as_ufl(law.of(numbers_of_law).limit(old)))
         except Exception as error:
-            raise SceneError(
+            raise ModelError(
                 f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
                 f"written with + - * / ** and the functions of ub.law_functions{stated_at(law)}"
             ) from error
@@ -250,7 +251,7 @@ class Asked:
             force, state = returned
             state = np.array(state, dtype=np.float64).reshape(self.state.shape)
         except (TypeError, ValueError):
-            raise SceneError(
+            raise ModelError(
                 f"{self._link}: the function returned {shorten(returned)}; it must return the "
                 f"force and the state, a list of {self.state.size} numbers"
             ) from None

@@ -28,7 +28,7 @@ from ufl_beam.discretization.function_spaces import (
 )
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.errors import SceneError
+from ufl_beam.errors import ModelError
 from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
@@ -64,7 +64,7 @@ def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
     """Return coefficients of steps of 1 s, and refuse rows of another length.
 
     Raises:
-        SceneError: They are not as :class:`Coefficients` says.
+        ModelError: They are not as :class:`Coefficients` says.
     """
     known: Any = scheme
     number = len(scheme.kept)
@@ -76,7 +76,7 @@ def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
     except (TypeError, ValueError, AttributeError):
         right = False
     if not right or MORE + number > lib.MOST_RATES:
-        raise SceneError(
+        raise ModelError(
             f"{scheme!r}: coefficients(dt, last_dt, known) must return Coefficients with rows of "
             f"3 + known numbers, {1 + number} of them in rates, see docs/extending.md"
         )
@@ -108,7 +108,7 @@ class Inertia(Term):
         slips: True if the scheme loses energy by the rates.
 
     Raises:
-        SceneError: The scheme states no such coefficients as :class:`Coefficients` describes.
+        ModelError: The scheme states no such coefficients as :class:`Coefficients` describes.
     """
 
     kind = "inertia"
@@ -307,7 +307,7 @@ def damping_forces(
     ledger.lost["damping"] += 0.0
     if isinstance(of, Rayleigh):
         if rates is None:
-            raise SceneError(
+            raise ModelError(
                 "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
                 "use KelvinVoigt, which acts in the time of a static run"
             )

@@ -19,7 +19,7 @@ from ufl_beam.discretization.function_spaces import Fields, element_of
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.discretization.work_forms import Statement, statement
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.errors import SceneError, shorten
+from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.functions import Constant
 from ufl_beam.model.works import Potential, Work
@@ -51,7 +51,7 @@ class Acting:
         try:
             made: list[Any] = [form and fields.kernel(form, fields.element.q1) for form in forms]
         except Exception as error:
-            raise SceneError(f"{work}: its form cannot be compiled: {shorten(error)}") from error
+            raise ModelError(f"{work}: its form cannot be compiled: {shorten(error)}") from error
         self.residual: Kernel = made[0]
         self.tangent, self._energy, self._lost = made[1:]
         if self.tangent is not None:
