@@ -55,10 +55,10 @@ def test_models_and_results_have_a_page(cells, name):
     assert "no picture" not in data["text/html"]
 
 
-@pytest.mark.parametrize("plot", ["plot(", '"history"', '"energy"', '"hinge"'])
-def test_figures_are_pictures(cells, plot):
+@pytest.mark.parametrize("quantity", ["M", "history", "energy", "hinge"])
+def test_figures_are_pictures(cells, quantity):
     """Without `%matplotlib inline`."""
-    (source,) = (source for source in cells if source.startswith(f"ub.{plot}"))
+    (source,) = (x for x in cells if x.startswith("ub.plot(") and f'"{quantity}"' in x)
     data = shown(cells[source])
     assert data["image/png"].startswith("iVBOR")  # the first bytes of PNG
     assert "text/html" not in data

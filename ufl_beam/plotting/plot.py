@@ -47,27 +47,31 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
 def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure:
     """Draw a model, a solution, or the result of an analysis.
 
-    | `shown` | `quantity`, the first by default | further arguments |
-    |---|---|---|
-    | `Scene` | "model": all its parts, before any run | `ax` |
-    | `Solution`, `Path` | "shape": the frame at a time | `n`, `magnify`, `ax` |
-    | | "N", "V", "M": diagram of a section force | `n`, `magnify`, `ax` |
-    | | "damage": yielded cells, opened hinges | `n`, `magnify`, `ax` |
-    | | "shapes": successive shapes in one picture | `times` or `count`, `magnify`, `ax` |
-    | | "history": a motion of places over time | `places`, `component`, `ax` |
-    | | "energy": the ledger over time | |
-    | | "dissipation": energy losses over time | `ax` |
-    | | "hinge": moment of a hinge over its jump | `place`, `ax` |
-    | | "moment-curvature": of a cell | `place`, `ax` |
-    | `Modes`, `Buckling` | "modes": shapes side by side | `numbers`, `amplitude` |
-    | `Extremes` | "M", "N", "V": envelope of a section force | `ax` |
-    | `Fatigue` | "cycles": rainflow matrix and spectrum | the `HotSpot` |
-    | `Study` | "results": over the cases | |
-    | `Tradeoff` | "errors": over wall times | `ax` |
+    The first quantity of a class is drawn by default; a ``Path`` is a ``Solution``.
+
+    ===============  ==================  ========================================================
+    shown            quantity            picture and further arguments
+    ===============  ==================  ========================================================
+    Scene            "model"             all parts, before any run; ``ax``
+    Solution         "shape"             the frame at a time; ``n``, ``magnify``, ``ax``
+    Solution         "N", "V", "M"       diagram of a section force; ``n``, ``magnify``, ``ax``
+    Solution         "damage"            yielded cells, opened hinges; ``n``, ``magnify``, ``ax``
+    Solution         "shapes"            some shapes; ``times`` or ``count``, ``magnify``, ``ax``
+    Solution         "history"           motion over time; places, ``component``, ``ax``
+    Solution         "energy"            the energy ledger over time
+    Solution         "dissipation"       energy losses over time; ``ax``
+    Solution         "hinge"             moment of a hinge over its jump; a place, ``ax``
+    Solution         "moment-curvature"  moment of a cell; a place, ``ax``
+    Modes, Buckling  "modes"             shapes side by side; ``numbers``, ``amplitude``
+    Extremes         "M", "N", "V"       envelope of a section force; ``ax``
+    Fatigue          "cycles"            rainflow matrix and spectrum; a spot
+    Study            "results"           results over the cases
+    Tradeoff         "errors"            errors over wall times; ``ax``
+    ===============  ==================  ========================================================
 
     Args:
         shown: Object to draw.
-        quantity: Quantity to draw, see the table.
+        quantity: Quantity to draw.
         places: Places of "history" (one or a sequence), "hinge" and "moment-curvature"; the spot of
             "cycles".
         options: By name: ``n``, number of the kept time, negative from the end; ``magnify``, factor
