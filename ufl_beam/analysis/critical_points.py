@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Critical points of static paths: tangent stiffness of the whole scene, its signs and modes.
 
-Points and directions of a path are arrays: the configuration at the local degrees of freedom (m, m,
-rad), or a change of it, and behind it the load factor.
+A point of a path is an array: the configuration at the local degrees of freedom (m, m, rad),
+followed by the load factor.  A direction has the changes of both in the same order.
 """
 
 from __future__ import annotations
@@ -24,8 +24,8 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.stepper import Trial
 from ufl_beam.solvers.factorization import Factorisation
 
-INVERSE_ITERATIONS = 50  # inverse iterations in which a mode is sought
-MODE_TOLERANCE = 1e-8  # its change in the last one; the square is the error of the eigenvalue
+INVERSE_ITERATIONS = 50  # most inverse iterations for a mode
+MODE_TOLERANCE = 1e-8  # change of the mode that ends them; its square is the eigenvalue's error
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +33,7 @@ class Branch:
     """Start and direction of a secondary path; made by :meth:`CriticalPoint.branch`.
 
     Attributes:
-        state: Solution whose last state is the beginning.
+        state: Solution whose last state is the start of the path.
         mode: Direction at all degrees of freedom, in the order of the grid.
 
     Example:
@@ -57,12 +57,12 @@ class CriticalPoint:
     """Limit or bifurcation point: a state of a path with singular tangent stiffness.
 
     Attributes:
-        kind: "limit" where the load factor turns, "bifurcation" where another branch begins.
+        kind: "limit" if the load factor turns, "bifurcation" if another branch begins.
         factor: The load factor.
         n: Number of the state in the path.
-        state: The state alone, as a solution.
-        mode: Critical mode with the root mean square 1 of displacements over the size of the scene,
-            and of rotations; all degrees of freedom in the order of the grid.
+        state: Solution with this state only.
+        mode: Critical mode at all degrees of freedom, in the order of the grid.  The root mean
+            square of its rotations, and displacements over the size of the scene, is 1.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), amplitude=lambda t: t)
@@ -99,21 +99,22 @@ class CriticalPoint:
 class Stiffness:
     """Tangent stiffness of the whole scene, factored by every process; StepFailed if singular.
 
-    Each process gives its part A of the tangent, the local degrees of freedom ``held`` by supports,
-    and its part ``rate`` of the derivative of the residual by the load factor.  ``weights`` are
-    the weights of the norm of a direction, at all degrees of freedom of the scene.
+    Each process contributes its subdomain's tangent A, the local degrees of freedom ``held`` by
+    supports, and its contribution ``rate`` to the derivative of the residual by the load factor.
+    ``weights`` are the weights of the norm of a direction, at all degrees of freedom of the scene.
 
-    A symmetric form of the tangent is factored.  A connector has the gradient g of its motion in
-    its column, and α g and β in its row.  The row is divided by α.  Where β is not zero, the unit
-    of the force is such that ±1 stands on the diagonal, so a law whose force does not answer the
-    motion (α = 0) is no exception.  Each force brings one negative eigenvalue if it holds a motion
-    or resists its growth, and none if it falls when the motion grows.
+    The tangent is factored in a symmetric form.  The column of a connector holds the gradient g of
+    its motion; the row holds α g and β.  The row is divided by α.  If β is not zero, the unit of
+    the force is chosen so that the diagonal entry is ±1; this includes laws whose force does not
+    depend on the motion (α = 0).  Each force adds one negative eigenvalue if it constrains a motion
+    or grows with it, and none if it falls when the motion grows.
 
     Attributes:
-        negative: Number of negative eigenvalues, the forces of connectors eliminated; where it is
-            not symmetric, as with follower loads, 1 if its determinant is negative, else 0.
-        flow: Change of the configuration for a unit of the load factor, zero where supports hold;
-            (grid.size,).
+        negative: Number of negative eigenvalues after elimination of the connectors' forces.  If
+            the tangent is not symmetric, as with follower loads: 1 if its determinant is negative,
+            else 0.
+        flow: Change of the configuration for a unit of the load factor, zero at supported degrees
+            of freedom; (grid.size,).
     """
 
     def __init__(self, share: Share, A: Csr, held: Index, rate: Array, weights: Array) -> None:
@@ -153,7 +154,7 @@ class Stiffness:
         self.flow = self._spread(-self._solve(self._forces))
 
     def _solve(self, b: Array) -> Array:
-        """The solution of the tangent for one right-hand side."""
+        """Solve with the tangent for one right-hand side."""
         n = self._motions
         given = b[n:] / self._β
         held = np.where(np.isinf(self._β), self._of_row * b[n:], 0.0)
@@ -163,7 +164,7 @@ class Stiffness:
 
     @property
     def most_work(self) -> float:
-        """Work of the load if it went all along the largest motion of the softest mode; N m."""
+        """Work of the load if all of it moved by the largest motion of the softest mode; N m."""
         units = np.sqrt(self._weights)
         moving = units > 0.0
         forces = np.abs(self._forces[moving]) / units[moving]
@@ -176,7 +177,7 @@ class Stiffness:
 
     @cached_property
     def softest(self) -> tuple[float, Array]:
-        """Eigenvalue nearest to zero, N m, and its mode, of length 1 in the metric."""
+        """Eigenvalue nearest to zero (N m), and its mode of norm 1 with ``weights``."""
         w = self._weights
         mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
         for _ in range(INVERSE_ITERATIONS):
@@ -184,7 +185,7 @@ class Stiffness:
             mode /= np.sqrt(w @ mode**2) * np.sign(w @ (mode * before) or 1.0)
             if w @ (mode - before) ** 2 <= MODE_TOLERANCE**2:
                 break
-        # More digits, as the works of stiff cells nearly cancel
+        # Extended precision: the works of stiff cells nearly cancel.
         K, x = self._K.tocoo(), mode.astype(np.longdouble)
         λ = float(np.sum(K.data * x[K.row] * x[K.col]))
         return λ, self._spread(mode * np.sign(mode[np.abs(w * mode).argmax()]))
@@ -193,15 +194,15 @@ class Stiffness:
 class Candidate(NamedTuple):
     """End of a step that may be accepted, with the stiffness and the direction of the path.
 
-    At a bifurcation point with the critical mode.
+    At a bifurcation point it also has the critical mode.
     """
 
     trial: Trial
     stiffness: Stiffness
     way: Array
-    #: Change of the load factor along the path over that of the configuration.  As K q' = f t', a
-    #: slope of zero means that the direction of the path is a critical one, and that the load f
-    #: does work on it.  At a bifurcation it does none on the critical direction.
+    #: Change of the load factor along the path over the change of the configuration.  As
+    #: K q' = f t', a slope of zero means that the direction of the path is critical, and that the
+    #: load f does work on it.  At a bifurcation it does no work on the critical direction.
     slope: float
     mode: Array | None = None
 
@@ -214,8 +215,8 @@ class Candidate(NamedTuple):
     def work(self) -> float:
         """Work of the load on the critical mode, near a critical point; N m.
 
-        As t'/|q'| = λ/(f·x) where the motion is along a mode x of length 1 with the eigenvalue λ.
-        The quotient tends to zero where the load does no work on it, whatever round-off adds to q'.
+        It follows from t'/|q'| = λ/(f·x) for a motion along a mode x of norm 1 with the eigenvalue
+        λ.  The quotient tends to zero if the load does no work on x, despite round-off in q'.
         """
         return self.softness / self.slope if self.slope else math.inf
 

@@ -55,9 +55,9 @@ class Decay:
         times: Times of the n peaks; (n,); s.
         amplitudes: Their amplitudes; (n,); unit of x.
         decrement: Logarithmic decrement δ, mean of all periods.
-        decrements: That of each period; (n-1,).
-        linear: The fit of A_0 − r t, as under dry friction: every period takes the same amount.
-        exponential: The fit of A_0 exp(−λ t), as under viscous damping: the same part.
+        decrements: Logarithmic decrement of each period; (n-1,).
+        linear: Fit of A_0 − r t, as under dry friction: equal losses in all periods.
+        exponential: Fit of A_0 exp(−λ t), as under viscous damping: equal ratios.
 
     Example:
         >>> t = np.arange(0, 5, 0.01)
@@ -90,20 +90,20 @@ class Decay:
 
     @property
     def fitted_ratio_95(self) -> float:
-        """Half-width of the 95 % interval of ``fitted_ratio`` that follows from that of λ."""
+        """Half-width of the 95 % interval of ``fitted_ratio``, from the interval of λ."""
         slope = (1 - self.fitted_ratio**2) ** 1.5 / (2 * np.pi)  # dζ/dδ
         return float(slope * self.exponential.rate_95 * self.period)
 
     @property
     def better(self) -> str:
-        """The law with the smaller residuals, "linear" or "exponential"."""
+        """Name of the law with the smaller residuals, "linear" or "exponential"."""
         return "linear" if self.linear.rms < self.exponential.rms else "exponential"
 
     @property
     def evidence(self) -> float:
         """Evidence ratio of the better law, exp(ΔAIC/2); both have two parameters.
 
-        For independent normal residuals; what is below round-off counts as round-off.
+        Residuals are assumed independent and normal; an rms below round-off counts as round-off.
         """
         least = np.finfo(float).eps * np.max(self.amplitudes)
         linear, exponential = (max(law.rms, least) for law in (self.linear, self.exponential))
@@ -155,21 +155,21 @@ def peaks(
 ) -> tuple[Array, Array]:
     """Find times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
 
-    They are maxima of x, not of its magnitude, and so one period apart for any equilibrium.  Each
-    is interpolated by a parabola through three samples; ends of the history do not count.
+    They are maxima of x, not of its magnitude, so they are one period apart for any equilibrium.
+    Each is interpolated by a parabola through three samples.  Ends of the history do not count.
 
-    Noise raises small peaks more than large ones: filter it first if it is more than 0.3 % of the
+    Noise raises small peaks more than large peaks.  Filter it first if it exceeds 0.3 % of the
     amplitudes.
 
     Args:
-        t: Increasing times, in any steps; (n,); s.
+        t: Increasing times, not necessarily equidistant; (n,); s.
         x: Values of the free vibration alone; (n,).
         about: Equilibrium from which amplitudes count; unit of x.
-        prominence: Part of the range of x by which it must fall on both sides of a maximum: more
-            than superposed vibrations of high frequency, less than the last peaks.
+        prominence: Fraction of the range of x by which x must fall on both sides of a maximum.
+            Superposed vibrations of high frequency must be smaller, the last peaks larger.
 
     Raises:
-        ArgumentError: t and x are not as many, not finite, or t does not increase.
+        ArgumentError: t and x differ in length, are not finite, or t does not increase.
 
     Example:
         >>> t = np.arange(0, 3, 0.01)
@@ -185,13 +185,13 @@ def peaks(
     rise, fall = (x[i] - x[i - 1]) / before, (x[i + 1] - x[i]) / after
     curvature = 2 * (fall - rise) / (before + after)
     slope = (rise * after + fall * before) / (before + after)
-    # Where three samples are equal there is neither slope nor curvature
+    # Three equal samples have neither slope nor curvature.
     shift = np.divide(-slope, curvature, out=np.zeros(len(i)), where=curvature < 0)
     return t[i] + shift, x[i] + slope * shift / 2 - about
 
 
 def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
-    """Compute the mean logarithmic decrement δ of n + 1 amplitudes, and that of each period, (n,).
+    """Compute logarithmic decrements δ of n + 1 amplitudes: the mean, and each period's; (n,).
 
     Raises:
         ArgumentError: Less than two amplitudes, or some are not positive.
@@ -237,8 +237,8 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
         amplitudes: Their amplitudes; (n,).
 
     Raises:
-        ArgumentError: t and amplitudes are not as many, at least 3, and finite; t does not
-            increase; an amplitude is not positive; or they scatter so much that nothing fits.
+        ArgumentError: t and amplitudes differ in length, are less than 3, or not finite; t does not
+            increase; an amplitude is not positive; or no exponential fits the amplitudes.
 
     Example:
         >>> t = np.arange(6.0)
@@ -254,7 +254,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     line = scipy.stats.linregress(s, A)
     errors = line.intercept_stderr, line.stderr
     linear = _envelope((line.intercept, -line.slope), errors, A - line.intercept - line.slope * s)
-    # Without units; first guess: the line through the logarithms, each weighted by its amplitude
+    # Dimensionless.  Initial guess: the line through the logarithms, weighted by the amplitudes.
     τ, a, units = s / s[-1], A / np.max(A), np.array([np.max(A), 1 / s[-1]])
     slope, logarithm = np.polyfit(τ, np.log(a), 1, w=a)
     guess = np.exp(logarithm), -slope
@@ -262,7 +262,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
         with np.errstate(over="ignore"):
             found, covariance = scipy.optimize.curve_fit(
                 lambda t, initial, rate: initial * np.exp(-rate * t), τ, a, guess,
-                # Differences fail at rate 0.
+                # A difference quotient fails at rate 0.
                 jac=lambda t, initial, rate: np.exp(-rate * t)[:, None] * np.stack(
                     [np.ones_like(t), -initial * t], axis=1
                 ),
@@ -285,7 +285,7 @@ def _envelope(values: npt.ArrayLike, errors: npt.ArrayLike, residuals: Array) ->
 
 
 def _series(call: str, t: npt.ArrayLike, x: npt.ArrayLike, what: str) -> tuple[Array, Array]:
-    """Increasing times and as many values, or :class:`ArgumentError`."""
+    """Return increasing times and values of the same length, or raise :class:`ArgumentError`."""
     times, values = require_row(t, f"{call}: t"), require_row(x, f"{call}: {what}")
     if len(times) != len(values):
         raise ArgumentError(

@@ -34,15 +34,15 @@ from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
 
 V = TypeVar("V", Array, Complex)
 
-COUPLING_TOLERANCE = 1e-9  # couplings below this part of the largest damping do not count
-BALANCED = 1e-13  # forces below this part of stiffness times size are round-off
-AT_REST = 1e150  # length of a step in which all rates vanish, and whose square is a number; s
+COUPLING_TOLERANCE = 1e-9  # couplings below this fraction of the largest damping do not count
+BALANCED = 1e-13  # forces below this fraction of stiffness times size are round-off
+AT_REST = 1e150  # time step so long that rates vanish, but with a finite square; s
 
 
 def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array]:
-    """Return :meth:`StepEquation.linearise` at ``q`` as this state answers it, K + C / dt.
+    """Return :meth:`StepEquation.linearise` at ``q`` in the simulation's state, K + C / dt.
 
-    Nothing yields or opens any further, now and later: no step may follow.
+    Yielding and opening stay frozen afterwards, so no step may follow.
     """
     simulation.controllers.ask(simulation)
     for cells in simulation.inelastic:
@@ -54,12 +54,12 @@ def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array
 
 
 def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | None]:
-    """Return the scene without loads, or with them and the state in which they hold it.
+    """Return the scene without loads, or with its loads and the equilibrium in which they hold it.
 
-    Loads that a state does not balance have no part in its stiffness.
+    Loads that are not in equilibrium in a state do not contribute to its stiffness.
 
     Raises:
-        ArgumentError: The scene turns steadily, and the state of that is not given.
+        ArgumentError: The scene rotates steadily, so the state of steady rotation must be given.
     """
     if any(isinstance(load, RotatingFrame) for load in scene.loads):
         raise ArgumentError(
@@ -68,7 +68,7 @@ def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | 
         )
     if scene.loads and require_no_mechanism(scene):
         simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)  # at rest
-        # Where they do not hold it, loads do not count either.
+        # Without an equilibrium, loads do not count either.
         with suppress(ArgumentError), closing(simulation):
             simulation.step_to(1.0)
             return scene, simulation.snapshot()
@@ -76,7 +76,7 @@ def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | 
 
 
 class _Standstill(Newmark):
-    """Scheme of small motions: all terms are taken at the present state, and no step is made."""
+    """Scheme of small motions: all terms are evaluated at the present state, without a step."""
 
     has_mean_velocity = True
     rings = False
@@ -88,18 +88,19 @@ class _Standstill(Newmark):
 
 
 class SmallMotions:
-    """Matrices of the small motions about a state, without the motions that supports hold.
+    """Matrices of small motions about a state, without the degrees of freedom that supports hold.
 
-    The state is the last one of ``at``, by default the undeformed scene; loads are those at t (s).
+    The state is the last state of ``at``, by default the undeformed scene.  Loads are evaluated at
+    the time t (s).
     """
 
     def __init__(
         self, scene: Scene, at: Solution | None, t: float | None = None, mesh: Mesh | None = None
     ) -> None:
         time = 0.0 if at is None else float(at.times[-1])
-        # Each process does the same: no answer depends on their number.
+        # All processes compute the same, so that no result depends on their number.
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ModelWarning)  # they are about runs
+            warnings.simplefilter("ignore", ModelWarning)  # they concern runs
             simulation = Simulation(
                 scene, _Standstill(), t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF
             )
@@ -115,11 +116,11 @@ class SmallMotions:
         left = np.ones(self.grid.size, dtype=bool)
         left[simulation.supports.dofs] = left[self._laws] = False
         scale = np.ones(self.grid.size)
-        scale[constraints] = abs(T.data).max()  # so that they are as stiff as what they hold
-        # Columns: what may move, in the axes of supports, and the forces of constraints.
+        scale[constraints] = abs(T.data).max()  # as stiff as the constrained motions
+        # Columns: the free motions, in the axes of supports, and the Lagrange multipliers.
         self._Z = (self._axes() @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
         self.K, self.M = self._reduced(T), self._reduced(self._matrix(simulation.inertia.M.data))
-        # A constraint takes itself and a motion away; what has no mass moves with the rest.
+        # A constraint removes its multiplier and a motion; massless motions follow the others.
         self.most = self.K.shape[0] - len(constraints) - int(np.sum(self.M.diagonal() == 0.0))
 
     def _matrix(self, data: Array) -> csr_array:
@@ -127,11 +128,11 @@ class SmallMotions:
         return csr_array((data.copy(), A.indices.copy(), A.indptr.copy()), shape=(A.size, A.size))
 
     def _derivative(self, q: Array, dt: float) -> csr_array:
-        """K + C / dt at ``q``, of all degrees of freedom."""
+        """Return K + C / dt at ``q`` for all degrees of freedom."""
         return self._matrix(linearise(self._simulation, q, dt)[1])
 
     def _axes(self) -> csr_array:
-        """Columns: the components of motion, in the axes of supports."""
+        """Return the components of motion in the axes of supports, in columns."""
         Q = eye_array(self.grid.size, format="lil")
         for support in (support for support in self.scene.supports if support.angle):
             i, j = self.grid.node(support.place)[:2]
@@ -140,7 +141,7 @@ class SmallMotions:
         return csr_array(Q)
 
     def _reduced(self, T: csr_array) -> csr_array:
-        """A matrix of all degrees of freedom at what may move; laws of connectors eliminated."""
+        """Reduce a full matrix to free motions and multipliers; eliminate laws of connectors."""
         laws = self._laws
         if len(laws):
             flexibility = diags_array(1 / (T.diagonal()[laws] + (T.diagonal()[laws] == 0.0)))
@@ -148,9 +149,9 @@ class SmallMotions:
         return csr_array(self._Z.T @ T @ self._Z)
 
     def unbalanced(self) -> str:
-        """Describe what is in no equilibrium in the state: works, connectors, motions of supports.
+        """List works, connectors and motions of supports that are not in equilibrium in the state.
 
-        Empty if all of them balance.
+        The text is empty if all are in equilibrium.
         """
         t = self._simulation.t
         r, data = linearise(self._simulation, self.q, AT_REST)
@@ -173,7 +174,7 @@ class SmallMotions:
     # -- frequencies ---------------------------------------------------------------------------
 
     def exponents(self, n: int) -> tuple[Complex, Array | Complex]:
-        """Compute the n exponents nearest to zero, or all, and their shapes; (n,), (size, n)."""
+        """Compute up to n exponents nearest to zero, and their shapes; (n,), (size, n)."""
         K, M = self.K, self.M
         heavy = (M.diagonal() > 0) & (K.diagonal() != 0)
         squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
@@ -188,7 +189,7 @@ class SmallMotions:
         works, zero = self._works(x)
         first = np.abs(values[~zero]).min(initial=highest)
         if zero.any():
-            # Inverses that are nearly infinite left few digits to the others.
+            # Nearly infinite inverses leave few digits for the other eigenvalues.
             values, x = solve(shift=-first / 2)
             works, zero = self._works(x)
         if abs(C).max() <= nothing * τ and symmetric:
@@ -201,7 +202,7 @@ class SmallMotions:
         return self._nearest(n, s[finite], motions[:, finite])
 
     def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-        """Works (J) of the stiffness on motions, in columns, and which may be but round-off."""
+        """Return works (J) of the stiffness on motions, in columns, and which may be round-off."""
         right, left = self._with_laws()
         works = self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
         sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
@@ -210,11 +211,12 @@ class SmallMotions:
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
         """Compute at least n exponents and motions with velocity-dependent forces C.
 
-        Nothing resists the motions ``free``, in columns; ``lowest`` is the first frequency; rad/s.
+        The motions ``free``, in columns, have no stiffness; ``lowest`` is the first frequency;
+        rad/s.
         """
-        # Drifts have the double exponent zero, which no solver finds well.  Those on which
-        # velocities cause only forces like inertia, C N = M N Λ, are known: constraints exclude
-        # them from the rest.
+        # Drifts have the double exponent zero, which no solver finds accurately.  Drifts with
+        # C N = M N Λ, whose velocities cause forces like inertia only, have known exponents:
+        # constraints exclude them from the eigenvalue problem.
         N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
         Λ = N.T @ (C @ N)
         _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
@@ -248,7 +250,7 @@ class SmallMotions:
     # -- buckling ------------------------------------------------------------------------------
 
     def buckling(self, n: int) -> tuple[Array, Array | Complex]:
-        """Compute the n buckling factors nearest to zero, or all, and their shapes."""
+        """Compute up to n buckling factors nearest to zero, and their shapes."""
         u = self._path()
         right, left = self._with_laws()
         change = csr_array(
@@ -256,15 +258,15 @@ class SmallMotions:
         )
         factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
         x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
-        # Once more, for combinations of these shapes: the round-off of works is that of strains.
+        # Solve again in the space of these shapes: works have only the round-off of strains.
         works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
         factors, mix = eigensolvers.small(works[0], -works[1])
         return self._nearest(n, factors, (x @ mix).astype(complex))
 
     def _with_laws(self) -> tuple[csr_array, csr_array]:
-        """Motions with the forces of laws that they bring, in columns; virtual ones, in rows.
+        """Return motions with the forces of laws, in columns, and virtual motions, in rows.
 
-        The tangent between them is K, and its derivative between them is that of K.
+        The products of these with the tangent are K, and with its derivative, the derivative of K.
         """
         T, laws, Z = self._derivative(self.q, AT_REST), self._laws, self._Z
         flexibility = diags_array(1 / T.diagonal()[laws])
@@ -274,7 +276,7 @@ class SmallMotions:
         return csr_array(right), csr_array(left)
 
     def _path(self) -> Array:
-        """Change of the configuration by the loads and motions, as if everything were linear."""
+        """Compute the linear change of the configuration due to loads and prescribed motions."""
         simulation, supports = self._simulation, self._simulation.supports
         r, data = linearise(simulation, self.q, AT_REST)
         T, Q = self._matrix(data), self._axes()
@@ -297,7 +299,7 @@ class SmallMotions:
     # -- shapes --------------------------------------------------------------------------------
 
     def _nearest(self, n: int, values: V, x: Complex) -> tuple[V, Array | Complex]:
-        """The n eigenvalues nearest to zero, with motions whose largest displacement is one."""
+        """Return the n eigenvalues nearest to zero, and motions with the largest displacement 1."""
         order = np.argsort(np.abs(values), kind="stable")[:n]
         shapes = self._Z @ x[:, order]
         turns = self._simulation.share.rotations
@@ -305,7 +307,7 @@ class SmallMotions:
         sizes[self.grid.multipliers] = 0.0
         turning = sizes[turns].max(axis=0, initial=0.0)
         sizes[turns] = 0.0
-        # Where only rotations move, the largest of them is one.
+        # If only rotations move, the largest rotation is 1.
         only = sizes.max(axis=0, initial=0.0) <= 1e-9 * self.scene.size * turning
         sizes[np.ix_(turns, only)] = np.abs(shapes[np.ix_(turns, only)])
         largest = shapes[sizes.argmax(axis=0), np.arange(shapes.shape[1])]

@@ -40,8 +40,8 @@ from ufl_beam.terms.base import InCells
 from ufl_beam.terms.beams import elastic_forms
 from ufl_beam.terms.cell_forces import CellForces
 
-MOST_TITLES = 4  # modes that a text of one line names
-AMPLITUDE = 0.1  # largest displacement of a mode that is shown, as a part of the scene's size
+MOST_TITLES = 4  # most modes that a text of one line names
+AMPLITUDE = 0.1  # largest displacement of a mode in pictures, as a fraction of the scene's size
 
 IN_EQUILIBRIUM = "give at=, a static solution"
 
@@ -51,11 +51,11 @@ class Shapes(Rich, ABC):
     """Modes about a state; the same on every process.
 
     Attributes:
-        scene: What was modelled.
+        scene: Model.
         grid: Its vertices, cells and numbering.
         q: The state; all degrees of freedom in the order of the grid.
-        shapes: Motions of all degrees of freedom, in columns, the largest displacement one (where
-            only rotations move, the largest of them); (size, n); complex if phases differ.
+        shapes: Motions of all degrees of freedom, in columns, with the largest displacement 1 (or
+            rotation, if only rotations move); (size, n); complex if phases differ.
     """
 
     scene: Scene
@@ -94,9 +94,9 @@ class Shapes(Rich, ABC):
         """Return one period of the k-th mode as a solution, for :func:`animate` or :func:`plot`.
 
         Args:
-            k: Which.
-            amplitude: Largest displacement, as a part of the size of the scene.
-            count: States from the beginning of the period to its end, at times from 0 to 1.
+            k: Number of the mode.
+            amplitude: Largest displacement, as a fraction of the size of the scene.
+            count: Number of intervals of the period, between states at times from 0 to 1.
 
         Raises:
             ArgumentError: No such shape, or a number that is not positive.
@@ -123,11 +123,11 @@ class Shapes(Rich, ABC):
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
         """Write a time series for ParaView with the k-th mode at time k.
 
-        Displacements are those of the state and the shape together, N, V, M those of the shape.
+        Displacements include the state and the shape; N, V, M belong to the shape alone.
 
         Args:
             path: File, ending in ``.xdmf`` or ``.vtkhdf``, see :class:`XDMF`, :class:`VTKHDF`.
-            amplitude: Largest displacement, as a part of the size of the scene.
+            amplitude: Largest displacement, as a fraction of the size of the scene.
 
         Raises:
             ArgumentError: The file cannot be written, or there is no shape.
@@ -153,7 +153,7 @@ class Shapes(Rich, ABC):
             recorder.close()
 
     def _scaled(self, k: int, amplitude: float) -> Array | Complex:
-        """The k-th shape, its largest motion a part of the size; if a rotation, of 1 rad."""
+        """Scale the k-th shape to ``amplitude`` times the scene's size, or 1 rad for rotations."""
         shape = self.shapes[:, k]
         lengths = np.r_[self.grid.dofs, self.grid.dofs_of_bodies][:, :2]
         size = self.scene.size if np.abs(shape[lengths]).max() > 0.5 else 1.0
@@ -184,7 +184,7 @@ class _Frame:
         return np.zeros((len(self.scene.links), len(Connection._fields)))
 
     def section_forces(self) -> Array:
-        """Section forces of the shape alone: a derivative, by a small difference."""
+        """Return section forces of the shape alone, by a central difference."""
         ends, ε = np.zeros((2, len(self.grid.cells), 3)), 1e-5
         for sign, end in zip((1.0, -1.0), ends, strict=True):
             self._forces.add(self._state + sign * ε * self._change, end)
@@ -196,7 +196,7 @@ class Modes(Shapes):
     """Vibration modes ``x exp(s t)`` about a state; made by :func:`modes`.
 
     Attributes:
-        exponents: s = -ζω ± iω√(1-ζ²) of each, imaginary part not negative, ``|s|`` ascending;
+        exponents: s = -ζω ± iω√(1-ζ²) of each mode, imaginary part not negative, ``|s|`` ascending;
             (n,); 1/s.
 
     Example:
@@ -223,7 +223,8 @@ class Modes(Shapes):
     def damping(self) -> Array:
         """Damping ratios ζ = ``-Re s/|s|``; (n,).
 
-        Negative: the motion grows; ±1: it does not oscillate; not a number: nothing drives it back.
+        A negative ratio means that the motion grows, ±1 that it does not oscillate, NaN that no
+        force opposes it.
         """
         ω = self.omega
         ratios: Array = np.full(len(ω), np.nan)
@@ -244,7 +245,7 @@ class Buckling(Shapes):
     """Buckling modes and their load factors; made by :func:`buckling`.
 
     Attributes:
-        factors: Factors on the loads, ``|factor|`` ascending; negative: with loads reversed; (n,).
+        factors: Load factors, ``|factor|`` ascending; negative for reversed loads; (n,).
 
     Example:
         >>> load = ub.PointLoad(beam.end, force=(-1e6, 0))
@@ -267,24 +268,24 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     They are vibrations about the undeformed, unloaded scene, or about the last state of a solution:
     with its section forces, the stiffness of its loads and of a :class:`RotatingFrame`, and the
     elastic stiffness of yielded material.  If only loads hold the scene, as its weight holds a
-    pendulum, the equilibrium with these.  Nothing yields or opens further, and hinges that bear no
-    moment any more are joints.  Sticking friction is a constraint, sliding friction and controllers
-    are ignored.
+    pendulum, they are vibrations about the equilibrium with these.  Yielding and opening are
+    frozen; hinges that no longer carry a moment act as joints.  Sticking friction is a constraint;
+    sliding friction and controllers are ignored.
 
-    Without damping they are eigenvalues of K x = ω² M x.  With damping, Coriolis or follower forces
-    they are those of (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that
-    decay without oscillation count as modes.  A negative damping ratio is flutter, or buckling if
-    it is -1.
+    Without damping the modes solve K x = ω² M x.  With damping, Coriolis or follower forces they
+    solve (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that decay
+    without oscillation count as modes.  A negative damping ratio means flutter, or buckling if it
+    is -1.
 
     Args:
         scene: Model.
         n: Number of modes, from the lowest frequency; fewer if the scene has fewer.
-        at: Solution whose last state is meant, of the same beams joined alike.
-        mesh: Discretization; as ``at``, or with the cells of the beams.
+        at: Solution whose last state is the reference state, of the same beams joined alike.
+        mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
         ArgumentError: The call or the scene is wrong, nothing that moves has mass, or the scene
-            turns with a :class:`RotatingFrame` and ``at`` is not given.
+            has a :class:`RotatingFrame` and ``at`` is not given.
 
     Warns:
         ModelWarning: Works, connectors, or motions of supports make the undeformed scene move.
@@ -316,21 +317,22 @@ def buckling(
 ) -> Buckling:
     """Compute buckling load factors and modes, (K + λ K') x = 0.
 
-    Loads and prescribed motions grow in proportion, from those of the state ``at`` (λ = 0; none
-    without it) to those at the time ``t`` (λ = 1).  K' is the derivative of the stiffness along the
-    first, linear part of their path, by forces and by displacements.  So factors are exact if the
-    state is close to buckling, and otherwise as accurate as the path is straight.
+    Loads and prescribed motions grow in proportion, from their values in the state ``at`` (λ = 0;
+    zero without ``at``) to their values at the time ``t`` (λ = 1).  K' is the derivative of the
+    stiffness along the initial tangent of this path, by forces and by displacements.  So factors
+    are exact if the state is close to buckling; otherwise their error grows with the curvature of
+    the path.
 
     Args:
         scene: Model.
         n: Number of factors, from the smallest ``|λ|``.
-        t: Time at which loads are taken; s.
-        at: Solution whose last state the loads grow from, of the same beams joined alike.
-        mesh: Discretization; as ``at``, or with the cells of the beams.
+        t: Time at which loads are evaluated; s.
+        at: Solution in whose last state the loads begin to grow, of the same beams joined alike.
+        mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
-        ArgumentError: The call is wrong, the scene is free to move, nothing acts on it, or what
-            acts has a stiffness of its own.
+        ArgumentError: The call is wrong, the scene is free to move, nothing acts on it, or a load
+            has a stiffness of its own.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))

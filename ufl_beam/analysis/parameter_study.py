@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Parameter studies: a scene many times, with other parameters or seeds, in parallel.
+"""Parameter studies: one scene with many parameters or seeds, computed in parallel.
 
-Members are handed out by :mod:`mpi4py.futures`.  Since all processes run the same script, each has
-the function of the member itself and only cases travel: it may be a closure, and need not pickle.
+:mod:`mpi4py.futures` distributes the members.  All processes run the same script and have the
+member function, so only cases are sent: the function may be a closure and need not be picklable.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ from ufl_beam.parallel import alone, communicator, on_first, print_once, progres
 Case = dict[str, Any]
 Member = Callable[..., dict[str, Any]]
 Outcome = dict[str, Array] | str  # result of a member, or the reason of its failure
-Record = tuple[Outcome, float]  # with its wall time; s
+Record = tuple[Outcome, float]  # outcome and its wall time; s
 
 FORMAT = "study of ufl_beam, 2"
 
@@ -54,13 +54,13 @@ _MEMBER: ContextVar[Member] = ContextVar("member of the study that this process 
 class Study(Rich):
     """Results of the members of a study, the same on every process.
 
-    ``study["peak"]`` has a row for each case; that of a failed member is NaN.
+    ``study["peak"]`` has a row for each case, of NaN if the member failed.
 
     Attributes:
         member: Name of the function.
-        cases: Arguments of each member; lists where these were tuples or arrays.
+        cases: Arguments of each member; tuples and arrays become lists.
         results: Returned values by name; (len(cases), ...) each.
-        failed: Number of a case that failed, and its error.
+        failed: Numbers of failed cases, with their errors.
         seconds: Wall time of each member; (len(cases),); s.
 
     Example:
@@ -77,7 +77,7 @@ class Study(Rich):
 
     @classmethod
     def of(cls, member: str, records: dict[str, Record]) -> Study:
-        """Make a study from outcome and seconds of each case, cases as :func:`_text_of`."""
+        """Make a study from outcome and seconds of each case; keys are as in :func:`_text_of`."""
         outcomes = [outcome for outcome, _ in records.values()]
         failed = {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)}
         first: dict[str, Array] = next((row for row in outcomes if not isinstance(row, str)), {})
@@ -113,7 +113,7 @@ class Study(Rich):
         return "\n".join(lines)
 
     def save(self, path: str | Path) -> None:
-        """Write a file with a checksum; an existing one is replaced once the new one is complete.
+        """Write a file with a checksum; it replaces an existing file once it is complete.
 
         Raises:
             ArgumentError: The file cannot be written.
@@ -158,32 +158,33 @@ def study(
 ) -> Study:
     """Run a parameter study: call ``member(**case)`` for each case, in parallel under ``mpirun``.
 
-    Each member is computed by one process alone, to the same last bit on any number of them.  The
-    first process also hands cases out and, between its own members, writes the file.
+    One process computes each member; results agree to the last bit for any number of processes.
+    The first process also distributes cases and, between its own members, writes the file.
 
-    A member that raises an exception has failed: it is reported, and the others are computed.
+    A member fails if it raises an exception.  The failure is reported, and the study continues.
 
     Args:
-        member: Makes and simulates a scene and returns numbers and arrays by name, the same names
-            and shapes for each case.  Files that it writes need names of their own.
+        member: Function that makes and simulates a scene and returns numbers and arrays by name,
+            with the same names and shapes for each case.  It must write to different files for
+            different cases.
         cases: Its arguments: ``[{"seed": seed, "mass": m} for m in (1, 2) for seed in range(50)]``;
-            numbers, texts and lists of them, no two alike.
-        path: File of the results, written on the way in at most a twentieth of the time.
-            Cases that the file has are not computed again, unless they failed; what it has of
-            other cases stays.
+            numbers, texts and lists of them, no two cases alike.
+        path: File of the results, saved repeatedly in at most a twentieth of the time.
+            Cases in the file are not computed again, unless they failed.  The file keeps its
+            results of other cases.
         anew: Compute all cases again and discard the results in the file, after a change of the
             member.
         progress: Show a progress bar in a terminal or notebook.
-        comm: Processes; all of them, or this one alone in a member of another study.  A member
-            leaves out ``comm`` of :func:`simulate`.
+        comm: Processes; by default all, or this process alone inside a member of another study.
+            A member leaves out ``comm`` of :func:`simulate`.
 
     Returns:
         Results in the order of the cases.
 
     Raises:
         ArgumentError: The call or the file is wrong, or a member returned something else than
-            numbers and arrays, or not the names and shapes of the others; the file has those
-            before.
+            numbers and arrays, or other names or shapes than the other members.  The file then has
+            the results of the earlier members.
         RuntimeError: All members failed.
 
     Example:
@@ -227,7 +228,7 @@ def study(
                 for key, (outcome, seconds) in old.records().items():
                     if key not in todo or not isinstance(outcome, str):
                         records[key] = outcome, seconds
-        save()  # that it cannot be written is better known now
+        save()  # fails early if the file cannot be written
 
     def save() -> None:
         if path is not None:
@@ -256,7 +257,7 @@ def study(
     with reserved(outputs):
         if comm.rank > 0:
             for _ in _outcomes(comm, member, {}):
-                pass  # this process serves until the first one has everything
+                pass  # this process serves until the first process has all results
         on_first(comm, gather)
     result = Study.of(name, comm.bcast({key: records[key] for key in todo}))
     if len(result.failed) == len(result):
@@ -269,7 +270,7 @@ def study(
 def _outcomes(
     comm: MPI.Intracomm, member: Member, cases: dict[str, Case]
 ) -> Generator[tuple[str, Outcome, float], None, None]:
-    """Case, outcome and seconds as members end; nothing on processes that serve the first one."""
+    """Yield case, outcome and seconds of each member; nothing on processes that only serve."""
     before = _MEMBER.set(member)
     try:
         if comm.size == 1:
@@ -287,7 +288,7 @@ def _outcomes(
 def _shared_out(
     pool: Any, cases: dict[str, Case]
 ) -> Generator[tuple[str, Outcome, float], None, None]:
-    """Case, outcome and seconds; others take cases from the front, this process from the back."""
+    """Yield case, outcome and seconds; the pool takes cases from the front, this from the back."""
     futures = {pool.submit(_run, case): key for key, case in cases.items()}
     ended: SimpleQueue[Any] = SimpleQueue()
 
@@ -297,7 +298,7 @@ def _shared_out(
 
     for future in futures:
         future.add_done_callback(note)
-    # A thread of the pool talks to the others meanwhile, which not every MPI allows.
+    # Meanwhile a thread of the pool communicates, which not every MPI allows.
     left = [*futures] if MPI.Query_thread() == MPI.THREAD_MULTIPLE else []
     given = 0
     try:
@@ -318,7 +319,7 @@ def _shared_out(
 
 
 def _run(case: Case) -> Record:
-    """Run one member on the process that serves; its error is an outcome as well."""
+    """Run one member on this process; an exception is also an outcome."""
     begin = time.perf_counter()
     try:
         with alone():
@@ -329,7 +330,7 @@ def _run(case: Case) -> Record:
 
 
 def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> None:
-    """Names and shapes must be those of the first member that did not fail."""
+    """Raise unless names and shapes agree with the first member that did not fail."""
     if isinstance(outcome, str):
         return
     new = {name: outcome[name].shape for name in sorted(outcome)}
@@ -345,7 +346,7 @@ def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> 
 
 
 def _text_of(case: dict[str, Any], what: str = "case") -> str:
-    """Write a case as JSON, by which cases are compared: all digits, names sorted."""
+    """Write a case as JSON with all digits and sorted names, for comparison of cases."""
     require_kind(case, dict, what)
     for name in case:
         require_kind(name, str, f"{what}: name")

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Controls of static paths, and the corrector that solves their steps.
 
-A step ends in an equilibrium that fulfils the equation of a control, with the load factor unknown.
+A step ends in an equilibrium that fulfils the equation of a control.  The load factor is unknown.
 """
 
 from __future__ import annotations
@@ -26,18 +26,18 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
 from ufl_beam.terms.base import Term
 
-MOST_DOUBLINGS = 30  # doublings of a step until something dissipates in it
-ONSET_PART = 1e-6  # part of the dissipated energy of a step at which its onset is looked at
-CONTROL_TOLERANCE = 1e-9  # part of a step by which its end may miss the equation of the control
+MOST_DOUBLINGS = 30  # most doublings of a step until something dissipates in it
+ONSET_PART = 1e-6  # fraction of a step's dissipated energy that defines the onset of dissipation
+CONTROL_TOLERANCE = 1e-9  # largest error of the equation of the control, as a fraction of a step
 
 
 class Crossing(NamedTuple):
     """Step to a bifurcation point, with the critical mode there.
 
-    Along the mode the tangent is singular, and the load does no work: a correction along it is
-    round-off over zero.  So only the load factor moves the step along the mode, as it moves the
-    path: ``speed`` is its motion along the mode for a unit of the load factor.  The mode is in the
-    axes of supports.
+    Along the mode the tangent is singular and the load does no work, so a correction along it would
+    be round-off over zero.  Hence corrections move along the mode only in proportion to the load
+    factor: ``speed`` is the path's motion along the mode for a unit of the load factor.  The mode
+    is in the axes of supports.
     """
 
     predicted: Array
@@ -48,17 +48,17 @@ class Crossing(NamedTuple):
 class PathCorrector:
     """Newton corrector of a path: equilibrium together with the equation of the control.
 
-    A change ``factor`` of the load factor counts as much as a unit of displacement.  Steps are
-    predicted and corrected by ``crossing``, where there is one.
+    A change ``factor`` of the load factor counts as much as a unit of displacement.  If
+    ``crossing`` is set, it predicts and corrects the step.
 
     Attributes:
         weights: Weights of the squares in the norm of a direction.  Displacements are divided by
             the size of the scene, the load factor by ``factor``; displacements and rotations enter
-            with their mean square.  Degrees of freedom that another process owns have the weight
-            zero, so that processes add their sums.
+            with their mean square.  Degrees of freedom owned by another process have the weight
+            zero, so that sums of the processes add up.
         of_factor: Gradient of the load factor.
         direction: Direction of the path at the beginning of the step.
-        sought: The step that was predicted.
+        sought: The predicted step.
     """
 
     def __init__(self, simulation: Simulation, factor: float) -> None:
@@ -94,7 +94,7 @@ class PathCorrector:
         largest = max(largest, abs(way[-1]) / self.factor)
         if largest == 0.0 or not math.isfinite(largest):
             return largest
-        # Squares of what is below 1e-154 would be nothing.
+        # Squares of components below 1e-154 would underflow.
         unit = np.asarray(way / largest)
         return largest * math.sqrt(self.along(self.weights * unit, unit))
 
@@ -109,7 +109,7 @@ class PathCorrector:
         return self.share.total(here)
 
     def dissipation_side(self, q: Array, way: Array) -> float:
-        """Positive where more dissipates in a direction from ``q``, negative where against it."""
+        """Return a number with the sign of the change of dissipation along ``way``, or 0."""
         motion = way[:-1]
         now, size = self.dissipation(q), self.size(motion)
         here = any(one.response.way.any() for one in self.simulation.couplings)
@@ -122,9 +122,9 @@ class PathCorrector:
         return 0.0
 
     def predict_dissipation(self, energy: float) -> Array:
-        """Predict a step that dissipates so much energy (J); :class:`StepFailed` if none does.
+        """Predict a step that dissipates ``energy`` (J); :class:`StepFailed` if none does.
 
-        Where nothing dissipated before, the direction changes as soon as something does.
+        If nothing dissipated before, the direction of the path changes at the onset of dissipation.
         """
         self.begin()
         step = self._until(energy, 0.0 * self.direction, self.direction)
@@ -132,9 +132,9 @@ class PathCorrector:
         return step if kink is None else self._until(energy, *kink)
 
     def kink(self, step: Array) -> tuple[Array, Array] | None:
-        """Find the part of a step before dissipation begins, and the direction of the path there.
+        """Find the fraction of a step before dissipation begins, and the path's direction there.
 
-        None if nothing begins to dissipate in it.
+        Return None if no dissipation begins in the step.
         """
         q, motion = self.simulation.q, step[:-1]
         self.begin()
@@ -147,7 +147,7 @@ class PathCorrector:
         return gone, -way if self.dissipation_side(q, way) < 0 else way
 
     def _until(self, energy: float, gone: Array, way: Array) -> Array:
-        """Extend the step so far along a direction until it dissipates an energy; J."""
+        """Extend the step ``gone`` along a direction until it dissipates an energy; J."""
         q = self.simulation.q + gone[:-1]
 
         def enough(length: float) -> bool:
@@ -165,7 +165,7 @@ class PathCorrector:
     # -- the border ----------------------------------------------------------------------------
 
     def step_at(self, t: float) -> Step:
-        """Return an infinitely slow step to a load factor: rates and viscous forces vanish."""
+        """Return an infinitely slow step to a load factor, without rates and viscous forces."""
         return Step(-math.inf, t, self.simulation.q, load_time=t, motion_time=t, fraction=1.0)
 
     def _moved(self, t: float) -> Array:
@@ -175,15 +175,15 @@ class PathCorrector:
         return x
 
     def arrive(self, x: Array) -> None:
-        """Bring the loads to the load factor of an iterate."""
+        """Set the loads to the load factor of an iterate."""
         self._x = x.copy()
         self.simulation.equation.begin(self.step_at(self.t), self._driven)
 
     def tangent(self, x: Array, r: Array) -> None:
-        """Fill the matrix, and the derivative by the load factor, exact for linear functions."""
+        """Assemble the tangent and the load-factor derivative, exact for linear functions."""
         simulation, t = self.simulation, self.t
         q, ε = simulation.supports.in_plane(x), 1e-6 * max(1.0, abs(t))
-        for δ, weight in ((ε, 0.5 / ε), (-ε, -0.5 / ε), (0.0, 0.0)):  # last where the tangent is
+        for δ, weight in ((ε, 0.5 / ε), (-ε, -0.5 / ε), (0.0, 0.0)):  # last: the tangent's state
             simulation.equation.begin(self.step_at(t + δ), self._driven)
             forces = np.zeros(self.share.size)
             for term in self._driven:
@@ -215,13 +215,13 @@ class PathCorrector:
         return abs(self._missing(self.simulation.supports.in_plane(self._x))) <= CONTROL_TOLERANCE
 
     def _missing(self, q: Array) -> float:
-        """Error of the equation of the control at ``q``, as a part of its reach."""
+        """Return the error of the equation of the control at ``q``, as a fraction of its reach."""
         if self._normal is None:
             return self.dissipation(q) / self._reach - 1.0
         return self.along(self._normal, np.append(q, self.t) - self._end) / self._reach
 
     def _derivative(self, way: Array) -> float:
-        """Derivative of the error; of an energy by a central difference."""
+        """Return the derivative of the error; for an energy, by a central difference."""
         if self._normal is not None:
             return self.along(self._normal, way) / self._reach
         q, size = self.simulation.supports.in_plane(self._x), self.size(way[:-1])
@@ -237,14 +237,14 @@ class PathCorrector:
     ) -> Trial:
         """Solve for an equilibrium on the plane across a normal through a predicted step.
 
-        Or without a normal, for one up to which the energy ``reach`` (J) dissipates.  Closed
-        openings that do not flow are held closed if they can be, see material_points.py, unless
+        Without a normal, solve for an equilibrium up to which the energy ``reach`` (J) dissipates.
+        Closed openings that do not flow are held closed if possible, see material_points.py, unless
         ``hold`` is false, as in a direction in which they open.
 
         Args:
             predicted: Predicted step.
-            normal: Gradient of the quantity that the control sets.
-            reach: Change of it in the step, which errors of it are compared with.
+            normal: Gradient of the controlled quantity.
+            reach: Change of this quantity in the step, the reference of its error.
             hold: Whether closed openings are held.
         """
         simulation = self.simulation
@@ -263,9 +263,9 @@ class PathCorrector:
         simulation.together(simulation.equation.begin, self.step_at(simulation.t))
 
     def direction_at(self, q: Array, t: float) -> tuple[Stiffness, Array]:
-        """Return the tangent stiffness of a state, and the direction in which its factor grows."""
+        """Return the tangent stiffness of a state, and the direction of a growing load factor."""
         self.t, supports = t, self.simulation.supports
-        for _ in range(2):  # the first tangent of a step is that of the forces before it
+        for _ in range(2):  # the first tangent of a step belongs to the forces before it
             rate = np.zeros(self.share.size)
             self.simulation.together(self.tangent, supports.in_axes(q), rate)
         stiffness = Stiffness(self.share, self._A, supports.dofs, rate, self._all_weights)
@@ -282,7 +282,7 @@ class PathCorrector:
 
 
 def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
-    """Find by bisection where something is reached: at the upper end of what is left."""
+    """Find by bisection where something is reached; return the upper end of the last interval."""
     for _ in range(halvings):
         middle = (low + high) / 2
         low, high = (low, middle) if reached(middle) else (middle, high)
@@ -292,11 +292,11 @@ def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: 
 class Control(ABC):
     """Base class of path controls, which set the lengths of steps.
 
-    A step changes a quantity by ``step``, or by a part of that.
+    A step changes a quantity by ``step``, or by a fraction of ``step``.
     """
 
     step: float
-    least_rest = 0.0  # least part of a step that is left beyond a kink
+    least_rest = 0.0  # least fraction of a step that remains beyond a kink
 
     def __post_init__(self) -> None:
         require_number(self.step, f"{type(self).__name__}: step")
@@ -310,7 +310,7 @@ class Control(ABC):
 
     @property
     def quantity(self) -> str:
-        """The quantity in words, if it may turn back along a path."""
+        """Name of the quantity if it may turn back along a path, else an empty text."""
         return ""
 
     def require(self, scene: Scene) -> None:
@@ -318,16 +318,19 @@ class Control(ABC):
 
     @abstractmethod
     def normal(self, corrector: PathCorrector, way: Array) -> Array:
-        """Gradient of the quantity, in a step along a direction; its change is positive."""
+        """Return the gradient of the quantity, which grows in a step along a direction."""
 
     def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
-        """Positive if a path that came by ``gone``, or begins (None), goes on along ``way``."""
+        """Return a positive number if the path continues along ``way``.
+
+        The path came by the step ``gone``, or begins (None).
+        """
         return corrector.along(self.normal(corrector, way), way)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
-        """Solve for the end of a part of a step; :class:`StepFailed` if there is none.
+        """Solve for the end of a fraction of a step; :class:`StepFailed` if there is none.
 
-        Where that fails and something begins to dissipate, the direction changes there.
+        If this fails and dissipation begins in the step, the direction changes at its onset.
         """
         reach, gone, way = abs(self.step) * part, 0.0 * corrector.direction, corrector.direction
         rest, hold = reach, True
@@ -364,11 +367,11 @@ class ArcLength(Control):
     rotations (rad), and of the change of the load factor over ``factor``.
 
     Args:
-        step: Longest step; a negative one begins with a falling load factor.
+        step: Longest step; a path with a negative step begins with a falling load factor.
         factor: Change of the load factor that counts as much as a length of 1.
 
     Raises:
-        ArgumentError: No step, or ``factor`` is not positive.
+        ArgumentError: ``step`` is zero, or ``factor`` is not positive.
 
     Example:
         >>> rod = ub.Section.circle(d=0.05, E=210e9, nu=0.3)
@@ -391,11 +394,14 @@ class ArcLength(Control):
         require_number(self.factor, "ArcLength: factor", positive=True)
 
     def normal(self, corrector: PathCorrector, way: Array) -> Array:
-        """Gradient of the arc length, in a step along the direction of the path."""
+        """Return the gradient of the arc length, in a step along the direction of the path."""
         return np.asarray(corrector.weights * way / corrector.length(way))
 
     def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
-        """First the sign of the step, later that of flow and openings, else by turns below π/2."""
+        """Return the sense: first by the sign of ``step``, then by dissipation, else by the angle.
+
+        The angle between successive steps must be below π/2.
+        """
         if gone is None:
             return self.step * float(way[-1])
         side = corrector.dissipation_side(corrector.simulation.q + gone[:-1], way)
@@ -407,10 +413,10 @@ class LoadControl(Control):
     """Load control: equal steps of the load factor, up to the limit load.
 
     Args:
-        step: Change of the load factor; negative downwards.
+        step: Change of the load factor; negative if the factor is to fall.
 
     Raises:
-        ArgumentError: No step.
+        ArgumentError: ``step`` is zero.
 
     Example:
         >>> path = ub.follow(scene, ub.LoadControl(0.25), steps=4)
@@ -422,7 +428,7 @@ class LoadControl(Control):
     quantity = "the load factor"
 
     def normal(self, corrector: PathCorrector, way: Array) -> Array:
-        """The load factor, or its fall."""
+        """Return the gradient of the load factor, with the sign of ``step``."""
         return math.copysign(1.0, self.step) * corrector.of_factor
 
 
@@ -436,7 +442,8 @@ class DisplacementControl(Control):
         step: Change of the component; m or rad.
 
     Raises:
-        ArgumentError: Not a place of a beam, another component, no step.
+        ArgumentError: ``place`` is not a place of a beam, ``component`` is another text, or
+            ``step`` is zero.
 
     Example:
         >>> control = ub.DisplacementControl(beam.end, "v", -0.05)
@@ -468,11 +475,11 @@ class DisplacementControl(Control):
 
     @property
     def quantity(self) -> str:
-        """The component and the place."""
+        """Name of the component and the place."""
         return f"{self.component} of {self.place}"
 
     def normal(self, corrector: PathCorrector, way: Array) -> Array:
-        """The component, or its fall."""
+        """Return the gradient of the component, with the sign of ``step``."""
         share, normal = corrector.share, np.zeros(corrector.share.grid.size)
         nodes, weights = share.grid.weights(self.place)
         normal[share.grid.dofs[nodes, COMPONENTS.index(self.component)]] += weights
@@ -483,13 +490,13 @@ class DisplacementControl(Control):
 
 @dataclass(frozen=True)
 class DissipationControl(Control):
-    """Dissipation control by the energy that hinges and yielding beams lose: sharp snap-backs.
+    """Dissipation control by the energy that hinges and yielding beams lose, for sharp snap-backs.
 
-    Softening and unloading may begin in nearly the same direction; only one of them dissipates.
+    Softening and unloading may begin in nearly the same direction; only softening dissipates.
 
     Args:
         step: Dissipated energy of a step; J.
-        otherwise: Steps where nothing dissipates; arc length.
+        otherwise: Arc-length control of steps in which nothing dissipates.
 
     Raises:
         ArgumentError: ``step`` is not positive.
@@ -515,15 +522,15 @@ class DissipationControl(Control):
         return self.otherwise.factor
 
     def normal(self, corrector: PathCorrector, way: Array) -> Array:
-        """Gradient of the arc length; used where nothing dissipates."""
+        """Return the gradient of the arc length; used where nothing dissipates."""
         return self.otherwise.normal(corrector, way)
 
     def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
-        """Sense of the arc length; used where nothing dissipates."""
+        """Return the sense of the arc length; used where nothing dissipates."""
         return self.otherwise.sense(corrector, way, gone)
 
     def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
-        """Solve at the next dissipated energy, unless a step of arc length dissipates nothing."""
+        """Solve for the next dissipated energy, unless an arc-length step dissipates nothing."""
         if not corrector.dissipates:
             with suppress(StepFailed):
                 trial = self.otherwise.solve_step(corrector, part)

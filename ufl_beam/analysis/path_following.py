@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Path following: static equilibria with the load factor among the unknowns, critical points."""
+"""Path following: static equilibria with an unknown load factor, and critical points."""
 
 from __future__ import annotations
 
@@ -40,36 +40,36 @@ from ufl_beam.simulation.solution import NAMED, Solution
 from ufl_beam.simulation.stepper import Trial
 from ufl_beam.solvers.newton_options import Newton
 
-MOST_POINTS = 5  # critical points that the text of a path names
+MOST_POINTS = 5  # most critical points that the summary of a path names
 
 ADVICE = (
     "Try a shorter step or another control: ArcLength goes through limit points of loads and of "
     "displacements, DissipationControl through softening that snaps back"
 )
 
-SMALLEST_STEP_PART = 2.0**-12  # a step is cut down to this part of it
-TARGET_ITERATIONS = 12  # steps of more are followed by shorter ones, of fewer by longer ones
-MOST_FAILURES = 4  # of steps, before a critical point is sought from another state
-LOCATION_TOLERANCE = 1e-7  # critical points are located to this part of a step
-BRACKET = 1e-2  # part of a step within which motions along a critical mode are interpolated
-SEPARABLE = 1.5e-5  # critical points closer than this part of a step need not be told apart
-MOST_CROSSING_STEPS = 8  # steps to a bifurcation point from there
-SOFT = 0.1  # part of its size at the ends of a step that an eigenvalue is in such a bracket
-IDLE = 1e-6  # part of the most work of a load, below which it does none
-MOST_LOCATION_STEPS = 60  # steps in which a critical point is sought
-LEAST_COSINE = 0.5  # cosine of the angle by which a step may leave the direction of its predictor
-LARGEST_LENGTH_RATIO = 10.0  # ratio by which a step may be longer than its predictor
-UNCHECKED_PART = 2.0**-6  # shorter parts of a step may leave it: a law may have a kink
-SAME_POINT_PART = 1e-3  # within this part of a step a critical point is the one just reached
-LEAP_PART = 0.1  # part of a step by which states before and at a critical point never differ
-SINGULAR_RATIO = 1e-3  # what is below this part of its size at the ends of a step vanishes
+SMALLEST_STEP_PART = 2.0**-12  # smallest fraction to which a step is cut
+TARGET_ITERATIONS = 12  # steps with more iterations shorten the next step, with fewer lengthen it
+MOST_FAILURES = 4  # failed steps before a critical point is sought from another state
+LOCATION_TOLERANCE = 1e-7  # accuracy of the location of critical points, as a fraction of a step
+BRACKET = 1e-2  # fraction of a step within which motions along a critical mode are interpolated
+SEPARABLE = 1.5e-5  # critical points closer than this fraction of a step may count as one point
+MOST_CROSSING_STEPS = 8  # most steps from a bracket to its bifurcation point
+SOFT = 0.1  # largest ratio of an eigenvalue in such a bracket to its size at the ends of a step
+IDLE = 1e-6  # fraction of the most work of a load below which the load does no work
+MOST_LOCATION_STEPS = 60  # most steps to locate a critical point
+LEAST_COSINE = 0.5  # least cosine of the angle between a step and its predictor
+LARGEST_LENGTH_RATIO = 10.0  # largest ratio of the lengths of a step and its predictor
+UNCHECKED_PART = 2.0**-6  # shorter fractions of a step are not checked: a law may have a kink
+SAME_POINT_PART = 1e-3  # fraction of a step within which a critical point is the last one again
+LEAP_PART = 0.1  # fraction of a step that states before and at a critical point never exceed
+SINGULAR_RATIO = 1e-3  # ratio to its size at the ends of a step below which a measure vanishes
 
 
 class Path(Solution):
     """Equilibrium path: a solution whose times are load factors.
 
     Attributes:
-        critical: Limit and bifurcation points, in the order in which they were passed.
+        critical: Limit and bifurcation points, in the order of the path.
 
     Example:
         >>> path = ub.follow(scene, ub.LoadControl(0.5), steps=4)
@@ -82,7 +82,7 @@ class Path(Solution):
 
     @property
     def factor(self) -> Array:
-        """Load factors, the time of the time functions; (n+1,)."""
+        """Load factors, the argument of the time functions; (n+1,)."""
         return self.times
 
     def summary(self) -> list[str]:
@@ -136,9 +136,9 @@ def follow(
 ) -> Path:
     """Follow a path of static equilibria through limit points and snap-backs.
 
-    The load factor is the time of loads and motions, and an unknown like the displacements.  A path
-    begins with the equilibrium at the factor 0, in the direction of the control, and goes on in its
-    own direction.  It is quasi-static: viscosity and masses have no effect.
+    The load factor replaces the time of loads and motions and is an unknown, as the displacements.
+    A path starts at the equilibrium with the factor 0, in the direction of the control, and then
+    follows its own direction.  It is quasi-static: viscosity and masses have no effect.
 
     Limit points of the load factor and bifurcation points become states of the path.
 
@@ -148,11 +148,11 @@ def follow(
             :class:`DissipationControl`.
         until: The path ends after the first step for which this is true, as in
             ``until=lambda now: now.displacement(tip)[1] < -0.5``; ``now.t`` is the load factor.
-        steps: The path ends after so many.
-        start: Branch of a :class:`CriticalPoint`, or a solution whose last state is the beginning.
-        record: Files to write on the way.
+        steps: Largest number of steps.
+        start: Branch of a :class:`CriticalPoint`, or a solution that the path continues.
+        record: Files to write during the run.
         newton: Tolerances and PETSc options; line searches and Krylov methods are not used.
-        mesh: Discretization; as ``start``, or with the cells of the beams.
+        mesh: Discretization; by default the mesh of ``start``, or the cells of the beams.
         progress: Show a progress bar in a terminal or notebook.
         comm: Processes that share the scene.
 
@@ -202,7 +202,7 @@ def follow(
 
 
 def _require_driven(scene: Scene, t0: float) -> None:
-    """Raise unless something depends on the load factor, and nothing on the history of time."""
+    """Raise unless a load or motion depends on the load factor, and no law on physical time."""
     for link in scene.links:
         if isinstance(link.law, Controller):
             raise ArgumentError(f"{link}: a controller acts in time, and a path has none")
@@ -229,7 +229,7 @@ def _require_driven(scene: Scene, t0: float) -> None:
 
 
 class PathStepper:
-    """Stepper of a path: it sets lengths of steps and locates critical points."""
+    """Stepper of a path, which sets lengths of steps and locates critical points."""
 
     def __init__(self, simulation: Simulation, control: Control, most: int) -> None:
         self._simulation, self._control = simulation, control
@@ -243,27 +243,27 @@ class PathStepper:
         self._landed = False
 
     def begin(self, branch: Branch | None, *, fresh: bool) -> None:
-        """Find the direction in which the path begins; if fresh, its first equilibrium too."""
+        """Find the initial direction of the path; if ``fresh``, also its first equilibrium."""
         corrector, simulation = self.corrector, self._simulation
         if branch is not None:
             corrector.direction = np.append(branch.mode[corrector.share.dofs], 0.0)
             return
         if fresh:
-            factor = corrector.of_factor  # it is given, and stays as it is
+            factor = corrector.of_factor  # the load factor is prescribed
             simulation.accept(corrector.attempt(0.0 * factor, factor, 1.0))
         corrector.begin()
         stiffness, way = corrector.direction_at(simulation.q, simulation.t)
         corrector.direction = way if self._control.sense(corrector, way, None) > 0 else -way
         here = Trial(corrector.step_at(simulation.t), simulation.q, np.zeros(corrector.share.size))
-        # A run that ended at a critical point may go on from there.
+        # The path may continue a run that ended at a critical point.
         self._before = self._candidate(here, stiffness, corrector.direction)
         self._landed = not fresh
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take a step, a shorter one where it fails, only up to a critical point in it; keep it.
+        """Take a step to its end or a critical point, shorter if it fails; store it if ``keep``.
 
         Raises:
-            StepFailed: Even the shortest one fails.
+            StepFailed: Even the shortest step fails.
         """
         while True:
             iterations = self._simulation.iterations
@@ -292,32 +292,32 @@ class PathStepper:
         after = found
         found, reached = self._locate(before, after, part)
         if self._landed and reached < SAME_POINT_PART * part:
-            # The signs of one critical point need not change in the same last digit.
+            # The signs at one critical point may change in different last digits.
             self._landed = False
             self._take(self._seek(part))
             return
         if found.mode is not None:
-            way, self._landed = corrector.direction, False  # signs are those beyond it
+            way, self._landed = corrector.direction, False  # has the signs beyond it
             self._take(found)
             self._note(found, way, len(self._simulation.solution), limit=False)
             return
         self._landed = found.passed(before)
-        # The load factor has turned in the state that was found, as at a kink, or its slope
-        # vanishes.  It and the eigenvalue need not change their signs in the same last digit.
+        # At a limit point the load factor has turned in the located state, as at a kink, or its
+        # slope vanishes.  It and the eigenvalue may change their signs in different last digits.
         soft = _vanishes("softness", found, before, after)
         limit = self._turned(found) or _vanishes("slope", found, before, after)
         limit = limit and not (soft and _idle(found, before, after))
         if self._landed and not corrector.dissipates and corrector.dissipation(found.trial.q1) > 0:
             self._pass_kink(found, reached - 2 * LOCATION_TOLERANCE * part, part, limit)
             return
-        # What yields or opens may change signs without an eigenvalue of zero.
+        # Yielding or opening may change signs without an eigenvalue of zero.
         way = corrector.direction
         self._take(found)
         if self._landed and (soft or limit):
             self._note(found, way, len(self._simulation.solution), limit)
 
     def _pass_kink(self, after: Candidate, last: float, part: float, limit: bool) -> None:
-        """Go to the last state in which nothing dissipates, if the load factor turns there."""
+        """Go to the last state without dissipation, if the load factor turns there."""
         before, n = self.corrector.direction, len(self._simulation.solution)
         if limit and last > 0:
             self._take(self._seek(last))
@@ -341,7 +341,7 @@ class PathStepper:
         return Candidate(trial, stiffness, way, slope, mode)
 
     def _seek(self, part: float) -> Candidate:
-        """Solve for the end of a part of a step; refuse one that left the direction of the path."""
+        """Solve for the end of a fraction of a step; reject it if it leaves the direction."""
         corrector = self.corrector
         trial = self._control.solve_step(corrector, part)
         stiffness, way = corrector.direction_at(trial.q1, trial.step.t1)
@@ -356,12 +356,12 @@ class PathStepper:
         return self._candidate(trial, stiffness, way)
 
     def _locate(self, before: Candidate, after: Candidate, part: float) -> tuple[Candidate, float]:
-        """The first state whose signs have changed, and the part of the step that leads there.
+        """Return the first state with changed signs, and the fraction of the step that leads to it.
 
-        By false position with halved weights (Illinois).  At a bifurcation, from states so far on
-        both sides that round-off along the mode is small there, see :meth:`_cross`.  Where a step
-        in between fails, or the signs change in a leap to another branch, the last state before,
-        for shorter steps from there.
+        It is located by false position with halved weights (Illinois).  A bifurcation is located
+        from states on both sides that are far enough for small round-off along the mode, see
+        :meth:`_cross`.  If an intermediate step fails, or the signs change by a leap to another
+        branch, return the last state before, from which shorter steps follow.
         """
         low, high, first, last = 0.0, part, before, after
         weight_low, weight_high, bracket = 1.0, 1.0, BRACKET
@@ -380,7 +380,7 @@ class PathStepper:
             here, there = weight_low * sizes[0], -weight_high * sizes[1]
             middle = (low * there - high * here) / (there - here)
             if not turned and high - low > bracket * part:
-                # Beyond the estimate, so that it comes to lie between two states.
+                # Go beyond the estimate, so that two states bracket it.
                 middle += 0.4 * bracket * part * (1 if here < -there else -1)
             margin = min(0.01 * (high - low), LOCATION_TOLERANCE * part)
             middle = min(max(middle, low + margin), high - margin)
@@ -416,14 +416,14 @@ class PathStepper:
         ends: tuple[Candidate, Candidate],
         part: float,
     ) -> tuple[Candidate, float]:
-        """The bifurcation point between two states near to it, and the part that leads there.
+        """Return the bifurcation point between two nearby states, and its fraction of the step.
 
-        Close to it, round-off and what the solver leaves would move the state along the mode,
-        perhaps to the other branch.  So motions along the mode and the direction of the path are
-        those of a cubic between the two states.  Signs are those of the second state.
+        Close to the point, round-off and residuals of the solver would move the state along the
+        mode, perhaps to the other branch.  So a cubic between the two states sets the motion along
+        the mode and the direction of the path.  The second state sets the signs.
 
         Raises:
-            StepFailed: It is no bifurcation point, or was not found.
+            StepFailed: The point is no bifurcation point, or was not found.
         """
         corrector, leave = self.corrector, self._simulation.supports.leave
         (first, last), (before, after) = near, ends
@@ -452,7 +452,7 @@ class PathStepper:
             near_by = abs(x - x0) * (parts[1] - parts[0]) <= LOCATION_TOLERANCE * part
             if not near_by and abs(λ) < abs(λ0) / 2:
                 continue
-            # Where it falls no more, the eigenvalue is round-off.
+            # An eigenvalue that no longer falls is round-off.
             if not _soft(found, first, last) or not _idle(found, before, after):
                 break
             way = (1.0 if way[-1] * first.way[-1] > 0 else -1.0) / corrector.length(way) * way
@@ -461,21 +461,21 @@ class PathStepper:
         raise StepFailed("no bifurcation point was found")
 
     def _turned(self, found: Candidate) -> bool:
-        """Return whether the load factor goes the other way than before the step."""
+        """Return whether the load factor has reversed its direction since the step began."""
         return bool(found.way[-1] * self.corrector.direction[-1] < 0)
 
     def _note(self, found: Candidate, before: Array, n: int, limit: bool) -> None:
-        """Remember the state as a critical point, the n-th of the path; ``found`` is beyond it."""
+        """Store state n of the path as a critical point; ``found`` is at or beyond it."""
         corrector, simulation, way = self.corrector, self._simulation, found.way
         if limit:
-            # At a limit point the path goes along the mode.
+            # At a limit point the path is tangent to the mode.
             mode = np.asarray(way[:-1] / corrector.size(way[:-1]))
         elif found.mode is not None:
             mode = found.mode
         else:
             mode = np.array(found.stiffness.softest[1][corrector.share.dofs])
             simulation.supports.leave(mode)
-            # What the path goes along the mode is lost in a singular stiffness.
+            # A singular stiffness gives no accurate component of the path along the mode.
             along = corrector.along(corrector.weights[:-1] * mode, (way - before)[:-1])
             corrector.direction = way - along * np.append(mode, 0.0)
         kind = "limit" if limit else "bifurcation"
@@ -485,17 +485,17 @@ class PathStepper:
 
 
 def _vanishes(what: str, found: Candidate, before: Candidate, after: Candidate) -> bool:
-    """Return whether a measure is nearly zero in a state that was located between two others."""
+    """Return whether a measure is nearly zero in a state located between two others."""
     size, *ends = (getattr(one, what) for one in (found, before, after))
     return bool(size < SINGULAR_RATIO * max(ends))
 
 
 def _idle(found: Candidate, before: Candidate, after: Candidate) -> bool:
-    """Return whether the load does no work on the critical mode, or as little as round-off."""
+    """Return whether the load does no work on the critical mode, except round-off."""
     least = IDLE * found.stiffness.most_work
     return found.work < least or _vanishes("work", found, before, after)
 
 
 def _soft(found: Candidate, before: Candidate, after: Candidate) -> bool:
-    """Return whether an eigenvalue is small, compared with those at the ends of a step."""
+    """Return whether an eigenvalue is small, compared with its values at the ends of a step."""
     return found.softness < SOFT * max(before.softness, after.softness)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Richardson extrapolation of runs on two or three levels: order, limit and uncertainty.
 
-Level k of a dial is 2**k times as fine as level 0.  The uncertainty is that of Roache's grid
+Cells or steps of level k are 2**k times as fine as on level 0.  The uncertainty is Roache's grid
 convergence index (J. Fluids Eng. 116 (1994) 405).
 """
 
@@ -18,11 +18,11 @@ import scipy  # its parts are loaded when they are used
 from ufl_beam.arrays import Array
 from ufl_beam.display import one_line
 
-# Roache's safety factors on the error of the finest level: if the observed order is that of a
-# theory, and if it is not, or not known since there are two levels only
+# Roache's safety factors on the error of the finest level: for an observed order that agrees with
+# theory, and for an order that does not or is unknown because there are only two levels.
 TRUSTED, DOUBTED = 1.25, 3.0
-# Half of the lowest order that a scheme can have: at this one, the changes to come are together
-# 2.4 times the last one, and no limit follows from it.
+# Half of the lowest order of a scheme.  At this order the sum of the changes to come is 2.4 times
+# the last change, so that no limit can be extrapolated.
 LEAST_ORDER = 0.5
 
 
@@ -33,34 +33,34 @@ def size(values: Array) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Convergence:
-    """Convergence of a quantity with one dial, from two or three successive levels."""
+    """Convergence of a quantity with cells or steps, from two or three successive levels."""
 
     coarsest: int  # the coarsest level
     changes: tuple[float, ...]  # sizes of the changes from level to level; unit of the quantity
     method: float  # order in theory
-    order: float  # observed; NaN from two levels, where that in theory is taken
-    used: float  # order for predictions, at most that in theory
-    trusted: bool  # whether the changes are those of a whole order, up to that in theory
-    lacks: Array  # what each level and the limit lack of the limit, with sign; (levels + 1, ...)
-    doubt: float  # by how much the limit may be wrong; unit of the quantity
+    order: float  # observed order; NaN from two levels, where predictions use the order in theory
+    used: float  # order for predictions, at most the order in theory
+    trusted: bool  # whether the changes fit an integer order, at most the order in theory
+    lacks: Array  # limit minus value of each level and of the limit (zero); (levels + 1, ...)
+    doubt: float  # bound of the error of the limit; unit of the quantity
 
     __repr__ = one_line
 
     @classmethod
     def of(cls, values: Sequence[Array], coarsest: int, method: float) -> Convergence:
-        """Judge values on two or three levels."""
+        """Evaluate the convergence of values on two or three levels."""
         changes = np.diff(np.stack(values), axis=0)
         sizes = tuple(map(size, changes))
         first, last = sizes[0], sizes[-1]
         order, trusted, most = math.nan, False, last
         if len(values) > 2:
             order = math.log2(first / last) if min(sizes) > 0 else math.copysign(9, first - last)
-            # A factor of 1.25 covers a change that is wrong by a quarter.
+            # A safety factor of 1.25 covers an error of a change by a quarter.
             trusted = first > 0 and any(
                 size(changes[1] * 2**k - changes[0]) <= (TRUSTED - 1) * first
                 for k in range(1, round(method) + 1)
             )
-            # What fell faster than the method can explain may have passed through zero.
+            # A change that fell faster than the method can explain may have passed through zero.
             most = max(last, first / 2**method)
         used = method if math.isnan(order) else min(max(order, LEAST_ORDER), method)
         rest, doubt = changes[-1] * 0.0, DOUBTED * max(sizes)  # irregular: as large on all levels
@@ -77,13 +77,13 @@ class Convergence:
 
     @property
     def finest(self) -> int:
-        """The finest of the levels that were run."""
+        """Finest level of the runs."""
         return self.coarsest + len(self.changes)
 
     def lack(self, level: npt.ArrayLike) -> Array:
-        """Predict what levels, not necessarily whole, lack of the limit; (*level.shape, ...).
+        """Predict the limit minus the value on levels, also fractional ones; (*level.shape, ...).
 
-        It is linear in the power of the fineness between the levels that were run, and the limit.
+        It is interpolated linearly in the cell or step size to the power of the order.
         """
         levels = np.append(np.arange(len(self.changes), -1.0, -1.0), 0.0)
         s = np.append(0.0, 2.0 ** (-self.used * levels[:-1]))
@@ -91,9 +91,9 @@ class Convergence:
         return np.asarray(of_power(2.0 ** (-self.used * (np.asarray(level) - self.coarsest))))
 
     def unsure(self, level: float) -> float:
-        """Bound the error of the limit that follows from a run on a level; unit of the quantity.
+        """Bound the error of the limit extrapolated from a run on a level; unit of the quantity.
 
-        It falls beyond the finest level; irregular changes are as large on all levels.
+        It falls beyond the finest level.  Irregular changes are assumed equal on all levels.
         """
         finer = max(0.0, level - self.finest) if self.seen else 0.0
         return float(self.doubt * 2 ** (-self.used * finer))
@@ -109,8 +109,8 @@ class Convergence:
 class Cross:
     """Self-convergence of a quantity with cells and with steps."""
 
-    cells: Convergence  # with the cells
-    steps: Convergence  # with the steps
+    cells: Convergence  # with refined cells
+    steps: Convergence  # with refined steps
     limit: Array  # extrapolated value
     uncertainty: float  # of the limit; unit of the quantity
 
@@ -123,15 +123,15 @@ class Cross:
         return cls(cells, steps, limit, cells.doubt + steps.doubt)
 
     def lack(self, i: float, j: float) -> Array:
-        """Predict what a run with some levels lacks of the limit; unit of the quantity."""
+        """Predict the limit minus the value of a run on two levels; unit of the quantity."""
         return self.cells.lack(i) + self.steps.lack(j)
 
     def confirmed(self, value: Array, i: float, j: float) -> Cross:
-        """Return it with the limit that follows from a run in which both dials are finer.
+        """Return a copy with the limit extrapolated from a run with finer cells and finer steps.
 
-        The limit moves by what errors of cells and steps depend on each other.  An error in
-        proportion to the product of both, as a part c of it for cells that are left and a part s
-        for steps, moves it by a part (1 - c) (1 - s), and leaves the rest in doubt.
+        The limit moves because errors of cells and steps depend on each other.  Take an error term
+        proportional to the product of both, and let fractions c and s of the errors of cells and of
+        steps remain.  It moves the limit by its fraction (1 - c) (1 - s); the rest is uncertain.
         """
         limit = np.asarray(value + self.lack(i, j))
         c, s = (
@@ -153,7 +153,7 @@ def fit_cost(steps: Array, cells: Array, seconds: Array) -> Array:
 
 
 def pareto(seconds: Array, errors: Array) -> list[int]:
-    """Find the runs that no other one beats in time and error, the fastest first."""
+    """Find the runs that no other run beats in both time and error, the fastest first."""
     front: list[int] = []
     for k in np.lexsort((errors, seconds)):
         if not front or errors[k] < errors[front[-1]]:

@@ -39,26 +39,27 @@ from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_control import Adaptive
 from ufl_beam.solvers.newton_options import Newton
 
-MESHES = Mesh(degree=2), Mesh()  # that compete unless others are given
+MESHES = Mesh(degree=2), Mesh()  # meshes that compete by default
 NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
-WRONG = "ArgumentError: "  # how failures of runs begin that finer dials do not help
+WRONG = "ArgumentError: "  # start of failures of runs that no refinement can help
 
-LEAST_USED = 0.3  # part of a tolerance that the error of the answer shall use up at least
-# Limits known to the rest of it: a larger uncertainty leaves no room for such an error.
+LEAST_USED = 0.3  # least error of the recommended run, as a fraction of a tolerance
+# Largest uncertainty of a limit, as a fraction of a tolerance: a larger one leaves no room for
+# such an error.
 LIMIT = 1 - LEAST_USED
-# The error that is aimed at is the geometric mean of the least and the largest, 0.55 if the limit
-# is known well.  What is left is for cells and steps that are not refined, for the options of
-# Newton's method, and for the limit, a quarter each.
+# The search aims at the geometric mean of the least and the largest error, 0.55 for an accurate
+# limit.  The rest of the tolerance is divided by four, for cells and steps that are not refined,
+# for the options of Newton's method, and for the limit.
 NEGLIGIBLE = (1 - math.sqrt(LEAST_USED)) / 4
-NOISE = 1e-9  # part of a quantity: Newton's method leaves 1e-10 of its forces
-STEP_ORDER = 2.0  # of the schemes, at most; that of cells is twice their degree
-FURTHER = 2  # levels to the next base at most: the finest levels of the one before
-REACH = 8  # levels beyond all runs: errors of second order fall to 2**-16, the smallest asked for
+NOISE = 1e-9  # fraction of a quantity: Newton's method leaves residuals of 1e-10 of the forces
+STEP_ORDER = 2.0  # largest order of the schemes; the order of cells is twice their degree
+FURTHER = 2  # most levels to the next base: up to the finest levels of the last base
+REACH = 8  # levels beyond all runs: errors of second order fall to 2**-16, the most possible
 GRID = 8  # settings per level: an error of second order changes by 2**(2/8), a fifth
-DOUBTS = 4  # levels on which no convergence is seen; 16 times finer than the coarsest
-TRIALS = 3  # of settings; together less than the run that confirms the limit, of 4 times the cost
-SCATTER = 0.1  # part by which times of one run differ on a quiet machine, see bench_budget.py
+DOUBTS = 4  # levels without visible convergence before giving up; 16 times finer than the coarsest
+TRIALS = 3  # most settings tried; they cost less than the run for the limit, of 4 times the cost
+SCATTER = 0.1  # relative scatter of times of one run on a quiet machine, see bench_budget.py
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 
@@ -80,42 +81,42 @@ def tradeoff(
     progress: bool = True,
     comm: MPI.Intracomm | None = None,
 ) -> Tradeoff:
-    """Find the cheapest setting for a tolerance, or the most accurate one for a time.
+    """Find the cheapest setting for a tolerance, or the most accurate setting for a wall time.
 
-    The scene is run on three levels of cells and of steps.  By Richardson's extrapolation the
-    errors of the runs, the limits and the required setting are estimated.  A run that is finer than
-    that one confirms the limits, and the setting is run as well: its errors shall be 0.3 to 1 times
-    the tolerance.  All settings are arguments of :func:`simulate`; several schemes, steps and
-    meshes compete by their coarse runs.
+    The scene is run on three levels of cells and of steps.  Richardson extrapolation estimates the
+    errors of the runs, the limits and the required setting.  A run finer than this setting confirms
+    the limits.  A run with the setting must have errors of 0.3 to 1 times the tolerance.  All
+    settings are arguments of :func:`simulate`.  Several schemes, steps and meshes compete by their
+    coarse runs.
 
     Args:
         scene: Model; ``cells`` of its beams are the coarsest.
-        quantities: Functions of a :class:`Solution` by name that return a number, or an array of
-            the same shape whatever the steps and cells: ``{"tip": lambda s:
-            s.position(beam.end)[-1]}``.  The error of an array is that of its worst entry.
-        scheme: The scheme, or several.
+        quantities: Functions of a :class:`Solution` by name that return a number, or an array
+            whose shape does not depend on steps and cells: ``{"tip": lambda s:
+            s.position(beam.end)[-1]}``.  The error of an array is its largest error.
+        scheme: Time scheme, or several.
         t: Beginning and end; s.
-        dt: The longest step, s; or :class:`Adaptive` steps with the largest tolerance; or several.
-        tolerance: Largest error of each quantity, by name, in its own unit; or for all of them, as
-            a part of the quantity's largest magnitude.
-        budget: Wall time of one run, in the place of a tolerance; s.
-        mesh: The coarsest cells, or several kinds; by default of degree 1, and of degree 2 where
-            the scene allows it.
-        newton: How exactly equilibria are found; of several the first is used, and the others are
-            compared with it on a coarse run.  The fastest one that changes the quantities little is
-            used for the answer.
+        dt: Longest step, s; or :class:`Adaptive` steps with the largest tolerance; or several.
+        tolerance: Largest error of each quantity, by name, in its own unit; or for all quantities,
+            as a fraction of their largest magnitudes.
+        budget: Wall time of one run, instead of a tolerance; s.
+        mesh: The coarsest cells, or several kinds; by default of degree 1, and of degree 2 if the
+            scene allows it.
+        newton: Options of Newton's method, or several.  Runs use the first, and the others are
+            compared with it on a coarse run.  The recommendation uses the fastest options that
+            change the quantities little.
         max_seconds: Wall time of all runs; s.
         progress: Show the number of runs in a terminal or notebook.
-        comm: Processes; each run is done by one of them, several at a time.  Runs that go on
-            together disturb each other's times: leave cores idle where times matter.
+        comm: Processes; each run uses one process, and several run at a time.  Simultaneous runs
+            disturb each other's times: leave cores idle if times matter.
 
     Returns:
         The runs with their times and errors, and the recommended arguments.
 
     Raises:
-        ArgumentError: The call is wrong, or no kind of dials can be used for the scene.
-        TradeoffError: Self-convergence is not seen, or it would take too long; it says what was
-            seen and has the runs.
+        ArgumentError: The call is wrong, or no family of settings can be used for the scene.
+        TradeoffError: The runs show no self-convergence, or would take too long; the error
+            describes their results and has the runs.
 
     Example:
         >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
@@ -164,7 +165,7 @@ def tradeoff(
         run = best.best()
     for other in others:
         if other.unsure > LIMIT:
-            continue  # its coarse runs do not know
+            continue  # its coarse runs give no limit
         for name, cross in other.crosses.items():
             known = best.crosses[name]
             apart = size(cross.limit - known.limit)
@@ -178,9 +179,9 @@ def tradeoff(
 
 
 def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str]]:
-    """Search with the family that coarse runs predict to be the best, or with the next.
+    """Search with the family that coarse runs predict to be the best; if it fails, the next.
 
-    Returns the search, those that were given up, and notes on them.
+    Returns the successful search, the other searches, and notes on them.
     """
     searches: list[_Search] = []
     notes: list[str] = []
@@ -216,7 +217,7 @@ def _target_of(
     tolerance: float | Mapping[str, float] | None,
     budget: float | None,
 ) -> Target:
-    """Return the target of a call for some quantities, checked."""
+    """Check the tolerance or budget of a call, and return its target."""
     if (tolerance is None) == (budget is None):
         raise ArgumentError("tradeoff: give either a tolerance or a budget")
     if budget is not None:
@@ -254,10 +255,10 @@ class _Runs:
     scene: Scene
     quantities: Mapping[str, Quantity]
     simulate: Callable[..., Solution]
-    families: Sequence[Dials]  # coarsest dials to begin with
+    families: Sequence[Dials]  # coarsest setting of each family
     newtons: Sequence[Newton]
     t: tuple[float, float]
-    max_seconds: float  # wall time that all runs together may take; s
+    max_seconds: float  # largest total wall time of the runs; s
     comm: MPI.Intracomm
     bar: Any  # progress bar
     runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
@@ -266,7 +267,7 @@ class _Runs:
     _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
 
     def begin(self, family: int) -> None:
-        """Compile by a single step, and do the coarsest run on every process."""
+        """Compile by a single step, then do the coarsest run on every process."""
         first = Refinement(family, Fraction(1), 0.0)
         dt = self.families[family].dt
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
@@ -276,14 +277,14 @@ class _Runs:
                 self._take(first, self._member(*first))
                 self.bar.update(1)
             except ConvergenceError as error:
-                self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may do
+                self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may converge
 
     def allowed(self, refinements: Sequence[Refinement]) -> bool:
         """Return whether there is time for runs."""
         return self.spent + sum(map(self._longest, refinements)) <= self.max_seconds
 
     def run(self, refinements: Sequence[Refinement]) -> None:
-        """Run what is missing, several at a time where there are processes."""
+        """Do the runs that are missing, several at a time if there are several processes."""
         missing = [r for r in refinements if r not in self.runs and r not in self.failed]
         if not missing:
             return
@@ -317,7 +318,7 @@ class _Runs:
                 self.failed[one] = done.failed[k]
 
     def dials(self, one: Refinement) -> Dials:
-        """Return the dials of a refinement."""
+        """Return the setting of a refinement."""
         finer = self.families[one.family].finer(one.refine, one.level, self.t)
         return replace(finer, newton=self.newtons[one.newton])
 
@@ -326,7 +327,7 @@ class _Runs:
         return [run for one, run in self.runs.items() if one.family == family]
 
     def divisor(self, family: int) -> int:
-        """Return the parts of a cell, GRID at most, that make whole numbers between all places."""
+        """Return the largest q up to GRID so that refinement by (q+1)/q fits between all places."""
         mesh, scene = self.families[family].mesh, self.scene
         for q in range(GRID, 1, -1):
             finer = replace(mesh, refine=mesh.refine * Fraction(q + 1, q))
@@ -339,7 +340,7 @@ class _Runs:
         return 1
 
     def _longest(self, one: Refinement) -> float:
-        """Wall time at most, by the nearest run; s; 0 if there is none."""
+        """Bound the wall time by the nearest run; s; 0 if there is no run."""
         times = (
             run.seconds
             * 2 ** max(0.0, one.level - run.refinement.level)
@@ -379,7 +380,7 @@ class _Runs:
         return found
 
     def _take(self, one: Refinement, found: Mapping[str, Any]) -> None:
-        """Keep a run, as the first process has measured it."""
+        """Store a run with the data of the first process."""
         found = self.comm.bcast(found)
         values = {
             name: np.asarray(found[f"quantity {n}"]) for n, name in enumerate(self.quantities)
@@ -394,11 +395,11 @@ class _Runs:
 class _Choice(NamedTuple):
     """Setting of a run with its predicted time and error."""
 
-    refine: Fraction  # parts of each cell
-    level: float  # steps are about 2**level times as many
+    refine: Fraction  # divisor of each cell
+    level: float  # the number of steps is multiplied by about 2**level
     seconds: float  # wall time
     likely: float  # largest error, of cells and steps together, in its unit
-    bound: float  # the same if they do not cancel
+    bound: float  # largest error if errors of cells and steps do not cancel
 
     @property
     def levels(self) -> tuple[float, float]:
@@ -407,9 +408,9 @@ class _Choice(NamedTuple):
 
 
 class _Search:
-    """Search with one family: three levels of cells and of steps around a base, and a finer run.
+    """Search with one family: three levels of cells and of steps from a base, and a finer run.
 
-    The base moves until the setting that serves is about a level finer than it, so that the finest
+    The base moves until the chosen setting is about a level finer than the base.  Then the finest
     levels are about a level finer than the setting.
     """
 
@@ -420,8 +421,8 @@ class _Search:
         self._runs, self._target = runs, target
         self._base = [0, 0]  # levels of cells and of steps
         self._doubts: list[str] = []
-        self._larger = 1.0  # errors of runs over those predicted
-        self._speeds = [1.0] * len(runs.newtons)  # the same of times, of options of Newton's method
+        self._larger = 1.0  # errors of runs over predicted errors
+        self._speeds = [1.0] * len(runs.newtons)  # times over predicted times, by Newton options
         self._newton = 0
         self._divisor = runs.divisor(family)
         self._refine_base()
@@ -429,9 +430,9 @@ class _Search:
         self.objective = choice.seconds if math.isinf(target.budget) else choice.bound
 
     def find(self) -> None:
-        """Run what is needed to know the setting and its error; TradeoffError if none serves."""
+        """Do the runs that determine the setting and its error; TradeoffError if none serves."""
         while True:
-            choice = self._choose(min(self.unsure, NEGLIGIBLE))  # which the limit will be known to
+            choice = self._choose(min(self.unsure, NEGLIGIBLE))  # uncertainty after refinement
             some, base = next(iter(self.crosses.values())), self._base
             finest = some.cells.finest, some.steps.finest
             far = any(level > last for level, last in zip(choice.levels, finest, strict=True))
@@ -453,7 +454,7 @@ class _Search:
             except TradeoffError:
                 if self.unsure > LIMIT:
                     raise
-                self._base = before  # no time for more, but it may do
+                self._base = before  # no time for more runs, but these may suffice
                 break
         self._choose_newton()
         self._try()
@@ -468,7 +469,7 @@ class _Search:
         return min(self._runs.of(self.family), key=self._rank)
 
     def remarks(self, run: Run) -> list[str]:
-        """Say whether the order is not seen, and by how much a run is not what was asked for."""
+        """Return notes on an unseen order, and on a run that misses the target."""
         notes = [
             f"the order of convergence is not seen: {name}{cross}"
             for name, cross in self.crosses.items()
@@ -495,13 +496,13 @@ class _Search:
         return Refinement(self.family, Fraction(refine), float(level), newton)
 
     def _refine_base(self) -> None:
-        """Run three levels around the base; a finer one where changes do not fall."""
+        """Run three levels from the base; refine the base while changes do not fall."""
         while True:
             i, j = self._base
             first, *others = wanted = [
                 self._at(2**i, j), self._at(2 ** (i + 1), j), self._at(2**i, j + 1)
             ]  # fmt: skip
-            self._runs.run(wanted[:1])  # tells how long the others take
+            self._runs.run(wanted[:1])  # predicts the times of the others
             self._runs.run(wanted)
             failed = [self._runs.failed[one] for one in wanted if one in self._runs.failed]
             if failed:
@@ -535,7 +536,7 @@ class _Search:
             self._doubt("".join(f"\n  {name}{cross}" for name, cross in self.crosses.items()))
 
     def _counts(self, values: Mapping[str, Array], finer: Mapping[str, Array]) -> bool:
-        """Return whether a change counts for what was asked."""
+        """Return whether a change between levels matters for the target."""
         part = NEGLIGIBLE if math.isinf(self._target.budget) else 0.0
         return any(
             size(finer[name] - values[name]) > max(part * unit, NOISE * size(finer[name]))
@@ -543,7 +544,7 @@ class _Search:
         )
 
     def _worst(self) -> tuple[int, bool]:
-        """Return the dial, 0 or 1, that makes a limit most uncertain, and whether changes fall."""
+        """Return the largest source of doubt, cells (0) or steps (1), and if its changes fall."""
         dials = [
             (convergence.doubt / self.units[name], dial, convergence.seen)
             for name, cross in self.crosses.items()
@@ -552,7 +553,11 @@ class _Search:
         return max(dials)[1:]
 
     def _doubt(self, said: str, dial: int | None = None) -> None:
-        """Refine the base in a dial, the worst one by default; raise if that was done too often."""
+        """Refine cells (``dial=0``) or steps (1) of the base, by default the main uncertainty.
+
+        Raises:
+            TradeoffError: The base was refined too often.
+        """
         where = self._runs.dials(self._at(2 ** self._base[0], self._base[1]))
         self._doubts.append(f"\n  from {where} on: {said}")
         if len(self._doubts) == DOUBTS:
@@ -560,7 +565,7 @@ class _Search:
         self._base[self._worst()[0] if dial is None else dial] += 1
 
     def _confirm(self, choice: _Choice) -> None:
-        """Run what is a level finer than a choice, and than the base, in both dials."""
+        """Run with cells and steps a level finer than a choice and the base, for the limit."""
         i, j = self._base
         parts = 2 * max(round(2**choice.level), 2**j)
         finer = self._at(2 * max(choice.refine, Fraction(2**i)), math.log2(parts))
@@ -572,7 +577,7 @@ class _Search:
                 self.crosses[name] = cross.confirmed(found[name], *at)
 
     def _choose_newton(self) -> None:
-        """Take the options of Newton's method that are the fastest, if they change little."""
+        """Choose the fastest options of Newton's method that change the quantities little."""
         first = self._at(2 ** self._base[0], self._base[1])
         strict = self._runs.runs[first]
         most = self._share(self._choose(self.unsure))
@@ -591,7 +596,7 @@ class _Search:
                 self._newton, least = newton, run.stepping
 
     def _try(self) -> None:
-        """Run the setting that serves; correct predictions by it, and run another, if needed."""
+        """Run the chosen setting; if it misses the target, correct predictions and try again."""
         for _ in range(TRIALS):
             choice = self._choose(self.unsure)
             one = self._at(choice.refine, choice.level, self._newton)
@@ -605,25 +610,25 @@ class _Search:
                 return
             self._speeds[self._newton] *= run.seconds / choice.seconds
             if choice.likely > 0:
-                # An error below the uncertainty of the limit is not known any better.
+                # Errors are not known more accurately than the limit.
                 self._larger *= max(self.ratio(run), self.unsure) / choice.likely
 
     # -- decisions -----------------------------------------------------------------------------
 
     def _share(self, choice: _Choice) -> float:
-        """Return the part of its unit that is negligible, where with a choice errors are small."""
+        """Return the negligible error over its unit, for the size of the errors of a choice."""
         return NEGLIGIBLE * (1.0 if math.isinf(self._target.budget) else choice.bound)
 
     def _choose(self, unsure: float) -> _Choice:
-        """Choose the cheapest setting that is accurate enough, or the most accurate in a time.
+        """Choose the cheapest setting that is accurate enough, or the most accurate in the budget.
 
-        The limit is known to a part ``unsure`` of its unit.
+        The uncertainty of the limit is ``unsure``, in its unit.
         """
         some, dials = next(iter(self.crosses.values())), self._runs.families[self.family]
         top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
-        first = math.ceil(self._divisor / dials.mesh.degree)  # as many nodes as were given
+        first = math.ceil(self._divisor / dials.mesh.degree)  # nodes of the given cells at degree 1
         refine = [Fraction(k, self._divisor) for k in _spread(first, self._divisor * top[0])]
-        # Where the steps as given end, all others end as well.
+        # Whole multiples of the number of the user's steps, so that all runs end at the same time.
         parts = np.array(_spread(1, top[1]), dtype=float)
         of_cells, of_steps = np.log2(np.array(refine, dtype=float)), np.log2(parts)
         likely = bound = np.zeros((len(of_cells), len(of_steps)))
@@ -635,12 +640,12 @@ class _Search:
             bound = np.maximum(bound, np.abs(cells).max(axis=2) + np.abs(steps).max(axis=2))
         seconds = self._speeds[self._newton] * self._seconds(2.0 ** of_cells[:, None], parts)
         if math.isinf(self._target.budget):
-            # The middle half, on a logarithmic scale, of what may be the error of the answer
+            # The middle half, on a logarithmic scale, of the allowed errors.
             largest = 1 - unsure
             least, most = ((LEAST_USED ** (1 - p)) * largest**p for p in (1 / 4, 3 / 4))
             allowed = (likely <= most) & (bound <= largest)
             costs = np.where(allowed, seconds, np.inf)
-            # Errors that cancel are smaller than they must be: they cost up to twice as much.
+            # Errors that cancel may be smaller than needed; others may cost up to twice as much.
             used = allowed & (likely >= least) & (seconds <= 2 * costs.min())
             costs = np.where(used, seconds, np.inf) if used.any() else costs
             k = costs.argmin() if allowed.any() else bound.argmin()
@@ -667,16 +672,16 @@ class _Search:
         return np.asarray(a + b * cells + steps * (c + d * cells))
 
     def _accepts(self, run: Run) -> bool:
-        """Return whether a run is accurate or fast enough, and not much more."""
+        """Return whether a run is accurate or fast enough, but not much more than required."""
         budget, ratio = self._target.budget, self.ratio(run)
         if math.isinf(budget):
             return LEAST_USED <= ratio <= 1 - self.unsure
         return (1 - 2 * SCATTER) * budget <= run.seconds <= budget
 
     def _rank(self, run: Run) -> tuple[bool, bool, float]:
-        """Rank by time where accurate enough, else by errors; with a budget, the other way round.
+        """Rank by time if accurate enough, else by errors; with a budget, the other way round.
 
-        What is accurate since errors of cells and steps cancel does not count: others are not.
+        A run that is accurate only because errors of cells and steps cancel does not count.
         """
         _, refine, level, newton = run.refinement
         bound = self._larger * max(
@@ -692,6 +697,6 @@ class _Search:
 
 
 def _spread(first: int, last: int) -> list[int]:
-    """Return whole numbers, all the small ones, and fewer of the large ones."""
+    """Return integers in nearly geometric progression, GRID for each factor of 2."""
     spread = first * 2 ** np.arange(0.0, math.log2(last / first) + 1e-9, 1 / GRID)
     return [int(one) for one in np.unique(np.round(spread))]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Runs of a trade-off, what was asked of them, and its result."""
+"""Runs of a trade-off, their target, and its result."""
 
 from __future__ import annotations
 
@@ -29,12 +29,13 @@ class Dials:
     newton: Newton  # how exactly equilibria are found
 
     def finer(self, refine: Fraction, level: float, t: tuple[float, float]) -> Dials:
-        """Refine each cell into ``refine`` parts and take about ``2**level`` times as many steps.
+        """Divide each cell by ``refine`` and multiply the number of steps by about ``2**level``.
 
-        The error of an adaptive step is of third order: their number is as the cube root of 1/tol.
+        The error of an adaptive step is of third order, so the number of steps is proportional to
+        the cube root of 1/tol.
         """
         if refine == 1 and level == 0:
-            return self  # as it was given, to be checked as such
+            return self  # unchanged, so that checks see the user's arguments
         if isinstance(self.dt, float | int):
             number = max(1, math.ceil((t[1] - t[0]) / self.dt * (1 - 1e-9)))
             dt: Any = (t[1] - t[0]) / round(number * 2**level)
@@ -55,11 +56,11 @@ class Dials:
 
 
 class Refinement(NamedTuple):
-    """Family of dials and how much finer than its coarsest setting a run is."""
+    """Family of settings, and refinement of a run relative to its coarsest setting."""
 
-    family: int  # number of the dials that it begins with
-    refine: Fraction  # parts of each cell
-    level: float  # steps are about 2**level times as many
+    family: int  # number of the family, given by its coarsest setting
+    refine: Fraction  # divisor of each cell
+    level: float  # the number of steps is multiplied by about 2**level
     newton: int = 0  # number of the options of Newton's method
 
 
@@ -67,14 +68,14 @@ class Refinement(NamedTuple):
 class Run:
     """Result of a run, and its cost."""
 
-    refinement: Refinement  # how fine it is
-    dials: Dials  # with which dials
+    refinement: Refinement  # its family and refinement
+    dials: Dials  # its setting
     values: dict[str, Array]  # the quantities
     seconds: float  # wall time without compiling; s
     building: float  # part of it before the first step; s
-    steps: float  # steps that were taken
+    steps: float  # number of steps
     cells: float  # number of cells
-    iterations: float  # newton iterations per step
+    iterations: float  # Newton iterations per step
 
     @property
     def stepping(self) -> float:
@@ -87,15 +88,15 @@ class Run:
 
 @dataclass(frozen=True)
 class Target:
-    """Tolerances, of each quantity in its unit or a part of all, or the wall time of a run."""
+    """Target: tolerances, in the unit of each quantity or relative, or the wall time of a run."""
 
     absolute: Mapping[str, float]  # by quantity, in its unit; others have ``relative``
-    relative: float  # part of the largest magnitude of a quantity that errors are measured in
+    relative: float  # unit of errors, as a fraction of a quantity's largest magnitude
     budget: float  # wall time (s); infinite if errors are given
 
     @property
     def measure(self) -> str:
-        """Words for the sizes that errors are parts of."""
+        """Name of the measure by which errors are divided."""
         return "tolerances" if math.isinf(self.budget) else "largest values"
 
     @property
@@ -116,14 +117,14 @@ class Tradeoff(Rich):
     """Result of :func:`tradeoff`: runs, errors and the recommended setting.
 
     Attributes:
-        runs: All that was run.
+        runs: All runs.
         best: The run with the recommended setting.
         t: Beginning and end; s.
-        crosses: How each quantity converges with the recommended kind of dials.
+        crosses: Convergence of each quantity in the recommended family of settings.
         units: The tolerances, in the unit of each quantity; with a budget, the sizes of the
             quantities.
-        target: What was asked.
-        families: The kinds of dials, in words.
+        target: The tolerances or the budget.
+        families: The families of settings, in words.
         notes: Further remarks on the result.
         spent: Wall time of all runs; s.
 
@@ -160,7 +161,7 @@ class Tradeoff(Rich):
         return {name: cross.uncertainty for name, cross in self.crosses.items()}
 
     def errors(self, run: Run) -> dict[str, float]:
-        """Return the distances of a run from the limits, by quantity; its unit."""
+        """Return the distances of a run from the limits, by quantity, in its unit."""
         return {name: size(run.values[name] - limit) for name, limit in self.limit.items()}
 
     def ratio(self, run: Run) -> float:
@@ -169,22 +170,22 @@ class Tradeoff(Rich):
 
     @property
     def effort(self) -> float:
-        """Wall time of the steps of all runs over that of the recommended one."""
+        """Wall time of the steps of all runs over the wall time of the recommended run's steps."""
         return sum(run.stepping for run in self.runs) / self.best.stepping
 
     @property
     def front(self) -> list[Run]:
-        """Runs that no other one beats in time and in accuracy, the fastest first."""
+        """Runs that no other run beats in both time and accuracy, the fastest first."""
         seconds = np.array([run.seconds for run in self.runs])
         ratios = np.array([self.ratio(run) for run in self.runs])
         return [self.runs[k] for k in pareto(seconds, ratios)]
 
     def title(self) -> str:
-        """Return what was asked, in words."""
+        """Return the target in words."""
         return f"trade-off for {self.target}; errors are distances from the extrapolated limit"
 
     def table(self) -> list[list[str]]:
-        """Return cost, errors and dials of the runs that no other one beats, below a head."""
+        """Return cost, errors and settings of the unbeaten and the best runs, below a header."""
         rows = [["", "seconds", "steps", "cells", "iterations", *self.limit, "dials"]]
         for run in sorted({*self.front, self.best}, key=lambda run: run.seconds):
             rows.append([
@@ -215,7 +216,7 @@ class Tradeoff(Rich):
     def __str__(self) -> str:
         rows = self.table()
         widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-        widths[-1] = 0  # dials begin in one column
+        widths[-1] = 0  # settings begin in one column
         lines = ["  ".join(map(str.rjust, row, widths)) for row in rows]
         return "\n".join([self.title(), *lines, *self.remarks()])
 

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """UFL forms and functions of points, compiled for the hot loop.
 
-Forms are packed once, and refreshed only where something changed.
+Coefficients of forms are packed once; later only changed values are packed again.
 
-A form is compiled with one quadrature rule: forms that mix a one-point rule with another are
+A form is compiled with one quadrature rule: forms that mix a one-point rule with another rule are
 silently wrong in FFCx 0.9 to 0.11.
 """
 
@@ -32,18 +32,18 @@ from ufl_beam.memory import stated as stated
 
 
 def tabulator(compiled: fem.Form) -> Any:
-    """Return the C function of a compiled cell form; it lives as long as the form."""
+    """Return the C function of a compiled cell form; it is valid as long as the form exists."""
     integral = compiled.ufcx_form.form_integrals[0]
     return kernel(integral.tabulate_tensor_float64, compiled.module.ffi)
 
 
 class Prepared(NamedTuple):
-    """A form compiled for all scenes.
+    """Form compiled for all scenes.
 
     Attributes:
-        source: The C that FFCx wrote for it.
-        columns: Place of the values of each coefficient, by identity, in the numbers of a cell.
-        packed: Values of the coefficients in the cells that the form was stated on.
+        source: C file that FFCx wrote for it.
+        columns: Columns of each coefficient, by identity, in the packed values of a cell.
+        packed: Values of the coefficients in the cells of the form's own mesh.
         entries: Number of entries of the vector or matrix of a cell.
     """
 
@@ -59,7 +59,7 @@ class Prepared(NamedTuple):
 
 @lru_cache(maxsize=512)
 def prepared(form: ufl.Form) -> Prepared:
-    """Compile a form, once in a process."""
+    """Compile a form once per process."""
     compiled, source = compiled_form(form)
     ufcx, (constants, packed) = compiled.ufcx_form, pack(compiled)
     positions = ufcx.original_coefficient_positions[0 : ufcx.num_coefficients]
@@ -67,7 +67,7 @@ def prepared(form: ufl.Form) -> Prepared:
     ends = [0, *accumulate(f.function_space.element.space_dimension for f in used)]
     if packed.shape[1] != ends[-1]:
         raise ValueError(f"{VERSIONS} pack {packed.shape[1]} values of a cell, not {ends[-1]}")
-    # By identity: functions of UFL compute what they hash to.
+    # By identity, as functions of UFL compute their hashes.
     columns = {id(f): slice(*ends[i : i + 2]) for i, f in enumerate(used)}
     sizes = [x.ufl_function_space().element.space_dimension for x in form.arguments()]
     entries = math.prod(sizes)
@@ -81,9 +81,9 @@ def prepared(form: ufl.Form) -> Prepared:
 
 
 def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
-    """Fields of ``cells`` of loops.h for :meth:`Csr.blocks`: batches alike have one pattern.
+    """Make fields of ``cells`` of loops.h for :meth:`Csr.blocks`; equal batches share a pattern.
 
-    The first ones are those of cells of degree 1 with all entries of a row side by side.
+    The first patterns belong to cells of degree 1 with contiguous entries in each row.
     """
     batches, entries, lanes = places.shape
     as_one = places.reshape(batches, entries * lanes).view(f"V{entries * lanes}")[:, 0]
@@ -101,22 +101,22 @@ def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
 
 
 class Kernel:
-    """A compiled cell form together with the packed values of its coefficients.
+    """Compiled cell form with the packed values of its coefficients.
 
-    A form stated on one cell is computed on all cells, with the values of its coefficients there
-    until :meth:`put` or :meth:`set` gives them others.  If its test functions are those of the
-    unknown's space, cells add to their degrees of freedom; else each to entries of its own.
+    A form stated on one cell is evaluated on all cells.  Its coefficients keep their values on that
+    cell until :meth:`put` or :meth:`set` changes them.  If its test functions are in the unknown's
+    space, cells add to their degrees of freedom; else each cell has its own entries.
 
     Args:
         form: Cell integrals with one quadrature rule.
         unknown: The configuration that most calls change; it need not appear in the form.
         cell_dofs: Its degrees of freedom; shape (num_cells, 6).
         coordinates: Vertices of the cells; shape (num_cells, 2, 2); m.
-        several: These in batches of :data:`LANES`, see :func:`in_batches`, to compute several cells
-            at once where the form can be.
+        several: The coordinates in batches of :data:`LANES`, see :func:`in_batches`, to compute
+            several cells at once if the form allows it.
 
     Attributes:
-        lanes: Cells that are computed at once.
+        lanes: Number of cells that are computed at once.
     """
 
     def __init__(
@@ -164,13 +164,13 @@ class Kernel:
 
     @cached_property
     def _packed(self) -> Array:
-        """Values of the coefficients in the cells but for the unknown, in batches."""
+        """Values of the coefficients in the cells except the unknown, in batches."""
         stated = self._stated
         return in_batches(np.tile(stated, (len(self._dofs) // len(stated), 1)), self.lanes)
 
     @cached_property
     def _places(self) -> dict[str, Any]:
-        """Fields of ``cells`` of loops.h that say what the entries of the cells are added to."""
+        """Fields of ``cells`` of loops.h with the target positions of the cells' entries."""
         shape = len(self._dofs), self._entries
         if self._to_dofs or self._is_functional:
             return {}
@@ -186,7 +186,7 @@ class Kernel:
 
     @cached_property
     def cells(self) -> Any:
-        """Argument of ``add_cells`` of loops.h; made once all of the arrays are known."""
+        """Argument of ``add_cells`` of loops.h; made when all of its arrays are known."""
         number, of_cell = self._dofs.shape
         packed, coefficients = self._packed, self._form.packed.shape[1]
         return fill(
@@ -204,22 +204,22 @@ class Kernel:
         return id(function) in self._form.columns
 
     def position(self, function: fem.Function) -> int:
-        """Return the column of the first value of ``function``, not the unknown, in a cell."""
+        """Return the first column of ``function``, which is not the unknown, in a cell."""
         return int(self._columns[id(function)].start)
 
     def set(self, function: fem.Function, q: Array) -> None:
-        """Give ``function`` the degrees of freedom ``q``, if it appears in the form."""
+        """Set ``function`` to the degrees of freedom ``q``, if it appears in the form."""
         if (columns := self._columns.get(id(function))) is not None:
             lib.set_cells(self.cells, doubles(q), columns.start)
 
     def put(self, function: fem.Function, values: Array) -> None:
-        """Give ``function`` other values in the cells; shape (num_cells, dofs per cell)."""
+        """Set the values of ``function`` in the cells; shape (num_cells, dofs per cell)."""
         columns = self._columns[id(function)]
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
         self._packed[:, columns] = in_batches(rows, self.lanes)
 
     def share(self, other: Kernel) -> bool:
-        """Use the packed values of ``other``, if those of this form stand side by side there."""
+        """Use the packed values of ``other``, if it has this form's values contiguously."""
         mine, others = self._columns, other._columns
         shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}
         if not mine.keys() <= others.keys() or len(shifts) != 1 or self.lanes != other.lanes:
@@ -236,11 +236,11 @@ class Kernel:
         self._matrix = A
 
     def keep_entries(self) -> tuple[Any, int, Array]:
-        """Keep the entries of all cells in each evaluation from now on; nothing else may change.
+        """Store the entries of all cells in each evaluation from now on; nothing else may change.
 
         Returns:
-            A place with the address of an array for them, which C may change; the number of cells
-            in a batch, see :func:`in_batches`; and a second such array.
+            A pointer to the address of their array, which C may change; the number of cells in a
+            batch, see :func:`in_batches`; and a second array of the same shape.
         """
         batches = -(-len(self._dofs) // self.lanes)
         each, other = np.zeros((2, batches, self._entries, self.lanes))
@@ -258,9 +258,9 @@ class Kernel:
 
 
 class Pointwise:
-    """Compiler of functions from the numbers of a point, named ``inputs``, to other numbers.
+    """Compiler of functions of values at a point, named ``inputs``.
 
-    A form on a cell of unit length with one quadrature point is such a function.
+    Such a function is compiled as a form on a cell of unit length with one quadrature point.
     """
 
     def __init__(self, inputs: Sequence[str]) -> None:
@@ -270,7 +270,7 @@ class Pointwise:
         self.at: dict[str, Expr] = {name: x[i] for i, name in enumerate(inputs)}
 
     def compile(self, *outputs: Expr) -> Any:
-        """Compile a function to C; the C lives as long as this object."""
+        """Compile a function to C; it is valid as long as this object exists."""
         z = ufl.TestFunction(self._values(len(outputs)))
         dx = ufl.Measure("dx", domain=self._cell, metadata={"quadrature_degree": 1})
         form, _ = compiled_form(ufl.dot(ufl.as_vector(outputs), z) * dx)

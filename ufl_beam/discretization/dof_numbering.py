@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""From a scene to vertices, cells and the numbering of degrees of freedom.
+"""Vertices, cells and the numbering of degrees of freedom of a scene.
 
-Every process holds the numbering of the whole scene, a few integers a cell, and meshes only its
-own cells; so neither joints nor supports need communication, and files are written as if by one
-process.
+Every process holds the numbering of the whole scene, a few integers per cell, and meshes only its
+own cells.  So joints and supports need no communication, and files do not depend on the number of
+processes.
 """
 
 from __future__ import annotations
@@ -34,21 +34,21 @@ from ufl_beam.model.supports import COMPONENTS
 class Grid:
     """Vertices, cells and degrees of freedom of a scene.
 
-    Cells of a higher degree have nodes between their vertices, too.  A node has three degrees of
-    freedom (u, v, ψ); those that joints share are one.  They are numbered along the beams, the
-    shared ones last: eliminating them in this order fills in nothing but the coupling of the
+    Cells of a higher degree also have nodes between their vertices.  A node has three degrees of
+    freedom (u, v, ψ); nodes of a joint share degrees of freedom.  They are numbered along the
+    beams, shared ones last: elimination in this order causes fill-in only by the coupling of
     joints.
 
     Attributes:
-        points: Nodes of all beams: the vertices, beam after beam, those inside of cells, and the
+        points: Nodes of all beams: vertices, beam after beam, then nodes inside of cells, then the
             second vertex of each plastic hinge; shape (num_nodes, 2); m.
         cells: Vertices of the cells; shape (num_cells, 2).
         nodes_of_cells: Both vertices of the cells and the nodes between; (num_cells, degree + 1).
         beam_of_cell: Number of the beam of each cell; shape (num_cells,).
-        first_vertices: First vertex of each beam, and the number of all; (num_beams + 1,).
+        first_vertices: First vertex of each beam, then the number of vertices; (num_beams + 1,).
         dofs: Degrees of freedom of each node; shape (num_nodes, 3).
         dofs_of_bodies: Degrees of freedom of the rigid bodies; shape (num_bodies, 3).
-        multipliers: Degrees of freedom that are the forces of connectors; shape (num_links,).
+        multipliers: Lagrange multipliers, the forces of connectors; shape (num_links,).
         size: Number of degrees of freedom.
     """
 
@@ -58,7 +58,7 @@ class Grid:
         self.scene, self.mesh, beams = scene, mesh, scene.beams
         self._number_of_beam: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
         self._parameters: list[Array] = []
-        of_kind: dict[object, Array] = {}  # beams alike have one array of parameters
+        of_kind: dict[object, Array] = {}  # equal beams share parameters
         for beam, attached in scene.attached.items():
             kind = beam.cells, beam.corners, frozenset(attached) - {0.0, 1.0}
             if kind not in of_kind:
@@ -100,7 +100,7 @@ class Grid:
         return f"<Grid: {self}>"
 
     def _add_hinges(self, places: Sequence[Place]) -> None:
-        """Give each plastic hinge a second vertex, which the cell beyond it begins or ends with."""
+        """Give each plastic hinge a second vertex, an end of the cell beyond it."""
         at = np.array([self.vertex(place) for place in places], dtype=np.int64)
         numbers = range(len(self.points), len(self.points) + len(at))
         beyond = [Place(place.beam, place.s, beyond=True) for place in places]
@@ -139,12 +139,12 @@ class Grid:
         number[order] = np.arange(len(order))
         dofs = number[slots].reshape(-1, 3)
         self.dofs, self.dofs_of_bodies = dofs[:nodes], dofs[nodes:]
-        # Forces come last: eliminating what they act on first leaves no zero on the diagonal.
+        # Forces come last: eliminating their motions first leaves no zero on the diagonal.
         self.multipliers: Index = len(order) + np.arange(len(self.scene.links))
         self.size = len(order) + len(self.multipliers)
 
     def agrees(self, other: Grid) -> bool:
-        """Return whether the degrees of freedom are those of another grid."""
+        """Return whether another grid has the same degrees of freedom."""
         return (
             self.scene.beams == other.scene.beams
             and np.array_equal(self.points, other.points)
@@ -152,14 +152,14 @@ class Grid:
         )
 
     def checksum(self) -> int:
-        """A number that tells points and numberings apart."""
+        """Compute a checksum of points and numbering."""
         numbers = np.concatenate([self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers])
         return crc32(numbers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
 
     # -- beams, vertices, cells ------------------------------------------------------------------
 
     def _index(self, beam: Member) -> int:
-        """Number of a beam of the scene."""
+        """Return the number of a beam of the scene."""
         number = self._number_of_beam.get(beam)
         if number is not None:
             return number
@@ -168,34 +168,34 @@ class Grid:
         raise ModelError(f"{beam.name} is not in the scene")
 
     def parameters(self, beam: Member) -> Array:
-        """Parameters of the vertices of a beam."""
+        """Return the parameters of the vertices of a beam."""
         return self._parameters[self._index(beam)]
 
     def vertices_of(self, beam: Member) -> Index:
-        """Vertices of a beam from start to end."""
+        """Return the vertices of a beam from start to end."""
         i = self._index(beam)
         return np.arange(self.first_vertices[i], self.first_vertices[i + 1])
 
     def cells_of(self, beam: Member) -> Index:
-        """Cells of a beam from start to end."""
+        """Return the cells of a beam from start to end."""
         i = self._index(beam)
         return np.arange(self._first_cells[i], self._first_cells[i + 1])
 
     def nodes_along(self, beam: Member) -> Index:
-        """Vertices of a beam and nodes between them, from start to end."""
+        """Return the vertices of a beam and nodes between them, from start to end."""
         vertices, inner = self.vertices_of(beam), self.nodes_of_cells[self.cells_of(beam), 2:]
         return np.append(np.column_stack([vertices[:-1], inner]), vertices[-1])
 
     @property
     def pieces(self) -> Index:
-        """Neighbouring nodes, one pair after the other along each cell; (degree num_cells, 2)."""
+        """Pairs of neighbouring nodes along each cell; (degree num_cells, 2)."""
         start, end, *between = self.nodes_of_cells.T
         along = np.column_stack([start, *between, end])
         return np.stack([along[:, :-1], along[:, 1:]], axis=2).reshape(-1, 2)
 
     @cached_property
     def sections(self) -> tuple[list[Any], Index]:
-        """Sections of the beams, each object once, and the number in them of each beam's."""
+        """Sections of the beams, each object once, and the number of each beam's section."""
         numbers: dict[int, int] = {}
         of_beams = [numbers.setdefault(id(b.section), len(numbers)) for b in self.scene.beams]
         of_beam = np.array(of_beams, dtype=np.int32)
@@ -207,7 +207,7 @@ class Grid:
         """Layouts of material points, and the cells that have them.
 
         Raises:
-            ModelError: Their degree is more than one.
+            ModelError: Such cells have a degree above one.
         """
         groups = dict[Layout, list[int]]()
         sections, of_beam = self.sections
@@ -231,17 +231,17 @@ class Grid:
         return np.sort(np.concatenate([np.zeros(0, dtype=np.int64), *groups]))
 
     def lengths(self, cells: Index) -> Array:
-        """Lengths of some cells; (len(cells),); m."""
+        """Compute lengths of cells; (len(cells),); m."""
         start, end = self.cells[cells].T
         x, y = (self.points[end] - self.points[start]).T
         return np.asarray(np.sqrt(x * x + y * y))
 
     def hinges(self, beam: Member) -> list[SofteningLaw | None]:
-        """Law of the hinge that may open in the middle of each cell of a beam."""
+        """Return the law of the hinge that may open in the middle of each cell of a beam."""
         return [beam.section.hinge] * len(self.cells_of(beam))
 
     def keys(self, cells: Index) -> list[tuple[int, int]]:
-        """A number for the ends of the beam, and the number in the beam, of some cells."""
+        """Return for each cell a checksum of its beam's ends, and its number in the beam."""
         beams = self.beam_of_cell[cells]
         of_beam = [
             crc32(struct.pack("4d", *beam.ends[0], *beam.ends[1])) for beam in self.scene.beams
@@ -252,7 +252,7 @@ class Grid:
     # -- places ----------------------------------------------------------------------------------
 
     def cell_and_part(self, place: Place) -> tuple[int, float]:
-        """The cell at a place, and the part of it that lies before the place."""
+        """Return the cell at a place, and the fraction of it that lies before the place."""
         require_kind(place, Place, "place")
         if place.beam not in self._number_of_beam:
             raise ModelError(f"{place}: {place.beam.name} is not in the scene")
@@ -263,11 +263,11 @@ class Grid:
         return int(self._first_cells[i]) + left, float(part)
 
     def cell(self, place: Place) -> int:
-        """The cell at a place; at a vertex the one before it, at the start the first one."""
+        """Return the cell at a place; at a vertex the cell before it, at the start the first."""
         return self.cell_and_part(place)[0]
 
     def vertex(self, place: Place) -> int:
-        """The vertex at a place that something is attached to."""
+        """Return the vertex of an attachment place."""
         if place.beyond:
             return self._beyond[place]
         i = self._index(place.beam)
@@ -279,52 +279,52 @@ class Grid:
         return cell + i + round(part)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
-        """Nodes of the cell at a place, vertices first, and their weights there; (degree + 1,)."""
+        """Return nodes of the cell at a place, vertices first, and their weights; (degree + 1,)."""
         cell, part = self.cell_and_part(place)
         first, *between, last = self.mesh.weights(part)
         nodes = self.nodes_of_cells[cell].copy()
-        if part in (0.0, 1.0):  # the side of a hinge that is attached to, not that of the cell
+        if part in (0.0, 1.0):  # the attached side of a hinge, not the cell's
             nodes[int(part)] = self.vertex(place)
         return nodes, np.array([first, last, *between])
 
     def place(self, vertex: int) -> Place:
-        """Place of a vertex."""
+        """Return the place of a vertex."""
         number = int(np.searchsorted(self.first_vertices, vertex, side="right")) - 1
         beam: Member = self.scene.beams[number]
         return beam.at(float(self._parameters[number][vertex - self.first_vertices[number]]))
 
     def middle(self, cell: int) -> Place:
-        """The place in the middle of a cell."""
+        """Return the place in the middle of a cell."""
         number = int(self.beam_of_cell[cell])
         s, i = self._parameters[number], cell - int(self._first_cells[number])
         beam: Member = self.scene.beams[number]
         return beam.at((s[i] + s[i + 1]) / 2)
 
     def place_of(self, number: int) -> Place:
-        """The middle of a cell or, numbered after the cells, the place of a plastic hinge."""
+        """Return the middle of a cell, or the place of a hinge, numbered after the cells."""
         if number < len(self.cells):
             return self.middle(number)
         return place_of(self.scene.hinges[number - len(self.cells)])
 
     def hinge_at(self, place: Place) -> Connector | None:
-        """The plastic hinge of zero length at a place, if there is one."""
+        """Return the plastic hinge of zero length at a place, or None."""
         return next((h for h in self.scene.hinges if place in (h.a, h.b)), None)
 
     # -- degrees of freedom ----------------------------------------------------------------------
 
     def nodes_of(self, one: Member | Body) -> tuple[Array, Index]:
-        """Points and degrees of freedom of the nodes of a beam or body; (n, 2), (n, 3); m."""
+        """Return points and degrees of freedom of nodes of a beam or body; (n, 2), (n, 3); m."""
         if isinstance(one, Body):
             return np.array([one.center]), self.node(one.middle).reshape(1, 3)
         nodes = self._nodes_of(one)
         return self.points[nodes], self.dofs[nodes]
 
     def _nodes_of(self, beam: Member) -> Index:
-        """Nodes of a beam, both sides of its hinges included."""
+        """Return the nodes of a beam, including both sides of its hinges."""
         return np.union1d(self.nodes_of_cells[self.cells_of(beam)], self.vertices_of(beam))
 
     def node(self, anchor: Anchor) -> Index:
-        """Degrees of freedom of what an anchor that has a vertex, or a body, moves with; (3,)."""
+        """Return degrees of freedom of the vertex or body that an anchor belongs to; (3,)."""
         of = node(anchor)
         if not isinstance(of, Body):
             return np.asarray(self.dofs[self.vertex(of)])
@@ -334,14 +334,14 @@ class Grid:
 
     @cached_property
     def rotations(self) -> Index:
-        """Degrees of freedom that are rotations, those that joints share once."""
+        """Rotational degrees of freedom, each shared one once."""
         return np.unique(np.r_[self.dofs[:, 2], self.dofs_of_bodies[:, 2]])
 
     @property
     def scales(self) -> Array:
-        """Factors of comparable motions: 1 over the size of the scene, 1 for rotations; (size,).
+        """Scale factors of motions: 1 over the size of the scene, 1 for rotations; (size,).
 
-        Forces of connectors have 0.
+        Forces of connectors have the factor 0.
         """
         scales = np.full(self.size, 1 / self.scene.size)
         scales[self.rotations] = 1.0
@@ -357,7 +357,7 @@ class Grid:
         return np.column_stack([both, self.multipliers]).astype(np.int64)
 
     def describe(self, dof: int) -> str:
-        """A degree of freedom in words: its component, beam and point."""
+        """Describe a degree of freedom by its component, beam and point."""
         if dof in self.multipliers:
             return f"what holds {self.scene.links[dof - self.multipliers[0]]}"
         if dof not in self.dofs:
@@ -369,12 +369,12 @@ class Grid:
         return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
 
     def describe_cell(self, number: int) -> str:
-        """A cell in words: its beam and its middle."""
+        """Describe a cell by its beam and its middle."""
         x, y = self.points[self.cells[number]].mean(axis=0)
         return f"{self.scene.beams[self.beam_of_cell[number]].name} at ({x:g}, {y:g})"
 
     def worst(self, sizes: Array) -> dict[str, float]:
-        """Largest degree of freedom of each beam, body and connector, in words; zeros left out."""
+        """Describe the largest degree of freedom of each beam, body and connector, if not zero."""
         dofs_of_beams = [self.nodes_of(beam)[1] for beam in self.scene.beams]
         groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
         worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""The finite element of the beams that forms are stated on, and the cells of a share of the grid.
+"""Finite element of the beams, on which forms are stated, and the cells of a subdomain.
 
-Forms depend on nothing of a scene: they are stated on one cell, and compiled once in a process.  A
+Forms do not depend on a scene: they are stated on one cell and compiled once per process.  The
 user's own integrals are on the cells of a scene as a mesh of DOLFINx.
 """
 
@@ -31,15 +31,15 @@ from ufl_beam.model.scene import Scene
 
 
 class Element:
-    """The finite element of the beams, and the functions that forms are written in.
+    """Finite element of the beams, and the functions in which forms are written.
 
-    Forms that are compiled once for all scenes are stated on one cell; DOLFINx assembles those that
+    Forms that are compiled once for all scenes are stated on one cell; DOLFINx assembles forms that
     are stated on the cells of a scene.
 
     Attributes:
         degree: Polynomial degree of configurations.
         axis: Undeformed axis at the points of ``dx(1)``, in UFL.
-        anywhere: That at the points of any rule.
+        anywhere: Undeformed axis at the points of any rule.
         space: Configurations (u_x, u_y, ψ).
         q0, q1: Configurations at the beginning and at the end of a step.
         w: Virtual motions.
@@ -64,38 +64,38 @@ class Element:
         )
 
     def configuration(self) -> fem.Function:
-        """A new configuration (u_x, u_y, ψ)."""
+        """Create a configuration (u_x, u_y, ψ)."""
         return fem.Function(self.space)
 
     def in_cells(self, *shape: int) -> fem.Function:
-        """A new function with a value, or values of a shape, in each cell."""
+        """Create a function with a value, or values of a shape, in each cell."""
         return fem.Function(fem.functionspace(self._cell, ("DG", 0, shape)))
 
     def at_points(self, *shape: int) -> fem.Function:
-        """A new function with values of a shape in the points of ``dx(1)``."""
+        """Create a function with values of a shape at the points of ``dx(1)``."""
         rule = self._rule(1)
         element = basix.ufl.quadrature_element("interval", value_shape=shape, degree=rule)
         return fem.Function(fem.functionspace(self._cell, element))
 
     def sampled(self, values: Expr) -> ufl.Form:
-        """Values of shape (3,) in the points of ``dx(1)``, each with the weight of its point."""
+        """Return values of shape (3,) at the points of ``dx(1)``, multiplied by their weights."""
         z = ufl.TestFunction(self.at_points(3).function_space)
         return ufl.dot(values, z) / self.axis.h * self.dx(1)
 
     def constant(self, value: float) -> fem.Constant:
-        """A number that forms are not compiled for anew."""
+        """Create a number whose changes need no new compilation of forms."""
         return fem.Constant(self._cell, value)
 
     def dx(self, degree: int) -> ufl.Measure:
-        """Integration over the cells; one degree per form, see compiled_forms.py.
+        """Return the measure of the cells; one degree per form, see compiled_forms.py.
 
-        ``degree`` is for cells of degree 1; each degree that they have more adds two.
+        ``degree`` is for cells of degree 1; each further degree of the cells adds two.
         """
         rule = {"quadrature_degree": self._rule(degree)}
         return ufl.Measure("dx", domain=self._cell, metadata=rule)
 
     def dx_of_mass(self) -> ufl.Measure:
-        """Integration of inertia: exact, or with the nodes as points, which lumps it."""
+        """Return the measure of inertia: exact, or lumped, with the nodes as points."""
         if not self._lumped:
             return self.dx(2)
         rule = {"quadrature_rule": "GLL", "quadrature_degree": self._rule(1)}
@@ -106,7 +106,7 @@ class Element:
 
 
 def element_of(mesh: Mesh) -> Element:
-    """The element of a mesh on one cell, one for all meshes alike but for their cells."""
+    """Return the element of a mesh on one cell; meshes that differ only in cells share it."""
     return _element(mesh.degree, mesh.lumped)
 
 
@@ -117,21 +117,21 @@ def _element(degree: int, lumped: bool) -> Element:
 
 @stated
 def derivative(work: ufl.Form, q1: fem.Function) -> ufl.Form:
-    """Derivative of a virtual work."""
+    """Return the derivative of a virtual work."""
     return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
 
 
 @stated
 def applied(form: ufl.Form, q1: fem.Function) -> ufl.Form:
-    """A bilinear form times a vector, the unknown q1."""
+    """Return a bilinear form times a vector, the unknown q1."""
     return ufl.action(form, q1)
 
 
 class Fields:
-    """Cells of one process, or some of them: what forms of the element are evaluated on.
+    """Cells of one process, or some of them, on which forms of the element are evaluated.
 
-    Loops in C evaluate forms, which are compiled once for all scenes.  A ``part`` are positions in
-    ``share.cells``.
+    Loops in C evaluate the forms, which are compiled once for all scenes.  ``part`` holds positions
+    in ``share.cells``.
 
     Attributes:
         cell_dofs: Local degrees of freedom of the cells; (num_cells, 3 (degree + 1)).
@@ -152,15 +152,13 @@ class Fields:
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index | None = None, *,
         several: bool = True,
     ) -> Kernel:  # fmt: skip
-        """A form on the cells, compiled.
-
-        It has the numbers of the sections of the cells.
+        """Compile a form for the cells, with the properties of their sections.
 
         Args:
             form: Cell integrals with one quadrature rule.
             unknown: The configuration that changes.
-            cell_dofs: Its degrees of freedom, if not all of the cells are unknown.
-            several: Whether to compute several cells at once, if that is possible.
+            cell_dofs: Its degrees of freedom, by default all of the cells.
+            several: Whether to compute several cells at once, if possible.
         """
         dofs = self.cell_dofs if cell_dofs is None else cell_dofs
         lanes = self._coordinates_in_lanes if several else None
@@ -171,11 +169,11 @@ class Fields:
         return kernel
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
-        """Kernels of a virtual work and of its derivative, for ``A``, that share coefficients."""
+        """Compile a virtual work and its derivative, for ``A``, with shared coefficients."""
         form, lanes = derivative(work, q1), self._coordinates_in_lanes
         force = self.kernel(work, q1)
         tangent = Kernel(form, q1, self.cell_dofs, self._coordinates(), lanes)
-        if force.lanes != tangent.lanes:  # they would not share numbers
+        if force.lanes != tangent.lanes:  # they could not share coefficients
             force = self.kernel(work, q1, several=False)
             tangent = Kernel(form, q1, self.cell_dofs, self._coordinates())
         if not tangent.share(force):
@@ -184,7 +182,7 @@ class Fields:
         return force, tangent
 
     def _coordinates(self) -> Array:
-        """Vertices of the cells; (num_cells, 2, 2); m."""
+        """Return the vertices of the cells; (num_cells, 2, 2); m."""
         grid = self.share.grid
         vertices = grid.cells.take(self.share.cells[self.order], axis=0)
         return np.asarray(grid.points.take(vertices, axis=0))
@@ -194,7 +192,7 @@ class Fields:
         return in_batches(self._coordinates(), LANES)
 
     def matrix(self) -> Csr:
-        """A new matrix on the degrees of freedom of this process."""
+        """Create a matrix on the degrees of freedom of this process."""
         if self._matrix is None:
             share = self.share
             links = share.grid.scene.links
@@ -208,7 +206,7 @@ class Fields:
         return self._matrix.zeros_like()
 
     def assembled(self, form: ufl.Form) -> Csr:
-        """A new matrix with a bilinear form of the undeformed scene."""
+        """Assemble a bilinear form of the undeformed scene in a new matrix."""
         matrix = self.matrix()
         kernel = self.kernel(form, self.element.q1, several=False)
         kernel.place(matrix)
@@ -216,7 +214,7 @@ class Fields:
         return matrix
 
     def of_sections(self, function: fem.Function) -> Array:
-        """Numbers of the sections of the cells, for a coefficient of the element."""
+        """Return properties of the cells' sections, for a coefficient of the element."""
         grid = self.share.grid
         names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
         sections, of_beam = grid.sections
@@ -227,26 +225,26 @@ class Fields:
 
 @stated
 def mass_form(of: Element) -> ufl.Form:
-    """Mass of the beams, a bilinear form; kg, kg m²."""
+    """Return the mass of the beams as a bilinear form; kg, kg m²."""
     v = of.configuration()
     momentum = ufl.derivative(kinetic_energy(v, of.inertia) * of.dx_of_mass(), v, of.w)
     return ufl.derivative(momentum, v, ufl.TrialFunction(of.space))  # P(67)
 
 
 def mass_kernel(fields: Fields) -> Kernel:
-    """Mass of the beams times a vector, the unknown q1."""
+    """Compile the mass of the beams times a vector, the unknown q1."""
     q1 = fields.element.q1
     return fields.kernel(applied(mass_form(fields.element), q1), q1)
 
 
 def lumps(scene: Scene) -> list[tuple[Anchor, float, float]]:
-    """Places, masses and rotary inertias of the point masses and the bodies; kg, kg m²."""
+    """List places, masses and rotary inertias of the point masses and the bodies; kg, kg m²."""
     masses = [(one.place, one.mass, one.inertia) for one in scene.masses]
     return masses + [(one.middle, one.mass, one.inertia) for one in scene.bodies]
 
 
 def mass_matrix(fields: Fields) -> Csr:
-    """Mass of the beams, the point masses and the bodies."""
+    """Assemble the mass matrix of the beams, the point masses and the bodies."""
     share, M = fields.share, fields.assembled(mass_form(fields.element))
     for place, mass, inertia in lumps(share.grid.scene):
         dofs = share.grid.node(place)
@@ -262,10 +260,10 @@ def _weighted_strains(of: Element) -> ufl.Form:
 
 
 class Strains:
-    """(Σ, Γ, K) in the points of the cells of some fields; the kernel weights them.
+    """Strains (Σ, Γ, K) at the points of the cells; the kernel multiplies them by weights.
 
     Attributes:
-        weights: Of the numbers of a cell.
+        weights: Weights of the strains of a cell.
     """
 
     def __init__(self, fields: Fields) -> None:
@@ -274,11 +272,11 @@ class Strains:
         self.shape = (len(fields.order), len(self.weights))
 
     def __call__(self, q: Array) -> Array:
-        """Strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
+        """Compute strains at ``q``, in the order of the mesh, point after point; 1, 1, 1/m."""
         return np.asarray(self._weighted(q) / self.weights)
 
     def mean(self, q: Array) -> Array:
-        """Means of the cells at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
+        """Compute cell means at ``q``, in the order of the mesh; (num_cells, 3); 1, 1, 1/m."""
         in_points = self._weighted(q).reshape(self.shape[0], self.shape[1] // 3, 3)
         return np.asarray(in_points.sum(axis=1))
 
@@ -295,7 +293,7 @@ def _section_forces(of: Element) -> ufl.Form:
 
 
 def section_forces(fields: Fields) -> Kernel:
-    """(N, V, M) in the cells were they elastic, from the strains of a configuration, P(7)."""
+    """Compile (N, V, M) of elastic cells from the strains of a configuration, P(7)."""
     return fields.kernel(_section_forces(fields.element), fields.element.q1, several=False)
 
 
@@ -303,7 +301,7 @@ def section_forces(fields: Fields) -> Kernel:
 
 
 def dofs_of_cells(space: fem.FunctionSpace) -> Index:
-    """Degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
+    """Return degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
     blocks, size = space.dofmap.list, space.dofmap.bs
     return np.asarray(blocks[:, :, None] * size + np.arange(size)).reshape(len(blocks), -1)
 
@@ -312,7 +310,7 @@ def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
     """Integrate a form without arguments, or a scalar expression, over the cells of a mesh.
 
     Raises:
-        ModelError: It is neither, or it is of another mesh.
+        ModelError: ``integral`` is neither, or is on another mesh.
     """
     if isinstance(integral, Expr) and not integral.ufl_shape:
         integral = integral * ufl.dx(domain=mesh)
@@ -328,7 +326,7 @@ def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
         )
     if any(domain != mesh.ufl_domain() for domain in integral.ufl_domains()):
         raise ModelError("dolfinx.total: the form is of another mesh; state it on view.mesh")
-    # One by one, as each compiled form has one quadrature rule.
+    # Separately, as each compiled form has one quadrature rule.
     forms = (compiled_form(ufl.Form([one]))[0] for one in integral.integrals())
     return float(sum(fem.assemble_scalar(form) for form in forms))
 
@@ -337,7 +335,7 @@ class DolfinxFields(Fields):
     """Cells whose element is stated on their own mesh, for DOLFINx to assemble.
 
     Attributes:
-        mesh: Mesh of the cells, which DOLFINx puts in an order of its own.
+        mesh: Mesh of the cells, which DOLFINx reorders.
     """
 
     def __init__(self, share: Share, part: Index | None = None) -> None:

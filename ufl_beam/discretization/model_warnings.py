@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Warnings about scenes that can be computed but are likely not what is meant."""
+"""Warnings about scenes that can be computed but probably contain a mistake."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 
 TOUCHING = 1e-3
-"""Distance of places that touch, as a part of the length of the shorter beam."""
+"""Largest distance of touching places, as a fraction of the length of the shorter beam."""
 
 JUMP = 1e-6
-"""Least jump of a prescribed motion, as a part of the size of the scene, or in rad."""
+"""Least jump of a prescribed motion, as a fraction of the size of the scene, or in rad."""
 
 FAR_OUT = 10.0
-"""Distance of a point from its body's centre that is unlikely, in radii of gyration."""
+"""Unlikely distance of a point from its body's centre, in radii of gyration."""
 
 
 def warn_of_masses(scene: Scene) -> None:
-    """Warn of beams without mass beside others that have mass, and of scenes without any."""
+    """Warn of massless beams in a scene with other mass, and of scenes without mass."""
     light = [beam.name for beam in scene.beams if beam.section.massless_by_default]
     if not light:
         return
@@ -64,7 +64,7 @@ def warn_of_rates(scene: Scene) -> None:
 
 
 def warn_of_free_hinges(scene: Scene) -> None:
-    """Warn of hinges given at free ends where a load is a moment, which acts on the member."""
+    """Warn of hinges at free ends that are omitted because only a moment load is beyond them."""
     there = {place_of(hinge) for hinge in scene.hinges}
     for load in scene.moments:
         place = load.place
@@ -92,7 +92,7 @@ def warn_of_touching(grid: Grid) -> None:
 
 
 def _touching(grid: Grid) -> Index:
-    """Vertices of ends, and of what they touch without being joined to it; (num_pairs, 2)."""
+    """Return vertices of ends, and vertices that they touch without a joint; (num_pairs, 2)."""
     first = grid.first_vertices
     beam_of = np.repeat(np.arange(len(first) - 1), np.diff(first))
     points = grid.points[: first[-1]]
@@ -105,7 +105,7 @@ def _touching(grid: Grid) -> Index:
     counts = np.array([len(one) for one in near])
     end = np.repeat(ends, counts)
     other = np.fromiter(chain.from_iterable(near), dtype=np.int64, count=len(end))
-    # A beam touches itself where both of its ends meet.
+    # A beam touches itself only if both of its ends meet.
     apart = (beam_of[end] != beam_of[other]) | (np.isin(other, ends) & (end < other))
     gap = np.linalg.norm(points[end] - points[other], axis=1)
     kept = apart & (gap <= np.minimum(reach[end], reach[other]))
@@ -120,13 +120,13 @@ def _touching(grid: Grid) -> Index:
     order = np.lexsort((gap, keys))
     _, nearest = np.unique(keys[order], return_index=True)
     pairs = np.column_stack([end, other])[order][nearest]
-    # Two ends that touch each other are one pair.
+    # Two ends that touch each other count as one pair.
     _, once = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
     return np.asarray(pairs[np.sort(once)])
 
 
 def _groups(grid: Grid) -> Index:
-    """Number of the group of nodes that joints, connectors and supports join to each node."""
+    """Number groups of nodes connected by joints, connectors and supports; return each node's."""
     links = grid.dofs_of_links[:, :2]
     fixed = [s.place for s in grid.scene.supports if {0, 1} <= s.held.keys()]
     has_ground = GROUND in grid.scene.rigid_bodies
@@ -139,7 +139,7 @@ def _groups(grid: Grid) -> Index:
 
 @of_structure
 def _connected(size: int, pairs: Index) -> tuple[Index]:
-    """Number of the group of each of so many degrees of freedom, of which pairs are connected."""
+    """Return the group number of each of ``size`` degrees of freedom, given connected pairs."""
     rows, columns = pairs.T
     graph = coo_array((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(size, size))
     return (connected_components(graph, directed=False)[1],)
@@ -148,8 +148,8 @@ def _connected(size: int, pairs: Index) -> tuple[Index]:
 def warn_of_far_points(scene: Scene) -> None:
     """Warn of points of bodies that are far from their body and from everything else.
 
-    ``body.at(x, y)`` takes coordinates of the undeformed scene; a point that was meant relative to
-    the centre is far out.
+    ``body.at(x, y)`` takes coordinates of the undeformed scene; a point relative to the centre,
+    given by mistake, may be far away.
     """
     attached = (place for _, place in scene.attachments() if isinstance(place, Spot))
     spots = dict.fromkeys(s for s in attached if s.body is not GROUND and not carries(s))
@@ -177,7 +177,7 @@ def warn_of_far_points(scene: Scene) -> None:
 
 
 def _points(scene: Scene) -> Iterator[tuple[tuple[float, float], object]]:
-    """Points of a scene, and the beam or body that each of them belongs to."""
+    """Yield points of a scene, and the beam or body of each."""
     for beam in scene.beams:
         for s in (0.0, *beam.corners, *(i / beam.cells for i in range(1, beam.cells + 1))):
             yield beam.at(s).point, beam
@@ -188,7 +188,7 @@ def _points(scene: Scene) -> Iterator[tuple[tuple[float, float], object]]:
 
 
 def warn_of_origin(scene: Scene) -> None:
-    """Warn of velocities that turn about the origin by default where the scene is far from it."""
+    """Warn of angular velocities about the default origin if the scene is far from it."""
     points = np.array([point for point, _ in _points(scene)])
     away = _outside(np.zeros(2), points)
     for velocity in scene.initial:
@@ -206,16 +206,16 @@ def warn_of_origin(scene: Scene) -> None:
 
 
 def _outside(point: Array, points: Array) -> float:
-    """Distance of a point from the box around others; m."""
+    """Compute the distance of a point from the box around others; m."""
     low, high = points.min(axis=0), points.max(axis=0)
     beyond = np.maximum(low - point, 0.0) + np.maximum(point - high, 0.0)
     return float(np.linalg.norm(beyond))
 
 
 def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
-    """Warn of prescribed motions that do not begin where the scene is, ``q`` at ``t``; in dynamics.
+    """Warn of prescribed motions in dynamics that jump from the state ``q`` at the time ``t``.
 
-    ``motions`` are the relative motions of the connectors there; (num_links,).
+    ``motions`` are the relative motions of the connectors in this state; (num_links,).
     """
     starts = [
         (

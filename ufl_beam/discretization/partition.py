@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Partition of a scene: the cells and degrees of freedom that one process computes."""
+"""Partition of a scene into subdomains: cells and degrees of freedom of each process."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ufl_beam.model.bodies import Anchor, Spot
 
 
 def bisected(points: Array, number: int) -> Index:
-    """Divide points into parts of equal size that border on few others; the part of each.
+    """Divide points into subdomains of equal size with few neighbours; return each point's number.
 
-    Recursive coordinate bisection: across the longer side of their bounding box, again and again.
+    Recursive coordinate bisection divides along the longer side of the bounding box.
     """
     part = np.zeros(len(points), dtype=np.int32)
     to_divide = [(np.arange(len(points)), 0, number)]
@@ -38,25 +38,25 @@ def bisected(points: Array, number: int) -> Index:
 
 
 class Share:
-    """The part of a grid that one process computes: its cells, and their degrees of freedom.
+    """Subdomain of a grid that one process computes: its cells, and their degrees of freedom.
 
-    Local numbers: first the degrees of freedom that this process owns, then the ghosts; each in the
-    order of the grid.  Global numbers, those of PETSc, are contiguous on each process.
+    Local numbers begin with the degrees of freedom that this process owns, followed by the ghosts,
+    each in the order of the grid.  Global numbers, used by PETSc, are contiguous on each process.
 
     Attributes:
         grid: The :class:`Grid`.
-        alone: True if there is only one process; asking MPI takes longer.
+        alone: True if there is only one process; MPI calls take longer.
         cells: Numbers of the cells of this process, ascending.
         dofs: Degrees of freedom, in numbers of the grid, by local number.
-        size: How many there are, ghosts included.
-        num_owned: How many of them this process owns.
-        ghosts: Global numbers of the others.
+        size: Number of local degrees of freedom, including ghosts.
+        num_owned: Number of degrees of freedom that this process owns.
+        ghosts: Global numbers of the ghosts.
         cell_dofs: Local degrees of freedom of the cells: all u, all v, all ψ of their nodes;
             shape (len(cells), 3 (degree + 1)).
         links: Numbers of the connectors of this process.
-        body_dofs: Local degrees of freedom of the bodies that are here; (num, 3).
-        link_dofs: Local degrees of freedom of the connectors: those of a cell, and their force;
-            shape (len(links), 7).
+        body_dofs: Local degrees of freedom of the bodies on this process; (num, 3).
+        link_dofs: Local degrees of freedom of the connectors: u, v, ψ of both nodes, as in a cell,
+            and the force; shape (len(links), 7).
         rotations, multipliers: Local numbers of all rotations, and of the forces of connectors;
             int32.
     """
@@ -66,7 +66,7 @@ class Share:
         self.comm, self.alone = comm, comm.size == 1
         rank_of_cell = bisected(grid.points[grid.cells].mean(axis=1), comm.size)
         owner = np.full(grid.size, comm.size, dtype=np.int32)
-        for rank in reversed(range(comm.size)):  # the first of those that have it
+        for rank in reversed(range(comm.size)):  # the first process that has it
             owner[grid.dofs[grid.nodes_of_cells[rank_of_cell == rank]]] = rank
         self.cells = np.flatnonzero(rank_of_cell == comm.rank).astype(np.int32)
         of_cell = grid.dofs[grid.nodes_of_cells[self.cells]].transpose(0, 2, 1)
@@ -76,7 +76,7 @@ class Share:
         of_link = grid.dofs_of_links
         rank_of_link = owner[of_link].min(axis=1, initial=comm.size) % comm.size
         np.minimum.at(owner, of_link, rank_of_link[:, None])
-        owner[owner == comm.size] = 0  # bodies that nothing is attached to
+        owner[owner == comm.size] = 0  # bodies without attachments
         self.links = np.flatnonzero(rank_of_link == comm.rank)
         order = np.argsort(owner, kind="stable").astype(np.int32)
         number = np.empty(grid.size, dtype=np.int32)  # of PETSc
@@ -107,13 +107,13 @@ class Share:
 
     @cached_property
     def scratch(self) -> Array:
-        """Space for a number of each degree of freedom; loops in C leave it to what comes after."""
+        """Scratch space for each degree of freedom; loops in C keep nothing in it between calls."""
         return np.empty(self.size)
 
     def computes(self, anchor: Anchor) -> bool:
         """Return whether this process has the (first) cell at a place, or owns a body.
 
-        It then has all degrees of freedom of the place, even if others own some of them.
+        It then has all degrees of freedom of the place, even if other processes own some of them.
         """
         if isinstance(anchor, Spot):
             return bool(self.owns(self.grid.node(anchor)).all())
@@ -121,7 +121,7 @@ class Share:
         return bool(np.any(self.cells[place : place + 1] == cell))
 
     def translations(self) -> tuple[Index, Index]:
-        """Local numbers of both components of all displacements."""
+        """Return local numbers of both components of all displacements."""
         grid = self.grid
         pairs = np.unique(np.r_[grid.dofs[:, :2], grid.dofs_of_bodies[:, :2]], axis=0)
         found = self._local[pairs]
@@ -129,9 +129,9 @@ class Share:
         return x, y
 
     def lengths(self) -> Array:
-        """Change of each local dof by a strain of one: a cell's length, or a radian.
+        """Return the change of each local dof by a unit strain: a cell's length, or a radian.
 
-        Bodies are as large as the scene; forces of connectors have no length.
+        Bodies have the size of the scene, forces of connectors 0.
         """
         lengths = np.full(self.size, self.grid.scene.size)
         displacements = self.cell_dofs[:, : 2 * (self.grid.mesh.degree + 1)]
@@ -141,7 +141,7 @@ class Share:
         return lengths
 
     def weights(self) -> Array:
-        """Factors that make forces and moments comparable, see ``StepEquation``; a new array."""
+        """Return factors that make forces and moments comparable, see ``StepEquation``."""
         weights = np.ones(self.size)
         weights[self.rotations] = 1 / self.grid.scene.size
         weights[self.multipliers] = 0.0
@@ -149,19 +149,19 @@ class Share:
         return weights
 
     def local(self, dofs: Index) -> Index:
-        """Local numbers of those ``dofs`` (numbers of the grid) that this process has."""
+        """Return local numbers of the ``dofs`` (numbers of the grid) that this process has."""
         found = self._local[dofs]
         return np.asarray(found[found >= 0])
 
     def owns(self, dofs: Index) -> npt.NDArray[np.bool_]:
-        """Which of ``dofs`` (numbers of the grid) this process owns."""
+        """Return which of ``dofs`` (numbers of the grid) this process owns."""
         found = self._local[dofs]
         return np.asarray((found >= 0) & (found < self.num_owned))
 
     def gather(self, values: Array) -> Array:
-        """Values of all degrees of freedom, in the order of the grid, on every process.
+        """Gather values of all degrees of freedom, in the order of the grid, on every process.
 
-        One process alone gets ``values`` back: states are new arrays in each step.
+        A single process returns ``values`` itself: states are new arrays in each step.
         """
         if self.alone:
             return values
@@ -172,7 +172,7 @@ class Share:
         return result
 
     def added(self, values: Array) -> Array:
-        """Sums over the processes of values at the local degrees of freedom."""
+        """Sum values at the local degrees of freedom over the processes."""
         if self.alone:
             return values
         sums = np.zeros(self.grid.size)
@@ -181,14 +181,14 @@ class Share:
         return np.asarray(sums[self.dofs])
 
     def total(self, value: float) -> float:
-        """Sum over the processes."""
+        """Return the sum over the processes."""
         return value if self.alone else float(self.comm.allreduce(value))
 
     def largest(self, value: float) -> float:
-        """Largest over the processes; infinite where one has no number.
+        """Return the largest value over the processes; infinite if any value is NaN.
 
-        MPI does not say what the largest of numbers is with one that is none, and processes that
-        learn different ones part.
+        MPI does not define the maximum with NaN, and processes with different results would
+        diverge.
         """
         if self.alone:
             return value

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""The state of a simulation in numbers of the grid: the same on any number of processes.
+"""State of a simulation in numbers of the grid, the same on any number of processes.
 
-Whatever remembers something from one step to the next states in one method, ``remember``, what that
-is; the same statement writes it down and takes it back.
+Each object with state between steps lists it in one method, ``remember``.  The same calls save and
+restore it.
 """
 
 from __future__ import annotations
@@ -17,15 +17,15 @@ from ufl_beam.discretization.partition import Share
 from ufl_beam.errors import ModelError
 
 NOWHERE: Array = np.empty(0)
-"""In the place of a configuration: of what is remembered, strains and stored energies are not that
-of the scene."""
+"""Argument of ``remember`` instead of a configuration while a state is restored: saved strains and
+stored energies do not belong to the configuration of the scene."""
 
 
 class Memory:
     """Storage of the state of a process, for restart and ``start=``.
 
-    Without a ``state``, methods save the values that they get and return them.  With a ``state``,
-    they return the saved values instead.
+    Without a ``state``, methods save their values and return them.  With a ``state``, they return
+    the saved values instead.
     """
 
     def __init__(self, share: Share, state: State | None = None) -> None:
@@ -36,27 +36,27 @@ class Memory:
         self._dofs = (share.grid.size, share.dofs, share.num_owned)
 
     def number(self, name: str, value: float) -> float:
-        """A number that all processes know."""
+        """Save or restore a number that is equal on all processes."""
         return float(self._values(name, np.array([value]), *self._one)[0])
 
     def total(self, name: str, value: float) -> float:
-        """A number whose sum over the processes means something."""
+        """Save or restore a number of which only the sum over the processes is defined."""
         return float(self._values(name, np.array([value]), *self._one, summed=True)[0])
 
     def at_dofs(self, name: str, values: Array) -> Array:
-        """Values at the local degrees of freedom, alike on all processes that have them."""
+        """Save or restore values at the local degrees of freedom, equal on all processes."""
         return self._values(name, values, *self._dofs)
 
     def added(self, name: str, values: Array) -> Array:
-        """Values at the local degrees of freedom whose sums over the processes mean something."""
+        """Save or restore values at local degrees of freedom that are sums over the processes."""
         return self._values(name, values, *self._dofs, summed=True)
 
     def _values(
         self, name: str, values: Array, size: int, where: Index, owned: int, *, summed: bool = False
     ) -> Array:
-        """Values at some places of ``size``, of which the first ``owned`` are of this process.
+        """Save or restore values at positions ``where`` of an array; this process owns the first.
 
-        They are alike on all processes that have a place, or addends where they are ``summed``.
+        They are equal on all processes that have a position, or addends if they are ``summed``.
         """
         if self._given is None:
             mine = len(values) if summed else owned
@@ -64,11 +64,11 @@ class Memory:
             return values
         here = self._found(name, (size,))[where]
         if summed:
-            here[owned:] = 0.0  # the owner has all of it
+            here[owned:] = 0.0  # the owner has the sum
         return np.asarray(here)
 
     def rows(self, name: str, numbers: Index, rows: Array, *, known: bool = False) -> Array:
-        """Save or restore rows by number; each is on one process, or all are ``known`` to all.
+        """Save or restore rows by number, each on one process, or all ``known`` to all processes.
 
         Rows of one name may have different lengths.  A number that is not in the state keeps its
         present row.
@@ -87,11 +87,11 @@ class Memory:
         return np.where(there[:, None], table[found, 1:], rows)
 
     def has(self, name: str) -> bool:
-        """Return whether the state that is given back has numbers of this name."""
+        """Return whether a state is restored and has values of this name."""
         return self._given is not None and name in self._given
 
     def _found(self, name: str, shape: tuple[int, ...]) -> Array:
-        """Return an array of the state; :class:`ModelError` if it has not the shape; -1 is any."""
+        """Return an array of the state; :class:`ModelError` if its shape is wrong; -1 is any."""
         values = (self._given or {}).get(name)
         if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
             found = "missing" if values is None else f"of shape {values.shape}"
@@ -99,14 +99,14 @@ class Memory:
         return values
 
     def state(self) -> State:
-        """Return what all processes have written down, on each of them; they call it together."""
+        """Return the saved state of all processes on each process; all call it together."""
         here = self._sums, self._rows
         everyone = [here] if self._share.comm.size == 1 else self._share.comm.allgather(here)
         state: State = {}
         tables: defaultdict[str, list[Array]] = defaultdict(list)
         for sums, rows in everyone:
             for name, (size, where, values) in sums.items():
-                # From -0, to which anything may be added without losing its sign
+                # Start from -0, which keeps the sign of a zero that is added.
                 np.add.at(state.setdefault(name, np.full(size, -0.0)), where, values)
             for name, parts in rows.items():
                 tables[name] += parts

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Transfer of the end of a run to a scene of the same beams with other joints and connectors."""
+"""Transfer of the last state of a run to a scene of the same beams with other connections."""
 
 from __future__ import annotations
 
@@ -15,19 +15,19 @@ from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connectors import Connector
 
 APART = 1e-6
-"""Distance of places that a joint may join in motion: part of the scene's size or largest
-velocity, or rad."""
+"""Largest distance of places that a new joint may connect: fraction of the scene's size or of the
+largest velocity, or rad."""
 
 OF_CELLS = ("cells", "changes of strains")
 """Tables of internal variables whose rows are numbered like cells; all others like connectors."""
 
 
 class Transfer:
-    """Map from the degrees of freedom of one scene to those of another.
+    """Map between the degrees of freedom of two scenes.
 
-    Nodes of beams and bodies are the same if their records are, connectors if they join the same
-    points by laws of one kind.  Where a joint was removed, both places begin where the joint was;
-    where one was added, its places must be together.
+    Nodes of beams and bodies are the same if their records are equal; connectors are the same if
+    they connect the same points by laws of one type.  If a joint was removed, both places start at
+    the joint's position.  If a joint was added, its places must coincide.
     """
 
     def __init__(self, old: Grid, new: Grid) -> None:
@@ -38,7 +38,7 @@ class Transfer:
             np.vstack([grid.dofs, *(grid.node(body.middle) for body in bodies)]).ravel()
             for grid in (new, old)
         )
-        # Numbers of connectors that both scenes have: new -> old
+        # Numbers of connectors in both scenes: new -> old
         known: dict[object, list[int]] = {}
         for i, link in enumerate(old.scene.links):
             known.setdefault(_geometry(link), []).append(i)
@@ -51,7 +51,7 @@ class Transfer:
         self._from = np.concatenate([olds, old.multipliers[list(links.values())]])
 
     def _require_alike(self) -> None:
-        """Raise unless beams and vertices are the same, and every body is known."""
+        """Raise unless beams and vertices are equal and all bodies are in the old scene."""
         old, new = self._old, self._new
         if old.scene.beams != new.scene.beams or old.mesh != new.mesh:
             raise ModelError(
@@ -74,12 +74,12 @@ class Transfer:
                 )
 
     def state(self, q: Array) -> Array:
-        """Configuration in the new numbering; places that a new joint joins must be together."""
+        """Map a configuration to the new numbering; places of a new joint must coincide."""
         size = self._new.scene.size
         return self._map(q, lambda c: APART * (size if c < 2 else 1.0), ("m", "rad"), "are")
 
     def velocity(self, v: Array) -> Array:
-        """Velocities in the new numbering; places that a new joint joins must have the same."""
+        """Map velocities to the new numbering; places of a new joint must have equal velocities."""
         fastest = float(np.abs(v).max(initial=0.0)) * max(self._new.scene.size, 1.0)
         return self._map(v, lambda c: APART * fastest, ("m/s", "rad/s"), "move")
 
@@ -105,7 +105,7 @@ class Transfer:
         return mapped
 
     def internal(self, state: State) -> State:
-        """Internal variables, forces and kept rates in the numbering of the new scene."""
+        """Map internal variables, forces and stored rates to the numbering of the new scene."""
         mapped: State = {}
         for name, values in state.items():
             if values.ndim == 1:

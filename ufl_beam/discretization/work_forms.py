@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forms of virtual works and potentials that a user states, and checks of what was stated."""
+"""Forms of the user's virtual works and potentials, and checks of them."""
 
 from __future__ import annotations
 
@@ -21,27 +21,27 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.works import VirtualWork, Work
 
 GROWTH = "growth of works"
-"""Name of the part of virtual works that acts, which no number of a user can have."""
+"""Name of the acting fraction of virtual works, which no parameter of a user can have."""
 
 
 class Statement(NamedTuple):
     """Forms of a work."""
 
     residual: ufl.Form  # minus the virtual work
-    tangent: ufl.Form  # its derivative; empty where nothing depends on the configuration
-    numbers: Mapping[str, fem.Function]  # functions that have the numbers, by their names
-    energy: ufl.Form | None = None  # of a potential, at the end of the step
-    lost: ufl.Form | None = None  # what the scheme loses of it in the step
+    tangent: ufl.Form  # its derivative; empty if independent of the configuration
+    numbers: Mapping[str, fem.Function]  # functions that hold the parameters, by name
+    energy: ufl.Form | None = None  # energy of a potential at the end of the step
+    lost: ufl.Form | None = None  # energy that the scheme dissipates in the step
 
     def varies(self, work: Work) -> bool:
-        """Return whether the energy of a work may change in time while nothing moves."""
+        """Return whether the energy of a work may change in time without motion."""
         known = () if self.energy is None else self.energy.coefficients()
         of_time = ["t", *(name for name, number in work.numbers.items() if callable(number))]
         return any(self.numbers[name] in known for name in of_time)
 
 
 class _Same:
-    """A function of a user, which need not be hashable, as a part of a key."""
+    """Hashable wrapper of a user's function, compared by identity."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
         self.function = function
@@ -54,7 +54,7 @@ class _Same:
 
 
 def statement(work: Work, of: Element, scheme: Scheme) -> Statement:
-    """State a work in a time scheme, once for all beams and numbers.
+    """State a work in a time scheme, once for all beams and values of parameters.
 
     Raises:
         ModelError: Its function is wrong.
@@ -87,7 +87,7 @@ def _of_virtual_work(
     density, dx = _returned(work, known, of), of.dx(work.degree)
     try:
         check_form_arity(expand_derivatives(density * dx), (w,))
-    except (ArityMismatch, ValueError):  # which UFL's own message may raise
+    except (ArityMismatch, ValueError):  # UFL's own message may raise it
         raise ModelError(
             f"{work}: the function must return what is linear in w, such as f * w[1]"
         ) from None
@@ -97,7 +97,7 @@ def _of_virtual_work(
 def _of_potential(
     work: Work, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
 ) -> tuple[ufl.Form, ufl.Form, ufl.Form | None]:
-    """State minus the virtual work, the energy at the end of a step, and what that loses of it."""
+    """State minus the virtual work, the energy at the end of a step, and its dissipation."""
     q0, q1, w, q, dx = of.q0, of.q1, of.w, of.configuration(), of.dx(work.degree)
     energy = _returned(work, {"q": q, "axis": of.anywhere, **numbers}, of)
     gradient = expand_derivatives(ufl.derivative(energy, q, w))
@@ -107,7 +107,7 @@ def _of_potential(
     def along(way: Expr, at: Expr) -> Expr:
         return ufl.replace(gradient, {q: at, w: way})
 
-    # The variation that is the increment of q, everywhere, if w is the step of the nodes
+    # Variation that equals the increment of q everywhere if w is the increment of the nodes.
     axis = of.anywhere
     (_, ψ0), (_, ψ1), (w_u, w_ψ) = map(split, (q0, q1, w))
     pairs = zip(axis.at_nodes(ψ1 - ψ0), axis.at_nodes(w_ψ), strict=True)

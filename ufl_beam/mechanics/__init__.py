@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""The mechanics of the paper in UFL: strains, relative motions, time schemes."""
+"""Mechanics of the paper in UFL: strains, relative motions, time schemes."""

@@ -26,7 +26,7 @@ class PlainStep:
     half_tangents = False
 
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
-        """The virtual rotation itself."""
+        """Return the virtual rotation itself."""
         return w
 
 
@@ -37,23 +37,23 @@ STATIC_ADVICE = (
     "ub.DissipationControl(...), prescribe a displacement in the place of the load, or run "
     "dynamics"
 )
-"""Where a static step, in which time is the load parameter, finds no equilibrium."""
+"""Advice if a static step, in which time is the load factor, finds no equilibrium."""
 
 
 class _AtEnd(PlainStep):
-    """Base of schemes whose forces, strains and their variations are those at the end of the step.
+    """Base of schemes whose forces, strains and variations are taken at the end of the step.
 
-    Their works are counted by the trapezoidal rule.
+    The trapezoidal rule counts their works.
     """
 
     load_weight = 1.0
     weight_of_before = 0.5  # the trapezoidal rule, exact where forces grow in proportion
-    limits_turn = False  # a step may turn a node as far as it likes
+    limits_turn = False  # rotations of nodes in a step have no limit
     theta = 1.0
     alpha = 0.0
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
-        """The one at the end of the step."""
+        """Return the value at the end of the step."""
         return f(q1)
 
     def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
@@ -73,12 +73,13 @@ class _AtEnd(PlainStep):
 class Static(_AtEnd):
     """Static equilibrium at the end of each step; time is the load parameter.
 
-    What is viscous acts at the mean rates of the step, in real time: dampers, :class:`KelvinVoigt`,
+    Viscous forces act at the mean rates of the step, in real time: dampers, :class:`KelvinVoigt`,
     viscosity of materials, works with ``v``.  There is no inertia.
 
-    The ledger counts works by the trapezoidal rule, so its imbalance is of second order in the step
-    and a measure of it.  A step is cut if its forces do not account for the stored and dissipated
-    energy up to a twentieth, since it may have jumped to another branch of equilibria.
+    The ledger counts works by the trapezoidal rule.  Its imbalance is of second order in the step
+    and measures the error.  A step is cut if the work of its forces misses the stored and
+    dissipated energy by more than a twentieth, since it may have jumped to another branch of
+    equilibria.
 
     Example:
         >>> run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
@@ -94,7 +95,7 @@ class Static(_AtEnd):
 class Weights(NamedTuple):
     """Weights of Newmark's formulas and of the mean accelerations of generalised-α.
 
-    With a an acceleration that follows u and v, and ü that of the forces,
+    With the acceleration a that u and v follow from, and the acceleration ü by the forces,
 
         u1 = u0 + dt v0 + dt² ((1/2 - β) a0 + β a1),     v1 = v0 + dt ((1 - γ) a0 + γ a1),
         (1 - α_m) a1 + α_m a0 = (1 - α_f) ü1 + α_f ü0.
@@ -107,10 +108,10 @@ class Weights(NamedTuple):
 
 
 CONSTANT = Weights(0.0, 0.0, 1.0, 1 / 2)
-"""The acceleration of a step is that of its end; none at the beginning is needed."""
+"""Weights with the acceleration at the end of the step; they need none at its beginning."""
 
 AVERAGE = Weights(0.0, 0.0, 1 / 2, 1 / 4)
-"""The acceleration of a step is the mean of both ends."""
+"""Weights with the mean of the accelerations at both ends of the step."""
 
 
 class _Accelerated(_AtEnd):
@@ -125,17 +126,18 @@ class _Accelerated(_AtEnd):
 
     @property
     def rings(self) -> bool:
-        """Accelerations of a motion that is given follow from Newmark's formulas alone.
+        """True if the accelerations of a prescribed motion oscillate for ever.
 
-        Of what these make of an error only γ > 1/2 takes anything.
+        They follow from Newmark's formulas alone, which damp errors only if γ > 1/2.
         """
         _, _, γ, β = self.weights
         return not 2 * β > γ > 0.5
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        """Newmark's formulas, and accelerations ü of the forces; a leads by (α_m - α_f) dt.
+        """Return the numbers of Newmark's formulas, and of the accelerations ü by the forces.
 
-        Until an acceleration is known, and by how much a leads, steps do without.
+        The acceleration a leads ü by (α_m - α_f) dt.  A step uses the acceleration
+        and the lead only if they are known.
         """
         s, v, _, *more = np.eye(3 + known)
         forced = a0 = more[0] if known else 0 * s
@@ -155,7 +157,7 @@ class _Accelerated(_AtEnd):
         return Coefficients(inertia=forced1, velocity=v1, rates=(v1, *kept))
 
     def error_weights(self) -> tuple[float, float]:
-        """Return the error of Taylor's series; a runs ahead of the forces by α_m - α_f steps."""
+        """Return the error of Taylor's series; a leads the forces by α_m - α_f steps."""
         α_m, α_f, γ, β = self.weights
         ahead = α_m - α_f
         return 0.0, abs(β + ahead / 2 - 1 / 6) + abs(γ + ahead - 1 / 2)
@@ -165,19 +167,18 @@ class _Accelerated(_AtEnd):
 class Newmark(_Accelerated):
     """Newmark's scheme, by default with average acceleration; for comparison with other programs.
 
-    ``gamma = 1/2`` is of second order and damps nothing: in large motion its energy is not bounded,
-    and it may diverge where :class:`EnergyMomentum` does not.  ``gamma > 1/2`` damps at first
-    order; :class:`GeneralizedAlpha` does so at second order.
+    ``gamma = 1/2`` is of second order and damps nothing.  In large motion its energy is not
+    bounded, and it may diverge where :class:`EnergyMomentum` does not.  ``gamma > 1/2`` damps at
+    first order; :class:`GeneralizedAlpha` does so at second order.
 
-    The ledger counts works by the trapezoidal rule.  It does not close, and its imbalance, of
-    second order in the step, is a measure of the error.  Accelerations at the beginning are those
-    of a trial step of a sixteenth of the first one.  Laws that depend on rates, but for
-    :class:`Rayleigh`, take the mean rate of the step, and yielding is stated at its end: both are
-    of first order.
+    The ledger counts works by the trapezoidal rule.  It does not close; its imbalance is of second
+    order in the step and measures the error.  Initial accelerations come from a trial step of a
+    sixteenth of the first step.  Laws that depend on rates, except :class:`Rayleigh`, take the mean
+    rate of the step, and yielding is stated at its end.  Both are of first order.
 
     Args:
         gamma: γ; from 1/2.
-        beta: β; from γ/2, without which the scheme is unstable at large steps.
+        beta: β; from γ/2, below which the scheme is unstable at large steps.
 
     Raises:
         ArgumentError: A number is out of range.  A run raises it if the scene has joints held by
@@ -209,7 +210,7 @@ class Newmark(_Accelerated):
 
     @property
     def weights(self) -> Weights:  # type: ignore[override]
-        """Without a relation between accelerations."""
+        """Weights of γ and β alone, without a relation between accelerations."""
         return Weights(0.0, 0.0, self.gamma, self.beta)
 
 
@@ -217,20 +218,22 @@ class Newmark(_Accelerated):
 class GeneralizedAlpha(_Accelerated):
     """Generalised-α scheme of second order with damping of high frequencies.
 
-    With the weights of Chung and Hulbert (1993), in the form of Arnold and Brüls (2007): forces and
-    constraints are satisfied at the ends of the steps, and an auxiliary acceleration carries the
-    weights.  For linear scenes both are the same; this one is stable with joints held by
-    multipliers if ``rho_inf < 1``.  Where the step changes, the auxiliary acceleration is adjusted,
-    so that the order remains.
+    The weights are by Chung and Hulbert (1993), the form is by Arnold and Brüls (2007): equilibrium
+    and constraints are satisfied at the ends of the steps, and an auxiliary acceleration carries
+    the weights.  For linear scenes both forms agree; this form is stable with joints held by
+    multipliers if ``rho_inf < 1``.  If the step length changes, the auxiliary acceleration is
+    adjusted to keep the order.
 
-    Ledger, initial accelerations and rate-dependent laws are as in :class:`Newmark`.  In large
+    The ledger, initial accelerations and rate-dependent laws are as in :class:`Newmark`.  In large
     motion the energy may grow; with :class:`EnergyMomentumDecaying` it cannot.
 
     Args:
-        rho_inf: Spectral radius at infinite frequency, from 0 (gone in a step) to 1 (undamped).
+        rho_inf: Spectral radius at infinite frequency, from 0 (damped out in a step) to 1
+            (undamped).
 
     Raises:
-        ArgumentError: A number outside [0, 1].  A run raises it for what :class:`Newmark` lists.
+        ArgumentError: A number outside [0, 1].  A run raises it for the scenes that
+            :class:`Newmark` lists.
 
     Example:
         >>> run = ub.simulate(scene, ub.GeneralizedAlpha(rho_inf=0.8), t=(0, 1), dt=0.05)

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Equations of laws of connectors over a step: energy and resistance, and rigid-plastic slip.
+"""Equations of connector laws over a step: energy and resistance, and rigid-plastic slip.
 
-A law of energy and resistance holds at t_n+θ: its variables there are those after a backward-Euler
-step of the length θ dt, and grow on in proportion to the end of the step.  Its elastic force acts
-where loads do.  A rigid-plastic law is a function of the slip that grows in the step; it is stated
-once for UFL and for numbers.
+A law of energy and resistance holds at t_n+θ.  A backward-Euler step of length θ dt gives its
+variables there; from there they grow in proportion to the end of the step.  Its elastic force acts
+at the time of the loads.  A rigid-plastic law is a function of the slip that grows in the step; it
+is stated once for UFL and for numbers.
 """
 
 from __future__ import annotations
@@ -27,18 +27,18 @@ from ufl_beam.model.softening_laws import SofteningLaw
 # -- energy and resistance -------------------------------------------------------------------------
 
 SMOOTH = 1e-7
-"""Difference of Gauss's rule with four points and Simpson's rule, as a part of the forces, up to
-which the former has all digits.
+"""Relative difference of forces by Gauss's and Simpson's rule up to which Gauss's has all digits.
 
-Errors are of the eighth and the fourth order in the step h, with the factors 1 / 1778112000 and
-1 / 2880: where that of Simpson's rule is 1e-7, that of Gauss's is (3e-4)² / 2e9, below round-off.
+Gauss's rule has four points.  The errors are of the eighth and the fourth order in the step h, with
+the factors 1 / 1778112000 and 1 / 2880.  If Simpson's error is 1e-7, Gauss's is (3e-4)² / 2e9,
+below round-off.
 """
 
 
 class LawStep(NamedTuple):
-    """A law over a step; J, forces in N or N m."""
+    """Equations of a law over a step; J, forces in N or N m."""
 
-    forces: tuple[Expr, ...]  # that act in the step; of each component; size of a sliding force
+    forces: tuple[Expr, ...]  # of each component in the step; size of a sliding force
     stored: Expr  # at the end
     numerical: Expr  # lost by the scheme in the step
     variables: tuple[Expr, ...]  # at the end
@@ -47,11 +47,11 @@ class LawStep(NamedTuple):
 def law_step(
     law: ConnectorLaw, at: Mapping[str, Expr], scheme: Scheme, *, frozen: bool = False
 ) -> LawStep:
-    """State a step; ``frozen`` variables stay as they are.
+    """State the equations of a step; ``frozen`` variables stay constant.
 
-    Numbers are by name: motions at the end of the step, "motion 0" and so on, and before it as
-    "before 0", dt and theta, the variables before it as "state ...", and the numbers of the law as
-    "number ...".
+    The names in ``at`` are "motion 0" and so on for the motions at the end of the step, "before 0"
+    for the motions before it, "dt" and "theta", "state ..." for the variables before the step, and
+    "number ..." for the numbers of the law.
     """
     law = law.of({name: at[f"number {name}"] for name in law.numbers()})
     dt, θ, part = at["dt"], at["theta"], scheme.load_weight
@@ -64,7 +64,7 @@ def law_step(
     changes = law.increments(e, rate, old, θ * dt) if names else {}
 
     def after(part: Expr | float) -> State:
-        """Variables after a part of the step."""
+        """Return the variables after a fraction of the step."""
         return State(vars(old) | {n: getattr(old, n) + part / θ * changes[n] for n in names})
 
     end = {n: ufl.variable(ufl.as_ufl(z)) for n, z in vars(after(1.0)).items()}
@@ -79,7 +79,7 @@ def law_step(
     stored = ufl.as_ufl(law.energy(law.given(moved), State(end)))
     numerical = zero
     if part > 0.5 and scheme.average(0.0, 1.0) != 1.0:  # works are exact increments of energy
-        # What backward Euler loses: of second order, and positive of convex energies.
+        # Loss of backward Euler: of second order, and positive for convex energies.
         each = zip(moved, pairs, strict=True)
         growth = sum(ufl.diff(stored, m) * (x1 - x0) for m, (x0, x1) in each)
         growth += sum(ufl.diff(stored, z) * (z - getattr(old, n)) for n, z in end.items())
@@ -90,13 +90,13 @@ def law_step(
 def _elastic_forces(
     law: ConnectorLaw, e0: Sequence[Expr], e1: Sequence[Expr], state: State, scheme: Scheme
 ) -> list[Expr]:
-    """Forces of the energy where loads act: over the step, at its end, or a mean of both.
+    """Return the elastic forces at the time of the loads: over the step, at its end, or a mean.
 
-    Over the step the forces do the work of the change of the energy.  Means of the forces by
-    Gauss's rule do it to all digits where they are smooth over the step.  At kinks and in large
-    steps a force along the way does the work that is missing; forces and moment share it as the
-    squares of the errors of their works.  With one force it is then the quotient of the growth of
-    the energy and the way, which has few digits in small steps.
+    Over the step the work of the forces equals the change of the energy.  For forces that are
+    smooth over the step, means by Gauss's rule satisfy this to all digits.  At kinks and in large
+    steps a force along the increment does the missing work.  Forces and moment share that work in
+    proportion to the squares of the errors of their works.  A single force is then the growth of
+    the energy over the increment of the motion, which has few digits in small steps.
     """
 
     def energy(e: Sequence[Expr]) -> Expr:
@@ -141,27 +141,28 @@ def _elastic_forces(
 
 
 class Slip(NamedTuple):
-    """A law of slip over a step; J, forces in N or N m."""
+    """Response of a law of slip over a step; J, forces in N or N m."""
 
-    force: Values  # that acts in the step, in the direction of the motion
+    force: Values  # in the step, in the direction of the motion
     dissipated: Values  # in the step
     lost: Values  # numerically by backward Euler, over ``2 alpha`` of the scheme
     stored: Values  # at the end
-    limit: Values  # force beyond the back force up to which the motion is held after the step
-    back_force: Values  # force about which the limit lies after the step
+    limit: Values  # beyond the back force, up to which the motion is held after the step
+    back_force: Values  # centre of the limits after the step
 
 
 def numbers(law: SofteningLaw | ElastoPlastic) -> dict[str, Any]:
-    """Numbers of a law of slip by the names that :func:`slip` has for them."""
+    """Return the numbers of a law of slip by the names that :func:`slip` takes."""
     of_law = law.numbers() if isinstance(law, SofteningLaw) else law.numbers(np.ones(()))
     return {f"number {name}": value for name, value in of_law.items()}
 
 
 def slip(law: SofteningLaw | ElastoPlastic, at: Mapping[str, Values], scheme: Scheme) -> Slip:
-    """Slip by a law; numbers of ``law`` itself do not matter.
+    """Return the response of a law; its numbers come from ``at``, not from ``law``.
 
-    They are by name: the slip of the step and its direction (1 or -1); accumulated slip (slipped)
-    and motion (start) at its beginning; θ and dt; numbers of the law, see :func:`numbers`.
+    ``at`` maps names to numbers: the slip of the step and its direction (1 or -1); accumulated slip
+    (slipped) and motion (start) at its beginning; θ and dt; numbers of the law, see
+    :func:`numbers`.
     """
     a, ξ, s, none = at["slip"], at["slipped"], at["direction"], 0 * at["slip"]
     of_law = {n.removeprefix("number "): x for n, x in at.items() if n.startswith("number ")}

@@ -21,8 +21,10 @@ from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
 
 WAY = 4
-"""Points of Gauss's rule over the way of a step; it is exact up to degree 7, and four forces cost
-hardly more than a strain."""
+"""Points of Gauss's rule over the increment of a step.
+
+The rule is exact up to degree 7, and four forces cost hardly more than a strain.
+"""
 
 
 class _OverStep:
@@ -34,35 +36,35 @@ class _OverStep:
 
     @property
     def theta(self) -> float:
-        """The resultants of P(89) are those at this part of the step."""
+        """Fraction of the step at which the resultants of P(89) are taken."""
         return 0.5 + self.alpha
 
     def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
-        """The mean traction, so that the work of the step is what the opening dissipates."""
+        """Return the mean traction, whose work in the step is the dissipation of the opening."""
         return softening.mean_traction(opening, growth)
 
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
-        """The mean of both ends, and more of the end the more energy is to go."""
+        """Return the mean of both ends, shifted to the end in proportion to ``alpha``."""
         mean = functional.resultants((e0 + e1) / 2, C)  # P(83)
         if self.alpha == 0:
             return mean
         return mean + constant(self.alpha) * functional.resultants(e1 - e0, C)  # P(89)
 
     def average(self, before: Expr, now: Expr) -> Expr:
-        """The mean of both ends, of which increments are products."""
+        """Return the mean of both ends; products with it are exact increments."""
         return (before + now) / 2
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
-        """The mean over the straight way from q0 to q1, on which a gradient does the increment."""
+        """Return the mean on the straight line from q0 to q1; the work of a gradient is exact."""
         points, weights = np.polynomial.legendre.leggauss(WAY)
         values = (f(q0 + float(1 + x) / 2 * (q1 - q0)) for x in points)
         return sum((float(w) / 2 * f for w, f in zip(weights, values, strict=True)), 0)
 
 
 class EnergyMomentumBase(_OverStep):
-    """Base of schemes in whose steps works are exact increments of energy.
+    """Base of schemes whose works over a step are exact increments of energy.
 
-    A scheme has an ``alpha``: the energy that its resultants take, P(89).
+    A scheme defines ``alpha``, the dissipation by its resultants, P(89).
 
     Example:
         >>> schemes = ub.EnergyMomentum, ub.EnergyMomentumStatic
@@ -71,14 +73,14 @@ class EnergyMomentumBase(_OverStep):
     """
 
     exact_ledger = True
-    half_tangents = True  # with which works are exact increments; see docs/errata.md
+    half_tangents = True  # makes works exact increments; see docs/errata.md
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
-        """The variation that turns the step into the increment of the strains."""
+        """Return the variation that maps the nodal step to the increment of the strains."""
         return kinematics.virtual_strain_over_step(q0, q1, w, axis)
 
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
-        """The increment of the rotation, if ``w`` is 2 tan(turn_b/2) - 2 tan(turn_a/2)."""
+        """Return the increment of the rotation, if ``w`` is 2 tan(turn_b/2) - 2 tan(turn_a/2)."""
         tan_a, tan_b = (ufl.sin(x / 2) / ufl.cos(x / 2) for x in (turn_a, turn_b))
         return kinematics.over_tan((turn_b - turn_a) / 2) / (1 + tan_a * tan_b) * w
 
@@ -87,20 +89,20 @@ class EnergyMomentumBase(_OverStep):
 class EnergyMomentumStatic(EnergyMomentumBase):
     """Static equilibrium with an exact ledger: works are exact increments of energy.
 
-    :class:`Static` is in equilibrium at the ends of steps and counts works by the trapezoidal rule;
-    here the equation of the step is that of :class:`EnergyMomentum`.  Inelastic material follows
-    its laws over the step, not only at its end.  The ledger is exact; the solution is of first
-    order in the step with ``theta=1`` and of second order with ``theta=1/2``, see docs/schemes.md
-    for measured errors.  Loads that act from the start are applied in the first step, in parts that
-    turn nodes little.  At a jump to another branch of equilibria the run goes on, and the released
-    energy is in the entry "numerical"; :class:`Static` stops there.  Time is real for what is
-    viscous, as in :class:`Static`.
+    :class:`Static` is in equilibrium at the ends of steps and counts works by the trapezoidal rule.
+    This scheme uses the step equation of :class:`EnergyMomentum`.  Inelastic material follows its
+    laws over the step, not only at its end.  The ledger is exact; the solution is of first order in
+    the step with ``theta=1`` and of second order with ``theta=1/2``, see docs/schemes.md for
+    measured errors.  Loads that act from the start are applied in the first step, in substeps with
+    small rotations of nodes.  At a jump to another branch of equilibria the run goes on, and the
+    released energy is in the entry "numerical"; :class:`Static` stops there.  Viscous forces act in
+    real time, as in :class:`Static`.
 
     Args:
-        theta: Part of the step at which resultants and loads are in equilibrium.  With 1/2 no
+        theta: Fraction of the step at which resultants and loads are in equilibrium.  With 1/2 no
             energy is lost, but the states at the ends may oscillate about equilibrium.  With 1 they
-            tend to it, and the loss is the entry "numerical" of the ledger.  Uniform moments vary
-            along a beam by (Δψ/2)² of a step.
+            tend to equilibrium, and the loss is the entry "numerical" of the ledger.  Uniform
+            moments vary along a beam by (Δψ/2)² in a step.
 
     Raises:
         ArgumentError: A number outside [1/2, 1].
@@ -127,14 +129,14 @@ class EnergyMomentumStatic(EnergyMomentumBase):
 
     @property
     def load_weight(self) -> float:
-        """Loads act where the resultants are in equilibrium."""
+        """Fraction of the step at which loads act, in equilibrium with the resultants."""
         return self.theta
 
 
 class MidpointLoads:
     """Base of dynamic schemes whose loads act in the middle of the step.
 
-    A scheme states its ``coefficients`` and ``error_weights``, see :class:`DynamicScheme`.
+    A scheme defines ``coefficients`` and ``error_weights``, see :class:`DynamicScheme`.
 
     Example:
         >>> schemes = ub.EnergyMomentumDecaying, ub.Newmark
@@ -156,13 +158,13 @@ class MidpointLoads:
 
 
 class _Velocities(MidpointLoads):
-    """Velocities of which ``beta`` takes energy."""
+    """Velocities with dissipation ``beta``."""
 
     alpha: float
     beta: float
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        """Velocities v1 = a s - b v0 after the step s of the nodes, and their change over dt."""
+        """Return the numbers of v1 = a s - b v0 for the nodal step s, and of its change over dt."""
         keep = 0.5 + self.beta
         a, b = 1 / (dt * keep), (0.5 - self.beta) / keep  # P(87)
         return Coefficients(
@@ -173,7 +175,7 @@ class _Velocities(MidpointLoads):
         )
 
     def error_weights(self) -> tuple[float, float]:
-        """The trapezoidal rule's, and what both kinds of dissipation delay."""
+        """Return the error of the trapezoidal rule plus the delays by both kinds of dissipation."""
         return self.beta, 1 / 12 + self.alpha
 
 
@@ -186,11 +188,11 @@ class EnergyMomentum(EnergyMomentumBase, _Velocities):
     with exact momenta; ``beta`` by the velocities, without conservation of angular momentum.  The
     loss is the entry "numerical" of the ledger.
 
-    Laws of inelastic material hold in the middle of the step, which is of second order; with
-    ``alpha = 1/2`` they hold at its end: backward Euler, of first order.  In the middle of the step
-    stresses lie on the yield surface, and an open hinge bears no moment; at the ends they alternate
-    about these values by the order of a step, which a small ``alpha`` damps.  The elastic energy of
-    material that breaks completely is lost at once, as "numerical".
+    Laws of inelastic material hold in the middle of the step, which is of second order.  With
+    ``alpha = 1/2`` they hold at its end, which is backward Euler, of first order.  In the middle of
+    the step stresses lie on the yield surface, and an open hinge bears no moment.  At the ends they
+    alternate about these values by the order of a step; a small ``alpha`` damps this.  The elastic
+    energy of material that breaks completely is lost at once, as "numerical".
 
     Args:
         alpha: Dissipation by the resultants, from 0 to 1/2.
@@ -225,9 +227,9 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
 
     The dissipation of :class:`EnergyMomentum` is proportional to the changes of strains and
     velocities in a step, and of first order.  Here it is proportional to second differences of
-    both: a mode of circular frequency ω loses the part c (ω dt)⁴ of its energy in a step, with c =
-    rho_inf (1 - rho_inf) / (2 (1 + rho_inf)²), and unresolved modes are reduced to ``rho_inf`` of
-    their amplitude.  The equations of the step are
+    both: a mode of circular frequency ω loses the fraction c (ω dt)⁴ of its energy in a step, with
+    c = rho_inf (1 - rho_inf) / (2 (1 + rho_inf)²), and unresolved modes are reduced to ``rho_inf``
+    of their amplitude.  The equations of the step are
 
         resultants  C ((e0 + e1)/2 + c (Δe - r Δe')),     Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'),
 
@@ -237,8 +239,8 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
     any steps, because Δe (Δe - r Δe') = (Δe² - r² Δe'² + (Δe - r Δe')²)/2.  The total loss is the
     entry "numerical" of the ledger and never negative; a single step may give back a part of the
     loss of previous steps.  Linear momentum is conserved exactly, angular momentum to second order.
-    Resultants of cells that may yield or break are not damped, so that open hinges turn freely, nor
-    are connectors.
+    Connectors and the resultants of cells that may yield or break are not damped, so that open
+    hinges turn freely.
 
     Args:
         rho_inf: Spectral radius at infinite frequency, from 1/3 to 1; 1 loses nothing.
@@ -262,12 +264,12 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
 
     @property
     def part(self) -> float:
-        """The part c of what second differences of strains and velocities store that is lost."""
+        """Fraction c of the energy of second differences of strains and velocities that is lost."""
         # At infinity (λ + 1)/2 + c (λ - 1)²/λ = 0; λ = -rho_inf is the larger root.
         return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        """Velocities, of whose changes in this step and in the last one a part counts."""
+        """Return the numbers of the step, with c times second differences of velocities."""
         c, keep = self.part, 0.5 + self.part
         r = c * min(1.0, dt / last_dt)
         return Coefficients(
@@ -278,7 +280,7 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
         )
 
     def error_weights(self) -> tuple[float, float]:
-        """The trapezoidal rule's, and what the second differences delay."""
+        """Return the error of the trapezoidal rule plus the delay by the second differences."""
         return 0.0, 1 / 12 + self.part
 
 
@@ -286,10 +288,10 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
 class EnergyMomentumPrinted(_OverStep, _Velocities, PlainStep):
     """The midpoint rule as the paper prints it, for comparison; :class:`EnergyMomentum` is better.
 
-    The variation of the strains is that in the middle of the step, which differs from their
-    increment: energy drifts by the square of the rotation of a step.  Linear and angular momentum
-    are conserved.  The ledger counts the works of the step, and its imbalance is this drift.
-    Joints that are held by multipliers do work of the same size.
+    The variation of the strains is taken in the middle of the step and differs from their
+    increment, so energy drifts by the square of the rotation of a step.  Linear and angular
+    momentum are conserved.  The ledger counts the works of the step, and its imbalance is this
+    drift.  Joints with multipliers do work of the same size.
 
     Equations:
         P(77)-P(84), with the sign of P(79) mended; see docs/errata.md.
@@ -305,5 +307,5 @@ class EnergyMomentumPrinted(_OverStep, _Velocities, PlainStep):
     alpha = beta = 0.0
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
-        """The variation in the middle of the step."""
+        """Return the variation in the middle of the step."""
         return kinematics.virtual_strain((q0 + q1) / 2, w, axis)

@@ -5,13 +5,13 @@ The fields on a mesh of straight cells are
 
 * q = (u, ψ), the configuration, continuous and linear in a cell (P1);
 * α, the jump of the rotation in a hinge in the middle of each cell, constant in a cell (DG0);
-* r = (N, V, M), the resultants, constant in a cell, which leave the functional by P(33);
-* plastic strains and hardening variables, in the points of the quadrature.
+* r = (N, V, M), the resultants, constant in a cell, which P(33) eliminates from the functional;
+* plastic strains and hardening variables, at the quadrature points.
 
 Energies are densities along the undeformed axis, J/m; a function W maps the strains (Σ, Γ, K) of
-the bulk to its free energy at given internal variables, P(35).  Weak forms are derivatives of what
-stands here.  A time scheme puts strains and variations of its own in their places, one line each,
-see :mod:`ufl_beam.mechanics.time_schemes`.
+the bulk to its free energy at given internal variables, P(35).  Weak forms are derivatives of these
+functionals.  A time scheme replaces strains and variations by its own, one line each, see
+:mod:`ufl_beam.mechanics.time_schemes`.
 """
 
 from __future__ import annotations
@@ -28,54 +28,56 @@ Energy = Callable[[Expr], Expr]
 
 
 def hu_washizu(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Expr:
-    """Functional of three fields: the strains D are free, and the resultants r tie them to q."""
+    """Return the functional of three fields; the resultants r tie the free strains D to q."""
     return W(D) + ufl.dot(r, strain(q, axis) - D)  # P(26)
 
 
 def incompatible(α: Expr, axis: Axis) -> Expr:
-    """Strain of the bulk by a jump α of the rotation: what opens in the hinge unloads the cell.
+    """Return the strain of the bulk by a jump α of the rotation; it unloads the cell.
 
-    The derivative of Heaviside's function less a linear one, P(69); its Dirac delta is the hinge.
+    It is the derivative of Heaviside's function less a linear function, P(69); the Dirac delta is
+    the hinge.
     """
     return ufl.as_vector([0, 0, -α / axis.h])  # P(71)!
 
 
 def enhanced_strain(q: Expr, α: Expr, axis: Axis) -> Expr:
-    """Strains (Σ, Γ, K) of the bulk: of the configuration, and of the jump; 1, 1, 1/m."""
+    """Return strains (Σ, Γ, K) of the bulk by the configuration and the jump; 1, 1, 1/m."""
     return strain(q, axis) + incompatible(α, axis)  # P(30)
 
 
 def modified_functional(W: Energy, q: Expr, D: Expr, r: Expr, axis: Axis) -> Expr:
-    """Functional in which D are only the strains that the configuration does not have."""
+    """Return the functional in which D are only the strains beyond those by the configuration."""
     return W(strain(q, axis) + D) - ufl.dot(r, D)  # P(31)
 
 
 def potential(W: Energy, q: Expr, α: Expr, hinge: Expr, axis: Axis) -> Expr:
-    """Potential energy of configuration and jumps, with the energy of each hinge (J), P(49).
+    """Return the potential of configuration and jumps, with the energy of each hinge (J), P(49).
 
-    Resultants that are constant in a cell do no work on what a jump adds to its strains, P(33).
-    The derivatives by q and α are equilibrium of the beam, and of the bulk with its hinge, P(34).
+    Resultants that are constant in a cell do no work on the strains that a jump adds, P(33).  The
+    derivative by q is the equilibrium of the beam, the derivative by α the equilibrium of the bulk
+    with its hinge, P(34).
     """
     return W(enhanced_strain(q, α, axis)) + hinge / axis.h
 
 
 def elastic_energy(e: Expr, C: Expr) -> Expr:
-    """Energy of elastic strains e with the stiffness C = (EA, GA, EI); N, N, N m²."""
+    """Return the energy of elastic strains e with the stiffness C = (EA, GA, EI); N, N, N m²."""
     return sum(C[i] * e[i] ** 2 for i in range(3)) / 2  # P(9)
 
 
 def resultants(e: Expr, C: Expr) -> Expr:
-    """(N, V, M) of elastic strains, the derivative of their energy; N, N, N m."""
+    """Return (N, V, M) of elastic strains, the derivative of their energy; N, N, N m."""
     e = ufl.variable(e)
     return ufl.diff(elastic_energy(e, C), e)  # P(7)
 
 
 def virtual_work(r: Expr, w_e: Expr) -> Expr:
-    """Work of the resultants on virtual strains (w_Σ, w_Γ, w_K); J/m."""
+    """Return the work of the resultants on virtual strains (w_Σ, w_Γ, w_K); J/m."""
     return ufl.dot(r, w_e)  # P(12)
 
 
 def kinetic_energy(v: Expr, ρ: Expr) -> Expr:
-    """Kinetic energy of the velocities v = (u', ψ'), with ρ = (A_ρ, J_ρ); kg/m, kg m."""
+    """Return the kinetic energy of v = (u', ψ'), with ρ = (A_ρ, J_ρ); kg/m, kg m."""
     v_u, ω = split(v)
     return (ρ[0] * ufl.dot(v_u, v_u) + ρ[1] * ω**2) / 2  # P(18)

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Strains of the Reissner beam and their algorithmic variation over a time step, in UFL.
 
-Pure functions: configurations ``(u_x, u_y, ψ)`` in, strains ``(Σ, Γ, K)`` out; no state, no mesh
-but the one that the arguments live on.  The letters are the paper's; P(n) is its equation n.
+Pure functions map configurations ``(u_x, u_y, ψ)`` to strains ``(Σ, Γ, K)``, without state, on the
+mesh of their arguments.  The letters are the paper's; P(n) is its equation n.
 """
 
 import math
@@ -17,8 +17,8 @@ class Axis:
     """Undeformed axis of the beams on a mesh of straight cells.
 
     Attributes:
-        nodes: Where in a cell, from 0 to 1, the nodes of configurations are; ascending.
-        X: From 0 to 1 along each cell; by default the point is in the middle.
+        nodes: Positions of the nodes of configurations in a cell, from 0 to 1; ascending.
+        X: Position of the point along each cell, from 0 to 1; by default in the middle.
         t0: Unit tangent of the cell, from its first to its last vertex; shape (2,).
         n0: Unit normal, ``t0`` turned by +90°; shape (2,).
         h: Length of the cell; m.
@@ -33,11 +33,11 @@ class Axis:
         self.n0 = ufl.as_vector([-self.t0[1], self.t0[0]])
 
     def d(self, f: Expr) -> Expr:
-        """Derivative along the axis, ``f' = grad(f)·t0``."""
+        """Return the derivative along the axis, ``f' = grad(f)·t0``."""
         return ufl.dot(ufl.grad(f), self.t0)
 
     def at_nodes(self, f: Expr) -> list[Expr]:
-        """Values of a scalar function in the nodes of the cell, by its derivatives at the point."""
+        """Return nodal values of a scalar function by Taylor's series from the point."""
         terms = [f]
         for _ in self.nodes[1:]:
             terms.append(self.h * self.d(terms[-1]))
@@ -47,7 +47,7 @@ class Axis:
         ]
 
     def interpolate(self, values: Sequence[Expr]) -> tuple[Expr, Expr]:
-        """Interpolate nodal values at the point by Lagrange: value and derivative."""
+        """Interpolate nodal values at the point by Lagrange; return value and derivative."""
         X = ufl.variable(self.X)
         f = 0
         for a, value in zip(self.nodes, values, strict=True):
@@ -57,52 +57,52 @@ class Axis:
 
 
 def frame(ψ: Expr) -> tuple[Expr, Expr]:
-    """(cos ψ - 1, sin ψ), both to the relative precision of ``ψ``, however small that is.
+    """Return (cos ψ - 1, sin ψ), both to the relative precision of ``ψ``, however small.
 
-    The difference of two numbers near one would keep no digits of a small rotation.
+    The difference cos ψ - 1 would keep no digits of a small rotation.
     """
     half_sin, half_cos = ufl.sin(ψ / 2), ufl.cos(ψ / 2)
     return -2 * half_sin**2, 2 * half_sin * half_cos
 
 
 def _pull_back(a: Expr, ψ: Expr, axis: Axis) -> tuple[Expr, Expr]:
-    """Components of the plane vector ``a`` in the frame (t0, n0) turned by ``ψ``: Λᵀ a."""
+    """Return Λᵀ a: components of the plane vector ``a`` in the frame (t0, n0) turned by ``ψ``."""
     along, across = ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
     cos_1, sin = frame(ψ)
     return along + cos_1 * along + sin * across, across + cos_1 * across - sin * along
 
 
 def turn(a: Expr) -> Expr:
-    """W a: the plane vector ``a`` turned by +90°."""
+    """Return W a, the plane vector ``a`` turned by +90°."""
     return ufl.as_vector([-a[1], a[0]])
 
 
 def split(q: Expr) -> tuple[Expr, Expr]:
-    """Displacement (2,) and rotation of a configuration (3,)."""
+    """Return displacement (2,) and rotation of a configuration (3,)."""
     return ufl.as_vector([q[0], q[1]]), q[2]
 
 
 def strain(q: Expr, axis: Axis) -> Expr:
-    """Reissner's axial strain, shear strain, curvature (Σ, Γ, K), P(6), P(10); 1, 1, 1/m.
+    """Return Reissner's axial and shear strain and curvature (Σ, Γ, K), P(6), P(10); 1, 1, 1/m.
 
     The configuration ``q`` is (u_x, u_y, ψ), m and rad; the axis may have any initial direction.
     """
     u, ψ = split(q)
     Σ, Γ = _pull_back(axis.d(u), ψ, axis)
     cos_1, sin = frame(ψ)
-    # Λᵀ t0 - e1 = (cos ψ - 1, -sin ψ): no digits of small strains are lost in a difference of ones.
+    # Λᵀ t0 - e1 = (cos ψ - 1, -sin ψ), without a difference that loses digits of small strains.
     return ufl.as_vector([Σ + cos_1, Γ - sin, axis.d(ψ)])  # P(6)
 
 
 def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
-    """Variation of :func:`strain` at ``q`` in the direction ``w`` (w_u, w_ψ); P(21) pulled back."""
+    """Return the variation of :func:`strain` at ``q`` along (w_u, w_ψ); P(21) pulled back."""
     (u, ψ), (w_u, w_ψ) = split(q), split(w)
     w_Σ, w_Γ = _pull_back(axis.d(w_u) - turn(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
     return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])
 
 
 def _sinc(x: Expr) -> Expr:
-    """Sin x / x, smooth at zero: the series below 1e-2 has a remainder under 1e-18."""
+    """Return sin x / x, smooth at zero; the series below 1e-2 has a remainder under 1e-18."""
     x2 = x**2
     series = 1 - x2 / 6 * (1 - x2 / 20 * (1 - x2 / 42))
     small = ufl.lt(x2, 1e-4)
@@ -110,19 +110,19 @@ def _sinc(x: Expr) -> Expr:
 
 
 def over_tan(x: Expr) -> Expr:
-    """X / tan x, smooth at zero."""
+    """Return x / tan x, smooth at zero."""
     return ufl.cos(x) / _sinc(x)
 
 
 def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
-    """Algorithmic variation of the strain over one step, exact for energy and momentum.
+    """Return the algorithmic variation of the strain over a step, exact for energy and momentum.
 
-    With ``w = (Δu, 2 tan(Δψ/2))`` at the nodes it is ``strain(q1) - strain(q0)`` to round-off,
-    which makes the work of the algorithmic resultants the increment of stored energy; and it
-    vanishes for rigid rotations about any point, which makes angular momentum exact.  P(82) as
-    printed has neither property beyond O(Δψ²); docs/errata.md derives this form.
+    With ``w = (Δu, 2 tan(Δψ/2))`` at the nodes it is ``strain(q1) - strain(q0)`` to round-off, so
+    the work of the algorithmic resultants is the increment of stored energy.  It vanishes for rigid
+    rotations about any point, so angular momentum is exact.  P(82) as printed has neither property
+    beyond O(Δψ²); docs/errata.md derives this form.
 
-    Valid for ``|Δψ| < π``; on two-node cells with a one-point rule, on others with any.
+    Valid for ``|Δψ| < π``, on two-node cells with a one-point rule, on other cells with any rule.
     """
     (u0, ψ0), (u1, ψ1), (w_u, w_ψ) = split(q0), split(q1), split(w)
     turn_over_step = _turn_of_two_nodes if len(axis.nodes) == 2 else _turn_of_nodes
@@ -138,12 +138,12 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
 
 
 def _turn_of_two_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
-    """:func:`_turn_of_nodes` in the middle of a cell with two nodes, where it is short."""
+    """Return :func:`_turn_of_nodes` in the middle of a cell with two nodes, a shorter formula."""
     # Half the increments of rotation at both nodes of the cell are δ - e and δ + e.
     e = axis.h / 4 * axis.d(ψ1 - ψ0)
     sinc_e, cos_e = _sinc(e), ufl.cos(e)
     tan_e = e * sinc_e / cos_e
-    # Of 2 δ = ψ1 - ψ0 no functions are needed but those of the frames.
+    # The frames give all functions of 2 δ = ψ1 - ψ0.
     (cos_0, sin_0), (cos_1, sin_1) = ((1 + c, s) for c, s in map(frame, (ψ0, ψ1)))
     cos_δ_2 = (1 + cos_0 * cos_1 + sin_0 * sin_1) / 2
     tan_δ = (sin_1 * cos_0 - cos_1 * sin_0) / (2 * cos_δ_2)
@@ -153,13 +153,13 @@ def _turn_of_two_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr,
 
 
 def _turn_of_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
-    """Virtual rotation and curvature at a point: 2 tan δ and 2 δ' if w is 2 tan δ at the nodes.
+    """Return virtual rotation and curvature at a point: 2 tan δ, 2 δ' if w is 2 tan δ at nodes.
 
-    Both are linear in w, and a uniform w is that rotation, and no curvature; docs/errata.md.
+    Both are linear in w; a uniform w gives the rotation w and no curvature, see docs/errata.md.
     """
     δ = (ψ1 - ψ0) / 2  # half of the increment of rotation
     nodes, virtual = axis.at_nodes(δ), axis.at_nodes(w)
-    # Differences of 2 tan δ between neighbours are made differences of 2 δ.
+    # Convert differences of 2 tan δ between neighbours to differences of 2 δ.
     steps = [
         ufl.cos(a) * ufl.cos(b) / _sinc(b - a) * (w_b - w_a)
         for (a, b), (w_a, w_b) in zip(pairwise(nodes), pairwise(virtual), strict=True)

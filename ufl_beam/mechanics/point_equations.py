@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Equations of a material point over a step, stated once for UFL and for arrays.
 
-The law holds at t_n+θ: its variables there are those after a backward-Euler step of the length
-θ dt, and grow on in proportion to the end of the step.
+The law holds at t_n+θ.  A backward-Euler step of length θ dt gives its variables there; from there
+they grow in proportion to the end of the step.
 """
 
 from __future__ import annotations
@@ -28,17 +28,17 @@ At = Mapping[str, Values]
 
 
 def rows(law: MaterialLaw, name: str) -> tuple[str, ...]:
-    """Names of the components of a strain or stiffness."""
+    """Return the names of the components of a strain or stiffness."""
     return tuple(f"{name} {x}" for x in law.resultants) if law.resultants else (name,)
 
 
 def prefixed(prefix: str, names: Mapping[str, object] | tuple[str, ...]) -> tuple[str, ...]:
-    """Names of inputs that a user has named."""
+    """Return the names of inputs that a user has named."""
     return tuple(f"{prefix} {name}" for name in names)
 
 
 def inputs(layout: Layout) -> tuple[str, ...]:
-    """Inputs of the law of a point, as they are stored; loops.h explains their order."""
+    """Return the input names of the law of a point as stored; loops.h explains their order."""
     law, numbers = layout.kind
     softening = layout.softening.numbers() if layout.softening is not None else {}
     return (
@@ -55,20 +55,20 @@ class End(NamedTuple):
 
     worked: Values  # dissipated by the bulk
     broken: Values  # dissipated by the discontinuity, per area
-    lost: Values  # numerically by backward Euler, over ``2 alpha`` of the scheme
+    lost: Values  # numerical loss of backward Euler, over ``2 alpha`` of the scheme
     elastic: Values  # stored elastically
     hardening: Values  # stored by hardening
-    relaxed: Values  # work of the mean of both stresses on plastic strain, less that at the end
+    relaxed: Values  # work on plastic strain of the mean of both stresses, less of the end stress
     resistance: Values  # of the discontinuity
-    left: Values  # stored elastically if the point lets go of its stress
-    missed: Values  # numerically by schemes over the step, where elasticity is not linear
+    left: Values  # stored elastically after the point has dropped its stress
+    missed: Values  # numerical loss of schemes over the step in nonlinear elasticity
     stress: tuple[Values, ...]
     changes: tuple[Values, ...]  # of the variables
 
 
 @lru_cache(maxsize=128)
 def curved(kind: Kind) -> bool:
-    """Return whether stresses are not linear in strains while the variables stay."""
+    """Return whether stresses are nonlinear in strains at constant variables."""
 
     def symbol(_: str) -> Expr:
         return ufl.variable(ufl.as_ufl(0.5))
@@ -81,7 +81,7 @@ def curved(kind: Kind) -> bool:
         stress = law.as_tuple(of_point.stress(law.as_argument(e), state))
         slopes = [expand_derivatives(ufl.diff(ufl.as_ufl(σ), x)) for σ in stress for x in e]
     except Exception:
-        return False  # where the law is compiled, it says why
+        return False  # the compilation of the law reports the reason
     return any(one in e for slope in slopes for one in unique_pre_traversal(slope))
 
 
@@ -94,27 +94,27 @@ class PointEquations:
         self._over_step = scheme.average(0.0, 1.0) != 1.0
 
     def law(self, at: At) -> MaterialLaw:
-        """The law with the numbers of points."""
+        """Return the law with the numbers of points."""
         law, numbers = self._kind
         C = tuple(at[name] for name in rows(law, "stiffness"))
         return law.of(law.as_argument(C), {name: at[f"number {name}"] for name in numbers})
 
     def softening(self, at: At) -> SofteningLaw | None:
-        """The law of the discontinuity with the numbers of points."""
+        """Return the law of the discontinuity with the numbers of points."""
         law = self._softening
         return law and law.of({name: at[f"softening {name}"] for name in law.numbers()})
 
     def resistance(self, at: At, growth: Values) -> Values:
-        """Resistance of a discontinuity that grows in the step."""
+        """Return the resistance of a discontinuity that grows in the step."""
         law = self.softening(at)
         return 0 * growth if law is None else self._scheme.resistance(law, at["opening"], growth)
 
     def state(self, at: At, prefix: str = "state") -> State:
-        """Variables at the beginning of the step, or those that are being solved for."""
+        """Return the variables at the beginning of the step, or the unknown variables ("new")."""
         return State({name: at[f"{prefix} {name}"] for name in self._names})
 
     def strain(self, at: At) -> Values:
-        """Strain of the bulk at t_n+θ; a jump relieves it by jump over length."""
+        """Return the strain of the bulk at t_n+θ; a jump reduces it by jump over length."""
         law, θ = self._kind.law, at["theta"]
         jump = at["jump"] + θ * at["direction"] * at["growth"]
         ends = zip(rows(law, "before"), rows(law, "strain"), strict=True)
@@ -123,7 +123,7 @@ class PointEquations:
         )
 
     def changes(self, at: At) -> State:
-        """Changes of the variables from t_n to t_n+θ."""
+        """Return the changes of the variables from t_n to t_n+θ."""
         law, old = self.law(at), self.state(at)
         if law.solves:
             new = self.state(at, "new")
@@ -131,20 +131,20 @@ class PointEquations:
         return State(law.increments(self.strain(at), old, at["theta"] * at["dt"]))
 
     def residuals(self, at: At) -> tuple[Values, ...]:
-        """Equations of the variables at t_n+θ, where they are solved for."""
+        """Return the residuals at t_n+θ of a law that solves for its variables."""
         new, dt = self.state(at, "new"), at["theta"] * at["dt"]
         found = self.law(at).residuals(self.strain(at), self.state(at), new, dt)
         return tuple(found[name] for name in self._names)
 
     def stored(self, at: At) -> Values:
-        """Energy that a law which solves for its variables stores at t_n+θ."""
+        """Return the energy at t_n+θ stored by a law that solves for its variables."""
         law, new = self.law(at), self.state(at, "new")
         return law.elastic_energy(self.strain(at), new) + law.hardening_energy(new)
 
     def own_dissipation(self, at: At, slopes: tuple[Values, ...]) -> tuple[Values, Values]:
-        """Dissipation by the changes of such variables, as the law holds; size of its terms.
+        """Return dissipation at t_n+θ of a law that solves for its variables; size of its terms.
 
-        It is that which the law states, or -∂ψ/∂z Δz: no error of the time scheme is part of it.
+        It is the dissipation that the law states, or -∂ψ/∂z Δz, free of errors of the time scheme.
         ``slopes`` are the derivatives ∂ψ/∂z of :meth:`stored`.
         """
         law, old, new = self.law(at), self.state(at), self.state(at, "new")
@@ -161,17 +161,17 @@ class PointEquations:
         return by_variables if dissipated is None else dissipated + 0 * size, size
 
     def stress(self, at: At) -> tuple[Values, ...]:
-        """Stresses of the bulk at t_n+θ, where the law holds."""
+        """Return the stresses of the bulk at t_n+θ, where the law holds."""
         law, old, changes = self.law(at), self.state(at), self.changes(at)
         return law.as_tuple(law.stress(self.strain(at), _plus(old, changes)))
 
     def elastic_stress(self, at: At) -> tuple[Values, ...]:
-        """Stresses at t_n+θ if the variables stayed as they are."""
+        """Return the stresses at t_n+θ with the variables at the beginning of the step."""
         law = self.law(at)
         return law.as_tuple(law.stress(self.strain(at), self.state(at)))
 
     def _elastic_growth(self, law: MaterialLaw, de: tuple[Values, ...], dz: State) -> Values:
-        """Part of second order of the elastic energy that strains and variables of a step add."""
+        """Return the second-order part of the growth of the elastic energy in the step."""
         growth = law.elastic_energy(law.as_argument(de), dz)
         if not law.prestressed:
             return growth
@@ -182,7 +182,7 @@ class PointEquations:
         )
 
     def end(self, at: At) -> End:
-        """State and energies at the end of the step."""
+        """Return changes and energies at the end of the step."""
         law, softening, θ, a = self.law(at), self.softening(at), at["theta"], at["growth"]
         some, zero = law.as_argument, 0 * a
         relieved, length = at["jump"], at["length"]
@@ -196,12 +196,13 @@ class PointEquations:
         new = _plus(old, changes)
         before, now = (law.as_tuple(law.stress(some(e), z)) for e, z in ((e0, old), (e1, new)))
         elastic, hardening = law.elastic_energy(some(e1), new), law.hardening_energy(new)
-        # Energies are quadratic but for laws that state no dissipation: these account for the rest.
+        # Energies are quadratic, except for laws without a stated dissipation: see their
+        # ``worked``.
         hardened = law.hardening_energy(changes)
         lost = self._elastic_growth(law, de, changes) + hardened
         elastically, missed, C = de, zero, tuple(at[n] for n in rows(law, "stiffness"))
         if self._curved:
-            # What the formula below makes of the step while the variables stay is no dissipation.
+            # The value of the formula below at constant variables is not dissipation.
             ends = tuple(law.as_tuple(law.stress(some(e1), old)))
             elastically = tuple((y - x) / c for x, y, c in zip(before, ends, C, strict=True))
             work = sum(σ * e for σ, e in zip(self.elastic_stress(at), de, strict=True))
@@ -231,5 +232,5 @@ class PointEquations:
 
 
 def _plus(state: State, changes: State) -> State:
-    """Variables and their changes, added."""
+    """Add the changes to the variables."""
     return State({name: z + getattr(changes, name) for name, z in vars(state).items()})

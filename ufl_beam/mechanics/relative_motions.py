@@ -3,9 +3,9 @@
 
 A frame is a configuration (u_x, u_y, ψ).  Each motion is a function of the frames at both ends of a
 step, and of virtual motions of them.  It returns the motion at the end, which is zero in the
-undeformed scene, and its variation.  With the step of the nodes (Δu, 2 tan(Δψ/2)) in the place of
-the virtual motions, the variation is the increment of the motion: so what a joint holds does no
-work, and what a spring is given it stores.  All variations vanish for rigid motions of both frames.
+undeformed scene, and its variation.  With the nodal step (Δu, 2 tan(Δψ/2)) as virtual motions, the
+variation is the increment of the motion.  So constraint forces do no work, and springs store the
+work that is done on them.  All variations vanish for rigid motions of both frames.
 """
 
 from __future__ import annotations
@@ -42,29 +42,29 @@ class Pair(NamedTuple):
 
 
 def _turned(x: Expr, ψ: Expr) -> Expr:
-    """Λ(ψ) x."""
+    """Return Λ(ψ) x."""
     return x + _by_turning(x, ψ)
 
 
 def _by_turning(x: Expr, ψ: Expr) -> Expr:
-    """(Λ(ψ) - 1) x, to the relative precision of ``ψ``."""
+    """Return (Λ(ψ) - 1) x, to the relative precision of ``ψ``."""
     cos_1, sin = frame(ψ)
     return cos_1 * x + sin * turn(x)
 
 
 def _moved(q: Pair, n: Numbers) -> Expr:
-    """Displacement of point b less that of point a."""
+    """Return the displacement of point b relative to point a."""
     (u_a, ψ_a), (u_b, ψ_b) = split(q.a), split(q.b)
     return u_b - u_a + _by_turning(n.arm_b, ψ_b) - _by_turning(n.arm_a, ψ_a)
 
 
 def _between(q: Pair, n: Numbers) -> Expr:
-    """Vector from point a to point b."""
+    """Return the vector from point a to point b."""
     return n.apart + _moved(q, n)
 
 
 def _virtually_between(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
-    """Variation of :func:`_between`."""
+    """Return the variation of :func:`_between`."""
 
     def of_point(x0: Expr, x1: Expr, w: Expr, arm: Expr) -> Expr:
         w_u, w_ψ = split(w)
@@ -78,13 +78,13 @@ def _length(d: Expr) -> Expr:
 
 
 def turning(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
-    """Rotation of b relative to a; rad."""
+    """Return the rotation of b relative to a; rad."""
     turn_a, turn_b = (now[2] - before[2] for before, now in zip(q0, q1, strict=True))
     return q1.b[2] - q1.a[2], scheme.virtual_turn(turn_a, turn_b, w.b[2] - w.a[2])
 
 
 def stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
-    """Growth of the distance of the points; m."""
+    """Return the growth of the distance of the points; m."""
     # (d·d - d0·d0) / (|d| + |d0|) with d = d0 + moved; a difference of lengths would lose digits.
     moved, before, now = _moved(q1, n), _between(q0, n), _between(q1, n)
     value = ufl.dot(n.apart + n.apart + moved, moved) / (_length(now) + _length(n.apart))
@@ -93,13 +93,13 @@ def stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple
 
 
 def parting(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
-    """Way of point b relative to a along an axis of the plane; m."""
+    """Return the displacement of point b relative to a along an axis of the plane; m."""
     virtual = _virtually_between(q0, q1, w, n, scheme)
     return ufl.dot(n.axis, _moved(q1, n)), ufl.dot(n.axis, virtual)
 
 
 def sliding(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
-    """The same along an axis that turns with a; m."""
+    """Return the displacement of point b relative to a along an axis that turns with a; m."""
     by_turning = _by_turning(n.axis, q1.a[2])
     value = ufl.dot(by_turning, _between(q1, n)) + ufl.dot(n.axis, _moved(q1, n))
     axis = scheme.average(_turned(n.axis, q0.a[2]), _turned(n.axis, q1.a[2]))
@@ -116,14 +116,14 @@ MOTIONS = {one.__name__: one for one in (turning, stretching, parting, sliding)}
 
 
 class ConnectorForms(NamedTuple):
-    """Forms of connectors with the coefficients that they are written in."""
+    """Forms of connectors, and their coefficients."""
 
     work: ufl.Form  # virtual work, and a row ``row[:n]·e + row[n] λ - row[n + 1]`` of each motion
-    tangent: ufl.Form  # its derivative by the configuration
+    tangent: ufl.Form  # derivative of ``work`` by the configuration
     motion: ufl.Form  # the n relative motions e by cell
-    rate: ufl.Form  # their derivatives along ``u``
-    change: ufl.Form  # derivative of the tangent along ``u``; ``bend`` is that of row[:n] by e
-    numbers: fem.Function  # see :class:`Numbers`; of each motion
+    rate: ufl.Form  # derivatives of the motions along ``u``
+    change: ufl.Form  # derivative of the tangent along ``u``, with ``bend`` = d row[:n] / de
+    numbers: fem.Function  # :class:`Numbers` of each motion
     row: fem.Function
     q0: fem.Function
     q1: fem.Function
@@ -133,7 +133,7 @@ class ConnectorForms(NamedTuple):
 
 @stated
 def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
-    """Forms on cells of unit length, from one node of a connector to the other."""
+    """Return forms on cells of unit length between both nodes of a connector."""
     n = len(motions)
     line = basix.ufl.element("Lagrange", "interval", 1)
     point = basix.ufl.element("DG", "interval", 0)
@@ -170,7 +170,7 @@ def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -
 
 
 def _split(q: Expr) -> tuple[Pair, Sequence[Expr]]:
-    """Split coefficients into both configurations, values at the ends of a cell, and the forces."""
+    """Split coefficients into the configurations at both ends of a cell, and the forces."""
     parts = ufl.split(q)
 
     def at(end: float) -> Expr:

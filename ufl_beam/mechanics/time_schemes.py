@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Time schemes: how two states of the scene become the equation of a step.
+"""Time schemes: the equation of a step between two states of the scene.
 
 A scheme says, in UFL, which strains vary and which resultants act during a step, how velocities
-follow from displacements, and at what time loads act.  Neither the laws of the material nor the
-solver know which scheme runs.  This is what a scheme must say; the schemes whose forces act over
-the step are in energy_momentum.py, those whose forces act at its end in classical.py.
+follow from displacements, and at which time loads act.  Neither material laws nor the solver know
+which scheme runs.  This module has the protocols.  Schemes whose forces act over the step are in
+energy_momentum.py, schemes whose forces act at its end in classical.py.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
 
 Constant = Callable[[float], Expr]
-"""Makes a number of the scheme a constant of the form, so that changing it compiles nothing."""
+"""Makes a number of the scheme a constant of the form, so that a new value compiles nothing."""
 
 
 @in_one_line
 class Step(NamedTuple):
-    """A step in time, as a scheme has it: its ends, and where loads and motions are taken.
+    """Time step of a scheme: its ends, and the times of loads and prescribed motions.
 
     Example:
         >>> step = ub.Step.of(ub.EnergyMomentum(), 0.0, 0.1, 0.1, np.zeros(3))
@@ -41,17 +41,17 @@ class Step(NamedTuple):
     q0: Array  # configuration at the beginning, local degrees of freedom
     load_time: float  # at which loads are taken; s
     motion_time: float  # at which prescribed motions are taken; s
-    fraction: float  # part of the way to these loads and motions that the step goes; 1: all of it
-    at: float = 1.0  # part of the way between loads at both ends, in the equation; 1: at the end
+    fraction: float  # of the remaining increment of loads and motions in the step; 1: all of it
+    at: float = 1.0  # fraction of the increment of loads in the step equation; 1: at the end
     q_before: Array | None = None  # configuration at the beginning of the last step, if ratio > 0
-    ratio: float = 0.0  # of the length to that of the last step; 0 if none led to the beginning
+    ratio: float = 0.0  # of the length to the last step's; 0 if no step led to the beginning
 
     @classmethod
     def of(cls, scheme: Scheme, t0: float, t1: float, end: float, q0: Array) -> Step:
-        """Return the step of a scheme from ``t0`` to ``t1``, a part of one that goes on to ``end``.
+        """Return the step of a scheme from ``t0`` to ``t1``, in a whole step that ends at ``end``.
 
-        In statics parts go in proportion to the loads and motions at the end of the whole step, so
-        that those which are there at once can be reached in parts as well as those that grow.
+        In statics a substep takes its fraction of the increment of loads and motions to the end of
+        the whole step.  So sudden loads, too, can be applied in substeps.
         """
         w = scheme.load_weight
         if scheme.dynamic:
@@ -67,8 +67,9 @@ class Step(NamedTuple):
 class Scheme(Protocol):
     """Protocol of time schemes, static ones and those with inertia.
 
-    Any hashable object with these attributes and methods is a scheme; a run names what it lacks.
-    A base class to begin with is :class:`EnergyMomentumBase`; docs/extending.md has an example.
+    Any hashable object with these attributes and methods is a scheme; the error of a run lists
+    missing names.  A base class to begin with is :class:`EnergyMomentumBase`; docs/extending.md has
+    an example.
 
     Example:
         >>> class Mine:
@@ -79,49 +80,50 @@ class Scheme(Protocol):
     """
 
     dynamic: bool  # True if the scene has inertia
-    advice: str  # where a step finds no equilibrium
-    load_weight: float  # part of the step at which loads act; in statics on the straight way there
-    weight_of_before: float  # of the forces before a step among those that do its work
+    advice: str  # for the error if a step finds no equilibrium
+    load_weight: float  # fraction of the step at which loads act; in statics of their increment
+    weight_of_before: float  # of the forces before a step in the mean that does its work
     half_tangents: bool  # True if forces work on 2 tan(Δψ/2) of a rotation, else on Δψ
     limits_turn: bool  # True if a step that turns a node by more than 0.75 π is cut
-    theta: float  # part of the step at which laws of inelastic material are stated
-    slack: float  # part of what a step stores and dissipates that its forces may not account for
-    alpha: float  # part of twice the energy of a change of strain that is lost numerically
+    theta: float  # fraction of the step at which laws of inelastic material hold
+    slack: float  # fraction of stored and dissipated energy that the forces may miss; else a cut
+    alpha: float  # numerical loss over twice the energy of a change of strain
 
     def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
-        """Traction of a discontinuity whose opening grows in the step."""
+        """Return the traction of a discontinuity whose opening grows in the step."""
 
     def virtual_strain(self, q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
-        """Variation of the strains that the resultants work on; shape (3,)."""
+        """Return the variation of the strains that the resultants work on; shape (3,)."""
 
     def resultants(self, C: Expr, e0: Expr, e1: Expr, constant: Constant) -> Expr:
-        """(N, V, M) that act during the step, from stiffness and strains at both ends."""
+        """Return (N, V, M) during the step, from stiffness and strains at both ends."""
 
     def average(self, before: Expr, now: Expr) -> Expr:
-        """Average of a vector or a distance between frames, as variations take it."""
+        """Return the average of a vector or distance between frames, for variations."""
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
-        """Value of a function of the configuration in the step, whose integral has a meaning."""
+        """Return the value in the step of a function of the configuration."""
 
     def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
-        """Variation of a relative rotation whose virtual motion is ``w``."""
+        """Return the variation of a relative rotation whose virtual motion is ``w``."""
 
 
 CHANGE, V, V_BEFORE, MORE = range(4)
-"""Places of the rates in C: the step or a change of velocities, velocities, ..."""
+"""Positions of the rates in C: the step or a change of velocities, velocities, ..."""
 
 
 class Coefficients(NamedTuple):
     """Numbers of a step of a scheme with inertia.
 
-    In a row the first number multiplies the step of the nodes (Δu, 2 tan(Δψ/2)), the next ones the
-    velocities at its beginning, the velocities before the last step, and what is kept besides.
+    In a row the first number multiplies the nodal step (Δu, 2 tan(Δψ/2)).  The next numbers
+    multiply the velocities at its beginning, the velocities before the last step, and the other
+    rates of :attr:`DynamicScheme.kept`.
 
     Attributes:
-        inertia: Of the acceleration that the mass is multiplied with in the equation of the step.
-        velocity: Of the velocity in the equation of the step.
-        rates: Of the velocities after the step, and of what is kept besides; as many rows.
-        slip: Of Δu/Δt less the mean of both end velocities, P(88), whose work on the change of
+        inertia: Row of the acceleration in the equation of the step.
+        velocity: Row of the velocity in the equation of the step.
+        rates: Row of the velocities after the step, and a row of each other rate that is kept.
+        slip: Row of Δu/Δt less the mean of both end velocities, P(88), whose work on the change of
             momentum is lost; its first number multiplies the change of velocities.  None: no loss.
 
     Example:
@@ -150,23 +152,23 @@ class DynamicScheme(Scheme, Protocol):
         ufl_beam.errors.ArgumentError: scheme: Mine is not a time scheme: it lacks coefficients, ...
     """
 
-    kept: tuple[str, ...]  # names of the rates kept besides velocities, such as accelerations
+    kept: tuple[str, ...]  # names of rates besides velocities, such as accelerations
     has_mean_velocity: bool  # in the equation of a step; friction and rotating frames need it
-    looks_back: bool  # True if a step depends on the length of that before and its velocities
-    rings: bool  # True if the accelerations of a motion that is given oscillate for ever
+    looks_back: bool  # True if a step depends on length and velocities of the last step
+    rings: bool  # True if accelerations of prescribed motions oscillate for ever
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        """Return the numbers of a step of the length ``dt``.
+        """Return the numbers of a step of length ``dt``.
 
         Args:
             dt: Length of the step; s.
             last_dt: Length of the step before; infinite if there was none; s.
-            known: How many of :attr:`kept` are known at the beginning.  After the step, one is
-                known for each row of rates behind the first.
+            known: Number of rates of :attr:`kept` that are known at the beginning.  After the step,
+                each row of rates after the first makes a rate known.
         """
 
     def error_weights(self) -> tuple[float, float]:
-        """(c2, c3) of the error c2 a dt² + c3 da/dt dt³ of a step of acceleration a."""
+        """Return (c2, c3) of the error c2 a dt² + c3 da/dt dt³ of a step with acceleration a."""
 
 
 def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
@@ -175,27 +177,28 @@ def has_inertia(scheme: Scheme) -> TypeGuard[DynamicScheme]:
 
 
 def acting(scheme: Scheme, before: Array, now: Array) -> Array:
-    """Forces that do the work of a step, from those in its equation and in the one before."""
+    """Return the forces that do the work of a step, from its equation and the last one."""
     w = scheme.weight_of_before
     return w * before + (1 - w) * now if w else now
 
 
 def with_half_tangents(scheme: Scheme, rotations: Index) -> Index:
-    """Rotations whose nodal step is 2 tan(Δψ/2): all or none."""
+    """Return the rotations whose nodal step is 2 tan(Δψ/2): all or none."""
     return rotations if scheme.half_tangents else rotations[:0]
 
 
 def nodal_step(scheme: Scheme, q0: Array, q1: Array, rotations: Index) -> Array:
-    """Step of the nodes that forces work on: (Δu, 2 tan(Δψ/2)), or (Δu, Δψ)."""
+    """Return the nodal step that forces work on: (Δu, 2 tan(Δψ/2)), or (Δu, Δψ)."""
     s, turned = q1 - q0, with_half_tangents(scheme, rotations)
     s[turned] = 2 * np.tan(s[turned] / 2)
     return np.asarray(s)
 
 
 def way_to_rest(scheme: Scheme, dt: float) -> float:
-    """Way of a step at the end of which there is no velocity, over that at its beginning; s.
+    """Return the increment of a step that ends at rest, over its initial velocity; s.
 
-    It is that of a step with none before it; zero where nothing is known of it.
+    It holds for a step without a previous one.  It is zero in statics and for schemes without a
+    mean velocity.
     """
     if not has_inertia(scheme) or not scheme.has_mean_velocity:
         return 0.0
@@ -204,10 +207,10 @@ def way_to_rest(scheme: Scheme, dt: float) -> float:
 
 
 def combined(row: Sequence[float], s: Array, rates: Any) -> Array:
-    """Sum of a row of :class:`Coefficients` for the step ``s`` of the nodes.
+    """Return the sum of a row of :class:`Coefficients` for the nodal step ``s``.
 
-    ``rates`` are those at the beginning of the step: ``v``, ``v_before`` and ``more``, as many as
-    are known of :attr:`DynamicScheme.kept`.
+    ``rates`` at the beginning of the step are ``v``, ``v_before`` and ``more``, the known rates of
+    :attr:`DynamicScheme.kept`.
     """
     known: tuple[Array, ...] = (s, rates.v, rates.v_before, *rates.more)
     return sum(c * x for c, x in zip(row, known, strict=True) if c) + np.zeros(len(s))

@@ -34,18 +34,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
 
-LEAST_STRAIN = 1e-10  # strain that rounding and the tolerance of iterations leave behind
-DRAWN_AS_ZERO = 1e-4  # part of the largest value below which a value is drawn as zero
-ALIKE = 0.999  # part of the peak of an area from which on values are as large
-LABELLED = 0.15  # part of the largest value from which on the peak of an area is labelled
-MANY = 60  # beams beyond which both extreme values alone are labelled, and no directions drawn
+LEAST_STRAIN = 1e-10  # strain that may be due to rounding and the tolerance of iterations
+DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is drawn as zero
+ALIKE = 0.999  # fraction of the peak of an area above which values count as equal to it
+LABELLED = 0.15  # fraction of the largest value above which the peak of an area is labelled
+MANY = 60  # beams beyond which only extreme values are labelled, and no directions drawn
 
-CROWDED = 0.08  # part of the axes that labels cover, beyond which extreme values alone have some
+CROWDED = 0.08  # fraction of the axes under labels beyond which only extreme values are labelled
 FEW = 500  # areas whose ordinates texts should not cover
-MARGIN = 0.03  # part of the axes beyond what is drawn
+MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
-"""Room for words and numbers around the axes; least and largest size of a figure; inch."""
+"""Space for words and numbers around the axes; least and largest size of a figure; inch."""
 
 SIGNS = {
     "N": ("N > 0: tension", "N < 0: compression"),
@@ -54,7 +54,7 @@ SIGNS = {
 }
 """Meaning of both signs; the arrow on a beam points from its start to its end."""
 
-Values = tuple[Member, Array]  # a beam, and the values in points of its cells, (num_cells, points)
+Values = tuple[Member, Array]  # a beam, and values at points of its cells, (num_cells, points)
 
 
 def plane_stage(
@@ -64,15 +64,15 @@ def plane_stage(
     ax: Axes | None = None,
     size: tuple[float, float] | None = None,
 ) -> tuple[Stage, tuple[float, float]]:
-    """Make a stage whose symbols have their size in points.
+    """Make a stage whose symbols have a size in points.
 
     Args:
         solution: Solution to draw.
         shown: Numbers of the kept times.
         magnify: Factor on the displacements.
         ax: Axes of the user, if there are any.
-        size: Largest width and height of the figure; by default 9 inches, and what points need that
-            do not stand upright; inch.
+        size: Largest width and height of the figure; by default 9 inches, and the height that all
+            points need at this width; inch.
 
     Returns:
         The stage, and the size of the figure.
@@ -82,7 +82,7 @@ def plane_stage(
     high = float(np.clip(8.0 * extent[1] / max(extent[0], 1e-12), 3.2, 6.8))
     size = (9.0, high) if size is None else size
     if ax is None:
-        room = np.subtract(size, (0.9, 0.9))  # but for numbers and words
+        room = np.subtract(size, (0.9, 0.9))  # without numbers and words
     else:
         style.require_axes(ax)
         room = style.size_of(ax) / POINTS
@@ -109,13 +109,13 @@ def draw_shape(
     solution: Solution, *, quantity: str = "shape", n: int = -1, magnify: float = 1.0,
     ax: Axes | None = None,
 ) -> Figure:  # fmt: skip
-    """Draw the frame at the n-th kept time, perhaps with the diagram of a section force.
+    """Draw the frame at the n-th kept time, optionally with the diagram of a section force.
 
     M is on the side in tension, positive N and V to the left of the beam from start to end;
-    positive values are red, negative ones blue.  Between vertices they follow equilibrium, see
-    :meth:`Solution.diagram`.  Numbers are the peaks of areas, in the unit of the title; the largest
-    and the least value are bold.  Yielded or cracked cells are orange, open hinges circles as in
-    :func:`draw_state_of_damage`.
+    positive values are red, negative values blue.  Between vertices they follow from equilibrium,
+    see :meth:`Solution.diagram`.  Peaks of areas are labelled in the unit of the title; the largest
+    and the least value are bold.  Yielded or cracked cells are orange; open hinges are circles as
+    in :func:`draw_state_of_damage`.
 
     Raises:
         ArgumentError: No such time, ``magnify`` not positive, or ``ax`` no axes.
@@ -141,7 +141,7 @@ def draw_frame(
 ) -> Figure:
     """Draw the frame in a pose, with diagrams of a section force, their peaks, and damage.
 
-    The damage is that of the n-th kept time.  The unit stands between both parts of the title.
+    The damage is shown at the n-th kept time.  The unit stands between both parts of the title.
     """
     sizes = np.array([np.abs(values).max() for _, values in diagrams])
     factor, prefix = style.decimal_prefix(float(sizes.max(initial=0.0)))
@@ -153,7 +153,7 @@ def draw_frame(
         style.plane_axes(axes, f"{name} {unit}{when}")
         draw_undeformed(axes, solution, pose.stage)
         peaks: list[Peak] = []
-        if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # not of rounding and iterations
+        if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # more than rounding
             rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
             peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MANY else 1.0)
         draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
@@ -181,7 +181,7 @@ def _draw_diagrams(
     """Draw diagrams of a section force, all to one scale.
 
     Returns:
-        The peak of each area, its point of the axis, and the vector from there to the diagram;
+        The peak of each area, its point on the axis, and the vector from this point to the diagram;
         (num_areas, 5).
     """
     from matplotlib.collections import PolyCollection
@@ -192,7 +192,7 @@ def _draw_diagrams(
     largest = float(np.abs(found).max())
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
     values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
-    # A beam may have several diagrams, which do not meet.
+    # A beam may have several diagrams, which are not connected.
     diagram = np.repeat(np.arange(len(diagrams)), [len(of_cells) for _, of_cells in diagrams])
     axis, left = _along(solution, cells, diagram, nodes, found.shape[1])
     ordinates = scale * values[:, None] * left
@@ -227,9 +227,9 @@ class Peak(NamedTuple):
 
 
 def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
-    """Peaks to be labelled, both extreme values first; corners have one label for both beams.
+    """Choose peaks to label, both extreme values first; corners have one label for both beams.
 
-    Others have at least a part of the largest size, ``least``.
+    Other peaks are at least the fraction ``least`` of the largest magnitude.
     """
     values, axis, up = rows[:, 0], rows[:, 1:3], rows[:, 3:]
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
@@ -252,15 +252,16 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
 def _along(
     solution: Solution, cells: Index, diagram: Index, nodes: Array, points: int
 ) -> tuple[Array, Array]:
-    """Points of the axes as drawn and unit vectors to their left; both (num_cells points, 2).
+    """Return points of the drawn axes and unit vectors to their left; both (num_cells points, 2).
 
-    ``diagram`` is the number of that of each cell.
+    ``diagram`` is the number of the diagram of each cell.
     """
     mesh, parts = solution.grid.mesh, np.linspace(0.0, 1.0, points)
     start, end, *between = solution.grid.nodes_of_cells[cells].T
     chains = nodes[np.column_stack([start, *between, end])]
     ahead = unit_vectors(mesh.slopes(parts) @ chains)
-    # Ordinates at corners between cells of a beam halve the angle, and lean towards it in both.
+    # Ordinates at corners between cells of a beam bisect the angle; ordinates near them lean
+    # towards the bisector.
     lean = np.zeros((len(chains), 2, 2))
     k = np.flatnonzero(diagram[:-1] == diagram[1:])
     half = unit_vectors(ahead[k, -1] + ahead[k + 1, 0])
@@ -271,16 +272,16 @@ def _along(
 
 
 class Area(NamedTuple):
-    """Part of a diagram along a beam with values of one sign."""
+    """Section of a diagram along a beam with values of one sign."""
 
     outline: Array  # (n, 2); m
-    peak: float  # its largest value in size
-    place: int  # number of the point of the peak; of equal ones that in the middle
+    peak: float  # value of the largest magnitude
+    place: int  # number of the point of the peak, the middle one of equal peaks
 
 
 def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[Area]:
     """Divide diagrams, whose numbers are ``diagram``, where the sign changes."""
-    # There both areas end in a point of the axis.
+    # At a change of sign both areas end in a point of the axis.
     first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
     part = values[first] / (values[first] - values[first + 1])
     zeros = axis[first] + part[:, None] * (axis[first + 1] - axis[first])
@@ -309,15 +310,15 @@ def draw_state_of_damage(
 ) -> Figure:
     """Draw yielded cells and opened hinges on the frame at the n-th kept time.
 
-    Cells that have yielded are coloured by the energy that plastic strains dissipated per length
-    (J/m); in cells of fibres that includes cracks.  Hinges that have opened are circles, the larger
-    the more of their fracture energy is spent; from 99 % they are as hollow as a joint.
+    Yielded cells are coloured by the energy that plastic strains dissipated per length (J/m), in
+    cells of fibres also by cracks.  Opened hinges are circles, larger the more of their fracture
+    energy is dissipated; from 99 % they are hollow, as joints.
 
     Args:
         solution: Solution to draw.
         n: Number of the kept time; negative from the end.
         magnify: Factor on the displacements.
-        ax: Axes to draw in; by default those of a new figure.
+        ax: Axes to draw in; by default a new figure.
 
     Raises:
         ArgumentError: The scene is elastic, no such time, ``magnify`` is not positive, or ``ax`` is
@@ -330,16 +331,16 @@ def draw_state_of_damage(
 
     grid = solution.grid
     for beam in solution.scene.beams[:1]:
-        solution.material(beam)  # or its error
+        solution.material(beam)  # raises if the scene is elastic
     stage, (width, height) = plane_stage(solution, [n], magnify, ax)
     pose, density = stage.pose(n), dissipated_per_length(solution, n)
     length, rise = np.ptp(stage.points(), axis=0)
-    # Upright frames need less; the bar and the legend have their own widths.
+    # Upright frames need less width; the bar and the legend have their own widths.
     across = height * length / max(rise, 1e-12)
     with style.panel(ax, (min(width, max(6.0, across + 3.0)), height)) as axes:
         time = solution.parameter.at(solution.times[n])
         style.plane_axes(axes, f"damage at {time}{style.magnified(magnify)}")
-        axes.set_adjustable("datalim")  # room for the broad lines of a slender frame
+        axes.set_adjustable("datalim")  # space for the broad lines of a slender frame
         draw_undeformed(axes, solution, stage)
         draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.0, zorder=2)
         draw_strokes(axes, symbols.in_plane(pose))
@@ -371,11 +372,11 @@ def draw_state_of_damage(
 
 
 def _arrange(axes: Axes, peaks: Sequence[Peak], *, own: bool) -> None:
-    """Fit limits, and a figure of its own, to what is drawn; write peaks where they cover least."""
+    """Fit limits, and the size of a new figure; write peaks where they cover the least."""
     axes.margins(MARGIN)
     without_texts = axes.dataLim.frozen()
     written: list[Annotation] = []
-    # Room for the texts changes the scale, and with it what is beside them.
+    # Space for the texts changes the scale, and with it the objects beside them.
     for _ in range(3):
         _fit(axes, own)
         for text in written:
@@ -387,9 +388,9 @@ def _arrange(axes: Axes, peaks: Sequence[Peak], *, own: bool) -> None:
 
 
 def _fit(axes: Axes, own: bool) -> None:
-    """Make a figure of its own as wide and high as what is drawn, at the largest scale that fits.
+    """Fit the limits, and the size of a new figure, to the drawing at the largest scale possible.
 
-    Axes of the user have their limits fitted.
+    A figure of the user keeps its size.
     """
     axes.autoscale_view()
     if not own:
@@ -407,7 +408,7 @@ def _fit(axes: Axes, own: bool) -> None:
 
 
 def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
-    """Write peaks beside areas and lines; those without room are left out but for extremes."""
+    """Write peaks beside areas and lines; omit peaks that find no space, except extremes."""
     figure = style.figure_of(axes)
     figure.draw_without_rendering()
     looks: tuple[dict[str, Any], ...] = (
@@ -425,7 +426,7 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
 
     labels = []
     for k in chosen:
-        # Straight away from the axis first, then more and more aside
+        # First perpendicular to the axis, then more and more aside.
         turns = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
         x, y = peaks[k].outward
         at, ways = in_points(peaks[k].tip), layout.directions(math.atan2(y, x) + turns)
@@ -438,7 +439,7 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
         if len(one.leader):
             end = (one.leader[1] - one.center + one.half) / (2 * one.half)
             line = {"arrowstyle": "-", "color": color, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
-            arrow = {**line, "relpos": end, "patchA": None}  # by itself it would search that end
+            arrow = {**line, "relpos": end, "patchA": None}  # else Matplotlib computes this end
         if one.overlap == 0.0 or peaks[k].extreme:
             mark = axes.annotate(
                 text, (x, y), (right, up), textcoords="offset points", color=color,
@@ -449,7 +450,7 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
 
 
 def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
-    """Lines that texts should not cover, those within areas too; (n, 4); points."""
+    """Return lines that texts should not cover, also lines within areas; (n, 4); points."""
     chains = [
         np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"
     ]
@@ -466,7 +467,7 @@ def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
         if line.get_linestyle() == "None":  # symbols
             found += [segments(point + cross) for point in in_points(line.get_xydata())]
     for outline in map(in_points, areas[:FEW]):
-        # Ordinates, from a point of the outline to the one across the axis
+        # Ordinates, from a point of the outline to its opposite point on the axis.
         for part in (0.0, 0.5):
             between = outline[:-1] + part * np.diff(outline, axis=0)
             feet = (outline[1:] - part * np.diff(outline, axis=0))[::-1]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Films in GIF and MP4 files, which notebooks play, and a screen for VTK to draw them."""
+"""Films in GIF and MP4 files, which notebooks play, and a screen on which VTK draws them."""
 
 from __future__ import annotations
 
@@ -25,8 +25,7 @@ Frames = Iterator[Any]  # images (height, width, 3) of one size; np.uint8
 class Film(os.PathLike[str]):
     """Film in a file, as :func:`animate` returns it.
 
-    It is played where a notebook shows it, and stands for its path everywhere else.  The notebook
-    contains a copy of the film.
+    A notebook plays it and contains a copy of the film.  Everywhere else it acts as its path.
 
     Attributes:
         path: GIF or MP4 file.
@@ -56,11 +55,11 @@ class Film(os.PathLike[str]):
 
 
 def write_gif(path: Path, frames: Frames, fps: float) -> None:
-    """Write a GIF, which counts its time in hundredths of a second."""
+    """Write a GIF, whose times are in hundredths of a second."""
     from PIL import Image
 
     images = [Image.fromarray(frame).quantize(256) for frame in frames]
-    # Frames begin at the nearest hundredth, so that the film has its length.
+    # Frames begin at the nearest hundredth, so that the film has the right length.
     durations = 10.0 * np.diff(np.rint(100.0 * np.arange(len(images) + 1) / fps))
     first, *others = images
     first.save(path, save_all=True, append_images=others, duration=durations.tolist(), loop=0)
@@ -77,7 +76,7 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
         "-vf", "pad=ceil(iw/2)*2:ceil(ih/2)*2:color=white", "-pix_fmt", "yuv420p",
         str(path.absolute()),
     ]  # fmt: skip
-    # Not a pipe: PETSc ends the interpreter at the signal of a broken one.
+    # No pipe: if it breaks, PETSc ends the interpreter at the signal.
     with tempfile.TemporaryFile() as images:
         for frame in chain([first], frames):
             images.write(np.ascontiguousarray(frame).data)
@@ -93,12 +92,12 @@ def write_mp4(path: Path, frames: Frames, fps: float) -> None:
 
 
 def _ffmpeg() -> str:
-    """Find the program ffmpeg: that of the package imageio-ffmpeg, or the system's."""
+    """Find ffmpeg in the package imageio-ffmpeg, or else on the system."""
     try:
         from imageio_ffmpeg import get_ffmpeg_exe
 
         return str(get_ffmpeg_exe())
-    except (ImportError, RuntimeError) as error:  # there is no package, or no program in it
+    except (ImportError, RuntimeError) as error:  # no package, or no program in it
         program = shutil.which("ffmpeg")
         if program is None:
             raise ImportError(
@@ -114,7 +113,7 @@ WRITERS = {".gif": write_gif, ".mp4": write_mp4}
 
 @contextmanager
 def screen(pyvista: Any) -> Iterator[None]:
-    """Provide a screen by Xvfb if there is none: VTK before 9.4 ends the interpreter without."""
+    """Start Xvfb if there is no screen: without a screen, VTK before 9.4 ends the interpreter."""
     needed = sys.platform == "linux" and tuple(pyvista.vtk_version_info) < (9, 4)
     if not needed or os.environ.get("DISPLAY"):
         yield
@@ -126,7 +125,7 @@ def screen(pyvista: Any) -> Iterator[None]:
         )
     server = subprocess.Popen(
         ["Xvfb", "-displayfd", "1", "-screen", "0", "1280x1024x24", "-nolisten", "tcp"],
-        start_new_session=True,  # Ctrl-C is for this process; it still needs its screen to end
+        start_new_session=True,  # Ctrl-C must not end the screen before this process
         stdin=subprocess.DEVNULL,
         stdout=subprocess.PIPE,
         stderr=subprocess.DEVNULL,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of yielding and fracture: places and their marks, paths, and dissipation."""
+"""Pictures of yielding and fracture: marks on the frame, paths, and dissipation."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-FULLY_OPEN = 0.99  # part of the fracture energy from which on a hinge is drawn as a joint
+FULLY_OPEN = 0.99  # fraction of the fracture energy from which a hinge is drawn as a joint
 
 
 class OpenHinge(NamedTuple):
     """Hinge that has opened."""
 
     beam: Member
-    at: Array  # where it is now; (2,); m
-    part: float  # of its fracture energy, from 0 (closed) to 1 (a joint); 0 if it hardens
+    at: Array  # its present position; (2,); m
+    part: float  # dissipated fraction of its fracture energy, 1 for a joint; 0 if it hardens
 
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
-    """Find hinges, in cells and of zero length, that are open; ``points`` are nodes as drawn."""
+    """Find open hinges, in cells and of zero length; ``points`` are the drawn nodes."""
     grid = solution.grid
     found: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
     for beam in solution.scene.beams:
@@ -55,7 +55,7 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
             dissipated = float(kept.dissipated[n])
             found.append((place_of(hinge).beam, points[vertex], law_of(hinge), dissipated))
     return [
-        # One that never resisted is a joint.
+        # A hinge without strength is a joint.
         OpenHinge(beam, at, min(lost / law.fracture_energy, 1.0) if law.limit > 0.0 else 1.0)
         for beam, at, law, lost in found
     ]
@@ -75,7 +75,7 @@ def dissipated_per_length(solution: Solution, n: int) -> Array:
 
 
 def circle(part: float) -> dict[str, Any]:
-    """Return the look of a hinge of which a part of the fracture energy is spent."""
+    """Return the marker of a hinge that has dissipated a fraction of its fracture energy."""
     paper = shade(WHITE)
     inside, edge = (paper, BLUE) if part >= FULLY_OPEN else (BLUE, paper)
     size = 4.0 + 6.0 * math.sqrt(part)
@@ -102,13 +102,13 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
 def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
-    The curvature includes the jump of a hinge over the length of the cell; the area of loops is the
-    dissipated energy per length.  A ring marks the first kept time, a dot the last one.
+    The curvature includes the jump of a hinge divided by the length of the cell; the area of loops
+    is the dissipated energy per length.  A ring marks the first kept time, a dot the last.
 
     Args:
         solution: Solution to draw.
-        place: Where; at a vertex it is the cell before it.
-        ax: Axes to draw in; by default those of a new figure.
+        place: Place in the cell; a vertex means the cell before it.
+        ax: Axes to draw in; by default a new figure.
 
     Raises:
         ArgumentError: The scene is elastic, the beam of the place is not in it, or ``ax`` is no
@@ -129,14 +129,14 @@ def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
 def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
-    The area between the path and the axis is the energy that the hinge dissipated; the title says
-    how much it is (J), and how much of its fracture energy.
+    The area between the path and the axis is the energy that the hinge dissipated.  The title
+    states it (J), and its percentage of the fracture energy.
 
     Args:
         solution: Solution to draw.
-        place: Where; without a plastic hinge at the place it is that of the cell, at a vertex of
-            the cell before it.
-        ax: Axes to draw in; by default those of a new figure.
+        place: Place of a plastic hinge; else the hinge of its cell is drawn, at a vertex the hinge
+            of the cell before it.
+        ax: Axes to draw in; by default a new figure.
 
     Raises:
         ArgumentError: The scene is elastic, there is no hinge, the beam of the place is not in the
@@ -153,7 +153,7 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
         raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
     M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
-        # Pieces in which the jump only grows or only falls; neighbours share a point
+        # Sections in which the jump only grows or only falls; neighbours share a point.
         moves = np.flatnonzero(np.diff(jump))
         turns = moves[1:][np.diff(np.sign(np.diff(jump)[moves])) != 0]
         for first, last in pairwise([0, *turns, len(jump) - 1]):
@@ -173,16 +173,16 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
 def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     """Draw the energy losses over time (J) by their sinks, as stacked areas.
 
-    The line above them is the supplied work, plus the initial energy of the scene; the gap between
-    is the energy in the scene, which also has a line of its own.  The title states the worst
-    imbalance of the ledger.
+    The line above them is the supplied work plus the initial energy of the scene.  The gap between
+    line and areas is the energy in the scene, which also has its own line.  The title states the
+    largest imbalance of the ledger.
 
     Args:
         solution: Solution to draw.
-        ax: Axes to draw in; by default those of a new figure.
+        ax: Axes to draw in; by default a new figure.
 
     Raises:
-        ArgumentError: The scene is elastic, and has no connectors; or ``ax`` is no axes.
+        ArgumentError: The scene is elastic and has no connectors, or ``ax`` is no axes.
 
     Example:
         >>> ub.plot(broken, "dissipation").savefig("dissipation.png")
@@ -190,7 +190,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     if not solution.scene.connectors:
         if not solution.scene.beams:
             raise ArgumentError("plot: the scene has neither beams nor connectors")
-        solution.material(solution.scene.beams[0])  # or its error
+        solution.material(solution.scene.beams[0])  # raises if the scene is elastic
     energy, t = solution.energy, solution.progress
     held = energy.total
     work, gone = (sum(x.values(), np.zeros_like(t)) for x in (energy.supplied, energy.lost))
@@ -198,7 +198,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     start = held[0] > 1e-12 * energy.throughput
     with style.panel(ax, (8.0, 5.0)) as axes:
         style.time_axes(axes)
-        # Blue is the energy in the scene; colours come again after the last.
+        # Blue is reserved for the energy in the scene; the colours repeat.
         colors = [(color, 0.75) for color in (ORANGE, RED, style.GREEN, style.PINK, style.SKY)]
         labels = [f"lost: {name}" for name in energy.lost]
         axes.stackplot(t, *energy.lost.values(), labels=labels, colors=colors)
@@ -222,7 +222,7 @@ def _prefix(axis: Axis, values: Array, quantity: str, unit: str) -> None:
 
 
 def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> None:
-    """M against x, from light to dark in time; a ring at the beginning, a dot at the end."""
+    """Draw M against x, from light to dark in time; a ring marks the start, a dot the end."""
     from matplotlib.collections import LineCollection
 
     times, named = solution.progress, solution.parameter

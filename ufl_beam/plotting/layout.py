@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Positions of objects and labels in pictures; geometry in the plane, arrays end with (x, y)."""
+"""Positions of objects and labels in pictures, and plane geometry; arrays end with (x, y)."""
 
 from __future__ import annotations
 
@@ -22,63 +22,63 @@ from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.output.states import States
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
-"""Half the size of a symbol of a support where beams are not short; length of a beam below which it
-shrinks, in proportion; points.  It shrinks at most to this part."""
+"""Half the size of the symbol of a support, in points; length of beams, in points, below which it
+shrinks in proportion; smallest fraction to which it shrinks."""
 
-FEW = 40  # supports and loads whose symbols need not shrink as much as others do
+FEW = 40  # supports and loads up to which their symbols shrink less than others
 
-Range = tuple[float, float]  # of a slider along its rail from its place, m; or guide parameter
+Range = tuple[float, float]  # of a slider along its rail from its place, m; or guide parameters
 
 
 # -- geometry ----------------------------------------------------------------------------------
 
 
 def directions(angles: Any) -> Array:
-    """Unit vectors at angles from the axis x; (..., 2); angles in rad."""
+    """Return unit vectors at angles from the axis x; (..., 2); angles in rad."""
     return np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
 def unit_vectors(vectors: Array) -> Array:
-    """Vectors divided by their lengths; (..., 2)."""
+    """Divide vectors by their lengths; (..., 2)."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 def left_of(vectors: Array) -> Array:
-    """Vectors turned to their left by a right angle; (..., 2)."""
+    """Rotate vectors to their left by a right angle; (..., 2)."""
     return vectors[..., ::-1] * (-1.0, 1.0)
 
 
 def in_frame(points: Any, at: Any, ahead: Array) -> Array:
-    """Points from coordinates along a vector and to its left, in its length; (n, 2)."""
+    """Convert coordinates along a vector and to its left, in its length, to points; (n, 2)."""
     return np.asarray(at + np.array(points) @ np.array([ahead, left_of(ahead)]))
 
 
 def lengths_along(line: Array) -> Array:
-    """Lengths of a line from its start to each of its points; (n,)."""
+    """Compute lengths of a line from its start to each of its points; (n,)."""
     return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
 
 
 def points_along(line: Array, parts: Any) -> Array:
-    """Points of a line at parts of its length; (n, 2)."""
+    """Return points of a line at fractions of its length; (n, 2)."""
     lengths = lengths_along(line)
     at = np.multiply(parts, lengths[-1])
     return np.column_stack([np.interp(at, lengths, x) for x in line.T])
 
 
 def segments(line: Array) -> Array:
-    """Pieces of a line between its points, as (x, y, x, y) of both ends; (n - 1, 4)."""
+    """Return segments of a line between its points, (x, y, x, y) of both ends; (n - 1, 4)."""
     return np.hstack([line[:-1], line[1:]])
 
 
 def joined(lines: Iterable[Array]) -> Array:
-    """Lines one after the other, with NaN between them: one line to Matplotlib; (n, 2)."""
+    """Join lines with NaN between them, as one line for Matplotlib; (n, 2)."""
     gap = np.full((1, 2), np.nan)
     chains: list[Array] = [chain for line in lines for chain in (line, gap)]
     return np.concatenate(chains[:-1] or [np.empty((0, 2))])
 
 
 def evenly(progress: Array, count: int) -> list[int]:
-    """Choose numbers of so many kept states, evenly spaced in time or along a path."""
+    """Choose the numbers of ``count`` kept states, evenly spaced in time or along a path."""
     spaced = np.linspace(progress[0], progress[-1], count)
     return [int(np.argmin(np.abs(progress - x))) for x in spaced]
 
@@ -89,8 +89,8 @@ def evenly(progress: Array, count: int) -> list[int]:
 class Stage:
     """Scene before any run or in a solution, as pictures show it, and the size of its symbols.
 
-    Displacements are drawn ``magnify`` times as large as they are.  Of a solution, the kept times
-    ``shown`` are in the picture, by default all; rails are long enough for them.
+    Displacements are multiplied by ``magnify``.  The picture shows the kept times ``shown`` of a
+    solution, by default all; rails are long enough for these times.
     """
 
     def __init__(
@@ -99,7 +99,7 @@ class Stage:
         magnify: float,
         unit: float,  # half the size of a symbol; m
         shown: Sequence[int] | None = None,
-        outside: float = 0.0,  # of what stands around the beams: supports, loads and motions; m
+        outside: float = 0.0,  # the same of supports, loads and prescribed motions; m
     ) -> None:
         require_number(magnify, "magnify", positive=True)
         self.magnify, self.unit, self.outside = magnify, unit, outside or unit
@@ -107,7 +107,7 @@ class Stage:
         self.scene = subject.scene if isinstance(subject, States) else subject
         kept = 0 if self._solution is None else len(self._solution.times)
         self._shown = range(kept) if shown is None else shown
-        self.spots = spots_of(self.scene)  # of bodies and of the ground, to attach something to
+        self.spots = spots_of(self.scene)  # attachment points of bodies and of the ground
 
     @classmethod
     def at_scale(
@@ -127,7 +127,7 @@ class Stage:
 
     @property
     def undeformed(self) -> Pose:
-        """Pose in which everything was made."""
+        """Pose of the undeformed scene."""
         nodes = np.empty((0, 2)) if self._solution is None else self._solution.grid.points
         return Pose(self, lambda anchor: np.zeros(3), nodes)
 
@@ -144,7 +144,7 @@ class Stage:
         return Pose(self, lambda anchor: state.displacement(anchor)[0], nodes)
 
     def poses(self) -> Iterator[Pose]:
-        """Iterate over the undeformed pose and all that are shown."""
+        """Iterate over the undeformed pose and all poses in the picture."""
         yield self.undeformed
         yield from map(self.pose, self._shown)
 
@@ -154,10 +154,10 @@ class Stage:
 
     @cached_property
     def travels(self) -> dict[Connector, Range]:
-        """Ranges of all that slides or is guided, since it was made, by its holder.
+        """Ranges of sliders and guided points since the undeformed state, by connector.
 
-        Along a rail, across which its connector holds, they are positions; of a guide curve that
-        goes on they are parameters, and three units more to both sides.
+        On a rail, whose connector constrains the motion across it, the range is in positions.  On
+        a guide curve it is in parameters, extended by three units at ends where the curve goes on.
         """
         found: dict[Connector, Range] = {}
         solution, shown = self._solution, list(self._shown)
@@ -176,7 +176,7 @@ class Stage:
         return found
 
     def _along_guide(self, holder: Connector, law: Guide) -> Range:
-        """Parameters between which a guide curve is used, and three units more if it goes on."""
+        """Return the used parameters of a guide curve, extended by three units if it goes on."""
         curve, size, found = law.curve, self.scene.size, [0.0]
         for point in () if self._solution is None else self._solution.position(holder.b):
             step = parameter_step(curve, found[-1], size)
@@ -195,7 +195,7 @@ class Stage:
 
     @cached_property
     def outlines(self) -> dict[Body, Array]:
-        """Convex, around centre and points of each body, closed; a disc around one; (n, 2); m."""
+        """Closed convex outlines around the centre and points of each body; (n, 2); m."""
         from scipy.spatial import ConvexHull
 
         found, circle = {}, self.unit * directions(np.arange(48) * math.pi / 24)
@@ -209,8 +209,8 @@ class Stage:
 
     @cached_property
     def offsets(self) -> dict[Connector, float]:
-        """Offsets of connectors that share their line, or their pin, with others; in units."""
-        # Rails and rods keep the middle.
+        """Offsets of connectors on the same line, or around the same pin, in units."""
+        # Rails and rods stay in the middle.
         middles = {frozenset(joint.places) for joint in self.scene.joints if not joint.meets}
         groups: defaultdict[tuple[bool, frozenset[object]], list[Connector]] = defaultdict(list)
         for c in self.scene.connectors:
@@ -229,7 +229,7 @@ class Stage:
 
 @dataclass(frozen=True, eq=False)
 class Pose:
-    """Scene at one time, as it is drawn."""
+    """Drawn positions of a scene at one time."""
 
     stage: Stage
     motion: Callable[[Anchor], Array]  # (u, v, ψ) of an anchor, not magnified; (3,); m, m, rad
@@ -244,7 +244,7 @@ class Pose:
         return float(self.motion(anchor)[2])
 
     def turned(self, x: tuple[float, float], anchor: Anchor) -> Array:
-        """Turn a vector with an anchor; (2,)."""
+        """Rotate a vector with an anchor; (2,)."""
         return in_frame(x, 0.0, directions(self.turn(anchor)))
 
     def points(self) -> Array:
@@ -263,20 +263,20 @@ class Pose:
 
 # -- labels, off lines and off each other ------------------------------------------------------
 
-GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # distances of a label from its spot that are tried; points
-CLEARANCE = 2.0  # room around a label; points
-ROUNDS = 6  # times that each label is placed at most
+GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # candidate distances of a label from its spot; points
+CLEARANCE = 2.0  # clearance around a label; points
+ROUNDS = 6  # most iterations of the placement
 
 LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0, 0.6, 0.4
-"""Costs of a candidate: of a point of length of lines under the label, of a square point of another
-label, of a point beyond the frame, of a point of distance, and of a place in the list of spots."""
+"""Costs of a candidate: per point of length of lines under the label, per square point of another
+label, per point beyond the frame, per point of distance, and per rank in the list of spots."""
 
-CROSSING_COST = 25.0  # of a label that the leader crosses; a line costs a tenth of that
-LEADER = 10.0  # distance of a label from its spot from which on a line leads to it; points
+CROSSING_COST = 25.0  # of a label that the leader crosses; a crossed line costs a tenth of it
+LEADER = 10.0  # distance of a label from its spot from which it has a leader line; points
 
 
 class Spot(NamedTuple):
-    """Place that a label belongs to, and the direction in which the label lies from it."""
+    """Point that a label belongs to, and the direction from this point to the label."""
 
     at: Array  # (2,)
     way: Array  # unit vector; (2,)
@@ -284,7 +284,7 @@ class Spot(NamedTuple):
 
 
 class Label(NamedTuple):
-    """Text and the places where it may stand, the best first."""
+    """Text and its candidate positions, the best first."""
 
     text: str
     color: str
@@ -293,17 +293,17 @@ class Label(NamedTuple):
 
 
 class Placed(NamedTuple):
-    """Label with its place; lengths in points."""
+    """Label with its position; lengths in points."""
 
     label: Label
     center: Array  # of its box; (2,)
     half: Array  # half the width and height of its box; (2,)
-    spot: Array  # that it belongs to; (2,)
-    overlap: float  # part of its box that other labels cover
+    spot: Array  # point that it belongs to; (2,)
+    overlap: float  # fraction of its box under other labels
 
     @property
     def leader(self) -> Array:
-        """Line from the spot to the box if that stands away; (2, 2) or (0, 2)."""
+        """Line from the spot to the box if the box is distant; (2, 2) or (0, 2)."""
         edge = np.clip(self.spot, self.center - self.half, self.center + self.half)
         ends = np.array([self.spot, edge])
         return ends if np.linalg.norm(edge - self.spot) >= LEADER else ends[:0]
@@ -312,10 +312,10 @@ class Placed(NamedTuple):
 def place(
     labels: Sequence[Label], halves: Sequence[Array], lines: Array, frame: Array | None = None
 ) -> list[Placed]:
-    """Place labels where they cover least; each again until all stay where they are.
+    """Place labels where they cover the least; iterate until their positions no longer change.
 
     Spots, half widths and heights, segments that should stay visible, (n, 4), and the corners of a
-    frame that labels should not leave, (4,), are all in points.
+    frame that labels should not leave, (4,), are in points.
     """
     order = sorted(range(len(labels)), key=lambda k: labels[k].rank)
     placed: dict[int, Placed] = {}
@@ -332,17 +332,17 @@ def place(
 def _best(
     label: Label, half: Array, lines: Array, others: list[Placed], frame: Array | None
 ) -> Placed:
-    """The place of a label that costs least, of all spots at all distances."""
+    """Return the position of a label with the least cost, of all spots at all distances."""
     boxes: Array = np.reshape([(*x.center - x.half, *x.center + x.half) for x in others], (-1, 4))
     lines = np.vstack([lines, *(x.leader.reshape(-1, 4) for x in others)])
     number = np.arange(len(label.spots))
     gaps, choices = np.repeat(GAPS, len(number)), np.tile(number, len(GAPS))
     ways = np.array([spot.way for spot in label.spots])[choices]
     spots = np.array([spot.at + spot.gap * spot.way for spot in label.spots])[choices]
-    # So far from its spot a box is beyond the line through it, across the way.
+    # At this distance the box is beyond the line through its spot, perpendicular to the direction.
     centers = spots + ways * (gaps + np.abs(ways) @ half)[:, None]
     low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
-    # Segments whose own boxes meet one of these
+    # Segments near the candidate boxes.
     first, last = np.minimum(lines[:, :2], lines[:, 2:]), np.maximum(lines[:, :2], lines[:, 2:])
     near = lines[((first <= high.max(axis=0)) & (last >= low.min(axis=0))).all(axis=1)]
     covered = areas_covered(low, high, boxes)
@@ -351,7 +351,7 @@ def _best(
     if frame is not None:
         beyond = np.maximum(frame[:2] - low, 0.0) + np.maximum(high - frame[2:], 0.0)
         cost += OUTSIDE_COST * beyond.sum(axis=1)
-    # Leaders that would be worse than the best place without one are not looked at.
+    # Skip leaders that cost more than the best position without a leader.
     ends = np.hstack([spots, np.clip(spots, centers - half, centers + half)])
     leads = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1) >= LEADER
     some = np.flatnonzero(leads & (cost < cost[~leads].min(initial=np.inf)))
@@ -367,7 +367,7 @@ def crossings(first: Array, second: Array) -> Array:
     """Count segments (n, 4) that each of the first segments (num_first, 4) crosses."""
     ends = first[:, None, :2], first[:, None, 2:], second[None, :, :2], second[None, :, 2:]
     a, b, c, d = np.broadcast_arrays(*ends)
-    # Signs of the areas of triangles p, q, r
+    # Signs of the areas of triangles p, q, r.
     p, q, r = np.stack([a, a, c, c]), np.stack([b, b, d, d]), np.stack([c, d, a, b])
     (x, y), (u, v) = np.moveaxis(q - p, -1, 0), np.moveaxis(r - p, -1, 0)
     sign = np.sign(x * v - y * u)
@@ -379,7 +379,7 @@ def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
     """Measure segments (n, 4) inside each box, given by its corners (num_boxes, 2)."""
     first, way = lines[None, :, :2], (lines[:, 2:] - lines[:, :2])[None]
     lengths = np.linalg.norm(way[0], axis=1)
-    # Along an axis in which a segment does not move, it is inside for ever or never.
+    # A segment perpendicular to an axis is either entirely inside along this axis, or outside.
     way = np.where(way == 0.0, 1e-99, way)
     ends = (low[:, None] - first) / way, (high[:, None] - first) / way
     enter, leave = np.minimum(*ends).max(axis=2), np.maximum(*ends).min(axis=2)

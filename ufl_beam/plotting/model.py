@@ -35,25 +35,24 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEAST, MOST = (5.5, 3.0), (9.0, 6.8)  # sizes of the figure; inch
-LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0  # room around axes; points
+LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0  # space around axes; points
 LABEL_SIZE, TITLE_SIZE, ARROW_SIZE = 11.0, 14.0, 26.0  # of labels, title, arrows above; points
-BADGE = 60.0  # room for the arrow of a load on the whole scene, and between two of them; points
+BADGE = 60.0  # width for the arrow of a load on the whole scene, with spacing; points
 
 Measure = Callable[[str], Array]  # half of width and height of a text; (2,); points
-UNBOUNDED = np.array([-np.inf, -np.inf, np.inf, np.inf])  # frame, before its place is known
+UNBOUNDED = np.array([-np.inf, -np.inf, np.inf, np.inf])  # frame before its position is known
 
 
 def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     """Draw the undeformed model, before any run.
 
     It shows beams, their cells and names, bodies, joints, supports, connectors with their sizes,
-    hinges, loads (red), prescribed motions (orange), masses and initial velocities (green).  Hollow
-    heads of arrows are loads that turn with their place.  What is orange drives: filled if it gives
-    the motion, hollow if it gives the force.  Names and sizes for which there is no room are left
-    out.
+    hinges, loads (red), prescribed motions (orange), masses and initial velocities (green).  Loads
+    that turn with their place have hollow arrow heads.  Drives are orange: filled if they prescribe
+    the motion, hollow if they prescribe the force.  Names and sizes that find no space are omitted.
 
     Raises:
-        ArgumentError: Constraints of the scene repeat, or ``ax`` is no axes.
+        ArgumentError: Constraints of the scene are redundant, or ``ax`` is no axes.
     """
     require_independent(scene)
     subject, notes = Subject(scene), notes_of(scene)
@@ -76,7 +75,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
             style.figure_of(axes).set_layout_engine("none")
             around = LEFT + RIGHT, font_size(BELOW + ABOVE + NOTE * len(notes))
             least, most = (POINTS * np.array(size) - around for size in (LEAST, MOST))
-            # At least as wide as the words above
+            # At least as wide as the words above the axes.
             badges = [2 * measure(text)[0] + BADGE for text, *_ in map(badge, scene.loads) if text]
             first = 2 * TITLE_SIZE / LABEL_SIZE * measure(title)[0] + sum(badges)
             above = max([first, *(2 * measure(words)[0] for words in notes)])
@@ -87,7 +86,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
         _fit(axes, sheet.scale, frame, len(notes) if ax is None else None)
         draw_strokes(axes, sheet.strokes)
         _write(axes, placed, sheet.scale)
-        # The loads on the whole scene, right above the axes
+        # Loads on the whole scene, at the right above the axes.
         x, y = frame[2:] - frame[:2] + (0.0, 17.0)
         for text, arrow, angle in filter(any, map(badge, scene.loads)):
             for words, size, turn in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
@@ -106,7 +105,7 @@ def of_scene(scene: Scene) -> str:
 
 
 def notes_of(scene: Scene) -> list[str]:
-    """Return words on loads of the whole scene, and a legend of the symbols."""
+    """Return notes on damping, works, and hinges that may form, for a legend."""
     notes = []
     for damping in scene.damping:
         if isinstance(damping, Rayleigh):
@@ -146,16 +145,16 @@ def badge(load: Load) -> tuple[str, str, float]:
 def _planned(
     subject: Subject, measure: Measure, least: Array, most: Array
 ) -> tuple[Sheet, list[Placed], Array]:
-    """The sheet at the largest scale at which it fits, its labels, and the corners of the axes.
+    """Return the sheet at the largest scale that fits, its labels, and the corners of the axes.
 
-    The sizes of the axes, at least and at most, and the corners are in points.
+    The least and the largest size of the axes, and the corners, are in points.
     """
     scene = subject.scene
     points = [*subject.axes.values(), *(np.array([body.center]) for body in scene.bodies)]
     points += [np.array([spot.point]) for spots in spots_of(scene).values() for spot in spots]
     low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
     scale, frame = max(*(high - low) / (400.0, 250.0), scene.size / 500.0), UNBOUNDED
-    # What stands around the beams has a size in points: with the second plan it fits.
+    # Symbols around the beams have sizes in points, so a second iteration is needed to fit them.
     for _ in range(2):
         sheet = draw(subject, scale)
         placed = _arrange(sheet, measure, frame)
@@ -174,7 +173,7 @@ def _planned(
 
 
 def _arrange(sheet: Sheet, measure: Measure, frame: Array) -> list[Placed]:
-    """Labels at their places; those that others would cover are left out."""
+    """Place the labels; omit labels that others would cover."""
     labels = sheet.labels
     for rank in (NAMES, CAPTIONS):
         if len(labels) > MOST_LABELS:
@@ -192,7 +191,7 @@ def _arrange(sheet: Sheet, measure: Measure, frame: Array) -> list[Placed]:
 
 
 def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
-    """Set limits and ticks; make a figure of its own as large as axes, and words around, need."""
+    """Set limits and ticks; make a new figure as large as the axes and the words around need."""
     from matplotlib.ticker import MaxNLocator
 
     (x0, y0, x1, y1), (across, up) = frame, frame[2:] - frame[:2]
@@ -204,7 +203,7 @@ def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
         below, above = font_size(BELOW), font_size(ABOVE + NOTE * notes)
         figure = style.figure_of(axes)
         left, width, height = LEFT, across + LEFT + RIGHT, up + below + above
-        for _ in range(2):  # the second time with as much room as the numbers at the axis take
+        for _ in range(2):  # the second time with the width of the numbers at the axis
             figure.set_size_inches(width / POINTS, height / POINTS)
             axes.set_position((left / width, below / height, across / width, up / height))
             outer: Any = axes.get_tightbbox()
@@ -215,7 +214,7 @@ def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
 
 
 def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
-    """The labels, and lines from those that stand away to what they name."""
+    """Write the labels, and lines from distant labels to their objects."""
     for one in placed:
         if len(one.leader):
             axes.plot(

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Strokes and labels of the picture of a model, at a scale that is still to be found."""
+"""Strokes and labels of the picture of a model, at a scale to be determined."""
 
 from __future__ import annotations
 
@@ -21,19 +21,19 @@ from ufl_beam.plotting.layout import Spot, directions, left_of, points_along, un
 from ufl_beam.plotting.style import GREEN, INK, RED, TEXT, WHITE, number, with_unit
 from ufl_beam.plotting.symbols import FRONT, Stroke, disc
 
-LOADS, MOTIONS, CAPTIONS, NAMES = range(4)  # ranks of labels: those of loads are placed first
+LOADS, MOTIONS, CAPTIONS, NAMES = range(4)  # ranks of labels: labels of loads are placed first
 MOST_LABELS = 80  # number beyond which names and captions are left out
 MOST_CELLS = 300  # number of cells beyond which they are not marked
 
 HINGE = "#B0508A"  # colour of hinges
-MOVED = "#A86E00"  # of prescribed motions: the orange of what drives, dark enough for text
+MOVED = "#A86E00"  # colour of prescribed motions: the orange of drives, dark enough for text
 HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units, and width of its line in points
 
 Spots = tuple[Spot, ...]
 
 
 class Subject:
-    """Scene, with all that its pictures at any scale have in common; lengths in m."""
+    """Scene with data common to its pictures at all scales; lengths in m."""
 
     def __init__(self, scene: Scene) -> None:
         self.scene, attached = scene, scene.attached
@@ -42,7 +42,7 @@ class Subject:
             for beam in scene.beams
         }
         self.cells = sum(len(axis) - 1 for axis in self.axes.values())
-        self.names: dict[Member | Body, str] = {}  # equal ones with their number in the scene
+        self.names: dict[Member | Body, str] = {}  # equal names get their number in the scene
         kinds: tuple[Sequence[Member | Body], ...] = (scene.beams, scene.bodies)
         for parts in kinds:
             known = Counter(part.name for part in parts)
@@ -91,14 +91,14 @@ class Sheet:
         self.strokes: defaultdict[str, list[Stroke]] = defaultdict(list)
         self.labels: list[layout.Label] = []
         self.stacks: defaultdict[object, float] = defaultdict(float)
-        """Heights of the symbols that stand at a place in a direction."""
+        """Heights of the symbols at a place in a direction."""
 
     def write(self, text: str, color: str, rank: int, spots: Iterable[Spot]) -> None:
-        """Add a label with the places where it may stand."""
+        """Add a label with its candidate positions."""
         self.labels.append(layout.Label(text, color, rank, tuple(spots)))
 
     def stack(self, key: object, height: float) -> float:
-        """Put a symbol onto those at a place; return the height at which it begins."""
+        """Stack a symbol onto the others at a place; return the height at which it begins."""
         self.stacks[key] += height
         return self.stacks[key] - height
 
@@ -114,7 +114,7 @@ class Sheet:
 
 
 def _normals(axis: Array) -> list[tuple[Array, Array]]:
-    """Points along a line and the unit vector to its left there, from the middle outwards."""
+    """Return points along a line and unit vectors to its left, from the middle outwards."""
     parts = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9])
     way = points_along(axis, parts + 0.01) - points_along(axis, parts - 0.01)
     return list(zip(points_along(axis, parts), left_of(unit_vectors(way)), strict=True))
@@ -132,7 +132,7 @@ def draw(subject: Subject, scale: float) -> Sheet:
     for mass in scene.masses:
         spots = sheet.around(np.array(mass.place.point), 0.45 * sheet.unit)
         sheet.write(f"{mass.mass:.4g} kg", INK, CAPTIONS, spots)
-    # Line loads come first, so that forces stand out from them.
+    # Line loads come first, so that forces are stacked above them.
     for load in sorted(scene.loads, key=lambda load: not isinstance(load, LineLoad)):
         if isinstance(load, LineLoad):
             _draw_line_load(sheet, load)
@@ -144,7 +144,7 @@ def draw(subject: Subject, scale: float) -> Sheet:
 
 
 def _draw_beams(sheet: Sheet) -> None:
-    """Axes, names, marks between cells and where hinges may form if these are few; hinges."""
+    """Draw axes, names and hinges; if few, also marks between cells and of possible hinges."""
     subject, scale, unit = sheet.subject, sheet.scale, sheet.unit
     weight = 2.8 * unit / scale / layout.SYMBOL
     sheet.strokes["beams"] += (Stroke(x, INK, weight, layer=4.0) for x in subject.axes.values())
@@ -165,7 +165,7 @@ def _draw_beams(sheet: Sheet) -> None:
     for hinge in subject.scene.hinges:
         place, r = place_of(hinge), 0.25 * unit
         axis, at = subject.axes[place.beam], np.array(place.point)
-        if place.s in (0.0, 1.0):  # beside what is at the end of the beam
+        if place.s in (0.0, 1.0):  # beside the symbol at the end of the beam
             end, inner = axis[:2] if place.s == 0.0 else axis[:-3:-1]
             at = at + 0.7 * unit * unit_vectors(inner - end)
         sheet.strokes["hinges"] += [disc(at, r, HINGE, HINGE, 5.2)]
@@ -175,7 +175,7 @@ def _draw_beams(sheet: Sheet) -> None:
 
 
 def _name_bodies_and_connectors(sheet: Sheet) -> None:
-    """Names and masses of bodies, kinds and sizes of connectors."""
+    """Write names and masses of bodies, kinds and sizes of connectors."""
     scene, stage, unit, scale = sheet.subject.scene, sheet.pose.stage, sheet.unit, sheet.scale
     for body in scene.bodies if len(scene.bodies) <= symbols.MOST_BODIES else ():
         arms, name = (stage.outlines[body] - body.center) / scale, sheet.subject.names[body]
@@ -208,7 +208,7 @@ def _name_bodies_and_connectors(sheet: Sheet) -> None:
 def _arrow(
     line: Array, color: str, unit: float, *, hollow: bool = False, size: float = 1.0
 ) -> list[Stroke]:
-    """An arrow along a line; ``size`` is a factor on its head and the width of the line."""
+    """Draw an arrow along a line; ``size`` is a factor on its head and the width of the line."""
     lengths = layout.lengths_along(line)
     head = min(size * HEAD * unit / lengths[-1], 1.0 / 3.0)
     shaft = points_along(line, lengths / lengths[-1] * (1.0 - head))
@@ -220,13 +220,13 @@ def _arrow(
 
 
 def _around(center: Array, radius: float, sense: float) -> Array:
-    """Line of an arrow around a point, counter-clockwise if ``sense`` is positive; (n, 2); m."""
+    """Return the arc of an arrow around a point, counter-clockwise if ``sense`` > 0; (n, 2)."""
     turns = math.copysign(1.0, sense) * np.linspace(-150.0, 120.0, 40)
     return np.asarray(center + radius * directions(np.radians(90.0 + turns)))
 
 
 def _beside(tail: Array, tip: Array) -> Spots:
-    """Spots of the label of an arrow: beyond its tail, and on both sides."""
+    """List spots of the label of an arrow: beyond its tail, and on both sides."""
     way, middle = unit_vectors(tip - tail), (tail + tip) / 2
     sides = left_of(way), -left_of(way)
     aside = [Spot(at, side) for at in (tail, middle) for side in sides]
@@ -242,7 +242,7 @@ def in_time(text: str, time: TimeFunction) -> str:
 
 
 def _draw_point_load(sheet: Sheet, load: PointLoad | FollowerLoad) -> None:
-    """Arrows of force and moment; heads of loads that follow are hollow."""
+    """Draw arrows of force and moment; follower loads have hollow heads."""
     at, unit, size = np.array(load.place.point), sheet.outside, math.hypot(*load.force)
     hollow = isinstance(load, FollowerLoad)
     more = ", follows" if hollow else ""
@@ -262,30 +262,30 @@ def _draw_point_load(sheet: Sheet, load: PointLoad | FollowerLoad) -> None:
 
 
 def _stand(sheet: Sheet, place: Anchor, way: Array, part: float) -> Array:
-    """The line of the arrow of a force: it ends at its place, or begins there; (2, 2); m.
+    """Return the line of the arrow of a force, which ends at its place; (2, 2); m.
 
-    It begins where it would lie on a beam else; where it would in both cases, it is beside it.
+    If it would lie on a beam, it begins at its place; if it still would, it is beside the beam.
     """
     unit = sheet.outside
     at, length = np.array(place.point), (2.6 + 1.4 * part) * unit
-    if isinstance(place, Place):  # it stands out from a line load on the beam
+    if isinstance(place, Place):  # beyond a line load on the beam
         length += sheet.stacks[(place.beam, *np.round(way, 6))]
     along = sheet.subject.ways(place) @ way  # cosines of angles between the force and the beams
     behind, ahead = along.min(initial=0.0) < -0.9, along.max(initial=0.0) > 0.9
     pulls, apart = behind and not ahead, 0.3 * unit
     start = apart + sheet.stack((place.point, *np.round(way, 6), pulls), length + apart)
-    if behind and ahead:  # along a beam that goes on: beside it
+    if behind and ahead:  # along a continuous beam: beside it
         at = at + 0.8 * unit * left_of(way)
     ends = np.outer((start, start + length), way)
     return np.asarray(at + ends if pulls else at - ends[::-1])
 
 
 def _draw_line_load(sheet: Sheet, load: LineLoad) -> None:
-    """A comb of arrows that end on the beam, arrows beside it if they are along it; moments."""
+    """Draw arrows that end on the beam, or are beside it if parallel to it; draw moments."""
     axis, unit, size = sheet.subject.axes[load.beam], sheet.outside, math.hypot(*load.force)
 
     def spaced(distance: float, *, ends: bool = False) -> Array:
-        """Equally spaced points, about as far apart as said; (n, 2); m."""
+        """Return equally spaced points, about ``distance`` apart; (n, 2); m."""
         number = max(1, round(layout.lengths_along(axis)[-1] / distance))
         steps = np.arange(number + 1) if ends else np.arange(number) + 0.5
         return points_along(axis, steps / number)
@@ -325,7 +325,7 @@ def _draw_line_load(sheet: Sheet, load: LineLoad) -> None:
 
 
 def _draw_prescribed(sheet: Sheet, support: Support) -> None:
-    """Motions that a support prescribes, hollow."""
+    """Draw motions that a support prescribes, as hollow arrows."""
     at, unit = np.array(support.place.point), sheet.outside
     ways = sheet.subject.ways(support.place)
     inward = ways[0] if len(ways) else np.array([0.0, 1.0])
@@ -349,7 +349,7 @@ def _draw_prescribed(sheet: Sheet, support: Support) -> None:
 
 
 def _draw_velocity(sheet: Sheet, velocity: Velocity) -> None:
-    """An initial motion with its label."""
+    """Draw an initial velocity with its label."""
     unit, subject = sheet.outside, sheet.subject
     found: list[tuple[float, Array, Array]] = []
     for part in velocity.beams:

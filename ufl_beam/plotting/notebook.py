@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pages of models and results in notebooks: tables, and a picture, drawn when a cell shows it."""
+"""HTML of models and results in notebooks: tables, and a picture drawn when a cell shows it."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from ufl_beam.terms.energy_ledger import Energy
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-ROWS = 12  # cases of a study that are shown
+ROWS = 12  # most cases of a study in a table
 
 
 @html_of.register
 def of_energy(energy: Energy) -> str:
-    """Write an energy ledger as a table of its entries at the end."""
+    """Write an energy ledger as a table of its final entries."""
     rows = [(kind, name, f"{value:.6g}") for kind, name, value in energy.entries()]
     return table(("energy", "", "at the end (J)"), rows) + lines(energy.balance()) if rows else ""
 
 
 @html_of.register
 def of_study(results: Study) -> str:
-    """Write a study: its first cases with the results that are single numbers."""
+    """Write a study: its first cases with their scalar results."""
     title, *failed = str(results).splitlines()
     numbers = {name: x for name, x in results.results.items() if x.ndim == 1}
     arrays = [f"{name}: {x.shape}" for name, x in results.results.items() if x.ndim > 1]
@@ -42,13 +42,13 @@ def of_study(results: Study) -> str:
 
 
 def lines(*texts: str) -> str:
-    """Write texts that are not empty as lines."""
+    """Write non-empty texts as lines."""
     shown = "<br>".join(escape(text).replace("\n", "<br>") for text in texts if text)
     return f"<p>{shown}</p>" if shown else ""
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """Write rows of texts as a table below its head."""
+    """Write rows of texts as a table below its header."""
     cells = [
         "".join(f"<{tag}>{escape(text)}</{tag}>" for text in row)
         for tag, row in (("th", head), *(("td", row) for row in rows))
@@ -57,7 +57,7 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def image(name: str, draw: Callable[[], Figure]) -> str:
-    """Draw a picture; where that fails, the reason takes its place."""
+    """Draw a picture; if this fails, return the reason."""
     try:
         data, look = png(draw())
     except Exception as error:

@@ -78,7 +78,7 @@ def plot(shown: Any, quantity: str = "", *places: Any, **options: Any) -> Figure
             on displacements; ``times`` (s) of "shapes", each replaced by the nearest that was kept,
             or ``count`` of them; ``component`` of "history", "u", "v", "psi", "du/dt", "dv/dt" or
             "dpsi/dt"; ``numbers`` of the modes, and ``amplitude``, their largest displacement as a
-            part of the size of the scene; ``ax``, axes to draw in in the place of a new figure.
+            part of the size of the scene; ``ax``, axes to draw in, instead of a new figure.
 
     Raises:
         ArgumentError: There is no such picture, or an argument of it is wrong; the message says

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of a solution over time, of modes, trade-offs, envelopes, and cycles of stress."""
+"""Pictures of a solution over time, of modes, trade-offs, envelopes, and stress cycles."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ COMPONENTS = {
 }  # fmt: skip
 
 MODES, SHAPES = 6, 5  # in a notebook
-VISIBLE = 0.1  # displacements, as a part of the size of the scene, up to which it magnifies them
-FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # larger ones would show round-off
-LEAST_ERROR = 1e-12  # errors below are drawn there, in the unit of the quantity
+VISIBLE = 0.1  # largest magnified displacement in a notebook, as a fraction of the scene's size
+FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # larger factors would show round-off
+LEAST_ERROR = 1e-12  # least drawn error; smaller ones are drawn here, in the quantity's unit
 CLASSES = 40  # classes of ranges and of means of cycles in pictures
 
 
@@ -54,12 +54,12 @@ def draw_shapes(
 
     Args:
         solution: Solution to draw.
-        times: The times, or the load factors of a path, each replaced by the nearest that was
-            kept; s.  Without, ``count`` of them from the first to the last, evenly spaced in time,
-            or along the path.
-        count: How many, if no times are given.
+        times: The times, or the load factors of a path, each replaced by the nearest kept time; s.
+            By default ``count`` times from the first to the last, evenly spaced in time or along
+            the path.
+        count: Number of shapes if ``times`` is not given.
         magnify: Factor on the displacements.
-        ax: Axes to draw in; by default those of a new figure.
+        ax: Axes to draw in; by default a new figure.
 
     Raises:
         ArgumentError: ``times`` is one number, ``count`` is less than 1, ``magnify`` is not
@@ -99,9 +99,9 @@ def draw_shapes(
 
 @html_of.register
 def of_solution(solution: Solution) -> str:
-    """Write a solution: the lines of its text, the energy ledger, and shapes on the way.
+    """Write a solution: its summary, the energy ledger, and successive shapes.
 
-    Displacements that can hardly be seen are magnified.
+    Small displacements are magnified.
     """
     text = (
         notebook.lines(*solution.summary())
@@ -128,7 +128,7 @@ def draw_history(
         solution: Solution to draw.
         places: The places.
         component: "u", "v", "psi", "du/dt", "dv/dt" or "dpsi/dt".
-        ax: Axes to draw in; by default those of a new figure.
+        ax: Axes to draw in; by default a new figure.
 
     Raises:
         ArgumentError: Unknown ``component``, a place that is not in the scene, the velocity of a
@@ -156,8 +156,8 @@ def draw_history(
 def draw_energy(solution: Solution) -> Figure:
     """Draw the energy ledger over time or along a path, and below it its imbalance.
 
-    Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance as a
-    part of the energy that went through, with the machine precision for comparison.
+    Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance divided
+    by the throughput, with the machine precision for comparison.
 
     Example:
         >>> ub.plot(solution, "energy").savefig("energy.png")
@@ -176,7 +176,7 @@ def draw_energy(solution: Solution) -> Figure:
         ledger.plot(along, energy.total, color=shade(INK), linewidth=1.2, label="in the scene")
         figure.legend(loc="outside upper left", ncols=5)
         part = np.abs(energy.imbalance) / (energy.throughput or 1.0)
-        # Where the balance is exact, the logarithm is not: such points stand at the lower edge.
+        # A balance that is exactly zero has no logarithm: its points are at the lower edge.
         check.semilogy(along, np.maximum(part, 1e-2 * precision), color=style.RED, linewidth=1.2)
         check.axhline(precision, color=style.GREY, linewidth=1.0, zorder=1)
         check.annotate(
@@ -197,9 +197,9 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
     """Draw modes side by side, in both directions from the grey undeformed scene.
 
     Args:
-        shapes: Of :func:`modes` or :func:`buckling`.
-        numbers: Their numbers; all by default.
-        amplitude: Largest displacement, as a part of the size of the scene.
+        shapes: Result of :func:`modes` or :func:`buckling`.
+        numbers: Numbers of the modes; all by default.
+        amplitude: Largest displacement, as a fraction of the size of the scene.
 
     Raises:
         ArgumentError: There is no such shape, or ``amplitude`` is not positive.
@@ -213,7 +213,7 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
     stages = [plane_stage(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
     box = np.concatenate([stage.points() for stage in stages])
-    # Room for the symbols of supports
+    # Space for the symbols of supports.
     room = 0.08 * np.hypot(*np.ptp(box, axis=0))
     corners = np.array([box.min(axis=0) - room, box.max(axis=0) + room])
     width, height = np.ptp(corners, axis=0)
@@ -247,12 +247,13 @@ def of_shapes(shapes: Shapes) -> str:
 def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
     """Draw errors over wall times of all runs, and the recommended run in a ring.
 
-    Each kind of scheme, steps and cells has a colour; the line is that of runs that no other one
-    beats in both.  The error is a part of the tolerance, or, with a budget, of the quantity.
+    Each family of scheme, steps and cells has a colour.  The line joins runs that no other run
+    beats in both time and error.  The error is divided by the tolerance, or with a budget, by the
+    quantity.
 
     Args:
         tradeoff: Result of :func:`tradeoff`.
-        ax: Axes to draw in; by default those of a new figure.
+        ax: Axes to draw in; by default a new figure.
 
     Raises:
         ArgumentError: ``ax`` is no axes.
@@ -296,7 +297,7 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
 
 @html_of.register
 def of_tradeoff(found: Tradeoff) -> str:
-    """Write a trade-off: the runs that no other one beats, remarks, and a picture."""
+    """Write a trade-off: the runs that no other run beats, remarks, and a picture."""
     head, *rows = found.table()
     text = (
         notebook.lines(found.title())
@@ -309,7 +310,7 @@ def of_tradeoff(found: Tradeoff) -> str:
 def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = None) -> Figure:
     """Draw the envelope of a section force on the undeformed frame: maxima red, minima blue.
 
-    The values of each point may be of different times.
+    Values may occur at different times.
 
     Raises:
         ArgumentError: Nothing was run, or ``ax`` is no axes.
@@ -335,7 +336,7 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
 def draw_study(study: Study) -> Figure:
     """Draw each result of a study over each number that its cases vary.
 
-    Results of several numbers are drawn by their largest size; cases that failed are left out.
+    An array result is drawn by its largest magnitude; failed cases are omitted.
 
     Raises:
         ArgumentError: No case has a number, or no member has a result.
@@ -369,15 +370,16 @@ def draw_study(study: Study) -> Figure:
 def draw_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
     """Draw rainflow matrix, spectrum and damage of the stress cycles at a place.
 
-    On the left the rainflow matrix; in the middle the number of cycles above each range, with the
-    S-N curve; on the right the part of the damage by each class of ranges.
+    On the left is the rainflow matrix; in the middle the number of cycles above each range, with
+    the S-N curve; on the right the percentage of the damage by each class of ranges.
 
     Args:
         fatigue: Recorder of a run.
-        spot: One of its places.
+        spot: One of its hot spots.
 
     Raises:
-        ArgumentError: The spot is none of them, nothing was run, or the stress never turned.
+        ArgumentError: The recorder does not have the spot, nothing was run, or the stress has no
+            cycle.
 
     Example:
         >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
@@ -401,7 +403,7 @@ def draw_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
         columns = np.linspace(middle - half, middle + half, CLASSES + 1)
         found, _, _ = np.histogram2d(means, ranges, (columns, edges), weights=cycles.count)
         colors = matrix.pcolormesh(
-            columns, edges, np.where(found > 0, found, np.nan).T,  # none is white
+            columns, edges, np.where(found > 0, found, np.nan).T,  # empty classes are white
             norm=LogNorm(0.5, max(10.0, found.max())), cmap="viridis_r", rasterized=True,
         )  # fmt: skip
         style.draw_bar(matrix, colors, "number")

@@ -63,14 +63,14 @@ def _require_place(value: Any, what: str) -> None:
 class Camera(Record):
     """Camera of :func:`render` and :func:`animate`, without perspective.
 
-    By default it stands still and sees the whole motion.
+    By default it is fixed and shows the whole motion.
 
     Attributes:
-        direction: Direction in which it looks; (x, y, z).  The frame is in the plane of x and y; y
-            is upwards in the picture, and (0, 0, -1) is the front view.
-        follow: Place that the camera moves with: it stands still in the picture.
+        direction: View direction; (x, y, z).  The frame is in the plane of x and y; y is upwards
+            in the picture, and (0, 0, -1) is the front view.
+        follow: Place that the camera moves with, so that it is at rest in the picture.
         width: Width of the picture around the followed place, or around the middle of the motion;
-            m.  By default all that moves stays in the picture.
+            m.  By default the picture contains the whole motion.
 
     Raises:
         ArgumentError: A direction along y, or a wrong argument; the message says which.
@@ -88,7 +88,7 @@ class Camera(Record):
     width: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def origin(self, pose: Pose) -> Array:
-        """Return the point of the plane that it moves with; (2,); m."""
+        """Return the point of the plane that the camera moves with; (2,); m."""
         return np.zeros(2) if self.follow is None else pose.at(self.follow)
 
     def aim(self, plotter: Any, box: Array, origin: Array, size: tuple[int, int]) -> None:
@@ -96,7 +96,7 @@ class Camera(Record):
 
         Args:
             plotter: Plotter of PyVista.
-            box: Lower and upper corner, from the origin; (2, 3); m.
+            box: Lower and upper corner, relative to the origin; (2, 3); m.
             origin: Point of the plane; (2,); m.
             size: Width and height of the picture; pixels.
         """
@@ -121,7 +121,7 @@ class Camera(Record):
         plotter.camera_set = True
 
 
-CAMERA = Camera()  # stands still and sees the whole motion
+CAMERA = Camera()  # fixed, shows the whole motion
 
 
 def render(
@@ -137,9 +137,9 @@ def render(
 ) -> None:
     """Write a rendered picture of the frame at the n-th kept time.
 
-    In the plane, beams have the depth of their section; across, they have the same depth, or a
-    visible one if they are slender.  Bodies are plates, see :func:`plot`.  Orange pins are hinges
-    that have opened.  Needs no screen, see :func:`animate`.
+    In the plane, beams have the depth of their section.  Their width is equal to it, or large
+    enough to be visible if they are slender.  Bodies are plates, see :func:`plot`.  Orange pins
+    mark opened hinges.  No screen is needed, see :func:`animate`.
 
     Args:
         solution: Solution to draw.
@@ -148,7 +148,7 @@ def render(
         quantity: Quantity that colours the beams: "N", "V", "M" or "rotation".
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
-        camera: Where the camera looks, and the place that it follows.
+        camera: View direction, and the place that the camera follows.
         size: Width and height; pixels.
 
     Raises:
@@ -185,23 +185,23 @@ def animate(
 ) -> Film:
     """Write an animation of the whole motion as GIF or MP4, and return it as a film to show.
 
-    Colours have the same meaning in all frames.  No screen is needed: for VTK before 9.4 an Xvfb is
-    started for the time being.
+    All frames have the same colour scale.  No screen is needed: for VTK before 9.4, Xvfb runs
+    during the call.
 
     Args:
         solution: Solution to draw.
         path: File, ending in ``.gif``, or in ``.mp4`` if there is ffmpeg, as in imageio-ffmpeg.
-        fps: Frames per second; browsers show at most 50 of a GIF.
-        seconds: Duration of the film, whatever the duration of the motion; s.
+        fps: Frames per second; browsers show at most 50 frames per second of a GIF.
+        seconds: Duration of the film, independent of the duration of the motion; s.
         quantity: Quantity that colours the beams: "N", "V", "M" or "rotation".
         thickness: Factor on the depth of the sections.
         magnify: Factor on the displacements.
-        camera: Where the camera looks, and the place that it follows.
+        camera: View direction, and the place that the camera follows.
         size: Width and height; pixels.
         progress: Show a progress bar in a terminal or notebook.
 
     Returns:
-        The film: a path that a notebook plays.
+        The film, a path that a notebook plays.
 
     Raises:
         ArgumentError: A wrong argument; the message says which.
@@ -229,7 +229,7 @@ def animate(
 
 
 def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
-    """Images (height, width, 3) of the states, in which only what moves is made anew."""
+    """Yield images (height, width, 3) of the states; only moving objects are drawn anew."""
     try:
         import pyvista
     except ImportError as error:
@@ -262,14 +262,14 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
                 plotter.suppress_rendering = True
                 pose = stage.pose(n)
                 camera.aim(plotter, box, camera.origin(pose), size)
-                # Meshes and texts replace those of the same name.
+                # Meshes and texts replace the old ones of the same name.
                 if beams:
                     plotter.add_mesh(
                         solids.beams(n, pose, factor), scalars="values", clim=(-limit, limit),
                         cmap="coolwarm", name="beams", scalar_bar_args=bar, reset_camera=False,
                         ambient=0.4, diffuse=0.7,
                     )  # fmt: skip
-                    plotter.scalar_bars["values"].SetTitle("")  # VTK would set it over the numbers.
+                    plotter.scalar_bars["values"].SetTitle("")  # VTK draws it over the numbers
                 for color, meshes in solids.others(n, pose).items():
                     look = {"color": color, "name": color, "ambient": 0.25}
                     plotter.add_mesh(pyvista.merge(meshes), reset_camera=False, **look)
@@ -283,7 +283,7 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
         finally:
             plotter.close()
             del plotter
-            # A window that is left to the collector would outlive its X server.
+            # Without this collection the window would outlive its X server.
             gc.collect()
 
 
@@ -302,7 +302,7 @@ def _require_suffix(path: str | Path, suffixes: Collection[str]) -> Path:
 
 @dataclass(frozen=True)
 class Solids:
-    """Solid bodies of a solution, as the arguments of :func:`render` ask for them, checked."""
+    """Solid bodies of a solution for :func:`render`, with checked arguments."""
 
     solution: Solution
     shown: list[int]  # numbers of the kept times
@@ -328,14 +328,14 @@ class Solids:
     def thickest(self, of: Iterable[Member | Anchor]) -> tuple[float, float]:
         """Return the largest depth in the plane and width across it of beams, or at places; m.
 
-        Slender beams, and bodies, have a least width.
+        Slender beams and bodies have a minimum width.
         """
         beams = [x.beam if isinstance(x, Place) else x for x in of if not isinstance(x, Spot)]
         depth = self.thickness * max((float(b.section.depth) for b in beams), default=0.0)
         return depth, max(depth, 0.04 * self.solution.scene.size)
 
     def values(self, n: int) -> Array:
-        """Values of the colours at both ends of all cells; (num_cells, 2)."""
+        """Return values of the colours at both ends of all cells; (num_cells, 2)."""
         solution, grid = self.solution, self.solution.grid
         if self.quantity == "rotation":
             return np.asarray(solution.q[n][grid.dofs[grid.cells, 2]])
@@ -345,9 +345,9 @@ class Solids:
         return np.concatenate([np.empty(0), *forces]).reshape(-1, 2)
 
     def beams(self, n: int, pose: Pose, factor: float) -> Any:
-        """Make a hexahedron for each cell of the beams, with values that are the colours.
+        """Make a hexahedron for each cell of the beams, with values for the colours.
 
-        Cross-sections turn with ψ; at corners between cells of a beam they halve the angle.
+        Cross-sections rotate with ψ; at corners between cells of a beam they bisect the angle.
         """
         from pyvista import CellType, UnstructuredGrid
 
@@ -369,14 +369,14 @@ class Solids:
             ],
             axis=1,
         )
-        points = corners[grid.cells].reshape(-1, 3)  # of each cell: colours may jump
+        points = corners[grid.cells].reshape(-1, 3)  # for each cell, as colours may jump
         hexahedra = {CellType.HEXAHEDRON: np.arange(len(points)).reshape(-1, 8)}
         mesh = UnstructuredGrid(hexahedra, points)
         mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
         return mesh
 
     def others(self, n: int, pose: Pose) -> dict[str, list[Any]]:
-        """Make bodies, joints, connectors, masses and supports; meshes by their colours."""
+        """Make meshes of bodies, joints, connectors, masses and supports, by their colours."""
         from pyvista import Cylinder, PolyData, Sphere
 
         found: defaultdict[str, list[Any]] = defaultdict(list)
@@ -384,7 +384,7 @@ class Solids:
         pins = [(pin, PIN) for pin in symbols.pins(pose)]
         for hinge in open_hinges(self.solution, n, pose.nodes):
             pins.append((Pin(hinge.at, True, (hinge.beam.start,)), style.ORANGE))
-        # Joints are cylinders as thick as the beams that they join; alike ones are one mesh.
+        # Joints are cylinders as thick as the beams that they join; equal cylinders share a mesh.
         alike: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)
         for pin, color in pins:
             depth, width = self.thickest(pin.places)
@@ -406,7 +406,7 @@ class Solids:
         return found
 
     def _add_strokes(self, found: dict[str, list[Any]], pose: Pose) -> None:
-        """Bodies as plates, lines as rods, and filled areas as blocks."""
+        """Add bodies as plates, lines as rods, and filled areas as blocks."""
         beams = self.solution.scene.beams
         body, front = self.thickest(())[1], 0.7 * self.thickest(beams)[1]
         lines: defaultdict[tuple[str, float], list[Array]] = defaultdict(list)
@@ -431,7 +431,7 @@ class Solids:
 
 
 def _lines(lines: list[Array]) -> Any:
-    """Lines in one mesh, which is fast; each piece of its own: corners make tubes thin."""
+    """Join lines in one mesh for speed, with separate segments: corners would thin the tubes."""
     from pyvista import line_segments_from_points
 
     ends = np.concatenate([np.repeat(line, 2, axis=0)[1:-1] for line in lines])
@@ -440,7 +440,7 @@ def _lines(lines: list[Array]) -> Any:
 
 
 def _extruded(outline: Array, low: float, high: float) -> Any:
-    """A block between two planes; the outline is closed; m."""
+    """Extrude a closed outline to a block between two planes; m."""
     from pyvista import PolyData
 
     flat = np.insert(outline[:-1], 2, low, axis=1)

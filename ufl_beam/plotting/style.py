@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Style of all pictures: colours, lines and areas, values with units, figures.
 
-Figures belong to no window, need no screen, and are gone when they are no longer used.
+Figures belong to no window, need no screen, and are freed when they are no longer used.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# Okabe and Ito's palette, which the colour-blind can tell apart.
+# Okabe and Ito's palette, which colour-blind readers can distinguish.
 BLUE, RED, GREEN, PINK, ORANGE, SKY = (
     "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9",
 )  # fmt: skip
@@ -37,13 +37,13 @@ POINTS = 72.0  # points of an inch
 CSS_DPI = 80.0  # pixels of a page to an inch of a figure
 
 FONT = 13.0  # of numbers at axes and words beside them; points
-FRAME = "#888888"  # of axes and their ticks
+FRAME = "#888888"  # colour of axes and their ticks
 
 SIZES = {
     "axes.titlesize": 14.0, "axes.labelsize": 13.0, "legend.fontsize": 12.0,
     "xtick.labelsize": 12.0, "ytick.labelsize": 12.0,
 }  # fmt: skip
-"""Sizes of fonts where that of texts is :data:`FONT`; points."""
+"""Sizes of fonts if texts have the size :data:`FONT`; points."""
 
 STYLE: dict[str, Any] = {
     "text.color": INK, "figure.dpi": 150.0, "lines.linewidth": 2.0,
@@ -55,7 +55,7 @@ STYLE: dict[str, Any] = {
 
 
 def decimal_prefix(value: float) -> tuple[float, str]:
-    """Find the power of 1000 that leaves 1 to 1000 of a value, and its prefix: (1000.0, "k")."""
+    """Find the power of 1000 that scales a value to 1 to 1000, and its prefix: (1000.0, "k")."""
     rounded = abs(float(f"{value:.3g}"))
     power = min(max(math.floor(math.log10(rounded) / 3), -3), 3) if rounded > 0.0 else 0
     return 1000.0**power, ("n", "µ", "m", "", "k", "M", "G")[power + 3]
@@ -68,12 +68,12 @@ def with_unit(value: float, unit: str) -> str:
 
 
 def number(value: float) -> str:
-    """Write a number with three digits and a minus sign that is one: "−12.3"."""
+    """Write a number with three digits and a true minus sign: "−12.3"."""
     return f"{value:.3g}".replace("-", "−")
 
 
 def magnified(factor: float, before: str = ", ") -> str:
-    """Write the factor on displacements in words; nothing if it is 1."""
+    """Write the factor on displacements in words; empty if it is 1."""
     return f"{before}displacements × {factor:g}" if factor != 1 else ""
 
 
@@ -86,11 +86,11 @@ def require_choice(choice: str, choices: Iterable[str], what: str) -> None:
 
 @contextmanager
 def picture(size: tuple[float, float]) -> Iterator[Figure]:
-    """Open a new figure in the style of this module, for pictures of your own.
+    """Open a new figure in the style of this module, for the user's own pictures.
 
-    Only the first process saves it, as all of them run the same script.  Settings and styles of
-    Matplotlib that you have chosen, such as ``plt.style.use("dark_background")``, stay.  A cell of
-    a notebook that ends with the figure shows it.
+    Only the first process saves it, as all processes run the same script.  The user's settings and
+    styles of Matplotlib, such as ``plt.style.use("dark_background")``, have priority.  A notebook
+    cell that ends with the figure shows it.
 
     Args:
         size: Width and height; inch.
@@ -104,17 +104,17 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
     from matplotlib.figure import Figure
 
     now, default = mpl.rcParams["font.size"], mpl.rcParamsDefault["font.size"]
-    font = FONT if now == default else now  # the others are in proportion to it
+    font = FONT if now == default else now  # other sizes are in proportion to it
     sizes = {"font.size": font, **{name: size / FONT * font for name, size in SIZES.items()}}
     with mpl.rc_context(_unless_chosen({**STYLE, **sizes})):
         figure = Figure(figsize=size, layout="constrained")
-        # Notebooks look for the method of this name.
+        # Notebooks call _repr_png_.
         vars(figure).update(savefig=partial(_save, figure), _repr_png_=partial(png, figure))
         yield figure
 
 
 def _save(figure: Figure, *args: Any, **options: Any) -> None:
-    """Save a figure; the first process alone writes, as all of them run the same script."""
+    """Save a figure on the first process only, as all processes run the same script."""
     if active_comm().rank == 0:
         type(figure).savefig(figure, *args, **options)
 
@@ -128,7 +128,7 @@ def png(figure: Figure) -> tuple[bytes, dict[str, int]]:
 
 @contextmanager
 def panel(ax: Axes | None, size: tuple[float, float]) -> Iterator[Axes]:
-    """Open those of a new :func:`picture` of a size, or axes of the user, whose sizes stay."""
+    """Open axes of a new :func:`picture`, or the user's axes ``ax``, which keep their size."""
     import matplotlib as mpl
 
     if ax is None:
@@ -141,7 +141,7 @@ def panel(ax: Axes | None, size: tuple[float, float]) -> Iterator[Axes]:
 
 
 def require_axes(ax: Any) -> None:
-    """Raise :class:`ArgumentError` for what is no axes of Matplotlib."""
+    """Raise :class:`ArgumentError` unless ``ax`` is an axes of Matplotlib."""
     from matplotlib.axes import Axes
 
     if not isinstance(ax, Axes):
@@ -151,7 +151,7 @@ def require_axes(ax: Any) -> None:
 
 
 def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:
-    """Our settings and colours of lines, where the user has left those of Matplotlib."""
+    """Return our settings and line colours, except settings that the user has changed."""
     import matplotlib as mpl
     from cycler import cycler
 
@@ -162,14 +162,14 @@ def _unless_chosen(ours: dict[str, Any]) -> dict[str, Any]:
 
 
 def font_size(size: float) -> float:
-    """Scale a size of a font in proportion to that of texts; points."""
+    """Scale a size of a font in proportion to the size of texts; points."""
     import matplotlib as mpl
 
     return float(size / FONT * mpl.rcParams["font.size"])
 
 
 def shade(color: str) -> str:
-    """Return the colour of texts for ink, that of the axes for white, and other colours as is."""
+    """Return the user's text colour for ink and axes colour for white; keep other colours."""
     import matplotlib as mpl
 
     now = mpl.rcParams
@@ -180,7 +180,7 @@ def shade(color: str) -> str:
 
 
 def plane_axes(axes: Axes, title: str) -> Axes:
-    """Set axes of the plane of motion up, both to one scale."""
+    """Set up axes of the plane of motion with one scale for x and y."""
     axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
     axes.margins(0.06, 0.10)
     axes.set_title(title, loc="left", wrap=True)
@@ -188,7 +188,7 @@ def plane_axes(axes: Axes, title: str) -> Axes:
 
 
 def time_axes(axes: Axes) -> Axes:
-    """Set axes up for histories over time."""
+    """Set up axes for histories over time."""
     axes.margins(x=0.0)
     axes.grid(axis="y", linewidth=0.8)
     axes.set_axisbelow(True)
@@ -208,7 +208,7 @@ def draw_legend(
     fontsize: float | None = None,
     **outside: Any,
 ) -> None:
-    """Draw a legend outside of the axes of a picture, or within axes ``ax`` that were given."""
+    """Draw a legend outside the axes of a new figure, or inside the user's axes ``ax``."""
     if ax is None:
         figure_of(axes).legend(handles=handles, fontsize=fontsize, **outside)
     else:
@@ -217,7 +217,7 @@ def draw_legend(
 
 
 def scale(name: str, first: float, last: float, low: float, high: float) -> Any:
-    """Make a colour map for values from low to high, without the end that is not seen on white."""
+    """Make a colour map for values from low to high, without its end that is invisible on white."""
     import matplotlib as mpl
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import ListedColormap, Normalize
@@ -234,7 +234,7 @@ def draw_bar(axes: Axes, colors: Any, label: str) -> None:
 
 
 def make_room(axes: Axes) -> None:
-    """Extend the limits such that texts stay off the edge, and all of it off a legend below."""
+    """Extend the limits so that texts are inside, and a legend below covers nothing."""
     figure = figure_of(axes)
     figure.draw_without_rendering()
     for text in axes.texts:
@@ -248,7 +248,7 @@ def make_room(axes: Axes) -> None:
 
 
 def size_of(axes: Axes) -> Array:
-    """Measure axes as they are; width and height; (2,); points."""
+    """Measure the present width and height of axes; (2,); points."""
     figure = figure_of(axes)
     figure.draw_without_rendering()
     return np.multiply(axes.get_window_extent().size, POINTS / figure.dpi)

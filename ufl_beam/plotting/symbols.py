@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Symbols of bodies, joints, connector laws and supports, which all kinds of pictures draw.
+"""Symbols of bodies, joints, connector laws and supports for all kinds of pictures.
 
-A support is an entry of :data:`SUPPORTS`, a joint one of :data:`JOINTS`, a connector law one of
+Supports are entries of :data:`SUPPORTS`, joints of :data:`JOINTS`, and connector laws of
 :data:`LAWS`; joints and laws without an entry have a plain symbol.  Half a symbol has the length 1.
 Symbols of loads are in `model_sheet.py`.
 """
@@ -29,13 +29,13 @@ from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, wit
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-# Layers: beneath the beams, over them, upon the areas there, pins, and over these
+# Layers: below the beams, above the beams, on the areas of that layer, pins, and above pins.
 BACK, MIDDLE, UPON, PINS, FRONT = 2.5, 4.2, 4.3, 5.0, 5.5
 
 FILLED, EDGE = "#D6E2ED", "#5F7A94"  # colours of bodies
-STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and still supports
+STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and fixed supports
 
-LEAST_SLIDE = 4.0  # least length of a connector that slides
+LEAST_SLIDE = 4.0  # least length of a sliding connector
 MOST_BODIES = 300  # number of bodies beyond which they are drawn as dots
 
 
@@ -50,9 +50,9 @@ class Stroke(NamedTuple):
 
 
 def draw_strokes(axes: Axes, groups: Mapping[str, Iterable[Stroke]], color: Any = None) -> None:
-    """Draw groups of lines and areas, in their own colours or all in one.
+    """Draw groups of lines and areas, in their own colours or all in one colour.
 
-    Those that look alike are one collection, so that large scenes are drawn fast.
+    Strokes that look alike share a collection, so that large scenes are drawn fast.
     """
     from matplotlib.collections import LineCollection, PolyCollection
 
@@ -98,22 +98,22 @@ _TRACK = ((-1.0, -1.0), (1.0, -1.0), (1.0, -1.1), (-1.0, -1.1), (-1.0, -1.0))
 _DIAMOND = ((-0.6, 0.0), (0.0, 0.6), (0.6, 0.0), (0.0, -0.6), (-0.6, 0.0))
 
 SUPPORTS = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))
-"""Outlines by the number of displacements that are held; 3 holds the rotation, too.  The place is
-the origin, the beam comes from above."""
+"""Outlines by the number of constrained displacements; 3 includes the rotation.  The place is the
+origin, and the beam comes from above."""
 
 
 class Footing(NamedTuple):
     """Symbol of a support, or of a point of the ground."""
 
     at: Array  # (2,); m
-    angle: float  # by which it is turned; rad
+    angle: float  # rotation of the symbol; rad
     outlines: tuple[Outline, ...]
-    color: str  # orange ones move
+    color: str  # orange if the support moves
     place: Anchor
 
 
 def footings(pose: Pose) -> Iterator[Footing]:
-    """Find supports, and points of the ground that hold something."""
+    """Find supports, and points of the ground with joints or connectors."""
     scene = pose.stage.scene
     for support in scene.supports:
         angle = support_direction(support, pose.turn(support.place))
@@ -124,7 +124,7 @@ def footings(pose: Pose) -> Iterator[Footing]:
         (j.places, _turns(j)) for j in scene.joints if look_of(j).grounded
     ]
     held_by += [((c.a, c.b), False) for c in scene.connectors if not c.turns]
-    grounds: dict[Spot, tuple[float, bool]] = {}  # direction of what it holds; if that turns freely
+    grounds: dict[Spot, tuple[float, bool]] = {}  # direction from it; if free to turn
     for places, turns in held_by:
         for spot in places:
             if isinstance(spot, Spot) and spot.body is GROUND:
@@ -142,7 +142,7 @@ def footings(pose: Pose) -> Iterator[Footing]:
 
 
 def supports(pose: Pose) -> Iterator[Stroke]:
-    """Draw supports; those that do not move on hatched ground."""
+    """Draw supports; fixed supports are on hatched ground."""
     for at, angle, outlines, color, _ in footings(pose):
         ahead = pose.stage.outside * directions(angle)
         yield from (Stroke(in_frame(x, at, ahead), color, 0.5, color, 3.5) for x in outlines)
@@ -152,7 +152,7 @@ def supports(pose: Pose) -> Iterator[Stroke]:
 
 
 def support_direction(support: Support, turned: float) -> float:
-    """Angle of the symbol of a support, away from its beam; a clamp is ``turned`` with it; rad."""
+    """Return the angle of a support's symbol, away from its beam; a clamp is ``turned``; rad."""
     inward = _inward(support.place)
     if len(support.held) == 3:
         return inward + turned - math.pi / 2
@@ -160,12 +160,12 @@ def support_direction(support: Support, turned: float) -> float:
 
 
 def _upright(inward: float, angle: float = 0.0) -> float:
-    """An angle, or the opposite one where the symbol would else lie on the beam; rad."""
+    """Return an angle, or its opposite if the symbol would lie on the beam; rad."""
     return angle + (math.pi if math.sin(inward - angle) < -0.5 else 0.0)
 
 
 def _inward(anchor: Anchor) -> float:
-    """Direction in which the beam leaves its end; upwards from a place in between; rad."""
+    """Return the direction in which a beam leaves its end, or upwards for other places; rad."""
     if not isinstance(anchor, Place) or 0.0 < anchor.s < 1.0:
         return math.pi / 2
     (x, y), (X, Y) = anchor.point, anchor.beam.curve(1e-3 if anchor.s == 0.0 else 1.0 - 1e-3)
@@ -173,7 +173,7 @@ def _inward(anchor: Anchor) -> float:
 
 
 def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
-    """The mark of the ground along a line, to its right."""
+    """Draw the hatching of the ground along a line, to its right."""
     lengths = layout.lengths_along(line)
     at = np.arange(0.3 * unit, lengths[-1], 0.55 * unit)
     step = np.minimum(np.searchsorted(lengths, at), len(line) - 1) - 1
@@ -207,19 +207,19 @@ class Look(NamedTuple):
     """Symbol of a joint."""
 
     rod: float = 0.0  # width of a line from place to place; points
-    pins: tuple[int, ...] = ()  # numbers of the places with a pin, where a rail does not show all
+    pins: tuple[int, ...] = ()  # numbers of the places with a pin; with a rail only if it turns
     rail: Callable[[Pose, Joint], Iterator[Stroke]] | None = None
     grounded: bool = True  # a point of the ground has the symbol of a support
 
 
 def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
-    """The rail as long as the way, and the block on it."""
+    """Draw the rail, as long as the range of motion, and the block on it."""
     (across,), (base, slider) = joint.holders, joint.places
     unit, start, block = pose.stage.unit, pose.at(base), pose.at(slider)
     ahead = -left_of(pose.turned(across.axis, base))
     s = float((block - start) @ ahead)
     low, high = pose.stage.travels[across]
-    # Magnified rotations lead elsewhere.
+    # Magnified rotations may leave this range.
     low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
     rail = block + np.outer((low - s, high - s), ahead)
     yield Stroke(rail, STEEL, 2.2)
@@ -233,7 +233,7 @@ def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
 
 
 def _guide(pose: Pose, joint: Joint) -> Iterator[Stroke]:
-    """The guide curve, as far as it was used."""
+    """Draw the used part of a guide curve."""
     (holder,) = joint.holders
     assert isinstance(holder.law, laws.Guide)
     low, high = pose.stage.travels[holder]
@@ -243,7 +243,7 @@ def _guide(pose: Pose, joint: Joint) -> Iterator[Stroke]:
 
 
 def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
-    """Two bars along what a release leaves free; a box if it leaves both free."""
+    """Draw two bars along the free direction of a release, or a box if both are free."""
     if 0 in joint.shared:
         return
     place = joint.places[0]
@@ -263,7 +263,7 @@ JOINTS: dict[type[Joint], Look] = {
     Guided: Look(pins=(1,), rail=_guide, grounded=False),
     Release: Look(pins=(0,), rail=_sleeve),
 }
-"""Symbols of joints by their class or a base; others have a pin, or a thin rod between places."""
+"""Symbols of joints by their class or a base; other joints have a pin or a thin rod."""
 
 
 def look_of(joint: Joint) -> Look:
@@ -299,7 +299,7 @@ class Pin(NamedTuple):
 
 
 def pins(pose: Pose) -> Iterator[Pin]:
-    """Find the pins of joints; what only slides has none."""
+    """Find the pins of joints; joints that only slide have none."""
     for joint in pose.stage.scene.joints:
         look, turns = look_of(joint), _turns(joint)
         for k in look.pins if turns or look.rail is None else ():
@@ -309,8 +309,8 @@ def pins(pose: Pose) -> Iterator[Pin]:
 
 # -- connectors --------------------------------------------------------------------------------
 #
-# A symbol, along a line or around a pin, has coordinates (s, t): s runs along the connector, from
-# -2 at its place a to 2 at its place b, its body from -1 to 1; t is across.
+# A symbol, along a line or around a pin, has coordinates (s, t).  s runs along the connector from
+# -2 at its place a to 2 at its place b, with the body from -1 to 1; t is perpendicular.
 
 
 class Glyph(NamedTuple):
@@ -318,14 +318,14 @@ class Glyph(NamedTuple):
 
     straight: list[Stroke]
     words: Callable[[Any, str, str], str] = lambda law, force, way: type(law).__name__.lower()
-    """Words on the size of a law, of the law and the units of force and motion."""
+    """Function of the law and the units of force and motion; it returns words on the law's size."""
     turning: list[Stroke] | None = None  # around a pin; by default the straight one with spokes
     sweep: float = math.pi + 1.0  # angle from place a to place b in the undeformed scene; rad
-    spins: bool = False  # turns with b as a whole; others begin at a and end at b
+    spins: bool = False  # rotates rigidly with b; else begins at a and ends at b
 
 
 def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke) -> Glyph:
-    """A drive: around a pin a curved arrow."""
+    """Make the symbol of a drive; around a pin, a curved arrow."""
     head = np.array([(1.45, 0.95), (2.05, 0.0), (1.45, -0.95), (1.45, 0.95)])
     turning = [_line((tail, 0), (1.6, 0), weight=2.6), Stroke(head, INK, 1.4, fill), *more]
     return Glyph(straight, turning=turning, sweep=1.4 * math.pi, spins=True)
@@ -362,7 +362,7 @@ def _friction_in_words(law: laws.Coulomb, force: str, way: str) -> str:
     return f"friction {' + '.join(words)}"
 
 
-LAWS: dict[type, Glyph] = {  # what drives is orange, filled if its motion is given
+LAWS: dict[type, Glyph] = {  # drives are orange, filled if they prescribe the motion
     laws.Spring: Glyph(
         [_line((-2, 0), (-1, 0), *_TEETH, (1, 0), (2, 0))],
         lambda law, force, way: with_unit(law.stiffness, f"{force}/{way}")
@@ -402,7 +402,7 @@ LAWS: dict[type, Glyph] = {  # what drives is orange, filled if its motion is gi
         WHITE, -1.4, _box(-2.0, -1.4, 0.5, WHITE),
     ),
     laws.ForceLaw: Glyph(_STATED),
-    laws.RigidPlastic: Glyph(  # nothing below a limit, flow at it
+    laws.RigidPlastic: Glyph(  # no motion below the limit, flow at it
         [*_BOXED, _line((-0.55, -0.35), (0, -0.35), (0, 0.35), (0.55, 0.35), layer=UPON)],
         lambda law, force, way: f"rigid up to {with_unit(float(law.law.limit), force)}",
     ),
@@ -411,21 +411,21 @@ LAWS: dict[type, Glyph] = {  # what drives is orange, filled if its motion is gi
 
 
 def glyph_of(law: laws.Law) -> Glyph:
-    """Return the symbol of a connector law; those without an entry have one in common."""
+    """Return the symbol of a connector law; laws without an entry share one symbol."""
     return LAWS.get(type(law), LAWS[ConnectorLaw])
 
 
 def connectors(pose: Pose) -> Iterator[Stroke]:
-    """Draw springs, dampers, motors and their like."""
+    """Draw springs, dampers, motors and other connectors."""
     for connector in pose.stage.scene.connectors:
         yield from (_around if connector.turns else _straight)(pose, connector)
 
 
 def ends_of(pose: Pose, connector: Connector) -> tuple[Array, Array]:
-    """Return the points from which and to which a straight connector is drawn; (2,) each; m.
+    """Return the start and end of the drawing of a straight connector; (2,) each; m.
 
-    One that slides is drawn along its axis and ends where its place b is seen across the axis.  It
-    begins before a if it would be too short in the undeformed scene.
+    A sliding connector is drawn along its axis and ends at the projection of its place b onto the
+    axis.  It begins before a if it would be too short in the undeformed scene.
     """
     a, b = pose.at(connector.a), pose.at(connector.b)
     if not connector.follows_a:
@@ -453,7 +453,7 @@ def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
             yield Stroke(np.array([end, lane, lane + offset * across]))
         inwards = 0.06 * (b - a)
         a, b = a + inwards + offset * across, b - inwards + offset * across
-    # The body takes the same part of the way at all times, so it stretches with the motion.
+    # The body is a constant fraction of the length, so that it stretches with the motion.
     body = min(0.66, 6.0 * unit / max(length, unit))
     places = 0.0, (1 - body) / 2, (1 + body) / 2, 1.0
     for stroke in glyph_of(connector.law).straight:
@@ -467,10 +467,10 @@ def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
     radius = (1.6 + pose.stage.offsets[connector]) * pose.stage.unit
     a, b = pose.turn(connector.a), pose.turn(connector.b)
     first, sweep = (b, 0.0) if glyph.spins else (a, b - a)
-    # Where it turns for many times, the symbol stops winding.
+    # Limit the winding of the symbol for many revolutions.
     sweep = glyph.sweep + min(max(sweep, -0.75 * glyph.sweep), 2.0)
     for stroke in glyph.turning or [*glyph.straight, *_SPOKES]:
-        # Steps of 5 degrees, such that what is straight between two points is bent.
+        # Steps of 5 degrees bend straight lines between two points.
         steps = np.abs(np.diff(stroke.points[:, 0])) / 4.0 * sweep / math.radians(5.0)
         counts = np.maximum(1, np.ceil(steps)).astype(int)
         at = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
@@ -484,7 +484,7 @@ def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
         yield Stroke(np.array([start, pin]), GREY, 1.0)
 
 
-# -- all together ------------------------------------------------------------------------------
+# -- all symbols -------------------------------------------------------------------------------
 
 
 def in_plane(pose: Pose) -> dict[str, list[Stroke]]:

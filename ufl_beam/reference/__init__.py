@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Reference solver: the equations of the paper, solved in the plainest way.
+"""Reference solver: a plain solution of the equations of the paper.
 
-A scene is read into forces, each with a residual and a tangent; a step is solved by PETSc's SNES.
+A scene becomes a list of forces, each with a residual and a tangent; PETSc's SNES solves a step.
 """

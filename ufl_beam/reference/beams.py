@@ -70,23 +70,23 @@ class ElasticBeams(CellForce):
         self._last_dt = math.inf
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Work of the resultants, which may depend on the change of strains in the step before."""
+        """Return the work of the resultants, which may depend on the last change of strains."""
         put(self._change_before, min(1.0, step.dt / self._last_dt) * self._last_change)
         return super().respond(step, q1)
 
     def change(self, step: Step, q1: Array) -> float:
-        """Energy that is stored in the step to ``q1``; J."""
+        """Return the energy stored in the step to ``q1``; J."""
         return self.energy(q1) - self.stored["stored"]
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Take the end of the step, and the changes of the strains in it."""
+        """Accept the end of the step, and keep its changes of the strains."""
         super().accept(step, q1, s)
         if self._decays:
             self._last_change = self.cells.strains(q1) - self.cells.strains(step.q0)
             self._last_dt = step.dt
 
     def remember(self, memory: Memory) -> None:
-        """Changes of the strains in the last step, and its length."""
+        """Save or restore the changes of the strains in the last step, and its length."""
         if self._decays:
             n = len(self._last_change)
             rows = self._last_change.reshape(n, -1), np.full(n, self._last_dt)
@@ -96,10 +96,10 @@ class ElasticBeams(CellForce):
 
 
 class YieldingBeams(CellForce):
-    """Cells with material points: resultants r of their return map, in quadrature functions.
+    """Cells with material points; quadrature functions hold the resultants r of their return map.
 
-    Around an iterate the resultants are b + D e, linear in the strains e, from which UFL derives
-    the tangent, material and geometric.
+    Around an iterate the resultants b + D e are linear in the strains e; UFL derives the material
+    and geometric tangent from them.
     """
 
     inner = True
@@ -116,7 +116,7 @@ class YieldingBeams(CellForce):
         self.points = MaterialPoints(layout, grid.keys(cells.numbers), cells.lengths, setting)
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Work of the resultants of the return map, with its consistent tangent."""
+        """Return the work of the resultants of the return map, with its consistent tangent."""
         points = self.points
         points.respond(self.cells.strains(q1)[:, 0], step.dt)
         put(self._r, points.r)
@@ -125,12 +125,12 @@ class YieldingBeams(CellForce):
         return super().respond(step, q1)
 
     def change(self, step: Step, q1: Array) -> float:
-        """Energy that is stored and dissipated in the step of the latest response; J."""
+        """Return the energy stored and dissipated in the step of the latest response; J."""
         self.points.require_dissipation(self._names)
         return self.points.change()
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Take the internal variables at the end of the step."""
+        """Accept the internal variables at the end of the step."""
         self.points.accept()
 
     def start(self, q: Array) -> None:
@@ -139,22 +139,22 @@ class YieldingBeams(CellForce):
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
-        """Energies that the points store."""
+        """Stored energies of the points."""
         return self.points.stored
 
     def remember(self, memory: Memory) -> None:
-        """Internal variables of all points."""
+        """Save or restore the internal variables of all points."""
         self.points.state(memory.rows("cells", self.cells.numbers, self.points.state()))
 
     def material(self) -> Array:
-        """Numbers of the cells, and what solutions keep of them; (num_cells, 7)."""
+        """Return the numbers of the cells, and their data for solutions; (num_cells, 7)."""
         kept = self.points.kept.copy()
         kept[:, 3] *= self._hinges  # a crack of one fibre is no rotation
         return np.column_stack([self.cells.numbers, kept])
 
 
 def inelastic_cells(grid: Grid) -> dict[Layout, Index]:
-    """Layouts of material points that can yield or break, and the cells that have them."""
+    """Return layouts of material points that can yield or break, and their cells."""
     sections, of_beam = grid.sections
     groups: dict[Layout, list[int]] = {}
     for number, section in enumerate(sections):
@@ -178,8 +178,8 @@ class Mass:
     """Mass matrix of a scene: beams, point masses and rigid bodies; P(18).
 
     Attributes:
-        matrix: All of it; kg, kg m².
-        cells: The beams.
+        matrix: Mass matrix of the whole scene; kg, kg m².
+        cells: Cells of the beams.
     """
 
     def __init__(self, grid: Grid) -> None:
@@ -191,17 +191,17 @@ class Mass:
         self._of_beams = cells.form(ufl.action(form, cells.element.q1))
 
     def on_nodes(self, v: Array) -> Array:
-        """Mass of the beams times a vector."""
+        """Return the mass matrix of the beams times a vector, on the nodes of cells."""
         self.cells.set(self.cells.element.q1, v)
         return self.cells.on_nodes("density", self._of_beams.assembled())
 
 
 class MatrixForce(Force):
-    """Constant matrix times a rate, which a row of :class:`Coefficients` states.
+    """Constant matrix times a rate by a row of :class:`Coefficients`.
 
     Attributes:
-        rate: Of the latest response; (size,).
-        of_step: Numbers of the scheme in it.
+        rate: Rate in the latest response; (size,).
+        of_step: Numbers of the scheme in the latest response.
     """
 
     row: str
@@ -212,7 +212,7 @@ class MatrixForce(Force):
         self.ledger, self._rotations = setting.ledger, setting.grid.rotations.astype(np.int32)
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Forces; the step of a rotation is 2 tan(Δψ/2) or Δψ, by the scheme."""
+        """Return forces; the scheme decides whether the step of a rotation is 2 tan(Δψ/2) or Δψ."""
         scheme, before, rotations = self.scheme, self.inertia, self._rotations
         self.of_step = scheme.coefficients(step.dt, before.last_dt, len(before.more))
         row = getattr(self.of_step, self.row)
@@ -231,8 +231,8 @@ class Inertia(MatrixForce):
 
     Attributes:
         v: Velocities; (size,).
-        v_before: Those at the beginning of the last step.
-        more: What the scheme keeps besides, such as accelerations.
+        v_before: Velocities at the beginning of the last step.
+        more: Further rates of the scheme, such as accelerations.
         last_dt: Length of the last step, infinite before the first; s.
     """
 
@@ -246,11 +246,11 @@ class Inertia(MatrixForce):
             setting.loses("numerical")
 
     def after(self, s: Array) -> tuple[Array, ...]:
-        """Velocities after the step ``s``, and what the scheme keeps besides."""
+        """Return velocities and further rates of the scheme after the step ``s``."""
         return tuple(combined(row, s, self) for row in self.of_step.rates)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """New velocities, and what the scheme has lost."""
+        """Accept new velocities, and enter numerical losses."""
         self.on_nodes = self.mass.on_nodes(self.rate)
         v, *more = self.after(s)
         if self.of_step.slip is not None:
@@ -261,11 +261,11 @@ class Inertia(MatrixForce):
         self.start(q1)
 
     def start(self, q: Array) -> None:
-        """Take the kinetic energy of the velocities."""
+        """Compute the kinetic energy of the velocities."""
         self.stored = {"kinetic": float(self.v @ (self.matrix @ self.v)) / 2}
 
     def remember(self, memory: Memory) -> None:
-        """What the scheme keeps besides the velocities."""
+        """Save or restore the further rates of the scheme."""
         pairs = zip_longest(self.scheme.kept, self.more)
         more = [memory.vector(name, known) for name, known in pairs]
         self.more = tuple(known for known in more if known is not None)
@@ -291,7 +291,7 @@ class RayleighForce(MatrixForce):
         super().__init__(setting, inertia.scheme, csr_array(matrix))
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the energy that was damped."""
+        """Enter the energy lost by damping."""
         self.ledger.lost["damping"] += float(s @ (self.matrix @ s)) / step.dt
         mass, damping = self.inertia.mass, self._damping
         by_mass = mass.on_nodes(self.rate)
@@ -300,7 +300,7 @@ class RayleighForce(MatrixForce):
 
 
 class KelvinVoigtForce(CellForce):
-    """Kelvin-Voigt damping: resultants C Δe over the time of the step, times that of the law."""
+    """Kelvin-Voigt damping: resultants C Δe times the retardation time over the step length."""
 
     def __init__(self, damping: KelvinVoigt, numbers: Index, setting: Setting) -> None:
         cells = Cells(setting.grid, numbers)
@@ -316,13 +316,13 @@ class KelvinVoigtForce(CellForce):
         super().__init__(cells, virtual_work(r, w_e) * of.dx(1), setting, lost=lost)
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Work of the resultants at the rates of the step."""
+        """Return the work of the resultants at the rates of the step."""
         self._rate.value = self._time / step.dt
         return super().respond(step, q1)
 
 
 def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:
-    """Forces of all damping in a scene."""
+    """Return the forces of all damping in a scene."""
     forces: list[Force] = []
     for damping in setting.grid.scene.damping:
         setting.loses("damping")

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Forms on cells, assembled by DOLFINx, and what every force in the equation of a step states.
+"""Forms on cells, assembled by DOLFINx, and the base of all forces in the equation of a step.
 
-Each cell has nodes of its own: q = C q_scene, with the Boolean matrix C of the numbers that joints
-and neighbours share.  Residuals of the scene are Cᵀ r, tangents Cᵀ K C.
+Each cell has its own nodes: q = C q_scene, with the Boolean matrix C of the numbers that joints and
+neighbours share.  Residuals of the scene are Cᵀ r, tangents Cᵀ K C.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ Entry = tuple[ufl.Form, str]
 
 @dataclass
 class Ledger:
-    """Energies in the scene, and those supplied and lost since the beginning, by entry; J."""
+    """Energies in the scene, and energies supplied and lost since the beginning, by entry; J."""
 
     state: dict[str, float] = field(default_factory=dict)
     supplied: dict[str, float] = field(default_factory=lambda: defaultdict(float))
@@ -48,11 +48,11 @@ class Ledger:
 
 @dataclass
 class Search:
-    """Search for the equilibrium of a step in which no more opens than must.
+    """Search for the equilibrium of a step without unnecessary openings.
 
     Attributes:
-        hold: Whether what did not flow in the last step stays closed.
-        over: Whether something that was held has borne more than its limit.
+        hold: True if points and connectors that did not flow in the last step stay closed.
+        over: True if a held point or connector has exceeded its limit.
     """
 
     hold: bool = False
@@ -61,18 +61,18 @@ class Search:
 
 @dataclass
 class Setting:
-    """Arguments that all forces and laws of a scene are made with."""
+    """Arguments of all forces and laws of a scene."""
 
     grid: Grid
     scheme: Scheme
     asked: Mapping[Connector, float]  # forces of controllers, limits of friction
-    rates: Mapping[Connector, float]  # of motions with friction as the step begins
-    friction_repeats: bool  # whether places that stick may hold what is held already
+    rates: Mapping[Connector, float]  # of motions with friction at the beginning of a step
+    friction_repeats: bool  # True if sticking may repeat a constraint
     ledger: Ledger = field(default_factory=Ledger)
     search: Search = field(default_factory=Search)
 
     def loses(self, *entries: str) -> None:
-        """Make entries of what is lost."""
+        """Make entries for losses."""
         for entry in entries:
             self.ledger.lost[entry] += 0.0
 
@@ -81,25 +81,24 @@ class Setting:
 class Memory:
     """Internal variables, by the names of :attr:`Solution.internal`.
 
-    Whatever remembers something states it in one method ``remember``, which serves to write it down
-    and to take it back.
+    Each force has a method ``remember`` that both saves and restores its variables.
 
     Attributes:
-        given: Variables to take back; without them all stay as they are.
-        kept: Those that were written down, in parts.
+        given: Variables to restore; other variables do not change.
+        kept: Saved variables, as lists of arrays.
     """
 
     given: Mapping[str, Array]
     kept: dict[str, list[Array]] = field(default_factory=lambda: defaultdict(list))
 
     def vector(self, name: str, values: T) -> Array | T:
-        """Write down values at the degrees of freedom if they are known; return those given."""
+        """Save values at the degrees of freedom if known; return the given values, if any."""
         if values is not None:
             self.kept[name].append(values)
         return self.given.get(name, values)
 
     def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Write down rows of numbered things; return them, or those that were given."""
+        """Save rows with numbers of cells or links; return them, replaced by given rows."""
         name, found = f"{name}, {rows.shape[1]}", rows.copy()
         self.kept[name].append(np.column_stack([numbers, rows]))
         if name in self.given:
@@ -110,12 +109,12 @@ class Memory:
 
 
 class Force:
-    """Virtual work in the equation of a step; a method that a force does not define does nothing.
+    """Virtual work in the equation of a step; methods that a force does not define do nothing.
 
     Attributes:
-        inner: Whether it acts between parts of the scene: cells and connectors.
+        inner: True for forces between parts of the scene: cells and connectors.
         size: Number of degrees of freedom of the scene.
-        stored: Energies that it holds in the accepted state, by entry of the ledger; J.
+        stored: Energies stored in the accepted state, by entry of the ledger; J.
         on_nodes: Forces on the cells in the accepted step, see :func:`numbers_of_cells`.
     """
 
@@ -125,28 +124,29 @@ class Force:
     on_nodes: Array | float = 0.0
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Virtual work if the step ends at ``q1``, and its derivative; (size,), (size, size)."""
+        """Return virtual work and derivative if the step ends at ``q1``; (size,), (size, size)."""
         return np.zeros(self.size), csr_array((self.size, self.size))
 
     def change(self, step: Step, q1: Array) -> float:
-        """Energy that is stored and dissipated in the step to ``q1``, of inner forces; J.
+        """Return the energy that inner forces store and dissipate in the step to ``q1``; J.
 
         Raises:
-            StepFailed: A law that must dissipate gives energy.
+            StepFailed: A law that must dissipate generates energy.
         """
         return 0.0
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Take the end of the step as the new state, and enter works and losses in the ledger.
+        """Accept the end of the step, and enter works and losses in the ledger.
 
-        ``q1`` is that of the latest response, and ``s`` the step of the nodes that forces work on.
+        ``q1`` is the configuration of the latest response, and ``s`` the nodal step that forces
+        work on.
         """
 
     def start(self, q: Array) -> None:
-        """Begin at a configuration that no step has led to."""
+        """Begin at a configuration without a step."""
 
     def remember(self, memory: Memory) -> None:
-        """Write down internal variables, or take them back."""
+        """Save or restore internal variables."""
 
 
 # -- DOLFINx -------------------------------------------------------------------------------------
@@ -156,9 +156,9 @@ class Form:
     """Form on the cells of a mesh, assembled by DOLFINx for the degrees of freedom of a scene.
 
     Args:
-        form: It has one quadrature rule: FFCx 0.9 to 0.11 is silently wrong otherwise.
-        at: Number in the scene of each degree of freedom of the mesh.
-        size: Number of degrees of freedom of the scene.
+        form: Form with one quadrature rule; FFCx 0.9 to 0.11 is silently wrong otherwise.
+        at: Number in the scene of each degree of freedom of the mesh.  size: Number of degrees of
+            freedom of the scene.
     """
 
     def __init__(self, form: ufl.Form, at: Index, size: int) -> None:
@@ -167,9 +167,9 @@ class Form:
         self._matrix: Any = None if self._form.rank < 2 else fem.create_matrix(self._form)
 
     def assembled(self) -> Any:
-        """Value, vector by the degrees of freedom of the form's own space, or matrix of the scene.
+        """Return a value, a vector on the form's own space, or a matrix of the scene.
 
-        There are as many arguments of the form: none, one, two.
+        The form has no, one, or two arguments, respectively.
         """
         if self._form.rank == 0:
             return float(fem.assemble_scalar(self._form))
@@ -180,37 +180,37 @@ class Form:
         return csr_array(self._joins.T @ K @ self._joins)
 
     def joined(self, entries: Array) -> Array:
-        """Vector of the scene from that of a linear form; cells that share a node add up."""
+        """Return the vector of the scene from entries of a linear form; shared nodes add up."""
         return np.asarray(self._joins.T @ entries)
 
 
 def dofs_of_cells(space: fem.FunctionSpace) -> Index:
-    """Degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
+    """Return the degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
     blocks, size = space.dofmap.list, space.dofmap.bs
     dofs = np.asarray(blocks[:, :, None] * size + np.arange(size))
     return dofs.reshape(len(blocks), blocks.shape[1] * size)
 
 
 def put(function: fem.Function, values: Array) -> None:
-    """Give a function values in the cells of its mesh, or in their quadrature points."""
+    """Set values of a function in the cells of its mesh, or at their quadrature points."""
     dofs = dofs_of_cells(function.function_space)
     function.x.array[dofs] = values.reshape(dofs.shape)
 
 
 def separate_cells(points: Array) -> tuple[meshes.Mesh, Index]:
-    """Mesh of cells without common vertices, (num_cells, 2, 2) in m; which cell became which."""
+    """Return a mesh of unconnected cells, (num_cells, 2, 2) in m, and their original numbers."""
     n = len(points)
     mesh = line_mesh(points.reshape(-1, 2), np.arange(2 * n).reshape(n, 2))
     return mesh, np.asarray(mesh.topology.original_cell_index)
 
 
 class Cells:
-    """Cells of beams, each with nodes of its own; joints and neighbours share numbers of the scene.
+    """Cells of beams, each with its own nodes; joints and neighbours share numbers of the scene.
 
     Attributes:
-        numbers: Of the cells in the scene, in the order of the mesh.
-        lengths: m.
-        element: Functions that forms are written in.
+        numbers: Numbers of the cells in the scene, in the order of the mesh.
+        lengths: Lengths of the cells; m.
+        element: Functions in the forms.
         at: Number in the scene of each degree of freedom of the mesh.
     """
 
@@ -232,7 +232,7 @@ class Cells:
         return Form(form, self.at, self.size)
 
     def set(self, function: fem.Function, q: Array) -> None:
-        """Give a function the configuration, or other vector, of the scene."""
+        """Set a function to the configuration, or another vector, of the scene."""
         function.x.array[:] = q[self.at]
 
     @cached_property
@@ -240,7 +240,7 @@ class Cells:
         return self.form(self.element.sampled(strain(self.element.q1, self.element.axis)))
 
     def strains(self, q: Array) -> Array:
-        """Strains (Σ, Γ, K) in the quadrature points; (num_cells, points, 3); 1, 1, 1/m."""
+        """Return strains (Σ, Γ, K) at quadrature points; (num_cells, points, 3); 1, 1, 1/m."""
         self.set(self.element.q1, q)
         space = self.element.at_points(3).function_space
         weighted = self._strains.assembled()[dofs_of_cells(space)]
@@ -248,22 +248,22 @@ class Cells:
         return np.asarray(strains)
 
     def on_nodes(self, kind: str, entries: Array) -> Array:
-        """Vector of a linear form on the nodes of the cells, see :func:`numbers_of_cells`."""
+        """Return a vector on the nodes of the cells, see :func:`numbers_of_cells`."""
         forces = entries[self._dofs].reshape(len(self.numbers), 3, self._dofs.shape[1] // 3)
         return numbers_of_cells(self._grid, kind, self.numbers, forces)
 
 
 def numbers_of_cells(grid: Grid, kind: str, cells: Index, forces: Array) -> Array:
-    """Forces at both ends of all cells, and how they are distributed; (9, num_cells).
+    """Return forces at both ends of all cells, and moments of their distribution; (9, num_cells).
 
-    (X, Y, M) at the start and at the end; the couple of what acts along a cell; first moments
-    of its forces about the middle, over the length.
+    The rows are (X, Y, M) at the start and at the end, the couple of the load along a cell, and
+    first moments of its forces about the middle, over the length.
 
     Args:
         grid: Numbering of the scene.
-        kind: "stress"; "work" of a user; "density", which acts along all of the cell.
+        kind: "stress"; "work" of a user; "density" along the whole cell.
         cells: Numbers of cells.
-        forces: On their nodes; (len(cells), 3, nodes of a cell); N, N, N m.
+        forces: Forces on the nodes; (len(cells), 3, nodes of a cell); N, N, N m.
     """
     numbers = np.zeros((9, len(grid.cells)))
     first, *between, last = grid.mesh.nodes - 0.5
@@ -279,12 +279,12 @@ class CellForce(Force):
     """Virtual work on cells: a form that is linear in ``element.w``, and its derivative by UFL.
 
     Args:
-        cells: Where it acts.
+        cells: Cells on which it acts.
         work: The form.
-        setting: Its ledger has entries of energies.
+        setting: Setting; its ledger has the entries of energies.
         around: Form with the same derivative, if UFL cannot derive ``work``.
-        stored: Form of the energy at the end of the step, and its entry.
-        lost: Form of the energy that is lost in the step, and its entry.
+        stored: Form of the energy stored at the end of the step, and its entry.
+        lost: Form of the energy lost in the step, and its entry.
         kind: See :func:`numbers_of_cells`.
     """
 
@@ -302,7 +302,7 @@ class CellForce(Force):
         setting.loses(*self._lost)
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Virtual work if the step ends at ``q1``, and its derivative."""
+        """Return the virtual work if the step ends at ``q1``, and its derivative."""
         self.cells.set(self.of.q0, step.q0)
         self.cells.set(self.of.q1, q1)
         forces = self.work.assembled()
@@ -312,19 +312,19 @@ class CellForce(Force):
         return self.work.joined(forces), K
 
     def energy(self, q: Array) -> float:
-        """Energy that is stored at a configuration; J."""
+        """Return the energy stored at a configuration; J."""
         self.cells.set(self.of.q1, q)
         return sum(float(form.assembled()) for form in self._stored.values())
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter what is lost, and take the energy at the end."""
+        """Enter the losses, and compute the energy at the end."""
         self.cells.set(self.of.q1, q1)
         for name, form in self._lost.items():
             self.ledger.lost[name] += form.assembled()
         self.start(q1)
 
     def start(self, q: Array) -> None:
-        """Take the energy of a configuration."""
+        """Compute the energy of a configuration."""
         self.stored = {name: self.energy(q) for name in self._stored}
 
 
@@ -332,12 +332,12 @@ class CellForce(Force):
 
 
 def lumps(grid: Grid) -> list[tuple[Index, float, float]]:
-    """Degrees of freedom, mass and inertia of point masses and rigid bodies; (3,), kg, kg m²."""
+    """Return dofs, mass and inertia of point masses and rigid bodies; (3,), kg, kg m²."""
     masses = [(grid.node(one.place), one.mass, one.inertia) for one in grid.scene.masses]
     return masses + [(grid.node(one.middle), one.mass, one.inertia) for one in grid.scene.bodies]
 
 
 def coupled(size: int, rows: Index, columns: Index, values: Array) -> csr_array:
-    """Matrix of the scene from entries; those at one place add up."""
+    """Return the matrix of the scene from entries; duplicates add up."""
     entries = np.ravel(values), (np.ravel(rows), np.ravel(columns))
     return csr_array(scipy.sparse.coo_array(entries, (size, size)))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors over a step: one row ``α e + β λ = γ`` each, linear around an iterate.
+"""Laws of connectors over a step: a row ``α e + β λ = γ`` each, linear around an iterate.
 
-e is the relative motion at the end of the step and λ the force that resists its growth.  A law is
-a class: ``row`` states the equation, ``z`` has the internal variables, ``stored`` the energies.
-Variables that a user has named are in ``z`` as "state ...".
+e is the relative motion at the end of the step and λ the force that resists its growth.  A law is a
+class: ``row`` returns the equation, ``z`` has the internal variables, ``stored`` the energies.
+Variables named by a user are in ``z`` as "state ...".
 """
 
 from __future__ import annotations
@@ -42,14 +42,18 @@ from ufl_beam.reference.cells import Setting
 from ufl_beam.reference.points import MaterialPoints, derivative
 
 CREEP = 1e-12
-"""Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
+"""Creep in a step of a sticking connector under its limit; over the size of the scene, or rad.
 
-Only where several places that stick hold the same motion: so they share the force.
+It occurs only if several sticking connectors constrain the same motion, so that they share the
+force.
 """
 
 EARLY, WEAK = 0.01, 1e-9
-"""Motion, in rad or sizes of the scene, that counts as much as the limit in deciding whether a
-rigid-plastic connector slips in an iterate; least factor of motions, in EI over that size."""
+"""Motion, in rad or over the size of the scene, that weighs as much as the limit of the force.
+
+It decides whether a rigid-plastic connector slips in an iterate.  The second number is the least
+factor of motions, over EI divided by that size.
+"""
 
 Row = tuple[float, float, float] | Array
 """α, β, γ; (k, k + 2) of the k components of a bushing."""
@@ -59,15 +63,16 @@ Motions = Any
 
 
 class LawInStep:
-    """Law of a connector in a step; its work is entered in ``entry`` of the ledger, if it has one.
+    """Law of a connector in a step; its work is in ``entry`` of the ledger, if it has an entry.
 
     Attributes:
-        saved_as: Name of the internal variables, that of the package's class.
-        z: Internal variables of the accepted state; "dissipated" is what yielding, slip and laws of
-            users have lost since the beginning, J; "start" the motion without round-off.
+        saved_as: Name of the internal variables, as in the package's class.
+        z: Internal variables of the accepted state; "dissipated" is the energy lost since the
+            beginning by yielding, slip and laws of users, J; "start" is the motion without
+            round-off.
         stored: Energies in the accepted state, by entry of the ledger; J.
-        opening: What opens beyond a limit, if the law does; see ``Solver._equilibrium``.
-        slope: Factor that rows about the force were divided by.
+        opening: Object that opens beyond a limit, or None; see ``Solver._equilibrium``.
+        slope: Divisor of rows about the force.
     """
 
     part, entry, sign, saved_as = "lost", "", 1.0, ""
@@ -77,7 +82,7 @@ class LawInStep:
     def __init__(self, link: Connector, setting: Setting) -> None:
         self.link, self.setting, self.e0, self.dt = link, setting, 0.0, 1.0
         self.law: Any = link.law
-        self.length = 1.0 if link.turns else setting.grid.scene.size  # of a motion that is large
+        self.length = 1.0 if link.turns else setting.grid.scene.size  # scale of motions
         self.z: dict[str, float] = {}
         self.stored: dict[str, float] = {}
         self.opening: Any = None
@@ -92,40 +97,40 @@ class LawInStep:
             getattr(setting.ledger, self.part)[self.entry] += 0.0
 
     def begin(self, e0: Motions, step: Step) -> None:
-        """Begin a step at the motion ``e0``; what iterates have tried is forgotten."""
+        """Begin a step at the motion ``e0``, and reset data of iterates."""
         self.e0, self.dt = e0, step.dt
 
     def row(self, e1: Motions, λ: Motions) -> Row:
-        """α, β, γ around an iterate; by default what ``begin`` has found."""
+        """Return α, β, γ around an iterate; by default the row computed by ``begin``."""
         return self._row
 
     def change(self, e1: Motions, work: float) -> float:
-        """Energy that is stored, dissipated or given away in a step; J.
+        """Return the energy that is stored, dissipated or transferred in a step; J.
 
         Raises:
-            StepFailed: A law that must dissipate gives energy.
+            StepFailed: A law that must dissipate generates energy.
         """
         return work
 
     def accept(self, e1: Motions, work: float) -> None:
-        """Take the end of the step; the connector has taken ``work`` in it."""
+        """Accept the end of the step, in which the connector has received ``work``."""
         if self.entry:
             getattr(self.setting.ledger, self.part)[self.entry] += self.sign * work
 
     def start(self, e: Motions) -> Any:
-        """Begin at a motion that no step has led to; return the force that the law has there."""
+        """Begin at a motion without a step; return the force of the law there."""
         return 0.0
 
     def state(self, given: Array | None = None) -> Array:
-        """Internal variables as a row, after those of ``given`` are taken over."""
+        """Return the internal variables as a row, after ``given`` has replaced them."""
         if given is not None:
             self.z = dict(zip(self.z, map(float, given), strict=True))
         return np.array([*self.z.values()])
 
     def after(self, e1: Motions, part: float) -> tuple[Any, Any, State]:
-        """Motions and rates at the time of the law of a user, and variables after a part of a step.
+        """Return motions and rates at the time of a user's law, and variables after a substep.
 
-        All are as the methods of the law get them; the variables grow in proportion.
+        All have the form of arguments of the law; the variables grow in proportion to ``part``.
         """
         θ, e0, e1 = self.setting.scheme.theta, np.atleast_1d(self.e0), np.atleast_1d(e1)
         both = (1 - θ) * e0 + θ * e1, (e1 - e0) / self.dt
@@ -138,7 +143,7 @@ class LawInStep:
 
 
 def around(forces: Callable[[Array], Any], e: Motions, ways: Motions) -> Array:
-    """Rows of a law whose forces are functions of the motions, by central differences."""
+    """Return rows of a law with ``forces`` as functions of motions, by central differences."""
     e, ways = np.atleast_1d(e), np.diag(np.atleast_1d(ways))
     with np.errstate(all="ignore"):
         slopes = [(forces(e + way) - forces(e - way)) / (2 * way.sum()) for way in ways]
@@ -147,16 +152,16 @@ def around(forces: Callable[[Array], Any], e: Motions, ways: Motions) -> Array:
 
 
 def small_way(e0: Motions, e1: Motions, length: Motions) -> Any:
-    """Third root of round-off, as a part of the step: it suits central differences."""
+    """Return an increment for central differences: third root of round-off times the step."""
     least = 1e-3 * np.maximum(np.abs(e1), 1e-3 * length)
     return 6e-6 * np.maximum(np.abs(e1 - e0), least)
 
 
-# -- what is held, driven, pushed, damped --------------------------------------------------------
+# -- constraints, motors, prescribed forces, dampers ---------------------------------------------
 
 
 class _Known(LawInStep):
-    """Law whose row is known as the step begins: of what is held, driven, pushed or damped."""
+    """Law with a row known at the beginning of a step: joint, motor, prescribed force, damper."""
 
     KINDS = {  # noqa: RUF012
         PrescribedMotion: ("supplied", "motors", -1.0, "_Driven"),
@@ -166,7 +171,7 @@ class _Known(LawInStep):
     }
 
     def __init__(self, link: Connector, setting: Setting) -> None:
-        held = "lost", "", 1.0, "_Held"  # by a joint: no motion, no work
+        held = "lost", "", 1.0, "_Held"  # a joint: no motion, no work
         kind = held if link.law is HELD else self.KINDS[type(link.law)]
         self.part, self.entry, self.sign, self.saved_as = kind
         super().__init__(link, setting)
@@ -182,7 +187,7 @@ class _Known(LawInStep):
         elif isinstance(law, Damper):
             factor = law.viscosity / step.dt
             self._row = -factor, 1.0, -factor * e0
-        else:  # a controller is asked as the step begins
+        else:  # a controller is called at the beginning of the step
             asked, reached = self.setting.asked.get(link), self.z["reached"]
             wanted = value_at(law.force, step.load_time, link) if asked is None else asked
             growth = step.fraction * (-wanted - reached)
@@ -198,7 +203,7 @@ class _Known(LawInStep):
 
 
 class _Stated(LawInStep):
-    """Law that states an energy and a resistance, such as a stop."""
+    """Law with an energy and a resistance, such as a stop."""
 
     def __init__(self, link: Connector, setting: Setting) -> None:
         super().__init__(link, setting)
@@ -212,16 +217,16 @@ class _Stated(LawInStep):
         return np.sum(self.law.energy(self.law.given([*np.atleast_1d(e)[:, None]]), z))
 
     def _elastic(self, e: Array, z: State) -> Array:
-        """Derivatives of the energy by the motions; (k,)."""
+        """Return derivatives of the energy by the motions; (k,)."""
         return np.array([float(np.sum(f)) for f in self.law.elastic_forces([*e[:, None]], z)])
 
     def _forces(self, e1: Array) -> Array:
-        """Forces of a step to ``e1``: of the energy where loads act, and the resistance; (k,)."""
+        """Return forces of a step to ``e1``: elastic at the time of loads, and resistance; (k,)."""
         e0, (*_, z) = np.atleast_1d(self.e0), self.after(e1, self._part)
         resistance = self.law.each(self.law.resistance(*self.after(e1, self._θ), self.dt))
         elastic = end = self._elastic(e1, z)
         if self._part != 1.0:
-            # By Gauss's rule; where the forces are not smooth, from the change of the energy.
+            # By Gauss's rule, or from the change of the energy if the forces are not smooth
             way, mean = e1 - e0, self.setting.scheme.mean(lambda e: self._elastic(e, z), e0, e1)
             first, middle = (self._elastic(e, z) for e in (e0, (e0 + e1) / 2))
             errors = (mean - (first + 4 * middle + end) / 6) * way
@@ -245,10 +250,10 @@ class _Stated(LawInStep):
         return float(self._energy(e1, self.after(e1, 0.0)[2])) - self.z["held"]
 
     def accept(self, e1: Motions, work: float) -> None:
-        """Take the variables; what is neither stored nor lost by the scheme is lost."""
+        """Accept the variables; work that is neither stored nor numerical loss is dissipated."""
         (*_, old), (*_, new) = (self.after(e1, part) for part in (0.0, 1.0))
         held, numerical = float(self._energy(e1, new)), 0.0
-        if self._delayed:  # its growth is the derivative along the step, by a complex step
+        if self._delayed:  # growth: derivative along the step, by a complex step
             z = {n: x + 1e-30j * (x - getattr(old, n)) for n, x in vars(new).items()}
             along = self._energy(e1 + 1e-30j * (e1 - self.e0), State(z))
             growth = float(np.imag(along)) / 1e-30
@@ -313,16 +318,16 @@ class _Sprung(LawInStep):
 
 
 class _Rubbing(LawInStep):
-    """Dry friction: it sticks, or slips one way or the other (-1, 1); a law of a user as well.
+    """Dry friction, also by laws of users: it sticks, or slips in the direction -1 or 1.
 
-    The sliding force of such a law may be below its limit, so that to stick and to slide can both
-    be solutions.  It goes on as in the last step until an equilibrium is found that does not admit
-    this.
+    The sliding force of a user's law may be below its limit, so that sticking and sliding can both
+    be solutions.  The connector sticks or slides as in the last step, unless no equilibrium admits
+    it.
 
     Attributes:
-        excess: Of a law of a user: infinite if it slides back or its coming to rest gives energy;
-            ``|force| / limit - 1`` if it is held and bears too much; else 0.
-        released: Whether it may change in the iterates from now on.
+        excess: For a law of a user: infinite if it slides back or its stop generates energy;
+            ``|force| / limit - 1`` if it is held and exceeds the limit; else 0.
+        released: True if it may change in the iterates from now on.
     """
 
     entry, saved_as = "friction", "_Rubbing"
@@ -342,7 +347,7 @@ class _Rubbing(LawInStep):
             self._limit = self.setting.asked[self.link]
         softness = CREEP * self.length * self.setting.friction_repeats
         self._creep = softness / self._limit if self._limit > 0 else 0.0
-        # With this way the velocity at the end is zero; with none, that before would come back.
+        # With this motion the velocity at the end is zero; without motion it would return reversed.
         self._way = way_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.link]
         self._slip, self._against, self._guessed = self.z["slip"], False, True
 
@@ -350,10 +355,10 @@ class _Rubbing(LawInStep):
         """Stick while the force is below the limit; slip until the sliding velocity reverses."""
         moved, stuck, search = e1 - self.e0, self._slip == 0, self.setting.search
         if not self._against and self._slip * self._way > 0:
-            moved -= self._way  # rest at the end, rather than a reversed velocity
+            moved -= self._way  # rest at the end instead of a reversed velocity
         back = not stuck and self._slip * moved < -1e-14 * self.length
-        # Coming to rest must not give energy; if it did, the place is held at once in this step.
-        # The force of the guess does not decide this: it belongs to another motion.
+        # A stop must not generate energy; if it did, the motion is held at once in this step. The
+        # force of the guess does not decide this, since it belongs to another motion.
         gives = not self._guessed and not self._against and stuck and λ * self._way < 0
         over = stuck and abs(λ) > self._limit * (1 + 1e-12)
         self._guessed, self.excess = False, 0.0
@@ -387,17 +392,17 @@ class _Rubbing(LawInStep):
 
 
 class _Slipping(LawInStep):
-    """Rigid-plastic connector, such as a plastic hinge: held up to a limit, then a law of slip.
+    """Rigid-plastic connector, such as a plastic hinge: constrained up to a limit, then a slip law.
 
     With R the resistance after the motion m, and any r > 0, the equation for the force λ is
 
         r m = 0 where |λ + r m| <= R, else λ = R or -R:
 
-    its residual is continuous in λ and m, as Newton's method wants.
+    its residual is continuous in λ and m, as Newton's method requires.
 
     Attributes:
-        excess: ``|force| / limit - 1`` if it is held closed and bears too much, else 0.
-        released: Whether it may open from now on.
+        excess: ``|force| / limit - 1`` if it is kept closed and exceeds the limit, else 0.
+        released: True if it may open from now on.
     """
 
     saved_as = "CompiledSlips"
@@ -416,7 +421,7 @@ class _Slipping(LawInStep):
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
-        self._way = int(self.z["way"])  # of the slip in the iterate; at first that of the last step
+        self._way = int(self.z["way"])  # slip direction of the iterate; at first of the last step
 
     def _slip(self, grown: Any, way: int) -> Slip:
         at = {**self._numbers, **self.z, "θ": self.setting.scheme.theta, "dt": self.dt}
@@ -424,7 +429,7 @@ class _Slipping(LawInStep):
 
     @np.errstate(all="ignore")
     def row(self, e1: float, λ: float) -> Row:
-        """α, β, γ around an iterate, whose direction of slip is found first."""
+        """Return α, β, γ around an iterate, after finding its direction of slip."""
         z, r, search, self.excess = self.z, self.slope, self.setting.search, 0.0
         motion, limit = e1 - z["start"], z["limit"]
         tested = λ - z["back force"] + r * motion
@@ -450,7 +455,7 @@ class _Slipping(LawInStep):
         return way * slope / r, -1 / r, (way * slope * e1 - force) / r
 
     def accept(self, e1: float, work: float) -> None:
-        """Take the slip of the step as the new state."""
+        """Accept the slip of the step."""
         grown, ledger = max(self._way * (e1 - self.z["start"]), 0.0), self.setting.ledger
         if math.isfinite(self.z["limit"]):
             end = self._slip(grown, self._way)
@@ -472,10 +477,10 @@ class _Slipping(LawInStep):
 
 
 def _slope(link: Connector, size: float) -> float:
-    """Factor r of motions beside forces in the equation of a rigid-plastic connector.
+    """Return the factor r of motions in the equation of a rigid-plastic connector.
 
-    It is above the steepest softening, so that an open branch is found open; and so large that
-    motions, not the round-off of forces, say in which direction a weak hinge slips.
+    It exceeds the steepest softening, so that an open branch stays open.  It is so large that
+    motions, not the round-off of forces, decide in which direction a weak hinge slips.
     """
     law = law_of(link)
     if not 0.0 < law.limit < np.inf:
@@ -504,12 +509,12 @@ class _Asked(LawInStep):
         part = step.fraction * step.at
         t = step.load_time if part == 1.0 else step.t0 + part * (step.load_time - step.t0)
         state = self.state()
-        state.flags.writeable = False  # iterates begin with the same one
+        state.flags.writeable = False  # all iterates begin with the same state
         self._known = {"t": t, "dt": step.dt, "state": state}
-        self._last: tuple[float, float, float, float] | None = None  # e, λ, residual, place of law
+        self._last: tuple[float, float, float, float] | None = None  # e, λ, residual, motion of law
 
     def _respond(self, e1: float) -> tuple[float, Array]:
-        """Force, and internal variables after a step to the motion ``e1``."""
+        """Return force and internal variables after a step to the motion ``e1``."""
         w = self.setting.scheme.load_weight
         motion, rate = (1 - w) * self.e0 + w * e1, (e1 - self.e0) / self.dt
         known = {name: self._known[name] for name in self.law.asked}
@@ -526,16 +531,16 @@ class _Asked(LawInStep):
                 ) from None
         force = require_returned(value, f"{self.link}: the function", at)
         for number in (force, *map(float, after)):
-            if not math.isfinite(number):  # a shorter step may not come there
+            if not math.isfinite(number):  # a shorter step may avoid this motion
                 raise NoNumber(f"{self.link}: the function returned {number} at {at}")
         return force, after
 
     def row(self, e1: float, λ: float) -> Row:
-        """The law around an iterate.
+        """Return the law around an iterate.
 
-        Where it has an infinite slope, Newton's method goes from one side to the other for ever.
-        The two latest iterates tell how the rest of the scene yields: the law is taken where it
-        meets this line, if that is between ``e1`` and the place before.
+        At an infinite slope, Newton's method oscillates for ever.  The secant through the two
+        latest iterates approximates the rest of the scene.  The law is linearised at its
+        intersection with this line, if that is between ``e1`` and the previous motion.
         """
         last, at, missed = self._last, e1, self._respond(e1)[0] - λ
         if last is not None and abs(missed) > abs(last[2]) / 2 and e1 != last[0]:
@@ -548,21 +553,21 @@ class _Asked(LawInStep):
                 at = float(scipy.optimize.brentq(excess, e1, last[3], xtol=1e-300, maxiter=2000))
         ε = float(small_way(self.e0, at, self.length))
         near = 6e-6 * max(abs(at), 0.0 if last is None else abs(last[3]))
-        if 0.0 < near < ε:  # beside zero, where the slope may be infinite
+        if 0.0 < near < ε:  # near zero, where the slope may be infinite
             low, here, high = (self._respond(at + x)[0] for x in (-near, 0.0, near))
             ε = near if abs(high - low) > 1e-8 * abs(here) else ε
         self._last = e1, λ, missed, at
         return around(lambda e: self._respond(float(e[0]))[0], at, ε)
 
     def accept(self, e1: float, work: float) -> None:
-        """Enter what is not stored of the work, and take the internal variables."""
+        """Enter the work that is not stored, and accept the internal variables."""
         before, (_, after) = self.stored["stored"], self._respond(e1)
         self.state(after)
         self.start(e1)
         super().accept(e1, work - (self.stored["stored"] - before))
 
     def start(self, e: float) -> float:
-        """Take the energy that can be had back; J."""
+        """Compute the recoverable energy; J."""
         if self.law.stored is not None:
             value = self.law.stored(e, **dict.fromkeys(self.law.asked_by_stored, self.state()))
             of, at = f"{self.link}: the energy", f"motion = {e:.6g}"
@@ -574,11 +579,11 @@ LAWS: dict[type, type[LawInStep]] = {
     **dict.fromkeys(_Known.KINDS, _Known), ConnectorLaw: _Stated, Spring: _Sprung,
     Coulomb: _Rubbing, RigidPlastic: _Slipping, ForceLaw: _Asked,
 }  # fmt: skip
-"""Law in a step by the class of a record, or by its base."""
+"""Classes of laws in a step, by the class of a record or its base."""
 
 
 def law_in_step(link: Connector, setting: Setting) -> LawInStep:
-    """Law of a connector in a step."""
+    """Return the law of a connector in a step."""
     if isinstance(link.law, ConnectorLaw) and link.law.holds:
         return _Rubbing(link, setting)
     return next(LAWS[kind] for kind in type(link.law).__mro__ if kind in LAWS)(link, setting)

@@ -32,18 +32,20 @@ from ufl_beam.reference.cells import (
 from ufl_beam.reference.connector_laws import law_in_step
 
 NEAR = 1e-5
-"""Way of differences of the forces of guides, as a part of the scene; they are of second order, and
-the last digits of the curve spoil less than 1e-10."""
+"""Increment of differences of the forces of guides, over the size of the scene.
+
+The differences are of second order; the round-off of the curve spoils less than 1e-10.
+"""
 
 
 class Linked(Force):
     """Base of connectors, whose forces are unknowns of the scene.
 
     Attributes:
-        numbers: Of the connectors among the links of the scene.
-        forces_at: Degrees of freedom that are their forces.
+        numbers: Indices of the connectors in the links of the scene.
+        forces_at: Degrees of freedom of their forces.
         before: Forces at the end of the last step.
-        at_rest: Forces that laws have in the undeformed scene.
+        at_rest: Forces of the laws in the undeformed scene.
     """
 
     inner = True
@@ -60,7 +62,7 @@ class Linked(Force):
 class Connectors(Linked):
     """Connectors of one relative motion, or of the k motions of a bushing.
 
-    Each is a cell of unit length from one node to the other, with its forces as further unknowns.
+    Each is a cell of unit length between both nodes, with its forces as further unknowns.
     """
 
     def __init__(self, motions: Sequence[str], numbers: Index, setting: Setting) -> None:
@@ -87,12 +89,12 @@ class Connectors(Linked):
         self._e0: Array = np.zeros(n)
 
     def motion(self, q: Array) -> Array:
-        """Relative motions at ``q``; (num_links,); m or rad."""
+        """Return the relative motions at ``q``; (num_links,); m or rad."""
         self._stated.q1.x.array[:] = q[self._at]
         return np.asarray(self._motion.assembled()[self._cell_dofs])
 
     def rates(self, q: Array, v: Array) -> Array:
-        """Rates of the motions if the velocities are ``v``; (num_links,); m/s or rad/s."""
+        """Return the rates of the motions at the velocities ``v``; (num_links,); m/s or rad/s."""
         self._stated.q1.x.array[:], self._stated.u.x.array[:] = q[self._at], v[self._at]
         return np.asarray(self._rate.assembled()[self._cell_dofs])
 
@@ -102,11 +104,11 @@ class Connectors(Linked):
             law.begin(e0, step)
 
     def _of_each(self, values: Array) -> list[Any]:
-        """Numbers of each connector: one, or an array of those of its components."""
+        """Return values by connector: a number, or an array of numbers of its components."""
         return [*map(float, values)] if self._k == 1 else [*values.reshape(-1, self._k)]
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Forces on the nodes and the rows of the laws, and their derivative."""
+        """Return forces on the nodes and residuals of the laws, and their derivative."""
         given = map(self._of_each, (self.motion(q1), q1[self.forces_at]))
         rows = [law.row(e, λ) for law, e, λ in zip(self.laws, *given, strict=True)]
         self._rows = np.vstack([np.reshape(row, (self._k, -1)) for row in rows])
@@ -115,9 +117,9 @@ class Connectors(Linked):
         return self._work.joined(self._work.assembled()), self._tangent.assembled()
 
     def missed(self, q: Array, r: Array, scale: float, moved: float) -> float:
-        """Largest residual of a row: of motions as a part of 1 % of ``moved``, or of ``scale``.
+        """Return the largest residual of a row, relative to 1 % of ``moved`` or to ``scale``.
 
-        What the last digits of the motions make of a row does not count.
+        The round-off of a row by motions does not count.
         """
         size = self.setting.grid.scene.size
         k, length = self._k, self._length.reshape(-1, self._k)
@@ -135,18 +137,18 @@ class Connectors(Linked):
             return float(np.where(left <= 0, 0.0, left / wanted).max())
 
     def taken(self, q1: Array) -> Array:
-        """Works of the forces of the step."""
+        """Return the works of the forces in the step."""
         force = acting(self.setting.scheme, self.before, q1[self.forces_at])
         return np.asarray(force * (self.motion(q1) - self._e0))
 
     def change(self, step: Step, q1: Array) -> float:
-        """Energy that the connectors store, dissipate or give away in the step; J."""
+        """Return the energy that connectors store, dissipate or transfer in the step; J."""
         works = self.taken(q1).reshape(-1, self._k).sum(axis=1)
         each = zip(self.laws, self._of_each(self.motion(q1)), works, strict=True)
         return sum(law.change(e, float(work)) for law, e, work in each)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Take the end of the step; enter what was supplied or lost."""
+        """Accept the end of the step; enter supplied works and losses."""
         e, taken = self.motion(q1), self.taken(q1)
         self.work = self.work + taken
         self.rate, self._e0 = np.asarray((e - self._e0) / step.dt), e
@@ -163,14 +165,14 @@ class Connectors(Linked):
 
     @property
     def stored(self) -> Mapping[str, float]:  # type: ignore[override]
-        """Energies that the laws store."""
+        """Stored energies of the laws."""
         total: dict[str, float] = defaultdict(float)
         for name, energy in (item for law in self.laws for item in law.stored.items()):
             total[name] += energy
         return total
 
     def kept(self, q: Array) -> Array:
-        """Columns of ``Connection`` of each; (num_links, columns)."""
+        """Return the columns of ``Connection``; (num_links, columns)."""
         each = zip(self.laws, self._of_each(self._e0), strict=True)
         e = np.ravel([law.z.get("start", e) for law, e in each])
         dissipated = np.zeros(len(self.links))
@@ -178,7 +180,7 @@ class Connectors(Linked):
         return np.column_stack([e, q[self.forces_at], self.work, self.rate, dissipated])
 
     def remember(self, memory: Memory) -> None:
-        """Works, rates, forces, motions and internal variables, by the kind of the law."""
+        """Save or restore works, rates, forces, motions and internal variables, by kind of law."""
         for i in range(len(self.links)):
             law = self.laws[i // self._k]
             row = np.array([self.work[i], self.rate[i], self.before[i], self._e0[i], *law.state()])
@@ -188,11 +190,11 @@ class Connectors(Linked):
 
 
 class GuideForce(Linked):
-    """Point on a curve of the plane: held across it, free along it.
+    """Point on a curve of the plane: constrained across it, free along it.
 
-    The force over a step is across the chord of the curve, so that it does no work.  The last
-    digits of the curve spoil the direction of a short chord; the direction in its middle takes its
-    place there.  The motion is the distance from the curve, zero when a step is accepted.
+    The force over a step is normal to the chord of the curve, so that it does no work.  Round-off
+    of the curve spoils the direction of a short chord; there the direction of the curve in the
+    middle is used.  The motion is the distance from the curve, zero when a step is accepted.
     """
 
     def __init__(self, number: int, setting: Setting) -> None:
@@ -213,14 +215,14 @@ class GuideForce(Linked):
         self._s = self._s0
 
     def _nearest(self, x: Array) -> float:
-        """Parameter of the nearest point of the curve, from the latest one on."""
+        """Return the parameter of the nearest point of the curve, starting at the latest point."""
         s = nearest(self._curve, x, self._s, self._step, self._size)
         if not math.isfinite(s):
             raise NoNumber(f"{self._place} is where no nearest point of its guide curve was found")
         return s
 
     def _equation(self, x: Array) -> Array:
-        """Distance from the curve, and direction of the force over the step; (3,)."""
+        """Return the distance from the curve, and the force direction over the step; (3,)."""
         s = self._nearest(x)
         on, slope = np.array(self._curve(s), np.float64), tangent(self._curve, s, self._step)
         t = along = slope / math.hypot(*slope)
@@ -233,7 +235,7 @@ class GuideForce(Linked):
         return np.array([t[0] * (x - on)[1] - t[1] * (x - on)[0], -y_m, x_m])
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Force across the curve, distance from it, and derivatives by central differences."""
+        """Return force across the curve, distance, and derivatives by central differences."""
         x, λ, r = self._point + q1[self._x], q1[self._λ], np.zeros(self.size)
         self._s = self._nearest(x)
         r[self._λ], *direction = self._equation(x)
@@ -247,18 +249,18 @@ class GuideForce(Linked):
         return r, coupled(self.size, np.repeat(dofs, 3), np.tile(dofs, 3), K)
 
     def missed(self, q: Array, r: Array, scale: float, moved: float) -> float:
-        """Distance, as a part of 1 % of the scene."""
+        """Return the distance, relative to 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._point + self._on0).max())
         return float(max(abs(r[self._λ]) - round_off, 0.0) / (0.01 * self._size))
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Take the point on the curve."""
+        """Accept the point on the curve."""
         self._on0 = np.array(self._curve(self._s), np.float64)
         t = tangent(self._curve, self._s, self._step)
         self._step, self._s0 = REACH * self._size / math.hypot(*t), self._s
 
     def kept(self, q: Array) -> Array:
-        """Columns of ``Connection``; the distance is NaN at the end of a curve."""
+        """Return the columns of ``Connection``; the distance is NaN at the end of a curve."""
         self._s = self._s0
         try:
             self._distance = self._equation(self._point + q[self._x])[0]
@@ -267,7 +269,7 @@ class GuideForce(Linked):
         return np.array([[self._distance, q[self._λ], 0.0, 0.0, 0.0]])
 
     def remember(self, memory: Memory) -> None:
-        """The point on the curve, its parameter, and the step of that for tangents."""
+        """Save or restore the point on the curve, its parameter, and its step for tangents."""
         row = np.array([[self._distance, self._s, self._s0, self._step, *self._on0]])
         (row,) = memory.rows("guides", self.numbers, row)
         self._distance, self._s, self._s0, self._step = map(float, row[:4])
@@ -275,7 +277,7 @@ class GuideForce(Linked):
 
 
 def connectors_of(setting: Setting) -> list[Connectors | GuideForce]:
-    """All connectors of a scene: those of one motion together, and each guide."""
+    """Return all connectors of a scene, grouped by motion, and each guide."""
     found: list[Connectors | GuideForce] = []
     kinds: dict[tuple[str, ...], list[int]] = {(motion,): [] for motion in MOTIONS}
     kinds |= {("sliding", "sliding", "turning")[:k]: [] for k in (2, 3)}

@@ -33,15 +33,15 @@ from ufl_beam.reference.cells import (
 )
 
 AT_REST = 1e300
-"""Longest step that forms are told of, in which all rates vanish; s."""
+"""Largest step length in forms, at which all rates vanish; s."""
 
 
 class LoadForce(Force, ABC):
-    """Base of loads: a factor in time, times forces at the configuration where loads act.
+    """Base of loads: a factor in time, times forces at the configuration at which loads act.
 
     Attributes:
-        force: In the latest response; (size,).
-        along: :attr:`on_nodes` at a factor of one, of loads along beams.
+        force: Force in the latest response; (size,).
+        along: :attr:`on_nodes` of loads along beams, at a factor of one.
     """
 
     along: Array | float = 0.0
@@ -56,14 +56,14 @@ class LoadForce(Force, ABC):
 
     @abstractmethod
     def forces(self, q: Array) -> Response:
-        """Forces at the configuration ``q`` and a factor of one, and their derivative."""
+        """Return forces at the configuration ``q`` and a factor of one, and their derivative."""
 
     def place(self, step: Step, q1: Array) -> Array:
-        """Configuration at which the load acts if the step ends at ``q1``."""
+        """Return the configuration at which the load acts if the step ends at ``q1``."""
         return np.asarray(step.q0 + self.scheme.load_weight * (q1 - step.q0))
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Minus the load of the step; parts of a step go in proportion."""
+        """Return minus the load of the step, in proportion to the substep."""
         wanted = value_at(self.time, step.load_time, self.load)
         growth = step.fraction * (wanted - self._reached)
         self.factor, self._end = self._reached + step.at * growth, self._reached + growth
@@ -72,12 +72,12 @@ class LoadForce(Force, ABC):
         return -self.force, csr_array(-self.factor * self.scheme.load_weight * slope)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the work of the load, that of its forces on the step of the nodes."""
+        """Enter the work of the load on the nodal step."""
         self.supplied["loads"] += float(acting(self.scheme, self._before, self.force) @ s)
         self._before, self._reached = self.force, self._end
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
-        """The load at the time ``t``; the state is taken as one that is in equilibrium with it."""
+        """Return the load at time ``t``; the state is assumed in equilibrium with it."""
         self._reached = value_at(self.time, t, self.load)
         self.force = self._before = self._reached * self.forces(q)[0]
         return self.force
@@ -108,19 +108,19 @@ class DeadLoad(LoadForce):
         self.along = numbers_of_cells(grid, "density", cells, -along)
 
     def forces(self, q: Array) -> Response:
-        """The consistent nodal forces."""
+        """Return the consistent nodal forces."""
         return self._vector, csr_array((self.size, self.size))
 
 
 class Follower(LoadForce):
-    """Follower load: it turns with the cross-section or body that it acts on."""
+    """Follower load: it rotates with the cross-section or body that it acts on."""
 
     def __init__(self, load: FollowerLoad, setting: Setting) -> None:
         super().__init__(load, setting)
         self._dofs, self._given = setting.grid.node(load.place), (*load.force, load.moment)
 
     def forces(self, q: Array) -> Response:
-        """(F_x, F_y, M) turned by the rotation."""
+        """Return (F_x, F_y, M) turned by the rotation."""
         (x, y, M), ψ, force = self._given, q[self._dofs[2]], np.zeros(self.size)
         c, s = math.cos(ψ), math.sin(ψ)
         x, y = c * x - s * y, s * x + c * y
@@ -130,9 +130,9 @@ class Follower(LoadForce):
 
 
 class FrameForce(LoadForce):
-    """Centrifugal and Coriolis forces; the first have a potential, the second do no work.
+    """Centrifugal forces, which have a potential, and Coriolis forces, which do no work.
 
-    Rotary inertia keeps its spin in steady rotation, so no moments come of it.
+    Rotary inertia keeps its spin in steady rotation, so it causes no moments.
     """
 
     def __init__(self, frame: RotatingFrame, setting: Setting, mass: Mass) -> None:
@@ -144,7 +144,7 @@ class FrameForce(LoadForce):
         self._pull = csr_array(mass.matrix.multiply(self._Ω**2 * self._no_turn[:, None]))
         nodes = np.concatenate([grid.dofs_of_bodies, grid.dofs])
         self._pairs = np.unique(nodes[:, :2], axis=0)  # degrees of freedom u, v of the nodes
-        # Mass times a quarter turn of velocities; 2 Ω of it times them is Coriolis' force.
+        # Mass times a quarter turn; Coriolis' force is 2 Ω times it times the velocities.
         (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
         density = of.inertia[0] * ufl.dot(turn(u), w_u)
         G = mass.cells.form(density * of.dx_of_mass()).assembled()
@@ -156,17 +156,17 @@ class FrameForce(LoadForce):
         self._places[nodes[:, :2]] = np.concatenate([centers, grid.points]) - frame.about
 
     def forces(self, q: Array) -> Response:
-        """Centrifugal forces at the places."""
+        """Return the centrifugal forces at the positions of the nodes."""
         return np.asarray(self._pull @ (self._places + q)), self._pull
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Minus the centrifugal forces, and Coriolis forces at the mean rate."""
+        """Return minus the centrifugal forces and the Coriolis forces at the mean rate."""
         r, K = super().respond(step, q1)
         coriolis = self._gyro @ (q1 - step.q0) / step.dt
         return np.asarray(r + coriolis), csr_array(K + self._gyro / step.dt)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter the work, and note mass times the accelerations of the frame in the beams."""
+        """Enter the work, and keep mass times the accelerations of the frame in the beams."""
         super().accept(step, q1, s)
         v = (q1 - step.q0) / step.dt
         a = -self.factor * self._Ω**2 * self._no_turn * (self._places + self.place(step, q1))
@@ -178,7 +178,7 @@ class FrameForce(LoadForce):
 class WorkForce(CellForce):
     """Virtual work or potential of a user on the cells on which it acts.
 
-    The forces of a potential are always there; virtual works grow in parts of the first step, as
+    Forces of a potential always act fully; virtual works grow over substeps of the first step, as
     loads do.
     """
 
@@ -201,7 +201,7 @@ class WorkForce(CellForce):
             supplied[work.in_time] += 0.0
 
     def _put(self, t: float, **clock: float) -> None:
-        """Give the forms time, growth, length of the step, and the numbers of the work."""
+        """Set time, growth, step length, and the numbers of the work in the forms."""
         numbers = self._work.numbers.items()
         values = {n: value_at(x, t, self._work) if callable(x) else x for n, x in numbers}
         for name, value in {"t": t, **clock, **values}.items():
@@ -209,9 +209,9 @@ class WorkForce(CellForce):
         self._at = t
 
     def respond(self, step: Step, q1: Array) -> Response:
-        """Minus the virtual work, or the derivative of the potential, and its derivative.
+        """Return minus the virtual work, or the derivative of the potential, and its derivative.
 
-        Parts of a step go in proportion to the way of the loads.
+        Substeps take the same fraction as for loads.
         """
         part, growth = step.fraction, step.fraction * (1.0 - self._grown)
         self._end = self._t + part * (step.motion_time - self._t), self._grown + growth
@@ -222,26 +222,26 @@ class WorkForce(CellForce):
         return r, K
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Enter what the work did in the step."""
+        """Enter the work in the step."""
         name, supplied, at = self._work.name, self.ledger.supplied, np.array(self._at)
         if not self._is_potential:
             supplied[name] += float(acting(self._scheme, self._before, self.force) @ s)
         held, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
         self._before, (self._t, self._grown) = self.force, self._end
         super().accept(step, q1, s)
-        if self._varies:  # what time brings is all of the change but that by the motion
+        if self._varies:  # supply by time: the change except its part by the motion
             self._put(t)
             moved = self.energy(q1) - self.energy(step.q0)
             supplied[self._work.in_time] += self.stored[name] - held - moved
 
     def start(self, q: Array) -> None:
-        """Take the energy of a potential."""
+        """Compute the energy of a potential."""
         if self._is_potential:
             self._put(self._t)
             super().start(q)
 
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
-        """The forces at ``q``, as at the end of a second in which the velocities stayed."""
+        """Return the forces at ``q``, as at the end of a second with constant velocities."""
         self._t, self._grown = t, 1.0
         self.cells.set(self.of.q0, q if v is None else q - v)
         self.cells.set(self.of.q1, q)
@@ -250,13 +250,13 @@ class WorkForce(CellForce):
         return self.force
 
     def remember(self, memory: Memory) -> None:
-        """Forces of the last step, which depend on its motion."""
+        """Save or restore the forces of the last step if they depend on its motion."""
         if self._work.takes_rates and self._scheme.weight_of_before and not self._is_potential:
             self._before = memory.vector(f"work of {self._work.name}", self._before)
 
 
 def loads_of(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce | WorkForce]:
-    """All loads and works of a scene."""
+    """Return all loads and works of a scene."""
     found: list[LoadForce | WorkForce] = []
     for load in setting.grid.scene.loads:
         if isinstance(load, RotatingFrame):
@@ -276,10 +276,10 @@ class Supports:
 
     Attributes:
         axes: Orthogonal matrix from the axes of the plane to those of the supports.
-        held: Degrees of freedom that are held or prescribed, in their axes.
-        free: All others: the unknowns of a step.
+        held: Constrained or prescribed degrees of freedom, in the axes of the supports.
+        free: All other degrees of freedom: the unknowns of a step.
         reactions: Forces of the supports in the latest residual, in their axes; (size,).
-        before: Those of the accepted step.
+        before: Reactions of the accepted step.
     """
 
     def __init__(self, setting: Setting) -> None:
@@ -307,33 +307,33 @@ class Supports:
             self._supplied["supports"] += 0.0
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
-        """Set in ``x`` what is held and prescribed in the step that begins at ``x0``."""
+        """Set the constrained and prescribed values in ``x`` for the step that begins at ``x0``."""
         x[self.held] = x0[self.held]
         for dof, motion, support in self._motions:
             wanted = value_at(motion, step.motion_time, support)
             x[dof] = x0[dof] + step.fraction * (wanted - x0[dof])
 
     def stop(self, v: Array) -> Array:
-        """Velocities without those of what is held fast; else they would ring."""
+        """Return velocities with zeros at fixed supports; else they would oscillate."""
         x = self.axes @ v
         moving = [dof for dof, *_ in self._motions]
         x[np.setdiff1d(self.held, moving)] = 0.0
         return np.asarray(self.axes.T @ x)
 
     def note(self, r: Array) -> None:
-        """Note the reactions in a residual, which is in the axes of the supports."""
+        """Store the reactions of a residual in the axes of the supports."""
         self.reactions: Array = np.zeros(len(r))
         self.reactions[self.held] = r[self.held]
 
     def accept(self, s: Array) -> None:
-        """Enter the work of supports that move in a step of the nodes."""
+        """Enter the work of moving supports in a nodal step."""
         if self._motions:
             force = acting(self._scheme, self.before, self.reactions)
             self._supplied["supports"] += float(force @ (self.axes @ s))
         self.before = self.reactions
 
     def forces(self) -> Array:
-        """Forces of each support on the scene, of the components that it holds; (num, 3)."""
+        """Return the forces of each support on the scene, in its held components; (num, 3)."""
         found = np.zeros((len(self._grid.scene.supports), 3))
         for force, support in zip(found, self._grid.scene.supports, strict=True):
             held = [*support.held]

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Return map of material points in NumPy, all points of a kind at once.
 
-A point answers the strain at the end of a step.  Its law is called on arrays; derivatives are
-complex steps.  Where the stress exceeds the resistance of the discontinuity, the jump grows until
-both are equal, and the tangent is condensed.
+A point responds to the strain at the end of a step.  Its law is called on arrays; derivatives are
+complex steps.  If the stress exceeds the resistance of the discontinuity, the jump grows until both
+are equal, and the tangent is condensed.
 """
 
 from __future__ import annotations
@@ -22,25 +22,25 @@ from ufl_beam.model.law_functions import Values
 from ufl_beam.reference.cells import Setting
 
 CLOSED, FLOWING = 0.0, 1.0
-"""A discontinuity did not grow in the last step, or grew in it."""
+"""Flags of a discontinuity that did not grow, or grew, in the last step."""
 
 IMAGINARY = 1e-200
-"""Step into the imaginary: its square disturbs no digit of the value."""
+"""Imaginary step; its square does not change the value."""
 
 EPS = float(np.finfo(float).eps)
 
 NO_ENERGY = 1e-9
-"""Dissipation that is none, as a part of its size."""
+"""Dissipation, over the size of its terms, that counts as zero."""
 
 CORRECTIONS, HALVINGS = 100, 10
-"""Most corrections of the variables of a law, and most halvings of each."""
+"""Maximum number of corrections of the variables of a law, and of halvings of a correction."""
 
 
 # -- derivatives ---------------------------------------------------------------------------------
 
 
 def derivative(f: Callable[[Values], Values], x: Array) -> tuple[Array, Array]:
-    """Value and derivative of a function of arrays, entry by entry."""
+    """Return value and derivative of a function of arrays, entry by entry."""
     y = f(x + 1j * IMAGINARY)
     return np.real(y).copy(), np.imag(y) / IMAGINARY
 
@@ -48,7 +48,7 @@ def derivative(f: Callable[[Values], Values], x: Array) -> tuple[Array, Array]:
 def jacobian(
     f: Callable[[At], Array], at: Mapping[str, Values], by: Sequence[str]
 ) -> tuple[Array, Array]:
-    """Values of functions of points, and derivatives by some numbers; (n, ...), (n, k, ...)."""
+    """Return values of functions and derivatives by numbers ``by``; (n, ...), (n, k, ...)."""
 
     def column(name: str) -> tuple[Array, Array]:
         return derivative(lambda x: f({**at, name: x}), at[name])
@@ -68,24 +68,24 @@ def solved(A: Array, b: Array) -> Array:
 
 
 class MaterialPoints:
-    """Points of one layout in many cells.
+    """Points with the same layout in many cells.
 
     Args:
         layout: The points of a cell, with their laws.
-        keys: Of the cells, for numbers that are drawn at random.
-        length: Of the cells; (cells,); m.
-        setting: Its scheme says where in a step the laws hold.
+        keys: Keys of the cells, for random numbers.
+        length: Lengths of the cells; (cells,); m.
+        setting: Setting; its scheme decides at which time of a step the laws hold.
 
     Attributes:
-        at: Numbers of the points by name, internal variables among them; (cells, n) each.
+        at: Numbers of the points by name, including internal variables; (cells, n) each.
         r: (N, V, M) of the latest response; (cells, 3).
-        D: Their derivatives by the strains; (cells, 3, 3).
+        D: Derivatives of ``r`` by the strains; (cells, 3, 3).
         kept: By cell: (N, V, M) of the accepted state, the jump of the last point, the energies
             dissipated by plastic strains and by discontinuities; (cells, 6).
         stored: Energies in the accepted state, by entry of the ledger; J.
-        softens: Whether points may open.
-        excess: ``|stress| / limit - 1`` of the points that are held closed, else 0; (cells, n).
-        released: Which of these may open from now on.
+        softens: True if points may open.
+        excess: ``|stress| / limit - 1`` of the points that are kept closed, else 0; (cells, n).
+        released: True for points that may open from now on.
     """
 
     def __init__(
@@ -110,7 +110,7 @@ class MaterialPoints:
         for name, value in (layout.softening.numbers() if layout.softening else {}).items():
             at[f"softening {name}"][:] = value
         self._equations = PointEquations(layout.kind, layout.softening, scheme)
-        # Strains of the points by component are B times those of the cell.
+        # Strains of the points by component are B times the strains of the cell.
         self._B = np.asarray(layout.strains).reshape(n, -1, 3)
         self._volume = layout.weights * at["length"]
         self.r, self.strains, self.strains0 = np.zeros((3, cells, 3))
@@ -119,7 +119,8 @@ class MaterialPoints:
         self.excess: Array = np.zeros((cells, n))
         self.released: Any = False
         self.softens = layout.softening is not None
-        # What has broken may have a stress at the ends of a step, and none where its law holds.
+        # Broken points have no stress where the law holds, but may have a stress at the ends of a
+        # step.
         over_step = scheme.average(0.0, 1.0) != 1.0
         releases = over_step and (self.softens or curved(layout.kind))
         entries = {"plastic": layout.yields, "hinges": self.softens}
@@ -129,18 +130,18 @@ class MaterialPoints:
         self.stored = {"stored": 0.0, **({"hardening": 0.0} if layout.yields else {})}
 
     def _of_points(self, strains: Array) -> Array:
-        """Strains of the points, by component, from those of the cells; (d, cells, n)."""
+        """Return strains of the points, by component, from cell strains; (d, cells, n)."""
         return np.asarray(np.einsum("nak,ck->acn", self._B, strains))
 
     def _array(self, values: Sequence[Values]) -> Array:
-        """Values at the points as one array; (m, cells, n)."""
+        """Return values at the points as one array; (m, cells, n)."""
         return np.array([x + 0 * self.at["length"] for x in values])
 
     # -- a step ----------------------------------------------------------------------------------
 
     @np.errstate(all="ignore")
     def respond(self, strains: Array, dt: float) -> None:
-        """Answer the strains of an iterate, (cells, 3), with :attr:`r` and :attr:`D`.
+        """Compute :attr:`r` and :attr:`D` from the strains of an iterate, (cells, 3).
 
         The step has the length ``dt``; s.
         """
@@ -150,7 +151,7 @@ class MaterialPoints:
             at[name][:] = values
         at["growth"][:] = at["direction"][:] = 0.0
         stress, slope = self._bulk(at)
-        first = stress[0]  # of points that can open it is the only one
+        first = stress[0]  # the only component of points that can open
         over = np.abs(first) > at["traction"]  # P(51)
         held = over & (at["flows"] == CLOSED) & (at["traction"] > 0) & self._search.hold
         held &= np.logical_not(self.released)
@@ -164,13 +165,13 @@ class MaterialPoints:
             stress_open, D = self._bulk(at)
             condensed = D * softens / (D / at["length"] + softens)  # P(76)
             stress, slope = np.where(opens, stress_open, stress), np.where(opens, condensed, slope)
-        rest = self._layout.rest  # stiffness of what has no points
+        rest = self._layout.rest  # stiffness without points
         self.r = rest * ((1 - θ) * self.strains0 + θ * strains)
         self.r = self.r + np.einsum("n,acn,nak->ck", w, stress, self._B)
         self.D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B) + θ * np.diag(rest)
 
     def _bulk(self, at: At) -> tuple[Array, Array]:
-        """Stresses of the bulk where its law holds, and derivatives; (d, cells, n), (d, d, ...)."""
+        """Return bulk stresses at t_n+θ, and derivatives; (d, cells, n), (d, d, cells, n)."""
 
         def stress(at: At) -> Array:
             return self._array(self._equations.stress(at))
@@ -184,11 +185,11 @@ class MaterialPoints:
         return σ, by_strains - np.einsum("aj...,jb...->ab...", by_unknown, solved(J, E))
 
     def _residuals(self, at: At) -> Array:
-        """Residuals of the variables that a law solves for; (m, cells, n)."""
+        """Return residuals of the variables that a law solves for; (m, cells, n)."""
         return self._array(self._equations.residuals(at))
 
     def _solve(self, at: At) -> None:
-        """Find the variables of a law from its residuals, by Newton's method at each point."""
+        """Solve for the variables of a law by Newton's method at each point."""
         for name, old in zip(self._z1, self._z, strict=True):
             at[name][:] = at[old]
         ε, done = np.array([at[name] for name in self._e]), np.zeros(at["length"].shape, bool)
@@ -196,7 +197,7 @@ class MaterialPoints:
             R, J = jacobian(self._residuals, at, self._z1)
             _, E = jacobian(self._residuals, at, self._e)
             z, δ = np.array([at[name] for name in self._z1]), solved(J, R[:, None])[:, 0]
-            # Sizes of the terms of each equation, and what their last digits make of it.
+            # Sizes of the terms of each equation, and their round-off
             by_z, by_δ = (np.einsum("ij...,j...->i...", abs(J), abs(x)) for x in (z, δ))
             digits = 4 * EPS * (by_z + np.einsum("ij...,j...->i...", abs(E), abs(ε)))
             sizes = by_δ + digits
@@ -219,17 +220,17 @@ class MaterialPoints:
     # -- discontinuities -------------------------------------------------------------------------
 
     def _growth(self, stress: Array, opens: Array) -> Array:
-        """Growth at which bulk and discontinuity bear the same; Newton's method in bounds."""
+        """Return the growth for equilibrium of bulk and discontinuity, by Newton in bounds."""
         at, length = self.at, self.at["length"]
 
         def excess(a: Array) -> tuple[Array, Array]:
-            """What the bulk bears more than the discontinuity, and its derivative."""
+            """Return bulk stress less resistance of the discontinuity, and its derivative."""
             borne, tangent = self._bulk({**at, "growth": a})
             resists, softens = derivative(partial(self._equations.resistance, at), a)
             over = at["direction"] * borne[0] - resists  # P(32)
             return over, -tangent[0, 0] / length - softens
 
-        # An elastic bulk lets go of all its stress over this length.
+        # An elastic bulk loses all its stress over this growth.
         bound = np.abs(stress) / at["stiffness"] * length / self._scheme.theta
         bound += np.finfo(float).tiny
         digits = np.maximum(np.abs(at["before"]), np.abs(at["strain"])) * length
@@ -237,14 +238,14 @@ class MaterialPoints:
         found, last = np.full_like(stress, np.nan), np.full_like(stress, np.inf)
         low, high = np.zeros_like(stress), np.full_like(stress, np.inf)
         over, slope = excess(low)
-        none = np.logical_not(np.logical_and(opens, over > 0))  # or over the limit by a last digit
+        none = np.logical_not(np.logical_and(opens, over > 0))  # or over the limit by round-off
         a = np.where(slope < 0, np.fmin(bound, -over / slope), bound)
         for _ in range(2 * CORRECTIONS):
             before, (over, slope) = over, excess(a)
             low, high = np.where(over > 0, a, low), np.where(over > 0, high, a)
             better = a - over / slope
             step = np.abs(better - a)
-            # So small a relative step was the last but none: the next one would be its square.
+            # The step after this relative step would be its square, below round-off.
             ends = np.isnan(found) & ((step <= 1e-9 * a) | (step <= digits))
             found = np.where(ends, np.where(better > 0, better, a), found)
             if (none | ~np.isnan(found)).all():
@@ -259,7 +260,7 @@ class MaterialPoints:
 
     @np.errstate(all="ignore")
     def require_dissipation(self, names: Sequence[str]) -> None:
-        """Raise :class:`StepFailed` if a law gives energy; ``names`` are those of the cells."""
+        """Raise :class:`StepFailed` if a law generates energy; ``names`` are names of cells."""
         if not self._law.must_dissipate:
             return
 
@@ -280,9 +281,9 @@ class MaterialPoints:
 
     @np.errstate(all="ignore")
     def change(self) -> float:
-        """Energy that the latest response stores and dissipates; J.
+        """Return the energy that the latest response stores and dissipates; J.
 
-        Where viscous stresses relax it is as the trapezoidal rule counts it.
+        Relaxing viscous stresses are counted by the trapezoidal rule.
         """
         end = self._equations.end(self.at)
         bulk = end.worked + end.elastic + end.hardening + end.missed + end.relaxed
@@ -290,12 +291,12 @@ class MaterialPoints:
         return float(change + self._of_rest(self.strains)) - sum(self.stored.values())
 
     def _of_rest(self, strains: Array) -> float:
-        """Elastic energy of what has no points; J."""
+        """Return the elastic energy of the stiffness without points; J."""
         return float(np.sum(strains**2 @ self._layout.rest / 2 * self.at["length"][:, 0]))
 
     @np.errstate(over="ignore")
     def accept(self) -> None:
-        """Take the latest response as the new state, and enter what it dissipated."""
+        """Accept the latest response, and enter its dissipation."""
         at, α = self.at, self._scheme.alpha
         end = self._equations.end(at)
         plastic = np.sum(self._volume * end.worked, axis=1)
@@ -309,7 +310,7 @@ class MaterialPoints:
         at["opening"] += at["growth"]
         at["flows"][:] = np.where(at["growth"] > 0, FLOWING, CLOSED)
         at["growth"][:] = at["direction"][:] = 0.0
-        # What has broken bears nothing; its elastic strain goes into the jump.
+        # Broken points bear no stress; their elastic strain becomes part of the jump.
         breaks = np.isfinite(at["traction"])
         at["traction"][breaks] = (end.resistance + 0 * at["length"])[breaks]
         gone = at["traction"] == 0
@@ -322,14 +323,14 @@ class MaterialPoints:
         self._hold(self.strains)
 
     def start(self, strains: Array) -> None:
-        """Begin at these strains of the cells, to which no step has led; (cells, 3)."""
+        """Begin at these strains of the cells, without a step; (cells, 3)."""
         softening, breaking = self._layout.softening, self._layout.breaking
         if softening is not None:
             self.at["traction"][:, breaking] = softening.traction(self.at["opening"][:, breaking])
         self._hold(strains.copy())
 
     def _hold(self, strains: Array) -> None:
-        """Make forces and stored energies those of the variables at these strains."""
+        """Compute forces and stored energies from the variables at these strains."""
         at, w = self.at, self._layout.weights
         self.strains0, of_points = strains, self._of_points(strains)
         for name, values in zip(self._e0, of_points, strict=True):
@@ -346,7 +347,7 @@ class MaterialPoints:
         self.stored = {entry: of_entries[entry] for entry in self.stored}
 
     def state(self, given: Array | None = None) -> Array:
-        """Internal variables of the accepted state, (cells, k), after those given are taken over.
+        """Return the accepted internal variables, (cells, k), after ``given`` has replaced them.
 
         Forces and stored energies follow from :meth:`start`.
         """
@@ -356,13 +357,13 @@ class MaterialPoints:
                 self.at[name][:] = given[:, i * n : (i + 1) * n]
             self.kept = given[:, -11:-5].copy()
         stored = np.zeros((len(self.kept), 2))
-        # That of all cells together; to whom it belongs does not matter.
+        # The energy of all cells together; the owner does not matter.
         stored[:1] = self.stored["stored"], self.stored.get("hardening", 0.0)
         variables = [self.at[name] for name in self._variables]
         return np.asarray(np.hstack([*variables, self.kept, self.strains0, stored]))
 
 
 def _part_of(residuals: Array, sizes: Array) -> Array:
-    """Largest part that the residuals of a law are of their sizes; infinite if it is no number."""
+    """Return the largest ratio of residuals of a law to their sizes; infinite instead of NaN."""
     part = np.where(residuals == 0, 0.0, np.abs(residuals) / sizes)
     return np.asarray(np.nan_to_num(part, nan=np.inf, posinf=np.inf).max(axis=0))

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Solver of a scene in time: a step from top to bottom, and the state between steps.
+"""Solver of a scene in time: the steps, and the state between steps.
 
-A step is read from :meth:`Solver.step_to` downwards: parts of a step, the guess, the search for
-what opens, SNES with the sum of all forces, the check of static branches, acceptance.
+Read a step from :meth:`Solver.step_to` downwards: substeps, the initial guess, the search for
+openings, SNES with the sum of all forces, the check of static branches, acceptance.
 """
 
 from __future__ import annotations
@@ -43,40 +43,48 @@ from ufl_beam.reference.connectors import Connectors, connectors_of
 from ufl_beam.reference.loads import Supports, loads_of
 
 LARGEST_TURN = 0.75 * math.pi
-"""A step that turns a node further is cut; the algorithmic strains end at π."""
+"""Largest rotation of a node in a step before it is cut; the algorithmic strains end at π."""
 
 MOST_PARTS = 2**12
-"""Largest number of parts that a step is cut into."""
+"""Largest number of substeps of a step."""
 
 SURE = 1e-4
-"""Part of the tolerance that first iterates have to meet."""
+"""Fraction of the tolerance that first iterates have to meet."""
 
 PATIENCE = 8
-"""Iterations in a row without half the least residual, after which Newton's method gives up."""
+"""Iterations without halving the least residual after which Newton's method stops."""
 
 FIRST = 1 / 16
-"""Part of the first step after which accelerations are taken for those at the beginning."""
+"""Fraction of the first step whose end accelerations serve as initial accelerations."""
 
 APPLYING, APPLYING_TURN, SHORT_PART = 1 / 8, 0.02, 512
-"""Part of the first step in which loads that are there from the start are applied; largest turn of
-a node meanwhile in a part (rad); parts shorter by this factor may turn nodes further."""
+"""Fraction of the first step in which loads that act from the start are applied.
+
+The second number is the largest rotation of a node in a substep of this fraction (rad).  Substeps
+that are shorter by the third number have no such limit.
+"""
 
 FALL, TIE = 0.7, 1e-9
-"""What is held opens from the largest excess over its limit on, then from this part of it on;
-difference of two excesses that means nothing."""
+"""Factor, for each repetition, of the largest excess over a limit from which on points open.
+
+The second number is a difference of excesses that does not matter.
+"""
 
 FAR, KINK = 1e3, 1e-6
-"""Largest motion in a static step that is no mechanism, in sizes of the scene or rad; work that a
-kink of a law may leave unexplained, as a part of the energy that went through."""
+"""Largest motion in a static step that is no mechanism, over the size of the scene, or rad.
+
+The second number is the work that a kink of a law may leave unexplained, over the energy that went
+through.
+"""
 
 MISSED = 1e-9
-"""Part of a sample time by which the end of a step may miss it."""
+"""Fraction of a sample time by which the end of a step may miss it."""
 
 REASONS = PETSc.SNES.ConvergedReason
 
 
 class Solver(PresentState):
-    """State of a scene, and the step to the next; controllers see it as the running simulation.
+    """State of a scene, and the next step; controllers see it as the running simulation.
 
     Args:
         grid: Numbering of the degrees of freedom.
@@ -84,12 +92,12 @@ class Solver(PresentState):
         t: Time of the initial state; s.
         q: Initial configuration; (size,).
         v: Initial velocities; (size,).
-        rtol: Tolerance of the residual, as a part of the forces in the scene.
+        rtol: Tolerance of the residual, relative to the forces in the scene.
         max_iterations: Iterations before a step is cut.
         petsc: Options of SNES, without a prefix.
 
     Attributes:
-        forces: All forces of the scene, those between its parts (``inner``) first.
+        forces: All forces of the scene, inner forces first.
     """
 
     def __init__(
@@ -103,7 +111,7 @@ class Solver(PresentState):
         rubbing = [link for link in scene.links if rubs(link.law)]
         self.asked: dict[Connector, float] = dict.fromkeys(asked, 0.0)
         self.rates: dict[Connector, float] = dict.fromkeys([*asked, *rubbing], 0.0)
-        self.samples: dict[Connector, tuple[float, int]] = {}  # time of the first, number
+        self.samples: dict[Connector, tuple[float, int]] = {}  # first time, last number
         laws = {link: link.law for link in asked if isinstance(link.law, Controller)}
         self._sampled = {link: law.sample for link, law in laws.items() if law.sample}
 
@@ -132,7 +140,7 @@ class Solver(PresentState):
         self._open: list[Any] = [one for one in openings if one is not None]
         self._open += [beams.points for beams in self.yielding if beams.points.softens]
 
-        self._weights: Array = np.ones(grid.size)  # which make forces and moments comparable
+        self._weights: Array = np.ones(grid.size)  # make forces and moments comparable
         self._weights[grid.rotations] = 1 / self.scene.size
         self._weights[grid.multipliers] = 0.0
         self._rtol, self._max_iterations, self._petsc = rtol, max_iterations, petsc
@@ -145,7 +153,7 @@ class Solver(PresentState):
     def start(self, internal: dict[str, Array] | None, *, same: bool) -> None:
         """Begin with the internal variables of another run, if there are any.
 
-        ``same`` says that scene and time are those at its end: no force has jumped.
+        ``same`` means that the scene and the time are as at its end, so that no force has jumped.
         """
         scheme, given = self.scheme, dict(internal or {})
         self._continues = internal is not None
@@ -164,7 +172,7 @@ class Solver(PresentState):
             self.q = self.q.copy()
             for one in self.connectors:
                 self.q[one.forces_at] = one.before = one.at_rest
-        # Forces of beams at rest: in a step so short that nothing viscous flows.
+        # Forces of beams at rest, in a step too short for viscous flow.
         short = Step.of(scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
         for beam in self.beams:
             self._inner_before = self._inner_before + beam.respond(short, self.q)[0]
@@ -181,7 +189,7 @@ class Solver(PresentState):
         self._sum_energies()
 
     def internal(self, given: Mapping[str, Array] | None = None) -> dict[str, Array]:
-        """All that later steps depend on, by name, after what is given is taken over."""
+        """Return all data for later steps, by name, after ``given`` has replaced its entries."""
         memory, supports = Memory(given or {}), self.supports
         supports.before = supports.reactions = memory.vector("reactions", supports.before)
         for force in self.forces:
@@ -196,13 +204,14 @@ class Solver(PresentState):
         together = {name: np.concatenate(parts) for name, parts in memory.kept.items()}
         return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
 
-    # -- a step, and its parts -------------------------------------------------------------------
+    # -- a step, and its substeps ----------------------------------------------------------------
 
     def step_to(self, t1: float) -> None:
-        """Go to the time ``t1``, in one step or, where that fails, in parts.
+        """Go to the time ``t1``, in one step or, if it fails, in substeps.
 
         Raises:
-            StepFailed: Even the smallest part failed; the state is that of the last one before.
+            StepFailed: Even the smallest substep failed; the state is the end of the substep
+                before.
         """
         scheme, scene = self.scheme, self.scene
         at_end = has_inertia(scheme) or scheme.average(0.0, 1.0) == 1.0
@@ -212,13 +221,13 @@ class Solver(PresentState):
                 # Loads that act at the beginning are applied before the first step.
                 begin, end = self.t, self.t + APPLYING * (t1 - self.t)
                 self._in_parts(end, partial(self._attempt, end=end, at_rest=begin))
-                self.last_dt = math.inf  # the next guess does not go on as loads were applied
+                self.last_dt = math.inf  # the next guess does not extrapolate these substeps
         while self.t != t1:
             end = self._next_sample(t1)
             self._in_parts(end, partial(self._attempt, end=end))
 
     def _in_parts(self, t1: float, attempt: Callable[[float], None]) -> None:
-        """Go to ``t1`` at once, or in parts: halves, halves of these, and so on."""
+        """Go to ``t1`` at once, or in substeps: halves, quarters, and so on."""
         t0, done, part = self.t, 0, MOST_PARTS
         while done < MOST_PARTS:
             last = done + part == MOST_PARTS
@@ -231,16 +240,17 @@ class Solver(PresentState):
                 continue
             done += part
             if done % (2 * part) == 0 and part < MOST_PARTS:
-                part *= 2  # where the larger one would begin anyway
+                part *= 2  # a larger substep can begin here
 
     def _attempt(self, t1: float, end: float, at_rest: float | None = None) -> None:
-        """Take the step to ``t1``, a part of one to ``end``, if there is an equilibrium.
+        """Take the step to ``t1``, in a whole step to ``end``, if there is an equilibrium.
 
-        With ``at_rest`` the loads of that time are applied, in parts that turn nodes little.
+        With ``at_rest`` the loads of that time are applied, in substeps with small rotations of
+        nodes.
         """
         inertia = self.inertia
         if inertia is not None and inertia.scheme.kept and not inertia.more:
-            # Accelerations at the beginning are those of a short trial step.
+            # A short trial step gives the initial accelerations.
             t = self.t + FIRST * (t1 - self.t)
             q1, s = self._solve(Step.of(self.scheme, self.t, t, t1, self.q))
             inertia.more = inertia.after(s)[1:]
@@ -257,7 +267,7 @@ class Solver(PresentState):
         self._accept(step, q1, s)
 
     def _solve(self, step: Step) -> tuple[Array, Array]:
-        """Configuration at the end of a step, and the step of the nodes that forces work on."""
+        """Return the configuration at the end of a step, and the nodal step that forces work on."""
         q0, axes = self.q, self.supports.axes
         self.ask()
         self.begin(step)
@@ -277,13 +287,14 @@ class Solver(PresentState):
         return q1, s
 
     def _turn(self, q1: Array) -> float:
-        """Largest turn of a node in the step to ``q1``; rad."""
+        """Return the largest rotation of a node in the step to ``q1``; rad."""
         return float(np.abs(q1 - self.q)[self.grid.rotations].max(initial=0.0))
 
     def _require_path(self, q1: Array, s: Array, in_beams: float, in_connectors: float) -> None:
-        """Raise :class:`StepFailed` if a static step has leapt to another branch of equilibria.
+        """Raise :class:`StepFailed` if a static step has jumped to another branch of equilibria.
 
-        Along the path the internal forces account for what the step stores and dissipates.
+        Along the path the work of internal forces equals the stored and dissipated energy of the
+        step.
         """
         moves = np.abs(s) / self.scene.size
         moves[self.grid.rotations] *= self.scene.size
@@ -305,7 +316,7 @@ class Solver(PresentState):
             )
 
     def _accept(self, step: Step, q1: Array, s: Array) -> None:
-        """Take the end of a step as the new state, and enter works and losses."""
+        """Accept the end of a step, and enter works and losses."""
         self._inner_before = self._inner
         for force in self.forces:
             force.accept(step, q1, s)
@@ -316,7 +327,7 @@ class Solver(PresentState):
         self._sum_energies()
 
     def _sum_energies(self) -> None:
-        """Sum the energies that forces store in the accepted state."""
+        """Sum the stored energies of forces in the accepted state."""
         total: dict[str, float] = defaultdict(float)
         for name, energy in (item for force in self.forces for item in force.stored.items()):
             total[name] += energy
@@ -325,11 +336,11 @@ class Solver(PresentState):
     # -- openings --------------------------------------------------------------------------------
 
     def _equilibrium(self, guess: Array, step: Step) -> Array:
-        """Find the equilibrium of a step in which no more opens than must.
+        """Find the equilibrium of a step without unnecessary openings.
 
-        What does not flow at the beginning stays closed if there is an equilibrium in which it
-        bears at most its limit.  Of several that bear too much, the one with the largest excess
-        opens first.
+        A point or connector that does not flow at the beginning stays closed if an equilibrium
+        exists in which it bears at most its limit.  Of several above their limits, the one with the
+        largest excess opens first.
         """
         if not self._open:
             return self._newton(guess)
@@ -354,13 +365,13 @@ class Solver(PresentState):
     # -- the equation of a step ------------------------------------------------------------------
 
     def begin(self, step: Step) -> None:
-        """Begin a step: what iterates have tried is forgotten."""
+        """Begin a step, and reset data of iterates."""
         self._step = step
         for one in self.connectors:
             one.begin(step)
 
     def respond(self, x: Array) -> Response:
-        """Residual at ``x``, and its derivative; all are in the axes of the supports."""
+        """Return the residual at ``x`` and its derivative, in the axes of the supports."""
         axes, q1, step = self.supports.axes, self.supports.axes.T @ x, self._step
         responses = [force.respond(step, q1) for force in self.forces]
         n, none = len(self.inner), np.zeros(len(x))
@@ -390,7 +401,7 @@ class Solver(PresentState):
         snes.ksp.pc.setType("lu")
         snes.ksp.pc.setFactorSolverType("mumps")
         self._set(petsc)
-        search = "snes_linesearch_type"  # none: full steps; if they fail, one with backtracking
+        search = "snes_linesearch_type"  # if not set: full steps, then backtracking if they fail
         self._searches = [{}] if search in petsc else [{search: "basic"}, {search: "bt"}]
 
     def _set(self, values: dict[str, Any]) -> None:
@@ -418,28 +429,28 @@ class Solver(PresentState):
         raise self._error or self._failure(reason)
 
     def _iterate(self) -> int:
-        """Let SNES iterate; return why it has stopped."""
+        """Iterate with SNES; return its reason to stop."""
         try:
             self.snes.solve(None, self._vector)
-        except PETSc.Error as error:  # also where a callback is interrupted
+        except PETSc.Error as error:  # also if a callback is interrupted
             cause: BaseException = error
             while cause.__cause__ is not None:
                 cause = cause.__cause__
             if not isinstance(cause, PETSc.Error):
                 raise cause from None
-            self._make_snes()  # MUMPS has stopped it where it found no pivot
+            self._make_snes()  # MUMPS has stopped it without a pivot
             return int(REASONS.DIVERGED_LINEAR_SOLVE)
         self.iterations += self.snes.getIterationNumber()
         return int(self.snes.getConvergedReason())
 
     def _all(self, vector: PETSc.Vec) -> Array:
-        """All degrees of freedom, from those that are free."""
+        """Return all degrees of freedom from the free ones."""
         x = self._x.copy()
         x[self.supports.free] = vector.array_r
         return x
 
     def _function(self, snes: PETSc.SNES, vector: PETSc.Vec, f: PETSc.Vec) -> None:
-        """Residual of the free degrees of freedom; NaN, at which SNES stops, after an error."""
+        """Compute the residual of the free degrees of freedom; NaN after an error stops SNES."""
         try:
             self._r, self._K = self.respond(self._all(vector))
         except Exception as error:  # of a function of the user
@@ -449,7 +460,7 @@ class Solver(PresentState):
         f.array_w[:] = self._r[self.supports.free]
 
     def _jacobian(self, snes: PETSc.SNES, vector: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
-        """Derivative of the residual by the free degrees of freedom, in the latest response."""
+        """Set the derivative of the residual by the free degrees of freedom."""
         K = csr_array(self._K[self.supports.free][:, self.supports.free])
         if not np.isfinite(K.data).all():
             self._error = self._error or StepFailed("the tangent has entries that are no numbers")
@@ -459,7 +470,7 @@ class Solver(PresentState):
         P.assemble()
 
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> Any:
-        """Stop where the residual is a small part of the forces, or as small as digits allow."""
+        """Stop if the residual is small relative to the forces, or as small as round-off allows."""
         x, r = self._all(snes.getSolution()), self._r.copy()
         r[self.supports.held] = 0.0
         size = self._norm(r)
@@ -469,13 +480,13 @@ class Solver(PresentState):
         moved = min(float(np.max(np.abs(x) * (self._weights > 0), initial=0.0)), self.scene.size)
         q1 = self.supports.axes.T @ x
         missed = max((c.missed(q1, r, scale, moved) for c in self.connectors), default=0.0)
-        # A small load beside large ones is lost in a guess that just meets the tolerance.
+        # A guess that just meets the tolerance would miss a small load beside large ones.
         least = 1 if self.inertia is not None else 2
         enough = self._rtol * scale * (SURE if iteration < least else 1.0)
         if size <= enough and missed <= self._rtol:
             return REASONS.CONVERGED_FNORM_ABS
         digits = 8 * self._norm(self._round_off(x)) if iteration > 1 else 0.0
-        # Newton's method no longer halves what the last digits make.
+        # Newton's method no longer halves a residual of round-off.
         stays = size <= digits and size > self._last / 2
         if iteration > 1 and stays and missed <= max(self._rtol, 1e-10):
             return REASONS.CONVERGED_FNORM_ABS
@@ -485,11 +496,11 @@ class Solver(PresentState):
         return REASONS.DIVERGED_DTOL if self._slow > PATIENCE else REASONS.CONVERGED_ITERATING
 
     def _norm(self, forces: Array) -> float:
-        """Norm of forces, and moments over the size of the scene; N."""
+        """Return the norm of forces, and of moments over the size of the scene; N."""
         return float(np.linalg.norm(self._weights * forces))
 
     def _round_off(self, x: Array) -> Array:
-        """Residual that the last digits of motions make; N, N m."""
+        """Return the residual by round-off of motions; N, N m."""
         motions = np.abs(x) * (self._weights > 0)
         return np.asarray(np.abs(self._K) @ np.spacing(motions))
 
@@ -508,7 +519,7 @@ class Solver(PresentState):
     # -- controllers and friction ----------------------------------------------------------------
 
     def ask(self) -> None:
-        """Ask controllers for forces and friction for limits; note the rates of what may slip."""
+        """Evaluate controllers and limits of friction; store the rates of friction."""
         for link in self.asked:
             due = self._due(link) if link in self._sampled else None
             if due is None or due != self.samples.get(link):
@@ -522,7 +533,7 @@ class Solver(PresentState):
                 self.rates.update(zip(one.links, map(float, rates), strict=True))
 
     def _due(self, link: Connector) -> tuple[float, int]:
-        """Time of the first sample of a controller, s, and number of the one that is due."""
+        """Return the first sample time of a controller, s, and the number of the due sample."""
         sample, (first, _) = self._sampled[link], self.samples.get(link, (self.t, -1))
         digits = MISSED * sample + 4 * math.ulp(max(self.t, first, key=abs))
         return first, math.floor((self.t - first + digits) / sample)
@@ -540,7 +551,7 @@ class Solver(PresentState):
     # -- the state, by objects of the scene ------------------------------------------------------
 
     def connections(self) -> Array:
-        """Columns of ``Connection`` for all links; (num_links, columns)."""
+        """Return the columns of ``Connection`` for all links; (num_links, columns)."""
         table = np.zeros((len(self.scene.links), len(Connection._fields)))
         for one in self.connectors:
             table[one.numbers] = one.kept(self.q)
@@ -548,7 +559,7 @@ class Solver(PresentState):
 
     @property
     def now(self) -> States:
-        """The state now, read as a solution; at first reactions are those of the scene at rest."""
+        """Present state as a solution; initial reactions are reactions of the scene at rest."""
         reactions = np.array(self.supports.forces())
         for k, support in enumerate(self.scene.supports):  # in its axes
             reactions[k, :2] = turned(reactions[k, :2], np.full(1, -support.angle))[0]

@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Virtual works, one class each: what a scene contributes to the equation of a step."""
+"""Virtual works in the equation of a step, one class for each physical effect."""

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Terms: virtual works that a scene may contribute to the equation of a step, and their phases.
+"""Terms: virtual works that a scene contributes to the equation of a step, and their phases.
 
-A term adds its part of the residual and of the tangent at the end of the step, and says what the
-step did to the energy.  Vectors hold the local degrees of freedom of a process, ghosts included;
-what several processes add to one degree of freedom is summed by the solver.
+A term adds its contributions to the residual and to the tangent at the end of the step, and enters
+the energies of the step in the ledger.  Vectors hold the local degrees of freedom of a process,
+ghosts included.  The solver sums the contributions of several processes to a degree of freedom.
 
-The beginning of a step and its acceptance are loops in C, with callbacks for functions of a user.
+Loops in C begin and accept a step, with callbacks for functions of a user.
 """
 
 from __future__ import annotations
@@ -32,16 +32,17 @@ KINDS = ("beams", "connectors", "loads", "inertia", "damping")
 
 
 class InCells(NamedTuple):
-    """Forces on the nodes of cells, as a term states them; see cell_forces.py.
+    """Forces of a term on the nodes of cells; see cell_forces.py.
 
     Attributes:
-        form: Makes the form whose entries are the forces; those of its latest evaluation count.
+        form: Makes the form whose entries are the forces; its latest evaluation counts.
         kind: ``force_kind`` of loops.h.
         order: Positions in ``share.cells`` of its cells.
-        vector: If the form is linear, and nothing else evaluates it: place of the address of the
-            vector that it is evaluated at.
+        vector: Pointer to the address of the vector that the form is evaluated at, if the form is
+            linear and nothing else evaluates it.
         factor: Factor of the forces.
-        q0: If the form depends on the configurations at both ends of the step alone: the first.
+        q0: Configuration at the beginning of the step, if the form depends only on it and on the
+            configuration at the end.
     """
 
     form: Callable[[], Any]
@@ -55,9 +56,9 @@ class InCells(NamedTuple):
 class Phases(NamedTuple):
     """Loops of the type ``phase`` of loops.h, each with its data.
 
-    ``change`` says what a step stores and dissipates, of the type ``change_of_energy``; ``opens``
-    are fields of ``openable``, if something may open; ``admits`` is the check of a step before it
-    is accepted, of the type ``admission``; ``again`` begins a step again, which iterates tried.
+    ``change``, of the type ``change_of_energy``, computes the stored and dissipated energy of a
+    step.  ``opens`` has fields of ``openable``, if something may open.  ``admits``, of the type
+    ``admission``, checks a step before it is accepted.  ``again`` resets a step after iterations.
     """
 
     begin: Sequence[Loop] = ()
@@ -70,13 +71,13 @@ class Phases(NamedTuple):
 
 
 class Term(ABC):
-    """Virtual work of one physical effect; a method that a term does not define does nothing.
+    """Virtual work of one physical effect; methods that a term does not define do nothing.
 
     Attributes:
         kind: Kind of its forces, one of :data:`KINDS`.
         loops: C functions of residual and tangent, with their data.
         in_cells: Forces on the nodes of cells; none if all act between nodes that joints may share.
-        demand: C function of how far a law is missed, with its data; None if that is always zero.
+        demand: C function of the residual of a law, with its data; None if it is always zero.
         must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
             accepted.
     """
@@ -88,11 +89,11 @@ class Term(ABC):
     must_dissipate = False
 
     _A: Csr
-    """Matrix that takes the tangent."""
+    """Matrix that the tangent is added to."""
 
     @abstractmethod
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return C functions of the beginning and the acceptance of a step; called once."""
+        """Return C functions that begin and accept a step; called once."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the virtual work at ``q1`` to ``r``."""
@@ -106,25 +107,25 @@ class Term(ABC):
             tangent[0](tangent[1], doubles(q1), doubles(self._A.data))
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
-        """Add the derivative of the tangent at ``q1`` along ``u``; no internal variable changes."""
+        """Add the derivative of the tangent at ``q1`` along ``u`` at constant variables."""
 
     def require_dissipation(self, q1: Array) -> None:
-        """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
+        """Raise :class:`StepFailed` if a law generates energy in the step to ``q1``."""
 
     def start(self, q: Array) -> None:
-        """Take ``q`` for the accepted configuration, which no step has led to."""
+        """Set the accepted configuration to ``q``, without a step."""
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """State what later steps depend on; ``q`` is the configuration of the state."""
+        """Save or restore the data for later steps; ``q`` is the configuration of the state."""
 
 
 class Callbacks:
     """Python functions that C calls while it takes steps.
 
-    What they raise must not pass through C: the first exception is kept, and the step fails.
+    Exceptions must not pass through C: the first exception is kept, and the step fails.
 
     Attributes:
-        error: What was raised in the latest step; a failure of a step gives way to anything else.
+        error: Exception in the latest step; any other exception replaces a failure of the step.
         c: ``equation`` of loops.h.
     """
 
@@ -136,7 +137,7 @@ class Callbacks:
     # -- functions, with their data ---------------------------------------------------------------
 
     def of_time(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
-        """``time_function`` of loops.h for functions of time with their owners, see value_at."""
+        """Return ``time_function`` of loops.h for functions with their owners, see value_at."""
         of_time = ffi.new("time_function[]", len(functions))
         for place, (function, owner) in zip(of_time, functions, strict=True):
             if function is steady:
@@ -153,20 +154,20 @@ class Callbacks:
         return of_time
 
     def phase(self, function: Callable[[Any, Any, Any], None]) -> Loop:
-        """Phase of C that calls ``function(step, q1, s)`` with pointers."""
+        """Return a phase of C that calls ``function(step, q1, s)`` with pointers."""
         return lib.phase_in_python, self.handle(function)
 
-    # -- what they raise --------------------------------------------------------------------------
+    # -- exceptions -------------------------------------------------------------------------------
 
     def settle(self) -> None:
-        """Raise what a function that C has called has raised."""
+        """Raise the exception of a function that C has called."""
         error, self.error = self.error, None
         if error is not None:
             raise error
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """Raise at the end of a block, outside of steps, what functions have raised in it."""
+        """Raise the exception of a callback at the end of a block outside of steps."""
         before, self.error = (self.error, self.c.raised), None
         try:
             yield
@@ -175,7 +176,7 @@ class Callbacks:
             self.error, self.c.raised = before
 
     def handle(self, function: Any, size: int = 0) -> Any:
-        """Handle of what C calls; ``size`` of numbers that it adds to, if it does."""
+        """Return a handle of a function for C; ``size`` is the number of its output values."""
         self._alive.append(ffi.new_handle((self, function, size)))
         return self._alive[-1]
 
@@ -198,7 +199,7 @@ def _note(kind: type, error: BaseException, traceback: Any) -> None:
 def from_c(
     error: float | None = None, name: str | None = None
 ) -> Callable[[Callable[..., Any]], Any]:
-    """Decorate a callback of C, declared in c_library.py; its value if it raises is ``error``."""
+    """Decorate a callback of C, declared in c_library.py; it returns ``error`` if it raises."""
     more = {} if error is None else {"error": error}
     declared: Any = ffi.def_extern(name=name, onerror=_note, **more)
     return declared  # type: ignore[no-any-return]
@@ -229,7 +230,7 @@ for _name in ("run", "begin", "phase"):
 
 
 def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
-    """Loops that give kernels the configuration at the beginning of a step, those that have it."""
+    """Return loops that set the initial configuration of a step in kernels that use it."""
     return [
         loop("begin_forms", struct("form_of_step", form=one.cells, at=one.position(q0)))
         for one in kernels if one.uses(q0)
@@ -237,11 +238,11 @@ def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
 
 
 def knowing(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
-    """Fields of a struct for forms that know values of a function, which a phase gives them."""
+    """Return fields of a struct for forms in which a phase sets the values of a function."""
     forms = [(one.cells, one.position(function)) for one in kernels]
     return {"forms": len(forms), "form": ffi.new("form_of_step[]", forms)}
 
 
 def entering(kernel: Any, entry: Any) -> Loop:
-    """Loop that adds the value of a kernel to an entry of the ledger."""
+    """Return a loop that adds the value of a kernel to an entry of the ledger."""
     return loop("add_values", struct("form_value", form=kernel.cells, entry=entry))

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Forces inside beams: elastic cells, and cells whose material yields, flows or breaks.
 
-The latter answer strains by the return map of their material points.  Common parts: forms of a
-step; strains that an iteration of a static step predicts; and works of the tangent and of its
-derivative, which buckling needs.
+Inelastic cells compute resultants by the return map of their material points.  Both kinds share
+forms of a step, strains that an iteration of a static step predicts, and works of the tangent and
+of its derivative, which buckling needs.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ufl_beam.terms.material_points import Points
 
 
 class OfForms(Term):
-    """Forces of a virtual work on cells, and forms of the energy that they lose in a step."""
+    """Forces of a virtual work on cells, with forms of the energy lost in a step."""
 
     _entry: str  # of the losses in the ledger
 
@@ -55,7 +55,7 @@ class OfForms(Term):
             ledger.lost[self._entry] += 0.0
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the cells at the beginning of a step and at its acceptance."""
+        """Return loops over the cells that begin and accept a step."""
         lost = self._ledger.lost
         accept = [entering(loss, lost.pointer(self._entry)) for loss in self._losses]
         return Phases(beginning(self._of_step, self._q0), accept)
@@ -66,23 +66,22 @@ class OfForms(Term):
 
 @stated
 def _linear_strains(of: Element) -> tuple[ufl.Form, fem.Function]:
-    """Strains at the points, linear in a displacement about a configuration; that one."""
+    """Return strains at the points, linearised about a configuration, and this configuration."""
     about = of.configuration()
     e_about = strain(about, of.axis)
     return of.sampled(e_about + ufl.derivative(e_about, about, of.q1)), about
 
 
 def predicted_strains(fields: Fields) -> Any:
-    """``predicted_strains`` of loops.h: those that an iteration of a static step predicts.
+    """Return ``predicted_strains`` of loops.h, the strains predicted by a static iteration.
 
-    They follow by linear kinematics.  Displacements that solve a linear equation strain slender
-    beams along their axes by nothing but the error of the linearisation, and forces from that send
-    the next iteration astray.  The equation was about forces as well, which strains that are linear
-    in the displacements predict without that error: they belong into the tangent, while the
-    residual remains that of the displacements.  That is Newton's method for displacements and
-    forces as independent unknowns, as the functional has them, with the forces eliminated; it
-    converges in few iterations, whatever the slenderness.  The first guess of a step strains beams
-    in the same way, so cells that yield extrapolate strains of states.
+    They follow from linear kinematics.  The error of the linearisation strains slender beams along
+    their axes, and the forces of these strains spoil the next iteration.  Strains that are linear
+    in the displacements predict forces without that error, so the tangent uses these forces.  The
+    residual still uses the forces of the displacements.  This is Newton's method for displacements
+    and forces as independent unknowns of the functional, with the forces eliminated; it converges
+    in few iterations at any slenderness.  The initial guess of a step strains beams in the same
+    way, so cells that yield extrapolate strains of states.
 
     Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
     """
@@ -102,7 +101,7 @@ def predicted_strains(fields: Fields) -> Any:
 
 @stated
 def _works(work: ufl.Form, q1: fem.Function) -> dict[str, Any]:
-    """Works of a tangent and of its change along u for the motion x on y; that change; x, y, u."""
+    """Return works of the tangent and its change along u for x on y; the change; x, y, u."""
     x, y, u = (fem.Function(q1.function_space) for _ in range(3))
     tangent = ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
     action = ufl.action(ufl.derivative(work, q1, x), y)
@@ -112,20 +111,20 @@ def _works(work: ufl.Form, q1: fem.Function) -> dict[str, Any]:
 
 
 class Cells(Term):
-    """Forces in cells whose tangent is known by its works on two motions, too.
+    """Forces in cells whose tangent also has a work on two motions.
 
     Works are summed over cells from the strains of the motions.  The entries of a matrix have the
-    round-off of axial and shear stiffness, in which the bending of slender cells would be lost.
+    round-off of axial and shear stiffness, which may exceed the bending stiffness of slender cells.
     """
 
     _work_form: ufl.Form
     _q1: fem.Function
     _fields: Fields
     predicted: Any = None
-    """In statics, the :func:`predicted_strains` whose forces tangents have."""
+    """In statics, the :func:`predicted_strains` for the forces in tangents."""
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
-        """Values in the cells, at ``q1``, of what the virtual work depends on besides."""
+        """Return the values at ``q1``, in the cells, of further functions in the virtual work."""
         return {}
 
     @cached_property
@@ -133,7 +132,7 @@ class Cells(Term):
         return _works(self._work_form, self._q1), {}
 
     def _at(self, q1: Array, name: str, **motions: Array) -> Kernel:
-        """The kernel of one of :func:`_works`, compiled when it is first asked for."""
+        """Return the kernel of a form of :func:`_works`, compiled at the first request."""
         forms, kernels = self._derivatives
         if name not in kernels:
             kernels[name] = self._fields.kernel(forms[name], self._q1, several=False)
@@ -152,7 +151,7 @@ class Cells(Term):
         self._at(q1, "matrix", u=u).add(q1, self._A.data)
 
     def tangent_work(self, q1: Array, x: Array, y: Array, u: Array | None = None) -> float:
-        """Return the work of the tangent, or of its derivative along u, for motions x on y; J."""
+        """Return the work of the tangent, or of its derivative along u, for motion x on y; J."""
         if u is None:
             return self._at(q1, "tangent", x=x, y=y).value(q1)
         return self._at(q1, "change", u=u, x=x, y=y).value(q1)
@@ -162,7 +161,7 @@ class Cells(Term):
 
 
 class ElasticForms(NamedTuple):
-    """Forms of elastic beams: virtual work, stored energy, and what a scheme loses of it."""
+    """Forms of elastic beams: virtual work, stored energy, and numerical losses of energy."""
 
     work: ufl.Form
     stored: ufl.Form
@@ -171,7 +170,7 @@ class ElasticForms(NamedTuple):
 
 @stated
 def elastic_forms(of: Element, scheme: Scheme) -> ElasticForms:
-    """Forms of a step of a time scheme."""
+    """Return the forms of a step of a time scheme."""
     q0, q1, w, C, dx = of.q0, of.q1, of.w, of.stiffness, of.dx(1)
     e0, e1 = strain(q0, of.axis), strain(q1, of.axis)
     r = scheme.resultants(C, e0, e1, of.constant)
@@ -183,7 +182,7 @@ def elastic_forms(of: Element, scheme: Scheme) -> ElasticForms:
 
 @stated
 def _static_tangent(of: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function]:
-    """Tangent of elastic cells with given strains in its forces; these strains."""
+    """Return the tangent of elastic cells with given strains in its forces; these strains."""
     q0, q1, C = of.q0, of.q1, of.stiffness
     e0, e1, e = strain(q0, of.axis), strain(q1, of.axis), of.at_points(3)
     w_e = scheme.virtual_strain(q0, q1, of.w, of.axis)
@@ -195,9 +194,9 @@ def _static_tangent(of: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function
 
 
 class ElasticBeams(OfForms, Cells):
-    """Resultants of elastic cells working on the virtual strains, P(12).
+    """Virtual work of the resultants of elastic cells, P(12).
 
-    In statics the tangent has the forces of the :func:`predicted_strains`.
+    In statics the tangent uses the forces of the :func:`predicted_strains`.
     """
 
     kind, _entry = "beams", "numerical"
@@ -222,7 +221,7 @@ class ElasticBeams(OfForms, Cells):
         self.in_cells = [one._replace(q0=self._q0) for one in self.in_cells]
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the cells."""
+        """Return loops over the cells."""
         begin, accept, *_ = super().phases(callbacks)
         if self.predicted is not None:
             begin = [*begin, loop("begin_static_tangent", self._static)]
@@ -233,11 +232,11 @@ class ElasticBeams(OfForms, Cells):
 # -- beams with material points --------------------------------------------------------------------
 
 KEPT_WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
-"""Factors of :attr:`Points.kept` where its jump is a crack of one fibre, and no hinge."""
+"""Factors of :attr:`Points.kept` if its jump is a crack of a fibre instead of a hinge."""
 
 
 class InelasticForms(NamedTuple):
-    """Virtual work of resultants r; the same of b + D e around an iterate, and its derivative."""
+    """Virtual work of resultants r, and of b + D e around an iterate with its derivative."""
 
     work: ufl.Form
     around: ufl.Form
@@ -249,7 +248,7 @@ class InelasticForms(NamedTuple):
 
 @stated
 def inelastic_forms(of: Element, scheme: Scheme) -> InelasticForms:
-    """Forms of a step of a time scheme."""
+    """Return the forms of a step of a time scheme."""
     r, b, D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
     w_e, dx = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis), of.dx(1)
     around = virtual_work(b + ufl.dot(D, strain(of.q1, of.axis)), w_e) * dx
@@ -258,14 +257,14 @@ def inelastic_forms(of: Element, scheme: Scheme) -> InelasticForms:
 
 
 class InelasticBeams(Cells):
-    """Resultants of cells with material points, working on the virtual strains, P(34).
+    """Virtual work of the resultants of cells with material points, P(34).
 
-    The points answer the strains of an iterate with resultants r and their derivatives D; around
-    it resultants are b + D e, linear in the strains e, from which UFL derives the tangent,
-    material and geometric.  One loop in C evaluates points and forms.
+    The points map the strains of an iterate to resultants r and their derivatives D.  Around the
+    iterate, the resultants b + D e are linear in the strains e; UFL derives the material and
+    geometric tangent from them.  One loop in C evaluates points and forms.
 
     Attributes:
-        kept_factors: Factors of :attr:`Points.kept` in what :meth:`kept` returns; (6,).
+        kept_factors: Factors of :attr:`Points.kept` in :meth:`kept`; (6,).
     """
 
     kind = "beams"
@@ -313,7 +312,7 @@ class InelasticBeams(Cells):
     # -- in C ----------------------------------------------------------------------------------
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the points."""
+        """Return loops over the points."""
         c = struct("inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger))
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
         if self.predicted is not None:
@@ -327,34 +326,34 @@ class InelasticBeams(Cells):
     # -- the step ------------------------------------------------------------------------------
 
     def start(self, q: Array) -> None:
-        """Let the points begin at the strains of a configuration."""
+        """Start the points at the strains of a configuration."""
         strains = self._strains(q)
         self.points.start(strains)
         self.points.refresh(strains)
 
     def require_dissipation(self, q1: Array) -> None:
-        """Raise :class:`StepFailed` if the law of a point gives energy in the step to ``q1``."""
+        """Raise :class:`StepFailed` if a point generates energy in the step to ``q1``."""
         lib.respond_at(self._in_c, doubles(q1))
         grid = self._fields.share.grid
         self.points.require_dissipation(lambda cell: grid.describe_cell(self._cells[cell]))
 
     def dissipation(self, q1: Array) -> float:
-        """Energy that cells of this process dissipate in the step to ``q1``; J."""
+        """Return the energy that cells of this process dissipate in the step to ``q1``; J."""
         lib.respond_at(self._in_c, doubles(q1))
         return self.points.dissipation()
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
-        """Resultants around ``q1`` and their derivatives; points go on as they answer."""
+        """Return b and D around ``q1``; the points keep this response as their latest."""
         strains = self._strains(q1)
         r, D = self.points.respond(strains)
-        self._latest.fill(np.nan)  # the points would answer otherwise now
+        self._latest.fill(np.nan)  # the points have another response now
         around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         return {self._b: around, self._D: D}
 
     def about_state(self) -> tuple[Index, Array, Array]:
-        """Cells (numbers of the grid), and b, D of resultants b + D e about the accepted state.
+        """Return cells (numbers of the grid), and b, D of b + D e about the accepted state.
 
-        Shapes (num_cells, 3) and (num_cells, 9).  D is that of a step like the last one.
+        Shapes (num_cells, 3) and (num_cells, 9).  D belongs to a step like the last one.
         """
         strains, D = self.points.tangent()
         elastic = np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
@@ -367,5 +366,5 @@ class InelasticBeams(Cells):
         self.points.restore(memory.rows("cells", self._cells, self.points.state()))
 
     def kept(self) -> tuple[Index, Array]:
-        """Cells (numbers of the grid), and :attr:`Points.kept` of them; (num_cells, 6)."""
+        """Return cells (numbers of the grid), and their :attr:`Points.kept`; (num_cells, 6)."""
         return self._cells, self.points.kept * self.kept_factors

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Forces on the nodes of cells in the equation of a step, and in the accepted state.
 
-At a node, the forces of all cells, and of all that acts there, add up to the residual.  So those at
-both ends of a cell are its section forces there, in equilibrium with supports and joints.
+At a node, the forces of all cells and all other forces add up to the residual.  So the forces at
+both ends of a cell are its section forces, in equilibrium with supports and joints.
 """
 
 from __future__ import annotations
@@ -26,8 +26,10 @@ class CellForces:
 
     Attributes:
         c: ``cell_forces`` of loops.h.
-        asks_for_before: Whether they depend on the configuration at the beginning of the step.
-        kept: Places of arrays that the forces follow from, besides configurations, and their sizes.
+        asks_for_before: True if the forces depend on the configuration at the beginning of the
+            step.
+        kept: Pointers to arrays, with their sizes, that determine the forces besides
+            configurations.
     """
 
     def __init__(self, share: Share, parts: Sequence[InCells], loads: Any = ffi.NULL) -> None:
@@ -37,7 +39,7 @@ class CellForces:
         self._of_ends: list[tuple[Kernel, fem.Function, Any, Array]] = []
         self.kept: list[tuple[Any, int]] = []
         self._forces = ffi.new("force_in_cells[]", len(parts))
-        vectors: dict[Any, Any] = {}  # places of them, and of those of the accepted step
+        vectors: dict[Any, Any] = {}  # latest vectors: accepted vectors, as pointers
         for c, one in zip(self._forces, parts, strict=True):
             c.kind, c.factor, c.number = one.kind, one.factor, len(one.order)
             if not np.array_equal(one.order, np.arange(len(share.cells))):
@@ -75,11 +77,11 @@ class CellForces:
         )  # fmt: skip
 
     def accept(self) -> None:
-        """Take the forces of the latest residual as those of the accepted step."""
+        """Accept the forces of the latest residual."""
         lib.accept_cell_forces(self.c)
 
     def begin(self, numbers: Array | None) -> None:
-        """Begin with given numbers, else with the stresses of the latest residual and no more."""
+        """Begin with given numbers, or with only the stresses of the latest residual."""
         if numbers is not None:
             fill(self.c, given=numbers)
             return
@@ -103,7 +105,7 @@ class CellForces:
         return out
 
     def _make(self) -> None:
-        """Make the forms that nothing but this asks for, once."""
+        """Make the forms that only cell forces need, once."""
         for one, c in self._unmade:
             form = one.form()
             each, c.lanes, _ = form.keep_entries()
@@ -112,11 +114,11 @@ class CellForces:
         self._unmade = []
 
     def in_order(self, lanes: int) -> bool:
-        """Return whether all forms have all cells, in batches of so many."""
+        """Return whether all forms have all cells, in batches of ``lanes``."""
         return all(not c.cell and c.lanes == lanes for c in self._forces)
 
     def keep_latest(self) -> None:
-        """Keep all entries of the latest residual from now on, for who asks after each step."""
+        """Keep all entries of the latest residual from now on, for requests after each step."""
         self._make()
         of_ends = (c for c in self._forces if not c.latest and not c.vector)
         for c, (*_, each, entries) in zip(of_ends, self._of_ends, strict=True):
@@ -125,10 +127,10 @@ class CellForces:
                 self._alive.append(latest)
                 c.tee, each[0] = each, doubles(latest)
 
-    # -- what solutions keep -------------------------------------------------------------------
+    # -- data of solutions ----------------------------------------------------------------------
 
     def of_record(self, record: Array, q: Array, before: Array) -> Array:
-        """The numbers that follow from those of :attr:`kept`, as a call returns them."""
+        """Return the numbers of a call from the saved arrays of :attr:`kept`."""
         given, now, at = self.c.given, [place[0] for place, _ in self.kept], 0
         record = np.array(record)
         try:

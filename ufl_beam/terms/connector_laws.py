@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors over a step: one row ``α e + β λ = γ`` for each component of each of them.
+"""Laws of connectors over a step: a row ``α e + β λ = γ`` for each component of each law.
 
-e is the relative motion at the end of the step and λ the force that resists its growth.  What is
-held has a row about e, all other laws have one about λ, linear in e around the latest iterate.
+e is the relative motion at the end of the step and λ the force that resists its growth.
+Constrained motions have a row about e.  All other laws have a row about λ, linear in e around the
+latest iterate.
 
-Here are laws that give a motion or a force, dry friction, springs, and rigid-plastic laws, such as
-those of plastic hinges of zero length; laws of force_laws.py are stated by functions.
+This module has laws that prescribe a motion or a force, dry friction, springs, and rigid-plastic
+laws, such as plastic hinges of zero length.  Laws in force_laws.py are stated by functions.
 """
 
 from __future__ import annotations
@@ -46,42 +47,44 @@ from ufl_beam.terms.energy_ledger import Account, Ledger
 from ufl_beam.terms.material_points import NOTHING, SPENT, Points, expect_entries
 
 CREEP = 1e-12
-"""Part of the size of the scene, or rad, by which what sticks creeps in a step under its limit.
+"""Creep in a step of a sticking connector under its limit; over the size of the scene, or rad.
 
-Only where several places that stick hold the same motion: so they share the force.
+It occurs only if several sticking connectors constrain the same motion, so that they share the
+force.
 """
 
 
 class Setting(NamedTuple):
     """Arguments that all responses are made with."""
 
-    asked: Callable[[Connector], Any]  # places of forces of controllers and limits of friction
+    asked: Callable[[Connector], Any]  # pointers to forces of controllers, limits of friction
     rates: Any  # ``rates`` of loops.h, with the velocities; None in statics
     size: float  # of the scene; m
     scheme: Scheme
     ledger: Ledger
-    friction_repeats: bool  # True if places that stick may hold what is held already
-    search: Index  # flags that all points and connectors share, see loops.h
-    switched: Index  # whether a row is not about the motion or force that it was about; (1,)
+    friction_repeats: bool  # True if sticking may repeat a constraint
+    search: Index  # flags shared by all points and connectors, see loops.h
+    switched: Index  # whether a row has changed between motion and force; (1,)
 
 
 class Response:
-    """Connectors whose laws are of one kind; motions and forces are arrays.
+    """Connectors with laws of one kind; motions and forces are arrays.
 
-    A method that a law does not define does nothing.  Arrays are views, which later steps change.
+    Methods that a law does not define do nothing.  Arrays are views, which later steps change.
 
     Attributes:
-        name: Of the internal variables in files.
-        in_c: Data of laws evaluated in C, by names in ``couplings`` of loops.h.
+        name: Name of the internal variables in files.
+        in_c: Data of laws in C, by names in ``couplings`` of loops.h.
         must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
             accepted.
-        opens: True if connectors open beyond a limit.
-        asks_at_ends: True if :meth:`take` is to be called when a step is accepted.
-        motion: Motions of the accepted state as solutions show them, (num_links,); None if those
-            are the motions of the nodes.
-        way: Way in which each slips plastically in the latest iterate, 1 or -1; 0 if it does not.
-        sticks: Whether friction holds each connector in the latest iterate; None without friction.
-        dissipated: Energies whose sum each connector has dissipated plastically; (num_links,); J.
+        opens: True if connectors yield beyond a limit.
+        asks_at_ends: True if :meth:`take` must be called when a step is accepted.
+        motion: Motions of the accepted state in solutions, (num_links,); None if they are the
+            motions of the nodes.
+        way: Direction of plastic slip in the latest iterate, 1 or -1; 0 without slip.
+        sticks: True for each connector that friction holds in the latest iterate; None without
+            friction.
+        dissipated: Energies whose sum is the plastic dissipation; (num_links,) each; J.
     """
 
     must_dissipate = opens = asks_at_ends = False
@@ -92,19 +95,19 @@ class Response:
     def __init__(self, links: Sequence[Connector], setting: Setting, name: str) -> None:
         self._links, self._setting, self.name = links, setting, name
         self._laws: list[Any] = [link.law for link in links]
-        # Motions that are large: the size of the scene, or a radian
+        # Scale of motions: the size of the scene, or a radian
         self._lengths = np.where([link.turns for link in links], 1.0, setting.size)
         self.way: Index = np.zeros(len(links), dtype=np.int32)
         self.in_c: dict[str, Any] = {}
         self._in_steps: dict[str, Any] = {}
         self._of_time: dict[str, list[tuple[TimeFunction, object]]] = {}
         self._entries: dict[str, tuple[Account, str]] = {}
-        # Internal variables, one for each connector, or for all components of one together
+        # Internal variables, one for each connector with all its components
         self._variables: list[npt.NDArray[Any]] = []
         self._components = 1
 
     def _enter(self, **entries: tuple[Account, str]) -> None:
-        """Make entries of the ledger; C knows their places by these names."""
+        """Make entries of the ledger; C finds them by these names."""
         self._entries.update(entries)
         for account, name in entries.values():
             account[name] += 0.0
@@ -112,7 +115,7 @@ class Response:
     def _rub(self, limits: list[Any], **of_laws: Any) -> None:
         """Let connectors stick or slip; ``limits`` are addresses of the limits of the forces."""
         n, setting = len(self._links), self._setting
-        # The way that each slips, or 0, in the step and in the accepted state
+        # Direction of slip, or 0, in the step and in the accepted state
         self._slip, self._accepted, way, creep = np.zeros((4, n))
         self.sticks, against = np.zeros((2, n), dtype=np.int32)
         softness = CREEP if setting.friction_repeats else 0.0
@@ -136,27 +139,27 @@ class Response:
         return {**self._in_steps, **of_time, **places}
 
     def know(self, couplings: Any) -> None:
-        """Take arrays of the connectors, and forms on them, that the laws need."""
+        """Set the arrays and forms of connectors that the laws need."""
         if self.sticks is not None:
             rate, v = couplings.rate_of_motion, couplings.forms.u
             fill(self.in_c["friction"], rate=rate.cells, at_v=rate.position(v))
 
     def take(self, e1: Array) -> None:
-        """Take the end of a step at the motions ``e1``, before C does; this may raise."""
+        """Accept the end of a step at the motions ``e1``, before C does; this may raise."""
 
     def dissipation(self, e1: Array, λ: Array) -> float:
-        """Energy dissipated plastically in a step to the motions ``e1``; J."""
+        """Return the energy dissipated plastically in a step to the motions ``e1``; J."""
         return 0.0
 
     def require_dissipation(self, e1: Array) -> None:
-        """Raise :class:`StepFailed` if a law gives energy in a step to the motions ``e1``."""
+        """Raise :class:`StepFailed` if a law generates energy in a step to motions ``e1``."""
 
     def remaining(self) -> Array:
-        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        """Return the remaining fraction of elastic stiffness in the iterate; (num_links,)."""
         return np.where(self.way == 0, 1.0, 0.0)
 
     def bends(self, e1: Array) -> Array:
-        """Derivatives of α by the motions, internal variables kept; (num_connectors, n)."""
+        """Return derivatives of α by motions at constant variables; (num_connectors, n)."""
         return np.zeros((len(self._links), 1))
 
     def state(self) -> Array:
@@ -167,7 +170,7 @@ class Response:
         return np.repeat(rows, self._components, axis=0)
 
     def restore(self, rows: Array) -> None:
-        """Take over the internal variables of :meth:`state`."""
+        """Restore the internal variables of :meth:`state`."""
         for mine, values in zip(self._variables, rows[:: self._components].T, strict=True):
             mine[:] = values
         if self.sticks is not None:
@@ -177,11 +180,11 @@ class Response:
         """Begin at motions that no step has led to."""
 
     def borne(self) -> Array | None:
-        """Forces of springs in the state that :meth:`start` has begun at; (num_links,)."""
+        """Return the forces of springs in the state of :meth:`start`; (num_links,)."""
         return None
 
     def freeze(self) -> None:
-        """Keep everything elastic from now on: nothing yields or breaks further."""
+        """Make all responses elastic from now on, without further yielding or breaking."""
 
 
 # -- laws that give a motion or a force ------------------------------------------------------------
@@ -193,13 +196,13 @@ GIVEN = {
     Damper: ("_Damped", "lost", "damping", 1.0),
     Coulomb: ("_Rubbing", "lost", "friction", 1.0),
 }
-"""Name in files, part and entry of the ledger where the work of the forces is, and its sign."""
+"""Name in files, part and entry of the ledger for the work of the forces, and its sign."""
 
 
 class GivenLaws(Response):
-    """Laws that give the motion or the force, or its limit: motors, dampers, dry friction, ...
+    """Laws that prescribe the motion, the force or its limit: motors, dampers, dry friction, ...
 
-    Joints and guides hold a motion, without work.
+    Joints and guides constrain a motion, without work.
     """
 
     def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
@@ -217,13 +220,13 @@ class GivenLaws(Response):
         elif isinstance(law, Coulomb):
             self._rub([setting.asked(link) for link in links])
         elif isinstance(law, PrescribedForce | Controller):
-            # The forces at the end of this step, and at that of the last one
+            # The forces at the ends of this step and of the last step
             end, reached = np.zeros((2, len(links)))
             self._in_steps.update(end=end, reached=reached)
             self._variables = [reached]
             if isinstance(law, PrescribedForce):
                 self._of_time["wanted_force"] = [(one.force, link) for one, link in both]
-            else:  # what controllers returned when the step began
+            else:  # the values of controllers at the beginning of the step
                 self._always = np.zeros(1)
                 wanted = ffi.new("time_function[]", len(links))
                 for place, link in zip(wanted, links, strict=True):
@@ -235,7 +238,7 @@ class GivenLaws(Response):
 
 
 class Springs(Response):
-    """Springs of one law, which may yield and break: points whose strain is the motion."""
+    """Springs of one law that may yield and break: points whose strain is the motion."""
 
     def __init__(self, law: Spring, links: Sequence[Connector], setting: Setting) -> None:
         super().__init__(links, setting, "_Sprung")
@@ -266,25 +269,25 @@ class Springs(Response):
         return self._strains
 
     def dissipation(self, e1: Array, λ: Array) -> float:
-        """Energy that yields or breaks springs in a step to the motions ``e1``; J."""
+        """Return the energy dissipated by springs in a step to the motions ``e1``; J."""
         self.points.respond(self._at(e1))
         return self.points.dissipation()
 
     def require_dissipation(self, e1: Array) -> None:
-        """Raise :class:`StepFailed` if a law gives energy in a step to the motions ``e1``."""
+        """Raise :class:`StepFailed` if a law generates energy in a step to motions ``e1``."""
         self.points.respond(self._at(e1))
         self.points.require_dissipation(lambda number: str(self._links[number]))
 
     def remaining(self) -> Array:
-        """Part of the elastic stiffness that is left in the latest iterate; (num_links,)."""
+        """Return the remaining fraction of elastic stiffness in the iterate; (num_links,)."""
         return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
 
     def state(self) -> Array:
-        """Internal variables of the points."""
+        """Return the internal variables of the points."""
         return self.points.state()
 
     def restore(self, rows: Array) -> None:
-        """Take over the variables of :meth:`state`."""
+        """Restore the variables of :meth:`state`."""
         self.points.restore(rows)
 
     def start(self, e: Array) -> None:
@@ -293,7 +296,7 @@ class Springs(Response):
         self.points.refresh(self._at(e))
 
     def borne(self) -> Array | None:
-        """Forces of the springs."""
+        """Return the forces of the springs."""
         return self.points.kept[:, 0]
 
     def freeze(self) -> None:
@@ -304,9 +307,11 @@ class Springs(Response):
 # -- rigid-plastic laws ---------------------------------------------------------------------------
 
 INPUTS = (*names("slip_input", "slip_"), "θ", "dt")
-"""First inputs of the compiled laws: the slip of the step and its direction (1 or -1); accumulated
-slip and motion at t_n, which loops.h names as well; numbers of the scheme.  Then come those of the
-law."""
+"""First inputs of the compiled laws: the slip of the step and its direction (1 or -1).
+
+The next inputs are accumulated slip and motion at t_n, which loops.h names as well, and numbers of
+the scheme.  Numbers of the law follow.
+"""
 
 
 class SlipForms:
@@ -325,7 +330,7 @@ class SlipForms:
 
     @cached_property
     def spent(self) -> Any:
-        """Force and its derivative next to nothing."""
+        """Force and its derivative, reduced to almost zero."""
         return self._pointwise.compile(*(NOTHING * x for x in self._response))
 
 
@@ -333,19 +338,21 @@ _slip_forms = stated(SlipForms)
 
 
 EARLY = 0.01
-"""Motion, in rad or as a part of the scene, that counts as much as the limit in deciding whether a
-connector slips in an iterate; solutions do not depend on it."""
+"""Motion, in rad or over the size of the scene, that weighs as much as the limit of the force.
+
+It decides whether a connector slips in an iterate; solutions do not depend on it.
+"""
 
 
 WEAK = 1e-9
-"""Factor of motions at least, as a part of EI of the member over the size of the scene."""
+"""Least factor of motions, over EI of the member divided by the size of the scene."""
 
 
 def _slope(link: Connector, size: float) -> float:
-    """Factor of motions beside forces in the equation of a connector, see rigid_plastic.c.
+    """Return the factor of motions in the equation of a connector, see rigid_plastic.c.
 
-    It is above the steepest softening, so that an open branch is found open; and so large that
-    motions, not the round-off of forces, say in which direction a weak hinge slips.
+    It exceeds the steepest softening, so that an open branch stays open.  It is so large that
+    motions, not the round-off of forces, decide in which direction a weak hinge slips.
     """
     law = law_of(link)
     if not 0.0 < law.limit < np.inf:
@@ -357,10 +364,10 @@ def _slope(link: Connector, size: float) -> float:
 
 
 class RigidPlasticLaws(Response):
-    """Rigid-plastic connectors whose laws are of one kind; see rigid_plastic.c.
+    """Rigid-plastic connectors with laws of one kind; see rigid_plastic.c.
 
-    A connector is held exactly until its force reaches the limit of its law.  Then the force is
-    that of the law, a function of the slip that grows in the step.
+    A connector is constrained exactly until its force reaches the limit of its law.  Then the law
+    gives the force, a function of the slip that grows in the step.
     """
 
     opens = True
@@ -386,10 +393,10 @@ class RigidPlasticLaws(Response):
         self._limit = self._given_limit.copy()
         back_force, dissipated, excess = np.zeros((3, n))
         self._slipped, self.way, self._way_before = np.zeros((3, n), dtype=np.int32)
-        self._stored = np.zeros(1)  # of all together; to whom it belongs does not matter
+        self._stored = np.zeros(1)  # of all together; the owner does not matter
         at = self._at["slipped"], self._at["start"]
         self._variables = [*at, self._limit, back_force, dissipated, self._way_before]
-        # Motions without the round-off of those that are held
+        # Motions without the round-off of constraints
         self.motion, self.dissipated = self._at["start"], (dissipated,)
 
         kind = ElastoPlastic(1.0) if isinstance(law.law, ElastoPlastic) else law.law.kind()
@@ -408,12 +415,12 @@ class RigidPlasticLaws(Response):
         }  # fmt: skip
 
     def dissipation(self, e1: Array, λ: Array) -> float:
-        """Energy dissipated in a step to the motions ``e1``, positive where one would slip; J."""
+        """Return the energy dissipated in a step to the motions ``e1``, positive in slip; J."""
         arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
         return float(lib.dissipation_of_rigid_plastic(self._c, *arrays))
 
     def state(self) -> Array:
-        """Internal variables; (num_links, 7)."""
+        """Return the internal variables; (num_links, 7)."""
         stored = np.zeros(len(self._links))
         stored[:1] = self._stored
         return np.column_stack([super().state(), stored])
@@ -429,7 +436,7 @@ class RigidPlasticLaws(Response):
         self._at["start"][:] = e
 
     def freeze(self) -> None:
-        """Hold from now on, but for connectors that bear nothing any more: these are free."""
+        """Hold connectors from now on, and free those with exhausted limits."""
         spent = self._limit <= SPENT * self._given_limit
         self._limit[:] = np.where(spent, 0.0, np.inf)
         if not self._hardens:

@@ -43,15 +43,15 @@ def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
 
 
 class Links(Term):
-    """Connectors that are alike; each has a force among the unknowns.
+    """Connectors of the same kind; each has a force among the unknowns.
 
     Attributes:
-        numbers: Of the connectors in the scene's links.
-        forces_at: Local degrees of freedom that are the forces; (num_links,).
-        response: What their law makes of motions and forces.
+        numbers: Indices of the connectors in the scene's links.
+        forces_at: Local degrees of freedom of the forces; (num_links,).
+        response: Response of their law to motions and forces.
         rate: Mean rate of the motions in the last step; (num_links,); m/s or rad/s.
-        kept: Numbers of the accepted state that are added to fields of ``Connection``, all but the
-            forces; (num_links,) each.  Later steps change them.
+        kept: Numbers of the accepted state, except forces, that are added to fields of
+            ``Connection``; (num_links,) each.  Later steps change them.
     """
 
     kind = "connectors"
@@ -62,7 +62,7 @@ class Links(Term):
         self._dofs = share.link_dofs[here].astype(np.int32)
         self.forces_at: Index = self._dofs[:, 6]
         self._A = A
-        self._callbacks: Callbacks  # from when the phases are made
+        self._callbacks: Callbacks  # set when the phases are made
         self.response = response = respond(self.links[0].law, self.links, setting)
         self.must_dissipate = response.must_dissipate
         # Motions and forces of the accepted state, and works since the beginning (J)
@@ -73,23 +73,23 @@ class Links(Term):
 
     @abstractmethod
     def motion(self, q: Array) -> Array:
-        """Relative motions at ``q``; (num_links,); m or rad."""
+        """Return the relative motions at ``q``; (num_links,); m or rad."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
-        """Add forces and rows of laws, and raise what functions of a user raise."""
+        """Add forces and rows of laws, and raise exceptions of functions of a user."""
         with self._callbacks.raising():
             super().add_residual(q1, r)
 
     def add_tangent(self, q1: Array) -> None:
-        """Add their derivatives, and raise what functions of a user raise."""
+        """Add derivatives of forces and rows, and raise exceptions of functions of a user."""
         with self._callbacks.raising():
             super().add_tangent(q1)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
-        """Put what laws of forces work on in the step ``v`` from ``q`` in the place of forces."""
+        """Set the motions in ``works`` that force laws work on in the step ``v`` from ``q``."""
 
     def take(self, q: Array) -> None:
-        """Take the forces in ``q`` as those before the next step."""
+        """Set the forces before the next step to those in ``q``."""
         self._before[:] = q[self.forces_at]
 
     def put_forces(self, q: Array) -> None:
@@ -98,23 +98,23 @@ class Links(Term):
             q[self.forces_at] = self._before[:] = borne
 
     def require_dissipation(self, q1: Array) -> None:
-        """Raise :class:`StepFailed` if a law gives energy in the step to ``q1``."""
+        """Raise :class:`StepFailed` if a law generates energy in the step to ``q1``."""
         self.response.require_dissipation(self.motion(q1))
 
     def dissipation(self, q1: Array) -> float:
-        """Energy that connectors of this process dissipate plastically in the step to ``q1``; J."""
+        """Return the plastic dissipation of connectors of this process in the step to ``q1``; J."""
         return self.response.dissipation(self.motion(q1), q1[self.forces_at])
 
 
 def _motions_with(link: Connector) -> tuple[str, ...]:
-    """Motions that the law of a link acts on, its own among them."""
+    """Return the motions that the law of a link acts on, including its own."""
     if isinstance(link.law, ConnectorLaw) and link.law.components > 1:
         return ("sliding", "sliding", "turning")[: link.law.components]
     return (link.motion,)
 
 
 def _kind(law: Law) -> object:
-    """Key of a law: connectors with the same one are computed together."""
+    """Return the key of a law; connectors with the same key are computed together."""
     if isinstance(law, Spring):
         return law
     if isinstance(law, ForceLaw):
@@ -130,11 +130,11 @@ def _one_cell() -> meshes.Mesh:
 
 
 class Couplings(Links):
-    """Connectors of the same relative motions whose laws are of one kind.
+    """Connectors of the same relative motions with laws of one kind.
 
-    Each is a cell of unit length from one node to the other, with its forces as unknowns after
-    those of the nodes.  Components of a :class:`Bushing` are links that stand one after the other.
-    Forms, and laws of many kinds, are evaluated in C.
+    Each is a cell of unit length between both nodes; its forces follow the unknowns of the nodes.
+    Components of a :class:`Bushing` are consecutive links.  C evaluates forms, and laws of many
+    kinds.
 
     Attributes:
         forms: Forms of a connector, and the functions in them.
@@ -157,7 +157,7 @@ class Couplings(Links):
         self._of_step = work, tangent
         self._now, self._rows = np.zeros(n), np.zeros((n, k + 2))
         self.motions = self._e, self._now
-        self._rows[:, 0] = 1.0  # held, until a law says something else
+        self._rows[:, 0] = 1.0  # constrained, unless a law changes the row
         for kernel in self._of_step:
             kernel.put(forms.row, self._rows.reshape(self._cells, -1))
         self._in_c = struct(
@@ -176,7 +176,7 @@ class Couplings(Links):
         self.response.know(self)
 
     def _form(self, form: ufl.Form) -> Kernel:
-        """A form on the connectors, with their numbers."""
+        """Return a kernel of a form on the connectors, with their numbers."""
         unit = np.tile([[0.0, 0.0], [1.0, 0.0]], (self._cells, 1, 1))
         kernel = Kernel(form, self.forms.q1, self._dofs, unit)
         if kernel.uses(self.forms.numbers):
@@ -184,7 +184,7 @@ class Couplings(Links):
         return kernel
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the connectors; where laws of a user have a history, they are asked, too."""
+        """Return loops over the connectors, with callbacks for laws of a user with a history."""
         self._callbacks, response = callbacks, self.response
         of_law = response.in_steps(callbacks)
         fields = {name for name, _ in ffi.typeof("coupling_term").fields}
@@ -200,7 +200,7 @@ class Couplings(Links):
         if response.asks_at_ends:
 
             def ask(step: Any, q1: Any, s: Any) -> None:
-                """Let laws of a user take the end of a step, before anything is accepted."""
+                """Let laws of a user accept the end of a step, before all other terms."""
                 lib.find_motions(self._in_c, q1)
                 response.take(self._now)
 
@@ -218,17 +218,17 @@ class Couplings(Links):
     # -- the step ------------------------------------------------------------------------------
 
     def motion(self, q: Array) -> Array:
-        """Relative motions at ``q``; (num_links,); m or rad."""
+        """Return the relative motions at ``q``; (num_links,); m or rad."""
         lib.find_motions(self._in_c, doubles(q))
         return self._now.copy()
 
     @cached_property
     def rate_of_motion(self) -> Kernel:
-        """The rates of the motions; friction asks for them."""
+        """Kernel of the rates of the motions, for friction."""
         return self._form(self.forms.rate)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
-        """Put minus the change of the motions where the row is about the force."""
+        """Set minus the change of the motions for rows about the force."""
         of_force = self.rows(q)[:, -2]
         about_force = of_force != 0.0
         factors = np.divide(-1.0, of_force, out=np.zeros(len(of_force)), where=about_force)
@@ -243,7 +243,7 @@ class Couplings(Links):
             works[at] = np.where(about_force, factors * rates, works[at])
 
     def rows(self, q: Array) -> Array:
-        """Rows of the laws around ``q``; (num_links, k + 2) with k components."""
+        """Return rows of the laws around ``q``; (num_links, k + 2) with k components."""
         lib.find_rows(self._in_c, doubles(q), doubles(self._rows))
         return self._rows
 
@@ -272,7 +272,7 @@ class Couplings(Links):
         self.response.start(self._e)
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """Motions, forces and works, and what the laws remember."""
+        """Save or restore motions, forces, works, and internal variables of laws."""
         response = self.response
         rows = np.column_stack([self._work, self.rate, self._before, self._e, response.state()])
         rows = memory.rows(response.name, self.numbers, rows)
@@ -281,14 +281,14 @@ class Couplings(Links):
 
 
 class Guides(Links):
-    """Forces across curves; those over a step are across the chord, so that they do no work.
+    """Forces across curves; over a step they are normal to the chord and do no work.
 
-    The last digits of the curve spoil the direction of a short chord.  Where it is so short that
-    they spoil more than the curvature does, the direction in its middle takes its place: either
-    errs by the last digits to the power of two thirds at most.
+    Round-off of the curve spoils the direction of a short chord.  If it spoils more than the
+    curvature does, the direction of the curve in the middle is used.  Either direction errs at most
+    by the round-off to the power of two thirds.
 
-    The motion of a guide is the distance from its curve, zero when a step is accepted.  All is
-    computed in guide_curves.c, which asks Python for points of the curves.
+    The motion of a guide is the distance from its curve, zero when a step is accepted.  Guides are
+    computed in guide_curves.c, which calls Python for points of the curves.
     """
 
     def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
@@ -315,7 +315,7 @@ class Guides(Links):
         self.demand = loop("missed_by_guides", self._c)
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops that begin at the points of the last step, and remember those at its end."""
+        """Return loops that begin at the points of the last step and save its end points."""
         self._callbacks = callbacks
         curves = [callbacks.handle(curve, 2 * lib.CURVE_POINTS) for curve in self._curves]
         fill(self._c, ask=lib.curve_in_python, curve=ffi.new("void *[]", curves))
@@ -328,7 +328,7 @@ class Guides(Links):
         raise NoNumber(f"{place} is where no nearest point of its guide curve was found")
 
     def motion(self, q: Array) -> Array:
-        """Distances from the curves; m."""
+        """Return the distances from the curves; m."""
         lib.begin_guides_again(self._c)
         with self._callbacks.raising():
             lib.find_frames(self._c, doubles(q))
@@ -337,8 +337,8 @@ class Guides(Links):
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``.
 
-        Only Python knows the curves, so it is a difference of fourth order, over a hundredth of
-        the scene: curvatures are known to 1e-8, which leaves 1e-6.
+        The curves are Python functions, so it is a difference of fourth order over a hundredth of
+        the scene.  Curvatures are known to 1e-8, which leaves 1e-6.
         """
         way = np.abs(u[np.r_[self._x, self._y]]).max(initial=0.0)
         ε = 1e-2 * self._size / way if way > 0 else 1.0
@@ -351,7 +351,7 @@ class Guides(Links):
         data[:] = before + change
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The points on the curves, their parameters, and the steps of these for tangents."""
+        """Save or restore points on curves, their parameters, and parameter steps for tangents."""
         numbers = (self._e, self._s, self._s0, self._steps)
         rows = memory.rows("guides", self.numbers, np.column_stack([*numbers, self._on0]))
         for mine, column in zip(numbers, rows.T, strict=False):
@@ -360,10 +360,10 @@ class Guides(Links):
 
 
 def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
-    """Make the connectors of a process, those that are alike together, and its guides.
+    """Make the connectors of a process, grouped by kind, and its guides.
 
-    Each process makes the entries of the ledger in the order of the scene, also those that only
-    others write.
+    Each process makes the entries of the ledger in the order of the scene, including the entries
+    that only other processes write.
     """
     links = share.grid.scene.links
     groups: dict[tuple[tuple[str, ...], object], list[int]] = {}

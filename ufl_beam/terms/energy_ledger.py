@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The ledger: every joule that is in the scene, came in, or went out."""
+"""Energy ledger: energy in the scene, work supplied, and losses."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ from ufl_beam.display import Rich
 from ufl_beam.model.connector_law import ENTRIES
 
 EXPLAINED = 0.1
-"""Part of an imbalance from which on an estimate of round-off explains it."""
+"""Fraction of an imbalance above which an estimate of round-off explains it."""
 
 NOTHING_HELD = 1e-3
-"""Part of the works up to which what the scene held and lost shows that they were round-off."""
+"""Ratio of energies held and lost to works up to which the works are round-off."""
 
 
 class Account(Mapping[str, float]):
-    """Entries of one part of the ledger by name; those that were never written are zero.
+    """Entries of one part of the ledger by name; entries never written are zero.
 
-    Their numbers are in one array, in the order in which the names came, so that C may add to them.
+    Their numbers are in one array, in the order of the first use of the names, so that C can add to
+    them.
 
     Attributes:
         numbers: The entries, and room for more.
@@ -58,7 +59,7 @@ class Account(Mapping[str, float]):
         return len(self._at)
 
     def pointer(self, name: str) -> Any:
-        """An entry as C has it; there is no room for many names after it."""
+        """Return the address of an entry; afterwards the array cannot grow."""
         self[name] += 0.0
         self._fixed = True
         return doubles(self.numbers) + self._at[name]
@@ -66,10 +67,10 @@ class Account(Mapping[str, float]):
 
 @dataclass
 class Ledger:
-    """Energies of one process at one time; terms write into it when a step is accepted.
+    """Energies of one process at one time; terms write them when a step is accepted.
 
-    Terms make their entries when they are made, so that all processes know the same ones; see
-    :class:`Energy` for the three parts.
+    Terms make their entries when they are constructed, so that all processes have the same entries;
+    see :class:`Energy` for the three parts.
     """
 
     state: Account = field(default_factory=Account)
@@ -77,23 +78,23 @@ class Ledger:
     lost: Account = field(default_factory=Account)
 
     def size(self) -> float:
-        """Sum of the sizes of all entries; J."""
+        """Return the sum of the absolute values of all entries; J."""
         parts = self.state, self.supplied, self.lost
         return float(sum(np.abs(part.numbers).sum() for part in parts))
 
     def remember(self, memory: Memory) -> None:
-        """Pass on the works and losses since the beginning."""
+        """Save or restore the works and losses since the beginning."""
         for kind, entries in (("supplied", self.supplied), ("lost", self.lost)):
             for name, value in entries.items():
                 entries[name] = memory.total(f"{kind}: {name}", value)
 
     def begin(self) -> None:
-        """Forget the state; what was supplied and lost remains."""
+        """Clear the state; supplied work and losses remain."""
         self.state.numbers.fill(0.0)
 
 
 class Entries(dict[str, Array]):
-    """Entries of a part of the ledger by name; a missing one is explained."""
+    """Entries of a part of the ledger by name; the error of a missing entry lists all names."""
 
     def __init__(self, entries: dict[str, Array], known: Sequence[str]) -> None:
         super().__init__(entries)
@@ -137,11 +138,11 @@ class Energy(Mapping[str, Array], Rich):
             object.__setattr__(self, part, Entries(getattr(self, part), names))
 
     def __getitem__(self, name: str) -> Array:
-        """Entry ``name``; (n+1,); J.  Entries of effects that the scene lacks do not exist."""
+        """Return the entry ``name``; (n+1,); J.  Effects that the scene lacks have no entries."""
         return next((part for part in self._parts if name in part), self.state)[name]
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the entries: state, supplied, lost."""
+        """Iterate over the names of the entries: state, supplied, lost."""
         return (name for part in self._parts for name in part)
 
     def __len__(self) -> int:
@@ -158,39 +159,39 @@ class Energy(Mapping[str, Array], Rich):
 
     @property
     def imbalance(self) -> Array:
-        """Energy since the first state that the ledger does not account for; (n+1,); J.
+        """Energy that the ledger does not account for since the first state; (n+1,); J.
 
-        A path begins in a state that bears its constant loads: their work is in the entries then.
+        A path begins in a state under its constant loads, with their work in the entries.
         """
         since = self.total - _sum(self.supplied) + _sum(self.lost)
         return np.asarray(since - since[0])
 
     @property
     def throughput(self) -> float:
-        """Energy that went through: the most that the scene held, and all work on or by it; J."""
+        """Energy that went through: maximum energy in the scene plus all work on or by it; J."""
         works = sum(float(np.sum(np.abs(np.diff(work)))) for work in self.supplied.values())
         return float(np.max(self._held)) + works
 
     @property
     def _held(self) -> Array:
-        """Energy in the scene; potentials of a user, which have no zero, by their change."""
+        """Energy in the scene, with changes of a user's potentials, whose zero is arbitrary."""
         sizes = {n: e if n in ENTRIES else np.abs(e - e[0]) for n, e in self.state.items()}
         return _sum(sizes)
 
     @property
     def worst(self) -> float:
-        """Largest imbalance, as a part of the energy that went through."""
+        """Largest imbalance over the energy that went through."""
         largest, throughput = float(np.max(np.abs(self.imbalance))), self.throughput
         return largest / throughput if throughput > 0 else largest
 
     def opened(self, claimed: float, round_off: float) -> str:
-        """Describe how far the ledger is open; empty if it closes as claimed.
+        """Describe the imbalance of the ledger; empty if it is as small as claimed.
 
         Args:
-            claimed: Largest imbalance claimed, as a part of the energy that went through.
-            round_off: Estimate of the energy that the last digits of the unknowns make; J.
+            claimed: Largest imbalance claimed, over the energy that went through.
+            round_off: Estimate of the energy by round-off of the unknowns; J.
         """
-        # Squares of the least numbers have lost their digits.
+        # Squares of the smallest numbers have lost their digits.
         if not self.throughput > sys.float_info.min / sys.float_info.epsilon:
             return ""
         if self.worst <= claimed:
@@ -198,7 +199,7 @@ class Energy(Mapping[str, Array], Rich):
         part = round_off / self.throughput
         held = float(np.max(self._held)) + sum(float(lost[-1]) for lost in self.lost.values())
         if part >= 1.0 and held <= NOTHING_HELD * self.throughput:
-            return ""  # all works are round-off, as where supports turn a scene as a whole
+            return ""  # all works are round-off, as in rigid motion by supports
         reason = (
             ", the last digits of positions times the largest stiffness; less stiffness of what "
             "hardly deforms, or fewer cells, close it"

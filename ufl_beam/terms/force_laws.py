@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors that are stated: as energy and resistance, compiled to C, or as functions.
+"""Connector laws stated as energy and resistance, compiled to C, or as functions of a user.
 
-Functions of a user give a force, with a history and with any slope; C asks Python for them.
+Functions of a user return a force, with a history and with any slope; C calls them in Python.
 """
 
 from __future__ import annotations
@@ -35,19 +35,19 @@ from ufl_beam.terms.connector_laws import Response, Setting
 
 
 def inputs(law: ConnectorLaw) -> tuple[str, ...]:
-    """Names of the inputs of a compiled law; loops.h explains their order."""
+    """Return the names of the inputs of a compiled law; loops.h explains their order."""
     motions = (f"{when} {i}" for when in ("motion", "before") for i in range(law.components))
     of_law = (*(f"state {name}" for name in law.variables), *(f"number {n}" for n in law.numbers()))
     return (*motions, "dt", "theta", *of_law)
 
 
 class LawForms:
-    """Compiled law of a connector, for all numbers.
+    """Compiled law of a connector, for any numbers of the law.
 
     Attributes:
-        force: Forces and their derivatives by the motions at the end of the step.
+        force: Forces and their derivatives with respect to the motions at the end of the step.
         end: ``law_output`` of loops.h, then the variables at the end.
-        limit: Force up to which the motion is held.
+        limit: Force up to which the motion is constrained.
     """
 
     def __init__(self, law: ConnectorLaw, scheme: Scheme) -> None:
@@ -72,17 +72,17 @@ class LawForms:
 
     @cached_property
     def frozen(self) -> tuple[Any, Any]:
-        """The same forces, and second derivatives, while the variables stay as they are."""
+        """Forces and their first and second derivatives at constant variables."""
         forces = law_step(self._law, self._at, self._scheme, frozen=True).forces
         slopes = self._slopes(forces)
         return self._compile(*forces, *slopes), self._compile(*self._slopes(slopes))
 
     def _slopes(self, values: Sequence[Expr]) -> list[Expr]:
-        """Derivatives of each value by all motions."""
+        """Return derivatives of each value with respect to all motions."""
         return [ufl.diff(value, motion) for value in values for motion in self._motions]
 
     def _compile(self, *outputs: Expr) -> Any:
-        """Compile a function; none if all that it returns is zero."""
+        """Compile a function; return a null pointer if all its outputs are zero."""
         outputs = tuple(map(expand_derivatives, outputs))
         zero = all(isinstance(one, Zero) for one in outputs)
         return ffi.NULL if zero else self._pointwise.compile(*outputs)
@@ -92,7 +92,7 @@ _law_forms = stated(LawForms)
 
 
 class CompiledLaws(Response):
-    """Connectors whose laws are of one class, with numbers of their own."""
+    """Connectors with laws of one class; each law has its own numbers."""
 
     def __init__(self, law: ConnectorLaw, links: Sequence[Connector], setting: Setting) -> None:
         super().__init__(links, setting, f"{type(law).__qualname__}{[*law.variables]}")
@@ -112,7 +112,7 @@ class CompiledLaws(Response):
             at[f"state {name}"][:] = value
         for name in law.numbers():
             at[f"number {name}"][:] = [getattr(one, name) for one in self._laws[::k]]
-        self._held, lost = np.zeros(n), np.zeros(n * k)  # what is lost, in the first component
+        self._held, lost = np.zeros(n), np.zeros(n * k)  # losses, in the first component
         self.dissipated = (lost,)
         variables = [at[f"state {name}"] for name in law.variables]
         self._variables = [*variables, self._held, lost[::k]]
@@ -131,9 +131,9 @@ class CompiledLaws(Response):
             self._rub(places, laws=self._c, limit_of_law=self._forms.limit)
 
     def bends(self, e1: Array) -> Array:
-        """Minus the second derivatives of the forces; variables stay.
+        """Return minus the second derivatives of the forces at constant variables.
 
-        Zero of laws that hold: what sticks has none, and what slides is followed in no analysis.
+        They are zero for laws that hold: sticking has none, and no analysis follows sliding.
         """
         if self._law.holds:
             return super().bends(e1)
@@ -145,7 +145,7 @@ class CompiledLaws(Response):
         return -bends
 
     def _accepted_state(self) -> tuple[ConnectorLaw, list[Array], State]:
-        """The law with the numbers of all connectors, their motions, and their variables."""
+        """Return the law with the numbers of all connectors, their motions and their variables."""
         law, at = self._law, self._at
         numbers = law.of({name: at[f"number {name}"] for name in law.numbers()})
         motions = [at[f"before {i}"] for i in range(law.components)]
@@ -160,14 +160,14 @@ class CompiledLaws(Response):
             self._held[:] = law.energy(law.given(motions), variables)
 
     def borne(self) -> Array | None:
-        """Forces of the energies where :meth:`start` has begun; nobody knows them if laws hold."""
+        """Return the elastic forces at the motions of :meth:`start`; None if laws hold."""
         if self._law.holds:
             return None
         law, motions, variables = self._accepted_state()
         return np.column_stack(law.elastic_forces(motions, variables)).ravel()
 
     def freeze(self) -> None:
-        """Keep the variables from now on, and let what sticks stick."""
+        """Keep variables constant from now on; sticking connectors stick."""
         if not self._law.holds:
             fill(self._c, force=self._forms.frozen[0])
 
@@ -175,31 +175,31 @@ class CompiledLaws(Response):
 # -- functions of a user ---------------------------------------------------------------------------
 
 MISSED = 0.5
-"""Part of what the iterate before has missed of a law, from which on a step went too far."""
+"""Ratio of residuals of successive iterates above which an iteration has overshot."""
 
 DIGITS = 1e-8
-"""Part of a force from which on a difference of forces has as many digits as a slope needs."""
+"""Difference of forces, over the force, that leaves enough digits for a slope."""
 
 DIFFERENCE = 6e-6
-"""Part of a motion over which central differences err least: the third root of the round-off."""
+"""Relative increment of central differences with least error: third root of round-off."""
 
 
 class Iterate(NamedTuple):
-    """Motion and force of a connector in an iterate, and the law there."""
+    """Motion and force of a connector in an iterate, and data of its law."""
 
     e: float  # motion; m or rad
     λ: float  # force; N or N m
-    missed: float  # force of the law at the motion less λ
-    at: float  # motion around which the law was taken as linear
+    missed: float  # residual: force of the law at the motion, less λ
+    at: float  # motion about which the law was linearised
 
 
 class Asked:
-    """The functions of a law, of one connector in one step.
+    """Functions of the law of a connector in a step.
 
     Attributes:
         state: Internal variables of the accepted state; written to when a step is accepted.
-        last: The iterate before in this step; None in the first.
-        energy: The energy that can be had back, a function; None if the law states none.
+        last: Previous iterate in this step; None in the first.
+        energy: Function of the recoverable energy; None if the law states none.
     """
 
     def __init__(
@@ -217,18 +217,18 @@ class Asked:
         """Begin a step at the motion ``e0``; the law acts at the time ``t``."""
         self._e0, self._dt = e0, dt
         state = self.state.copy()
-        state.flags.writeable = False  # iterates begin with the same one
+        state.flags.writeable = False  # all iterates begin with the same state
         self._known = {"t": t, "dt": dt, "state": state}
         self.last = None
 
     # -- the functions -------------------------------------------------------------------------
 
     def force(self, e1: float) -> float:
-        """The force if the step ends at the motion ``e1``."""
+        """Return the force if the step ends at the motion ``e1``."""
         return self.end(e1)[0]
 
     def end(self, e1: float) -> tuple[float, Array]:
-        """The force and the internal variables if the step ends at the motion ``e1``."""
+        """Return force and internal variables if the step ends at the motion ``e1``."""
         motion = (1.0 - self._weight) * self._e0 + self._weight * e1
         rate, state = (e1 - self._e0) / self._dt, self.state
         if not self._asked:
@@ -242,7 +242,7 @@ class Asked:
         at = f"motion = {motion:.6g}, rate = {rate:.6g}, t = {self._known['t']:.9g} s"
         force = require_returned(value, f"{self._link}: the function", at)
         for number in (force, *map(float, state)):
-            if not math.isfinite(number):  # a shorter step may not come there
+            if not math.isfinite(number):  # a shorter step may avoid this motion
                 raise NoNumber(f"{self._link}: the function returned {number} at {at}")
         return force, state
 
@@ -258,7 +258,7 @@ class Asked:
         return force, state
 
     def stored(self, motion: float) -> float:
-        """The energy that can be had back; J."""
+        """Return the recoverable energy; J."""
         if self.energy is None:
             return 0.0
         value = self.energy(motion, **dict.fromkeys(self._asked_by_stored, self.state.copy()))
@@ -269,7 +269,7 @@ class Asked:
     # -- the law around an iterate -------------------------------------------------------------
 
     def line(self, e: float, λ: float) -> tuple[float, float]:
-        """Slope and intercept of the law around an iterate."""
+        """Return slope and intercept of the law around an iterate."""
         force, last = self.force(e), self.last
         missed, at = force - λ, e
         if last is not None and abs(missed) > MISSED * abs(last.missed) and e != last.e:
@@ -280,11 +280,12 @@ class Asked:
         return slope, force - slope * at
 
     def _meeting(self, e: float, λ: float, last: Iterate) -> float:
-        """Motion around which the law is taken after a step that went too far.
+        """Return the motion about which the law is linearised after an overshoot.
 
-        Where a law has an infinite slope, Newton's method goes from one side to the other for ever.
-        Forces and motions of the two latest iterates tell how the rest of the scene yields: the law
-        is taken where it meets this line, if that is between ``e`` and the place before.
+        At an infinite slope of a law, Newton's method oscillates for ever.  The secant through
+        forces and motions of the two latest iterates approximates the rest of the scene.  The law
+        is linearised at its intersection with this line, if that is between ``e`` and the previous
+        motion ``last.at``.
         """
         yielding = max(0.0, (last.λ - λ) / (e - last.e))
 
@@ -297,10 +298,11 @@ class Asked:
         return float(scipy.optimize.brentq(excess, e, last.at, xtol=1e-300, maxiter=2000))
 
     def _slope(self, e: float, force: float) -> float:
-        """Derivative of the force at ``e``, by central differences.
+        """Return the derivative of the force at ``e`` by central differences.
 
-        Over a part of the step or of the scene; beside zero, where the slope may be infinite, over
-        a part of the motion, or of that in the iterate before, if that leaves digits.
+        The increment is a fraction of the step or of the scene.  Near zero the slope may be
+        infinite; there it is a fraction of the motion in this or the previous iterate, if that
+        leaves digits.
         """
         ε = DIFFERENCE * max(abs(e - self._e0), 1e-3 * max(abs(e), self._small))
         near = DIFFERENCE * max(abs(e), 0.0 if self.last is None else abs(self.last.at))
@@ -311,10 +313,11 @@ class Asked:
         return (self.force(e + ε) - self.force(e - ε)) / (2 * ε)
 
     def bend(self, e: float) -> float:
-        """Second derivative of the force, by a fourth-order difference.
+        """Return the second derivative of the force by a fourth-order difference.
 
-        Over a thousandth of the scene, or of a radian, it leaves 1e-10 of round-off, and less of
-        the sixth derivative of a law that bends over a thirtieth of the scene or more.
+        The increment is a thousandth of the scene, or of a radian.  The round-off is 1e-10, and the
+        error by the sixth derivative is smaller if the law bends over a thirtieth of the scene or
+        more.
         """
         ε, weights = self._small, (-1.0, 16.0, -30.0, 16.0, -1.0)
         forces = [w * self.force(e + k * ε) for k, w in zip(range(-2, 3), weights, strict=True)]
@@ -322,7 +325,7 @@ class Asked:
 
 
 class AskedLaws(Response):
-    """Forces that functions give; all laws have as many internal variables."""
+    """Forces by functions; all laws have the same number of internal variables."""
 
     def __init__(self, law: ForceLaw, links: Sequence[Connector], setting: Setting) -> None:
         super().__init__(links, setting, "AskedLaws")
@@ -341,7 +344,7 @@ class AskedLaws(Response):
         self.in_c = {"asked": self._c}
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
-        """The functions, which C calls."""
+        """Return fields of loops.h, and set the functions that C calls."""
         c, handle = self._c, callbacks.handle
         fill(c, begin=lib.begin_in_python, find_rows=lib.run_in_python, again=lib.run_in_python)
         c.begin_self, c.rows_self = handle(self._begin), handle(self._find_rows)
@@ -349,7 +352,7 @@ class AskedLaws(Response):
         return super().in_steps(callbacks)
 
     def know(self, couplings: Any) -> None:
-        """Take the arrays of motions in the accepted state and in the iterate."""
+        """Set the arrays of motions in the accepted state and in the iterate."""
         self._e0, self._e1 = couplings.motions
 
     def _begin(self, t: float, dt: float) -> None:
@@ -361,7 +364,7 @@ class AskedLaws(Response):
             one.last = None
 
     def _find_rows(self) -> None:
-        """Put the laws around the iterate into the rows of C."""
+        """Write the laws around the iterate to the rows of C."""
         self._rows[:, 2] = math.nan  # where a law has no value
         motions = zip(self._each, self._e1.tolist(), self._force.tolist(), strict=True)
         for row, (one, e1, λ) in zip(self._rows, motions, strict=True):
@@ -369,11 +372,11 @@ class AskedLaws(Response):
             row[0], row[2] = -slope, intercept
 
     def bends(self, e1: Array) -> Array:
-        """Derivatives of the slopes."""
+        """Return the derivatives of the slopes."""
         return np.array([one.bend(e1[i]) for i, one in enumerate(self._each)])
 
     def take(self, e1: Array) -> None:
-        """Take the internal variables after a step to the motions, and enter what is stored."""
+        """Accept the internal variables after a step to the motions, and enter stored energies."""
         states = [one.end(float(x))[1] for one, x in zip(self._each, e1, strict=True)]
         before = float(self._held[0])
         for one, state in zip(self._each, states, strict=True):
@@ -383,10 +386,10 @@ class AskedLaws(Response):
         account[entry] -= float(self._held[0]) - before
 
     def start(self, e: Array) -> None:
-        """Find the energy that is stored at these motions."""
+        """Compute the stored energy at these motions."""
         self._held[0] = sum([one.stored(float(x)) for one, x in zip(self._each, e, strict=True)])
 
     def restore(self, rows: Array) -> None:
-        """Take over the internal variables of a :meth:`state`, at the accepted motions."""
+        """Restore the internal variables of :meth:`state`, at the accepted motions."""
         super().restore(rows)
         self.start(self._e0)

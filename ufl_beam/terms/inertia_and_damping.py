@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Forces of velocities: inertia, damping, and the rates that a time scheme keeps, as C has them.
+"""Inertia, damping, and the rates of a time scheme in C.
 
-A scheme states the coefficients of a step, once for each length of a step.
+A scheme computes the coefficients of a step once for each step length.
 """
 
 from __future__ import annotations
@@ -48,12 +48,12 @@ from ufl_beam.terms.beams import OfForms
 from ufl_beam.terms.energy_ledger import Ledger
 
 BEFORE = "velocity before"
-"""Name of the velocities at the beginning of the last step, in what is saved."""
+"""Name in saved data of the velocities at the beginning of the last step."""
 
 
-@lru_cache(maxsize=1024)  # steps of one size have some ten lengths, as times are rounded
+@lru_cache(maxsize=1024)  # rounded times give about ten lengths for a constant step
 def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coefficients:
-    """Coefficients of a step, as lists of numbers."""
+    """Return the coefficients of a step as lists of numbers."""
     found = scheme.coefficients(dt, last_dt, known)
     inertia, velocity, *rates = (list(map(float, row)) for row in (*found[:2], *found.rates))
     slip = None if found.slip is None else list(map(float, found.slip))
@@ -61,10 +61,10 @@ def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coeffic
 
 
 def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
-    """Return coefficients of steps of 1 s, and refuse rows of another length.
+    """Return coefficients of steps of 1 s, after a check of the row lengths.
 
     Raises:
-        ModelError: They are not as :class:`Coefficients` says.
+        ModelError: They do not match :class:`Coefficients`.
     """
     known: Any = scheme
     number = len(scheme.kept)
@@ -97,10 +97,10 @@ def numbers_in_python(handle: Any, numbers: Any) -> int:
 
 
 class Inertia(Term):
-    """Inertia of beams and point masses: a constant matrix, P(18); and the rates of a scheme, in C.
+    """Inertia of beams and point masses: constant matrix, P(18), and the rates of a scheme in C.
 
-    Rates are velocities, those before the last step, and what else the scheme keeps; arrays of them
-    are copies.
+    Rates are velocities, velocities before the last step, and further rates of the scheme; arrays
+    of them are copies.
 
     Attributes:
         scheme: The time scheme.
@@ -108,7 +108,7 @@ class Inertia(Term):
         slips: True if the scheme loses energy by the rates.
 
     Raises:
-        ModelError: The scheme states no such coefficients as :class:`Coefficients` describes.
+        ModelError: The scheme has coefficients that do not match :class:`Coefficients`.
     """
 
     kind = "inertia"
@@ -123,8 +123,8 @@ class Inertia(Term):
         self._ledger, self._A, self.scheme = ledger, A, scheme
         size, number = len(v), MORE + len(scheme.kept)
         self.slips = checked_coefficients(scheme).slip is not None
-        # Changes are elsewhere; of velocities before the last ones new ones are not computed, and
-        # new velocities take their place where nothing asks for them.
+        # Changes are stored elsewhere.  Velocities before the last step are not computed anew; if
+        # nothing needs them, new velocities use their memory.
         asks = self.slips or scheme.looks_back
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
@@ -143,11 +143,11 @@ class Inertia(Term):
 
     @property
     def M(self) -> Csr:
-        """The mass matrix; a new one."""
+        """Mass matrix; a new object."""
         return self._times.matrix()
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the matrix and the velocities."""
+        """Return loops over the matrix and the velocities."""
         lost = self._ledger.lost.pointer("numerical") if self.slips else ffi.NULL
         kinetic = self._ledger.state.pointer("kinetic")
         of = self.times(self._times, kept=kinetic, lost=lost)
@@ -157,7 +157,7 @@ class Inertia(Term):
     # -- the rates -----------------------------------------------------------------------------
 
     def _rate(self, k: int) -> Array:
-        """A rate as C has it; a view."""
+        """Return a rate in the memory of C; a view."""
         return np.frombuffer(ffi.buffer(self.c.rate[k], 8 * self.c.size))
 
     @property
@@ -172,21 +172,21 @@ class Inertia(Term):
 
     @property
     def more(self) -> tuple[Array, ...]:
-        """Rates that the scheme keeps besides, as many as are known."""
+        """Known further rates of the scheme."""
         return tuple(self._rate(MORE + k).copy() for k in range(self.c.more))
 
     def keep(self, *more: Array) -> None:
-        """Set what else the scheme keeps; a step can begin if that is anything."""
+        """Set the further rates of the scheme; a step can begin with any, or if none are needed."""
         for k, rate in enumerate(more):
             self._rate(MORE + k)[:] = rate
         self.c.more, self.c.ready = len(more), bool(more) or not self.scheme.kept
 
     def take(self, v: Array, v_before: Array, last_dt: float) -> None:
-        """Set velocities, those before the last step, and its length."""
+        """Set velocities, velocities before the last step, and its length."""
         self._rate(V)[:], self._rate(V_BEFORE)[:], self.c.last_dt = v, v_before, last_dt
 
     def after(self, s: Array, dt: float) -> list[Array]:
-        """Velocities after a step ``s`` of the nodes, and what the scheme keeps besides."""
+        """Return velocities and further rates after a nodal step ``s``."""
         known: Any = self.scheme
         rows = _coefficients(known, dt, self.c.last_dt, self.c.more).rates
         return [combined(row, s, self) for row in rows]
@@ -200,12 +200,12 @@ class Inertia(Term):
     # -- in files ------------------------------------------------------------------------------
 
     def carry_on(self, memory: Memory, known: int) -> None:
-        """State what the scheme keeps besides the velocities, as much as is ``known`` of it."""
+        """Save or restore the first ``known`` further rates of the scheme."""
         more = self.more or (self.v,) * known
         self.keep(*map(memory.at_dofs, self.scheme.kept[:known], more))
 
     def pass_on_step(self, memory: Memory) -> None:
-        """State the velocities before the last step, and its length, at each degree of freedom."""
+        """Save or restore velocities before the last step and its length, by degree of freedom."""
         v_before = memory.at_dofs(BEFORE, self.v_before)
         lengths = memory.at_dofs("last step", np.full(self.c.size, self.c.last_dt))
         self.take(self.v, v_before, float(lengths[0]) if len(lengths) else self.c.last_dt)
@@ -224,7 +224,7 @@ class Inertia(Term):
 def _work_and_loss(
     of: Element, scheme: Scheme | EnergyMomentumDecaying, factor: Expr, before: Expr
 ) -> tuple[ufl.Form, ufl.Form]:
-    """Forms of resultants ``factor C (Δe - before)``, Δe being the changes of the strains."""
+    """Return forms of resultants ``factor C (Δe - before)`` with the change Δe of the strains."""
     change = strain(of.q1, of.axis) - strain(of.q0, of.axis)
     r = factor * resultants(change - before, of.stiffness)
     w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
@@ -233,7 +233,7 @@ def _work_and_loss(
 
 @stated
 def _viscous_forms(of: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Virtual work, the energy lost, and the time over that of the step."""
+    """Return forms of virtual work and lost energy, and the retardation time over the step."""
     rate = of.at_points()
     return *_work_and_loss(of, scheme, rate, ufl.zero(3)), rate
 
@@ -251,7 +251,7 @@ class KelvinVoigtForces(OfForms):
         self._time, self._dt = damping.retardation_time, np.zeros(1)
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the cells; the step is a number of the forms."""
+        """Return loops over the cells; the step length is a number of the forms."""
         begin, accept, *_ = super().phases(callbacks)
         c = struct(
             "viscous_forms", **knowing(self._of_step, self._rate), of_cell=len(self._rate.x.array),
@@ -294,7 +294,7 @@ class RayleighForces(Term):
         ]
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the matrix and the velocities."""
+        """Return loops over the matrix and the velocities."""
         of = self._rates.times(self._times, lost=self._ledger.lost.pointer("damping"))
         return Phases([loop("begin_rayleigh", of)], [loop("accept_rayleigh", of)])
 
@@ -303,7 +303,7 @@ def damping_forces(
     of: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
     rates: Inertia | None,
 ) -> list[Term]:  # fmt: skip
-    """Forces of one kind of damping on the cells of a process; none if it has no such cells."""
+    """Return the forces of a damping on the cells of a process; none without such cells."""
     ledger.lost["damping"] += 0.0
     if isinstance(of, Rayleigh):
         if rates is None:
@@ -329,7 +329,7 @@ def damping_forces(
 def _change_forms(
     of: Element, scheme: EnergyMomentumDecaying
 ) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Virtual work, the energy lost, and the changes of the strains in the step before."""
+    """Return forms of virtual work and lost energy, and changes of strains in the last step."""
     before = of.at_points(3)
     return *_work_and_loss(of, scheme, of.constant(scheme.part), before), before
 
@@ -350,7 +350,7 @@ class SecondDifferences(OfForms):
         self._last_dt = np.full(1, math.inf)
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the cells and their strains."""
+        """Return loops over the cells and their strains."""
         begin, accept, *_ = super().phases(callbacks)
         c = struct(
             "second_differences", strains=self._strains.kernel.cells, weight=self._strains.weights,
@@ -361,12 +361,12 @@ class SecondDifferences(OfForms):
         return Phases([*begin, before], [*accept, after])
 
     def start(self, q: Array) -> None:
-        """Take the strains at ``q``."""
+        """Set the strains to those at ``q``."""
         self._e[:] = self._strains(q)
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The changes of the strains in the last step, and its length."""
-        # The length is in the rows: the process that says numbers for all may have no such cells.
+        """Save or restore changes of the strains in the last step, and its length."""
+        # The length is in the rows: the process that saves numbers for all may have no such cells.
         rows = np.column_stack([self._change, np.full(len(self._change), self._last_dt)])
         rows = memory.rows("changes of strains", self._cells, rows)
         self._change[:], self._last_dt[0] = rows[:, :-1], rows[0, -1]

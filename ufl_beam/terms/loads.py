@@ -35,10 +35,10 @@ from ufl_beam.terms.energy_ledger import Ledger
 
 
 class LoadTerm(Term):
-    """Forces that time or the configuration gives.
+    """Forces that depend on time or on the configuration.
 
     Attributes:
-        vector: ``vector`` of loops.h: forces whose size is part of the scale of convergence.
+        vector: ``vector`` of loops.h: forces whose size enters the scale of convergence.
     """
 
     kind = "loads"
@@ -48,13 +48,13 @@ class LoadTerm(Term):
 
     @abstractmethod
     def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
-        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them.
+        """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them.
 
         ``v`` are the velocities, None in statics; ``past`` is the end of a run of the same scene.
         """
 
     def pass_on(self, memory: Memory) -> None:
-        """Save the forces of the last step that :meth:`carry_on` could not find again."""
+        """Save the forces of the last step that :meth:`carry_on` cannot recompute."""
 
 
 class _AtDofs(LoadTerm):
@@ -64,11 +64,11 @@ class _AtDofs(LoadTerm):
         dofs: Local degrees of freedom that are loaded; forces are at these alone.
     """
 
-    _forces: Array  # rows of forces: the first is that of the equation
+    _forces: Array  # rows of forces: the first is in the equation
 
     def _load(self, share: Share, loaded: Array, owners: Sequence[Load], rows: int) -> None:
-        """Make ``dofs`` of those that are not zero in ``loaded``, on any process, and forces."""
-        # A process may own degrees of freedom that others load.
+        """Make ``dofs`` of the nonzero entries of ``loaded`` on any process, and the forces."""
+        # Other processes may load degrees of freedom that this process owns.
         self.dofs: Index = np.flatnonzero(share.added(loaded)).astype(np.int32)
         self._size, self._in_time = share.size, [(load.amplitude, load) for load in owners]
         self._forces = np.zeros((rows, len(self.dofs)))
@@ -78,7 +78,7 @@ class _AtDofs(LoadTerm):
         return np.array([value_at(function, t, load) for function, load in self._in_time])
 
     def _whole(self, forces: Array) -> Array:
-        """Forces at all local degrees of freedom, from those that are loaded."""
+        """Return forces at all local degrees of freedom from forces at the loaded ones."""
         whole: Array = np.zeros(self._size)
         whole[self.dofs] = forces
         return whole
@@ -89,8 +89,8 @@ class DeadLoads(_AtDofs):
 
     def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
         self._scheme, self._ledger = scheme, ledger
-        # Loads of one time function are one vector, which belongs to the first of them for
-        # messages; functions need not be hashable.
+        # Loads with the same time function share a vector; messages name the first of them.
+        # Functions need not be hashable.
         vectors: dict[int, tuple[Load, Array]] = {}
         in_cells: dict[int, Array] = {}
         for load in loads:
@@ -101,17 +101,17 @@ class DeadLoads(_AtDofs):
         for key, along in in_cells.items():
             np.add.at(vectors[key][1], share.cell_dofs, along)
         owners, whole = zip(*vectors.values(), strict=True)
-        # Forces in the equation, at the end of the step, and at that of the last one.
+        # Forces in the equation, at the end of the step, and at the end of the last step.
         self._load(share, np.any(whole, axis=0) * 1.0, owners, rows=3)
         self._vectors = [vector[self.dofs] for vector in whole]
-        # Parts of the vectors that act: now, at the end of the step, at that of the last one, and
-        # in its equation.
+        # Factors of the vectors: now, at the end of the step, at the end of the last step, and in
+        # the equation of the last step.
         self._parts: Array = np.zeros((4, len(vectors)))
         self._along = [in_cells.get(key) for key in vectors]
         self.loops = loop("subtract_vector", self.vector), None
 
     def loads_in_cells(self) -> Any:
-        """``loads_in_cells`` of loops.h; null if nothing acts along beams."""
+        """Return ``loads_in_cells`` of loops.h; null if nothing acts along beams."""
         if not any(along is not None for along in self._along):
             return ffi.NULL
         along = [ffi.NULL if one is None else doubles(one) for one in self._along]
@@ -122,7 +122,7 @@ class DeadLoads(_AtDofs):
         return ffi.gc(c, lambda _, kept=(c, along): None)  # solutions outlive the term
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the vectors."""
+        """Return loops over the vectors."""
         number = len(self._vectors)
         c = self._c = struct(
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=number,
@@ -136,13 +136,13 @@ class DeadLoads(_AtDofs):
         return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
-        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
+        """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them."""
         self._parts[:3] = factors = self._factors_at(t)
         self._forces[:] = sum(f * vector for f, vector in zip(factors, self._vectors, strict=True))
         return self._whole(self._forces[0])
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The forces at the end of the last step."""
+        """Save or restore the forces at the end of the last step."""
         self._forces[:] = memory.added("dead loads", self._whole(self._forces[2]))[self.dofs]
         for k, part in enumerate(self._parts[2]):
             self._c.factors[k] = math.nan
@@ -150,10 +150,10 @@ class DeadLoads(_AtDofs):
 
 
 def _add_forces(load: Load, share: Share, forces: Array) -> Array | None:
-    """Add what a dead load of factor one exerts at places, consistent with displacements.
+    """Add the nodal forces of a dead load with factor one, consistent with displacements.
 
     Returns:
-        What it exerts on the nodes of the cells, (num_cells, dofs of a cell); None if nothing.
+        Forces on the nodes of the cells, (num_cells, dofs of a cell); None if there are none.
     """
     grid, per_beam, at_places = share.grid, None, []
     if isinstance(load, PointLoad):
@@ -180,7 +180,7 @@ def _add_forces(load: Load, share: Share, forces: Array) -> Array | None:
 
 
 class FollowerLoads(_AtDofs):
-    """Forces that turn with the cross-section they act on."""
+    """Forces that rotate with the cross-section they act on."""
 
     def __init__(
         self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
@@ -194,11 +194,11 @@ class FollowerLoads(_AtDofs):
         x, y, self._turning = np.ascontiguousarray(dofs.T)
         loaded: Array = np.zeros(share.size)
         loaded[dofs] = 1.0
-        # Forces in the latest residual, and in that of the last step.
+        # Forces in the latest residual, and in the residual of the last step.
         self._load(share, loaded, owners, rows=2)
         given = [[*load.force, load.moment] for load in owners]
         self._given = np.array(given, dtype=np.float64).reshape(-1, 3)
-        # In the equation, at the end of the step, and at that of the last one.
+        # In the equation, at the end of the step, and at the end of the last step.
         self._sizes = np.zeros((3, *self._given.shape))
         self._turns, self._A = np.zeros(len(here)), A
         self._c = struct(
@@ -214,13 +214,13 @@ class FollowerLoads(_AtDofs):
         self.loops = loop("subtract_follower_loads", self._c), tangent
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the loads."""
+        """Return loops over the loads."""
         c = fill(self._c, factor=callbacks.of_time(self._in_time))
         c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
-        """The loads at time ``t``; take the state ``q`` as one that is in equilibrium with them."""
+        """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them."""
         self._sizes[:] = self._given * self._factors_at(t).reshape(-1, 1)
         self._turns[:] = q[self._turning]
         self.add_residual(q, np.zeros(self._size))
@@ -228,7 +228,7 @@ class FollowerLoads(_AtDofs):
         return self._whole(self._forces[0])
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The forces in the equation of the last step, and their sizes."""
+        """Save or restore the forces in the equation of the last step, and their sizes."""
         self._forces[:] = memory.added("follower loads", self._whole(self._forces[1]))[self.dofs]
         self._sizes[:] = memory.rows("follower loads", self._numbers, self._sizes[2])
 
@@ -240,9 +240,9 @@ def _turned_mass(of: Element) -> ufl.Form:
 
 
 class FrameForces(LoadTerm):
-    """Centrifugal and Coriolis forces; the first have a potential, the second do no work.
+    """Centrifugal forces, which have a potential, and Coriolis forces, which do no work.
 
-    Rotary inertia keeps its spin in steady rotation, so no moments come of it.
+    Rotary inertia keeps its spin in steady rotation, so it causes no moments.
     """
 
     def __init__(
@@ -250,7 +250,7 @@ class FrameForces(LoadTerm):
     ) -> None:
         share = fields.share
         self._ledger = ledger
-        # Mass times a quarter turn of velocities, so that 2 Ω of it times them is Coriolis' force
+        # Mass times a quarter turn; Coriolis' force is 2 Ω times it times the velocities
         S, G = mass_matrix(fields), fields.assembled(_turned_mass(fields.element))
         for at, mass, _ in lumps(share.grid.scene):
             dofs = share.grid.node(at)[:2]
@@ -263,8 +263,8 @@ class FrameForces(LoadTerm):
         G.data *= coriolis
         self._matrices, self._A = (Product(S), Product(G)), A
         x, y = (np.ascontiguousarray(of, dtype=np.int32) for of in share.translations())
-        # Vectors from the axis to the places of all displacements.  Beams last: those joined to the
-        # ground share its displacement, not the place of its centre.
+        # Vectors from the axis to the places of all displacements.  Beams come last: beams joined
+        # to the ground share its displacement, not the place of its centre.
         grid, from_axis = share.grid, np.zeros(share.grid.size)
         centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
         points = np.concatenate([centers, grid.points]) - frame.about
@@ -286,12 +286,12 @@ class FrameForces(LoadTerm):
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at_cells)]
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the degrees of freedom."""
+        """Return loops over the degrees of freedom."""
         self._c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
-        """The forces at ``q``; take that state as one that is in equilibrium with them."""
+        """Return the forces at ``q``; this state is assumed in equilibrium with them."""
         self._c.grown = 1.0
         still = np.zeros(len(q))
         step = struct("time_step", q0=q, dt=math.inf, fraction=1.0, at=1.0)
@@ -301,6 +301,6 @@ class FrameForces(LoadTerm):
         return self._force.copy()
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The forces in the equation of the last step, and how much of them acts."""
+        """Save or restore the forces in the equation of the last step, and their growth."""
         self._force[:] = self._before[:] = memory.added("rotating frame", self._before)
         self._c.grown = memory.number("growth of the rotating frame", self._c.grown)

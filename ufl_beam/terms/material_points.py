@@ -1,18 +1,18 @@
 # SPDX-License-Identifier: MIT
 """Material points: return map, internal variables, stored and dissipated energies.
 
-The laws are traced with UFL symbols: UFL derives the consistent tangents, by the implicit function
-theorem where a discontinuity opens, and FFCx compiles them.  The return map is a loop in C over the
+The laws are traced with UFL symbols.  UFL derives the consistent tangents, by the implicit function
+theorem at opening discontinuities, and FFCx compiles them.  The return map is a loop in C over the
 points, material_points.c, which calls the compiled laws.
 
-With strong softening a step has two solutions, one in which a hinge stays closed and one in which
-it has opened.  The rule that chooses: a hinge, a crack of a fibre or a softening spring that does
-not flow at the beginning of a step stays closed in it if there is an equilibrium in which it bears
-at most its limit.  Of several that bear too much, the one with the largest excess opens first, and
-the others only if they still do then.
+With strong softening a step has two solutions: a hinge stays closed or opens.  A rule chooses
+between them.  A hinge, a crack of a fibre or a softening spring that does not flow at the beginning
+of a step stays closed if an equilibrium exists in which it bears at most its limit.  Of several
+points above their limits, the point with the largest excess opens first; the rest open only if they
+still exceed their limits.
 
-Laws of connectors that hold a motion follow the same rule, where the sliding force may be below the
-limit: what sticks goes on to stick, and what slides to slide, if there is such an equilibrium.
+Connector laws that hold a motion follow the same rule if the sliding force may be below the limit:
+sticking and sliding continue if such an equilibrium exists.
 """
 
 from __future__ import annotations
@@ -53,15 +53,15 @@ law_functions.log.register(Expr, ufl.ln)
 law_functions.tanh.register(Expr, ufl.tanh)
 
 DIGITS = 16 * float(np.finfo(float).eps)
-"""Round-off of dissipated energies, as a part of elastic ones of the strains."""
+"""Round-off of dissipated energies over elastic energies of the strains."""
 
 
 SPENT, NOTHING = 1e-6, 1e-30
-"""Part of its limit below which an open hinge counts as a joint; factor of its stiffness then."""
+"""Fraction of its limit below which an open hinge is a joint; factor of the joint's stiffness."""
 
 
 def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
-    """Make the entries of the ledger that points of a layout write, on whatever process."""
+    """Make the entries of the ledger that points of a layout write, on every process."""
     if layout.yields:
         ledger.state["hardening"] += 0.0
         ledger.lost["plastic"] += 0.0
@@ -72,25 +72,26 @@ def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
 
 
 def releases(layout: Layout, scheme: Scheme) -> bool:
-    """Return whether points lose energy numerically beside what ``alpha`` of a scheme takes.
+    """Return whether points have numerical losses besides those by ``alpha`` of a scheme.
 
-    No stress is left in what has broken but perhaps at the ends of a step.  Where elasticity is not
-    linear, the stress of a step is not the mean over it.
+    Broken points bear no stress, except perhaps at the ends of a step.  In nonlinear elasticity the
+    stress of a step is not its mean over the step.
     """
     return scheme.average(0.0, 1.0) != 1.0 and (layout.softening is not None or curved(layout.kind))
 
 
 class PointForms:
-    """Compiled laws: C functions from the inputs of a point to what the loops need.
+    """Compiled laws: C functions of the inputs of a point for the loops.
 
     The numbers of ``softening`` do not matter: they are inputs.
 
     Attributes:
-        law: Stresses and their derivatives by strains; of a law that solves for its variables
-            residuals and their derivatives, then stresses and theirs, see solve_law in C.
-        resistance: That of the discontinuity, and its derivative by the growth.
+        law: Stresses and their derivatives by strains.  For a law that solves for its variables:
+            residuals and their derivatives, then stresses and their derivatives, see solve_law in
+            C.
+        resistance: Resistance of the discontinuity, and its derivative by the growth.
         end: ``point_output`` of loops.h, stresses, and changes of the variables.
-        own: What a law that must dissipate does by itself, and the size of that; or null.
+        own: Dissipation of a law that must dissipate, and the size of its terms; or null.
     """
 
     def __init__(
@@ -135,12 +136,12 @@ class PointForms:
 
     @cached_property
     def elastic(self) -> Any:
-        """Stresses and their derivatives by strains while the variables stay as they are."""
+        """Stresses and their derivatives by strains at constant variables."""
         stress = tuple(map(ufl.as_ufl, self._equations.elastic_stress(self._at)))
         return self._pointwise.compile(*stress, *self._derivatives(stress, self._strains))
 
     def _derivatives(self, of: tuple[Expr, ...], by: tuple[str, ...]) -> list[Expr]:
-        """Derivatives, one row of each function."""
+        """Return derivatives, a row for each function."""
         return [ufl.diff(f, self._at[name]) for f in of for name in by]
 
 
@@ -148,31 +149,31 @@ _point_forms = stated(PointForms)
 
 
 class Points:
-    """Points of the same layout in many cells.
+    """Points with the same layout in many cells.
 
     Args:
         layout: The points of a cell.
         keys: See :meth:`Layout.numbers`.
-        length: Of the cells; (cells,); m.
+        length: Lengths of the cells; (cells,); m.
         scheme: The time scheme.
-        search: Flags of the present search for an equilibrium, see loops.h, which all points and
-            connectors of a scene share; (SEARCH_FLAGS,).
-        predicts: Let tangents predict stresses where points yield, see follow_prediction in C.
+        search: Flags of the present search for an equilibrium, see loops.h, shared by all points
+            and connectors of a scene; (SEARCH_FLAGS,).
+        predicts: True if tangents predict stresses of yielding points, see follow_prediction in C.
 
     Attributes:
         c: ``points`` of loops.h.
         names: Names of the inputs.
-        strains: Of the cells at the latest response; (cells, 3); may be written to.
+        strains: Strains of the cells at the latest response; (cells, 3); may be written to.
         r, D: The latest response, see :meth:`respond`.
         dt: Length of the step; (1,); s.
-        over: Largest ``|stress| / limit - 1`` of a point that was held closed, or zero; (1,).
+        over: Largest ``|stress| / limit - 1`` of a point that was kept closed, or zero; (1,).
         kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
             dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
-        sums: Of all cells: dissipated in the last step by plastic strains, by discontinuities,
-            lost numerically by backward Euler (θ = 1); stored elastically, and by hardening;
-            lost in the last step by what :func:`releases` names; work of the mean of the
-            stresses at both ends on plastic strains, less that of those at the end, of points whose
-            stress relaxes; (7,); J.
+        sums: Sums over all cells: energy dissipated in the last step by plastic strains and by
+            discontinuities, lost numerically by backward Euler (θ = 1); stored elastically, and by
+            hardening; lost in the last step as in :func:`releases`; work on plastic strains of the
+            mean of the stresses at both ends, less the work of the end stresses, for points with
+            stress relaxation; (7,); J.
     """
 
     def __init__(
@@ -193,7 +194,7 @@ class Points:
         cells, of_cell, width = len(length), len(layout.weights), len(self.names)
         self._storage = storage = np.zeros((cells, of_cell, width))
         self._at = {name: storage[:, :, i] for i, name in enumerate(self.names)}
-        # The internal variables, and what else of an accepted state the next step depends on
+        # Internal variables, and further data of an accepted state for the next step
         others = ("jump", "opening", *rows(law, "before"), "traction", "flows")
         self._kept = (*prefixed("state", law.variables), *others)
         self._components = len(law.resultants or "x")
@@ -244,16 +245,16 @@ class Points:
         return self._at[name]
 
     def _rows(self, name: str) -> tuple[str, ...]:
-        """Names of the components of a strain or stiffness."""
+        """Return the names of the components of a strain or stiffness."""
         return rows(self._layout.kind.law, name)
 
     def _of_points(self, strains: Array) -> tuple[Array, ...]:
-        """Strains of the points by component, each (cells, n), from those of the cells."""
+        """Return strains of the points by component, (cells, n) each, from strains of the cells."""
         d = self._components
         return tuple(strains @ self._layout.strains[k::d].T for k in range(d))
 
     def _resist(self) -> None:
-        """Resistance after the openings so far."""
+        """Update the resistance after the openings so far."""
         softening, breaking = self._layout.softening, self._layout.breaking
         if softening is not None:
             self["traction"][:, breaking] = softening.traction(self["opening"][:, breaking])
@@ -261,23 +262,23 @@ class Points:
     # -- the step ------------------------------------------------------------------------------
 
     def start(self, strains: Array) -> None:
-        """Begin at these strains of the cells and not at those accepted; (cells, 3); 1, 1, 1/m."""
+        """Begin at these strains of the cells, not the accepted strains; (cells, 3); 1, 1, 1/m."""
         self._e0[:] = strains
         for name, values in zip(self._rows("before"), self._of_points(strains), strict=True):
             self[name][:] = values
         self._resist()
 
     def begin(self, dt: float) -> None:
-        """Begin a step of this length; s."""
+        """Begin a step of length ``dt``; s."""
         if dt != self.dt[0]:
             self["dt"][:] = self.dt[0] = dt
         self.c.tried = 0  # of a law that solves for its variables
 
     def respond(self, strains: Array) -> tuple[Array, Array]:
-        """(N, V, M) that act in a step to these strains, and derivatives; (cells, 3), (cells, 9).
+        """Return (N, V, M) in a step to these strains, and derivatives; (cells, 3), (cells, 9).
 
-        They are not a number where an opening was not found.  The arrays are reused.  Predictions
-        of the last tangent do not matter.
+        They are NaN if an opening was not found.  The arrays are reused.  Predictions of the last
+        tangent do not matter.
         """
         self.c.predicts, self.c.linear = 0, ffi.NULL
         self.strains[:] = strains
@@ -285,7 +286,7 @@ class Points:
         return self.r, self.D
 
     def tangent(self) -> tuple[Array, Array]:
-        """Strains of the accepted state, and derivatives of a response to them; nothing changes.
+        """Return strains of the accepted state, and derivatives of a response; nothing changes.
 
         Shapes (cells, 3) and (cells, 9).
         """
@@ -298,7 +299,7 @@ class Points:
                 array[:] = values
 
     def remaining(self, change: Array) -> Array:
-        """Part of the elastic stiffness that is left for small changes of the strains; (cells,)."""
+        """Return the remaining fraction of elastic stiffness for small ``change``; (cells,)."""
         layout, theta = self._layout, self["theta"][0, 0]
         elastic = theta * change**2 @ layout.rest
         for name, by_point in zip(self._rows("stiffness"), self._of_points(change), strict=True):
@@ -307,10 +308,10 @@ class Points:
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
 
     def require_dissipation(self, describe: Callable[[int], str]) -> None:
-        """Raise :class:`StepFailed` if a point gives energy; ``describe`` names its cell.
+        """Raise :class:`StepFailed` if a point generates energy; ``describe`` names its cell.
 
-        That is a law whose dissipation is negative: its equations have several solutions, and one
-        was found that no material comes to.
+        The dissipation of the law is then negative: its equations have several solutions, and the
+        solver found a solution that no material reaches.
         """
         if (worst := lib.gives_energy(self.c)) >= 0:
             law = type(self._layout.kind.law).__name__
@@ -322,13 +323,13 @@ class Points:
             )
 
     def accept(self) -> None:
-        """Take the strains of the latest response as the new state."""
+        """Accept the strains of the latest response."""
         lib.commit(self.c)
 
     def dissipation(self) -> float:
-        """Energy that :meth:`accept` would add to what is dissipated; J.
+        """Return the energy that :meth:`accept` would add to the dissipated energies; J.
 
-        It is zero up to the round-off of the energies by whose difference laws may find it.
+        It is zero up to the round-off of the energies from whose difference laws may compute it.
         """
         copy = self._copy()
         lib.commit(copy)
@@ -339,7 +340,7 @@ class Points:
         return float(broken + (plastic if abs(plastic) > DIGITS * size else 0.0))
 
     def _copy(self) -> Any:
-        """Points with a copy of the state, which loops may change, and the same response."""
+        """Return points with the same response and a copy of the state, which loops may change."""
         copy = ffi.new("points *", self.c[0])
         return fill(
             copy, e0=self._e0.copy(), w=self._storage.copy(), kept=self.kept.copy(),
@@ -347,9 +348,9 @@ class Points:
         )  # fmt: skip
 
     def freeze(self) -> None:
-        """Keep everything elastic from now on; hinges that bear no moment any more are free.
+        """Make all points elastic from now on; hinges without remaining moment are free.
 
-        So points answer a vibration, however small, of what has yielded: elastic unloading.
+        So points respond to any small vibration of a yielded state by elastic unloading.
         """
         breaking, softening = self._layout.breaking, self._layout.softening
         if softening is not None:
@@ -362,9 +363,10 @@ class Points:
     # -- the ledger ----------------------------------------------------------------------------
 
     def in_steps(self, ledger: Ledger) -> dict[str, Any]:
-        """Fields of ``inelastic_term`` of loops.h, with entries of the ledger.
+        """Return fields of ``inelastic_term`` of loops.h, with entries of the ledger.
 
-        In statics a copy as well, which tells what a step would change.
+        In statics they include a copy, to compute the energy change of a step before it is
+        accepted.
         """
         state, lost = ledger.state, ledger.lost
         kinds = {
@@ -382,13 +384,13 @@ class Points:
     def state(self) -> Array:
         """Return the internal variables of the accepted state; (cells, k); a copy."""
         stored = np.zeros((len(self.kept), 2))
-        stored[:1] = self.sums[3:5]  # of all cells together; to whom it belongs does not matter
+        stored[:1] = self.sums[3:5]  # of all cells together; the owner does not matter
         return np.hstack([*(self[name] for name in self._kept), self.kept, self._e0, stored])
 
     def restore(self, rows: Array) -> None:
-        """Take over :meth:`state`.
+        """Restore the variables of :meth:`state`.
 
-        Call :meth:`start` and :meth:`refresh` where strains or laws are not those it is of.
+        Call :meth:`start` and :meth:`refresh` afterwards if strains or laws differ from that state.
         """
         ends = np.arange(1, len(self._kept) + 1) * self._storage.shape[1]
         *variables, kept, e0, stored = np.split(rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
@@ -398,7 +400,7 @@ class Points:
         self.sums[3:5] = stored.sum(axis=0)
 
     def refresh(self, strains: Array) -> None:
-        """Make forces and stored energies those of a state that no step has led to."""
+        """Compute forces and stored energies of a state without a step."""
         layout, length, law = self._layout, self["length"][:, :1], self._equations.law(self._at)
         state, volume = self._equations.state(self._at), layout.weights * length
         relieved = self["jump"] / self["length"]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Supports and prescribed motions: degrees of freedom whose values are given."""
+"""Supports and prescribed motions: degrees of freedom with prescribed values."""
 
 from __future__ import annotations
 
@@ -22,16 +22,17 @@ from ufl_beam.terms.energy_ledger import Ledger
 
 
 class Supports:
-    """Supports of a scene: held and prescribed degrees of freedom, reactions.
+    """Supports of a scene: constrained and prescribed degrees of freedom, reactions.
 
-    Unknowns and residuals of the solver are in the turned axes of the supports, those of the terms
-    in the axes of the plane; :meth:`enter` and :meth:`leave` change between them.
+    Unknowns and residuals of the solver are in the turned axes of the supports.  Unknowns and
+    residuals of the terms are in the axes of the plane.  :meth:`enter` and :meth:`leave` transform
+    them.
 
     Attributes:
-        reactions: Forces of the supports on the scene in the latest residual, at the degrees of
-            freedom that are held, in turned axes.
-        entries: Entries of the matrix that hold them, and those of them on the diagonal.
-        pivots: What stands on the diagonal.
+        reactions: Forces of the supports on the scene in the latest residual, at the constrained
+            degrees of freedom, in turned axes.
+        entries: Matrix entries in rows and columns of ``dofs``, and their diagonal entries.
+        pivots: Values on the diagonal.
         turned, axes: Number of supports at an angle; ``turned_axes`` of loops.h.
         moving: Local degrees of freedom whose values depend on time.
     """
@@ -76,25 +77,25 @@ class Supports:
         lib.turn_axes(self.turned, self.axes, doubles(x), -1)
 
     def in_axes(self, q: Array) -> Array:
-        """``q`` in the axes of the supports; a copy only if an axis is turned."""
+        """Return ``q`` in the axes of the supports; a copy only if an axis is turned."""
         if self.turned:
             self.enter(q := q.copy())
         return q
 
     def in_plane(self, x: Array) -> Array:
-        """``x`` in the axes of the plane; a copy only if an axis is turned."""
+        """Return ``x`` in the axes of the plane; a copy only if an axis is turned."""
         if self.turned:
             self.leave(x := x.copy())
         return x
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
-        """Set in ``x`` what is prescribed for the step that begins at ``x0``."""
+        """Set the prescribed values in ``x`` for the step that begins at ``x0``."""
         for dof, motion, support in self._motions:
             target = value_at(motion, step.motion_time, support)
             x[dof] = x0[dof] + step.fraction * (target - x0[dof])
 
     def in_c(self, callbacks: Callbacks) -> Any:
-        """``moving_supports`` of loops.h: what they prescribe in steps without Python."""
+        """Return ``moving_supports`` of loops.h: prescribed motions for steps without Python."""
         moves = [(motion, support) for _, motion, support in self._motions]
         entry = self._ledger.supplied.pointer("supports") if self.work else ffi.NULL
         return struct(
@@ -105,13 +106,13 @@ class Supports:
         )  # fmt: skip
 
     def hold(self, r: Array) -> None:
-        """Note the reactions in a residual that is complete, and remove them from it."""
+        """Store the reactions of a complete residual, and remove them from it."""
         if len(self.dofs):
             self.reactions[:] = r[self.dofs]
             r[self.dofs] = 0.0
 
     def stop(self, v: Array) -> None:
-        """Set velocities of what does not move to zero, in place; else they would ring."""
+        """Set velocities at fixed supports to zero, in place; else they would oscillate."""
         self.enter(v)
         moving = v[self.moving]
         v[self.dofs] = 0.0
@@ -119,11 +120,11 @@ class Supports:
         self.leave(v)
 
     def take(self) -> None:
-        """Take the latest reactions as those of the accepted state."""
+        """Accept the latest reactions."""
         self._before[:] = self.reactions
 
     def go_back(self) -> None:
-        """Return to the reactions of the accepted state: a step has failed."""
+        """Return to the reactions of the accepted state after a failed step."""
         self.reactions[:] = self._before
 
     def carry_on(self, memory: Memory, q: Array) -> None:
@@ -134,7 +135,7 @@ class Supports:
         self.take()
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The reactions, and what stands for what is held in the tangent."""
+        """Save or restore the reactions and the pivots."""
         self.carry_on(memory, q)
         pivots = np.zeros(len(q))
         pivots[self.dofs] = self.pivots
@@ -142,9 +143,9 @@ class Supports:
 
 
 def _turned_axes(dofs: Index, angle: float, A: Csr) -> tuple[Any, ...]:
-    """Fields of ``turned_axes`` of loops.h for the displacement of a place."""
+    """Return fields of ``turned_axes`` of loops.h for the displacement of a place."""
     rows = [np.arange(A.indptr[d], A.indptr[d + 1], dtype=np.int32) for d in dofs]
-    # Both dofs belong to the same cells, so their rows, and their columns, have one sparsity.
+    # Both dofs belong to the same cells, so their rows and columns have the same sparsity.
     columns = [np.flatnonzero(A.indices == d).astype(np.int32) for d in dofs]
     sizes, entries = (len(rows[0]), len(columns[0])), map(integers, (*rows, *columns))
     return *map(int, dofs), *sizes, math.cos(angle), math.sin(angle), *entries

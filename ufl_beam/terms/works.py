@@ -29,14 +29,14 @@ from ufl_beam.terms.loads import LoadTerm
 
 
 class Acting:
-    """A work on those cells of a process on which it acts.
+    """Work on the cells of a process on which it acts.
 
     Attributes:
         order: Positions of the cells in ``share.cells``.
         residual: Form of the forces.
         tangent: Form of their derivative, if there is any.
-        passes_on: True if forces depend on the motion of the last step, and their work is counted
-            on.
+        passes_on: True if forces depend on the motion of the last step and enter the work of the
+            next.
     """
 
     def __init__(
@@ -57,7 +57,7 @@ class Acting:
         if self.tangent is not None:
             self.tangent.place(A)
         self._numbers: Array = np.full(len(stated.numbers), math.nan)
-        # Forces of a virtual work in the equation of the last step.
+        # Forces of a virtual work in the equation of the last step
         self._before = np.zeros(0 if self._energy else fields.share.size)
 
     def in_c(self, ledger: Ledger, callbacks: Callbacks) -> Any:
@@ -84,7 +84,7 @@ class Acting:
         )  # fmt: skip
 
     def take(self, q: Array, past: Memory | None) -> Array:
-        """Take forces at ``q`` as those before the next step, or those that ``past`` knows."""
+        """Return the forces at ``q`` or in ``past``, and keep them for the next step."""
         force = np.zeros(len(q))
         self.residual.add(q, force)
         if self._energy is not None:
@@ -95,7 +95,7 @@ class Acting:
         return self._before
 
     def remember(self, memory: Memory) -> None:
-        """The forces of a virtual work in the equation of the last step."""
+        """Save or restore the forces of a virtual work in the equation of the last step."""
         if self._energy is None:
             self._before[:] = memory.added(self._saved_as, self._before)
 
@@ -122,7 +122,7 @@ class Acting:
 
 
 def _position(form: Kernel, function: fem.Function) -> int:
-    """Where a form has the values of a function; -1 if it has none."""
+    """Return the position of the values of a function in a form; -1 if it has none."""
     return form.position(function) if form.uses(function) else -1
 
 
@@ -132,8 +132,8 @@ def _position(form: Kernel, function: fem.Function) -> int:
 class Works(LoadTerm):
     """Works of a scene on the cells of a process; all processes have the term.
 
-    What a virtual work does is entered as supplied, the energy of a potential as one of the state.
-    Virtual works grow in parts of the first step, as loads do; potentials are there.
+    Virtual works are entered as supplied work, energies of potentials as state.  Virtual works grow
+    over substeps of the first step, as loads do; potentials act fully from the start.
     """
 
     def __init__(self, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr, t0: float) -> None:
@@ -143,7 +143,7 @@ class Works(LoadTerm):
         self._parts: list[Acting] = []
         for work in grid.scene.works:
             stated = statement(work, element_of(grid.mesh), scheme)
-            # The entries, also on processes without such cells
+            # Make entries also on processes without such cells
             of_energy = isinstance(work, Potential)
             (ledger.state if of_energy else ledger.supplied)[work.name] += 0.0
             if stated.varies(work):
@@ -171,7 +171,7 @@ class Works(LoadTerm):
         ]
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Loops over the works."""
+        """Return loops over the works."""
         self._callbacks = callbacks
         self._in_c = [one.in_c(self._ledger, callbacks) for one in self._parts]
         fill(self._c, work=ffi.new("user_work *[]", self._in_c))
@@ -179,9 +179,9 @@ class Works(LoadTerm):
         return Phases([begin], [accept], [loop("add_energy_of_works", self._c)])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
-        """The forces at ``q``; take that state as one that is in equilibrium with them."""
+        """Return the forces at ``q``; this state is assumed in equilibrium with them."""
         self._c.t, self._c.grown = t, 1.0
-        # As at the end of a second in which the velocities stayed.
+        # As at the end of a second with constant velocities
         before, dt = (q, math.inf) if v is None else (q - v, 1.0)
         times = {"load_time": t, "motion_time": t, "fraction": 1.0, "at": 1.0}
         step = struct("time_step", q0=before, dt=dt, **times)
@@ -197,7 +197,7 @@ class Works(LoadTerm):
                 one.remember(memory)
 
     def remember(self, memory: Memory, q: Array) -> None:
-        """The time and growth of the works, and their forces in the equation of the last step."""
+        """Save or restore time and growth of the works, and their forces in the last equation."""
         self._c.t = memory.number("time of works", self._c.t)
         self._c.grown = memory.number("growth of works", self._c.grown)
         self._force[:] = memory.added("works", self._force)
@@ -211,6 +211,6 @@ class Works(LoadTerm):
 
 
 def _calls(kernels: list[Kernel]) -> tuple[Any, Any]:
-    """Argument of ``add_calls`` of loops.h, and what it needs alive."""
+    """Return the argument of ``add_calls`` of loops.h, and an object to keep alive."""
     calls = ffi.new("call[]", [loop("add_cells", kernel.cells) for kernel in kernels])
     return ffi.new("calls *", {"number": len(kernels), "part": calls}), calls
