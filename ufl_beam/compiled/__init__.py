@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Compilation of C and of UFL forms, the code in C, and matrices that it fills."""
+"""Compilation of C and of UFL forms, the C library, and the matrices that it fills."""

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Library of the package in C: loops over cells and rows, material points, Newton's method.
+"""C library of the package: loops over cells and rows, material points, Newton's method.
 
-It is compiled once for the machine.  The loops over cells do what DOLFINx's assemblers do (a test
-compares both), but also update the unknowns of a cell, and know where its entries of a matrix are.
+It is compiled once for the machine.  The loops over cells assemble as DOLFINx does (a test compares
+both); they also update the unknowns of a cell, and store the matrix indices of its entries.
 """
 
 from __future__ import annotations
@@ -27,11 +27,10 @@ SOURCES = (
     "loops", "material_points", "rigid_plastic", "connectors", "guide_curves", "elimination",
     "fronts", "newton", "cell_forces", "march",
 )  # fmt: skip
-"""Files of C beside this one; they are one translation unit."""
+"""C files beside this one; they form one translation unit."""
 
 FLAGS = ["-O3", NATIVE, "-fopenmp-simd", "-ffp-contract=off"]
-"""Flags for the compiler; sums may be in the order of vectors, but each product is rounded, as in
-NumPy."""
+"""Compiler flags; sums may be reordered for vectors, but each product is rounded, as in NumPy."""
 
 _CALLBACKS = """
 extern "Python" void curve_in_python(void *handle, double s, double step, double *out);
@@ -70,12 +69,12 @@ for _name, _field in ffi.typeof("petsc_functions").fields:
 
 
 def opaque(thing: Any) -> Any:
-    """An object of petsc4py as C has it; other things as they are."""
+    """Return the C pointer of a petsc4py object; other arguments are returned unchanged."""
     return ffi.cast("void *", thing.handle) if isinstance(thing, PETSc.Object) else thing
 
 
 def petsc(name: str, *arguments: Any) -> None:
-    """Call a function of ``petsc_functions`` in loops.h; objects of petsc4py are theirs in C."""
+    """Call a function of ``petsc_functions`` in loops.h; petsc4py objects become C pointers."""
     if error := getattr(lib.petsc, name)(*map(opaque, arguments)):
         text, specific = ffi.new("const char **"), ffi.new("char **")
         lib.petsc.PetscErrorMessage(error, text, specific)
@@ -115,7 +114,7 @@ _kept: WeakKeyDictionary[Any, dict[str, Any]] = WeakKeyDictionary()
 
 
 def fill(struct: Any, **fields: Any) -> Any:
-    """Set fields of a struct of loops.h, and return it; with it, what they point to stays alive.
+    """Set fields of a struct of loops.h and return it; it keeps the values alive.
 
     Arrays become pointers to their float64 or int32.
     """
@@ -134,7 +133,7 @@ def struct(kind: str, **fields: Any) -> Any:
 
 
 def names(enum: str, prefix: str = "") -> tuple[str, ...]:
-    """Return the names in an enum of loops.h, in order, without the last, which counts them."""
+    """Return the names in an enum of loops.h, in order, without the last, which is their number."""
     elements = ffi.typeof(f"enum {enum}").elements
     return tuple(elements[i].lower().removeprefix(prefix) for i in range(len(elements) - 1))
 
@@ -148,17 +147,17 @@ def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
 
 
 LARGE = 2**16
-"""Unknowns of a scene from which on memory is given back, which takes at least 0.03 ms."""
+"""Number of unknowns from which on memory is released to the system; that takes 0.03 ms or more."""
 
 
 def give_back_memory(unknowns: int) -> None:
-    """Give memory that is free to the system, which the C library of GNU keeps; of large scenes."""
+    """Return freed memory of large scenes to the system; the GNU C library keeps it otherwise."""
     if unknowns > LARGE:
         lib.give_back_memory()
 
 
 def kernel(pointer: Any, of: Any) -> Any:
-    """Cast an FFCx kernel, a function pointer of the cffi instance ``of``, to that of loops.h."""
+    """Cast an FFCx kernel, a function pointer of the cffi instance ``of``, for loops.h."""
     expected, found = ffi.typeof("kernel *").cname, of.typeof(pointer).cname
     if found != expected:
         raise RuntimeError(

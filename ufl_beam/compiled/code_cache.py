@@ -2,9 +2,9 @@
 """Directory of compiled code: private to its user, checked before use, complete after a kill.
 
 An entry is a directory with the files of one build and a list of their checksums.  It is built
-elsewhere, written to the disk and renamed, so that a process that dies leaves no part of one.  The
-lock of an entry belongs to the operating system, which frees it when the process ends.  Entries
-that were not used for a month are removed, at most once a day.
+elsewhere, written to the disk and renamed, so that a killed process leaves no incomplete entry.
+The lock of an entry belongs to the operating system, which frees it when the process ends.  A
+sweep, at most once a day, removes entries that were not used for a month.
 """
 
 from __future__ import annotations
@@ -34,33 +34,33 @@ CHECKSUMS = "checksums"
 """File of an entry with its name and the checksums of its other files."""
 
 SWEPT = "swept"
-"""File whose time of change is when unused entries were looked for last."""
+"""File whose modification time is the time of the last sweep."""
 
 DAY = 86_400.0
-"""Time after which a use is noted again, and unused entries are looked for again; s."""
+"""Shortest time between two records of use of an entry, and between two sweeps; s."""
 
 UNUSED = 30 * DAY
-"""Time after which an entry that was not used is removed; s."""
+"""Time after which an unused entry is removed; s."""
 
 TRUSTED = os.geteuid(), 0
 """Users whose files are loaded: this one and the administrator."""
 
 
 def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tuple[T, Path]:
-    """Load an entry of the cache and its directory, built first if it is missing or damaged.
+    """Load an entry of the cache, which is built if it is missing or damaged; return its directory.
 
-    Processes that need the same entry at once build it once; the others wait.  ``build`` writes its
-    files into an empty directory and loads them.  ``name`` must change with what it is made of.
+    If several processes need the same entry, one builds it and the others wait.  ``build`` writes
+    its files into an empty directory and loads them.  ``name`` must change with the sources.
     """
     place, foreign = _place(), False
     if intact(place / name):
         try:
-            if _age(place / name / CHECKSUMS) > DAY:  # note that it is in use
-                with suppress(PermissionError):  # of the administrator
+            if _age(place / name / CHECKSUMS) > DAY:  # record the use
+                with suppress(PermissionError):  # an entry of the administrator
                     os.utime(place / name / CHECKSUMS)
             return load(place / name), place / name
         except FileNotFoundError:
-            pass  # removed in between, as it was not used for long
+            pass  # a sweep has just removed the entry
         except ImportError:
             foreign = True  # built for another system
     if not os.access(place, os.W_OK | os.X_OK):
@@ -90,13 +90,13 @@ def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tu
 
 
 def _remove_parts(entry: Path) -> None:
-    """Remove what processes that were killed have left of an entry."""
+    """Remove incomplete builds of an entry that killed processes have left."""
     for rest in entry.parent.glob(f"{entry.name}.*.part"):
         shutil.rmtree(rest, ignore_errors=True)
 
 
 def intact(entry: Path) -> bool:
-    """Return whether an entry is complete, as it was built, and of a trusted owner."""
+    """Return whether an entry is complete, unchanged since its build, and of a trusted owner."""
     try:
         return (entry / CHECKSUMS).read_text() == _checksums(entry, entry.name)
     except (OSError, ValueError):
@@ -104,7 +104,7 @@ def intact(entry: Path) -> bool:
 
 
 def _checksums(entry: Path, name: str) -> str:
-    """Name of an entry and SHA-256 of its files; ValueError if not all are files of this user."""
+    """Return the name of an entry and the SHA-256 of its files; ValueError for foreign files."""
     lines = [name]
     for path in sorted(entry.iterdir()):
         status = path.lstat()
@@ -115,18 +115,18 @@ def _checksums(entry: Path, name: str) -> str:
     return "\n".join(lines) + "\n"
 
 
-# -- what was not used for long ------------------------------------------------------------------
+# -- unused entries ------------------------------------------------------------------------------
 
 
 def _age(path: Path) -> float:
-    """Time since a file was written, or was used, which is noted once a day; s."""
+    """Return the time since a file was written or its use was recorded, once a day; s."""
     return time.time() - path.stat().st_mtime
 
 
 def sweep(place: Path) -> None:
-    """Remove entries that were not used for long, with their locks; at most once a day.
+    """Remove entries that were not used for long, and their locks; at most once a day.
 
-    An entry is moved away before it is removed, so that no process finds a part of it.
+    An entry is renamed before it is removed, so that no process finds an incomplete entry.
     """
     with suppress(OSError):
         if (place / SWEPT).exists() and _age(place / SWEPT) < DAY:
@@ -140,7 +140,7 @@ def sweep(place: Path) -> None:
                     if _age(entry / CHECKSUMS) < UNUSED:
                         continue
                     entry.rename(aside)
-                    if _age(aside / CHECKSUMS) < UNUSED:  # by a process that found it just before
+                    if _age(aside / CHECKSUMS) < UNUSED:  # a process has just used it
                         aside.rename(entry)
                         continue
                 _remove_parts(entry)
@@ -151,7 +151,7 @@ def sweep(place: Path) -> None:
 
 
 def _made(directory: Path) -> str:
-    """Make a private directory if it is missing; return why it cannot be used, or empty."""
+    """Create a private directory if it is missing; return why it cannot be used, else ""."""
     try:
         directory.mkdir(mode=0o700, parents=True, exist_ok=True)
         status = directory.lstat()
@@ -172,7 +172,7 @@ def _made(directory: Path) -> str:
 
 @cache
 def _place() -> Path:
-    """Directory of the entries."""
+    """Return the directory of the entries."""
     chosen = jit_directory() / "ufl_beam"
     if why := _made(chosen):
         return _temporary(f"the cache {chosen} cannot be used: {why}")
@@ -183,7 +183,7 @@ def _place() -> Path:
 
 @cache
 def _temporary(why: str) -> Path:
-    """Private directory for temporary files; the first process says once why it is used."""
+    """Return a private temporary directory; the first process warns once why it is used."""
     base = Path(tempfile.gettempdir())
     directory = base / f"ufl_beam-{os.geteuid()}"
     if _made(directory):

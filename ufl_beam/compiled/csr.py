@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Sparse matrices by rows, filled by loops in C and solved with by PETSc."""
+"""Sparse matrices by rows, which C loops fill and PETSc solves."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from ufl_beam.memory import of_structure
 
 
 class Csr:
-    """Compressed sparse rows with indices of 32 bits, as C needs them; SciPy chooses others.
+    """Compressed sparse rows with the 32-bit indices that C needs; SciPy may choose others.
 
-    ``again`` finds the indices once more where :meth:`release` gives them back.
+    ``again`` recomputes the indices after :meth:`release` has freed them.
     """
 
     def __init__(
@@ -37,14 +37,14 @@ class Csr:
         return self._again()
 
     def release(self) -> None:
-        """Give back the memory of :attr:`indices`, until they are asked for again."""
+        """Free the memory of :attr:`indices` until they are needed again."""
         if self._again is not None:
             vars(self).pop("indices", None)
 
     def zeros_like(self) -> Csr:
-        """Return a matrix of the same sparsity pattern, which is stored once."""
+        """Return a matrix that shares the sparsity pattern."""
         other = copy(self)
-        other.data = np.zeros(len(self.data))  # zeros_like writes them
+        other.data = np.zeros(len(self.data))  # zeros_like would touch the memory
         return other
 
     @property
@@ -53,7 +53,7 @@ class Csr:
         return len(self.indptr) - 1
 
     def narrow(self) -> bool:
-        """Return whether a byte can tell all entries of a row apart."""
+        """Return whether a byte can number the entries of each row."""
         return bool(np.diff(self.indptr).max(initial=0) <= 256)
 
     def rows(self) -> Index:
@@ -78,8 +78,9 @@ class Csr:
     def blocks(self, dofs: Index, lanes: int) -> Index:
         """Find the entries of all pairs of ``dofs``, int32, of each cell, in batches of cells.
 
-        They must exist; (num_batches, pairs, lanes), see :func:`in_batches`.  If rows have at most
-        256 entries, their places in the row, uint8; else those in :attr:`data`, int32.
+        They must exist.  The result has the shape (num_batches, pairs, lanes), see
+        :func:`in_batches`.  It has positions in the row (uint8) if rows have at most 256 entries,
+        else positions in :attr:`data` (int32).
         """
         cells, of_cell = dofs.shape
         narrow = self.narrow()
@@ -93,7 +94,7 @@ class Csr:
         return found
 
     def petsc(self) -> PETSc.Mat:
-        """Return a PETSc matrix on this process that shares the arrays, and keeps them."""
+        """Return a PETSc matrix on this process that shares the arrays and keeps them alive."""
         indptr, indices = (x.astype(PETSc.IntType, copy=False) for x in (self.indptr, self.indices))
         self._again = None
         arrays = (indptr, indices, self.data)
@@ -103,14 +104,14 @@ class Csr:
 
 
 def coupling(size: int, *coupled: Index) -> Csr:
-    """Return a matrix of zeros whose pattern has the diagonal and all pairs of coupled dofs."""
+    """Return a zero matrix whose pattern has the diagonal and all pairs of coupled dofs."""
     indices, indptr = _pattern(size, *coupled)
     return Csr(np.zeros(len(indices)), indices, indptr, lambda: _pattern(size, *coupled)[0])
 
 
 @of_structure
 def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
-    """Column indices and first entries of the rows of :func:`coupling`."""
+    """Return ``indices`` and ``indptr`` of :func:`coupling`."""
     none = np.empty(0, dtype=np.int32)
     lengths = np.concatenate([none, *(np.full(len(x), x.shape[1], np.int32) for x in coupled)])
     dofs = np.concatenate([none, *(rows.ravel() for rows in coupled)]).astype(np.int32, copy=False)
@@ -129,7 +130,8 @@ def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
 class Product:
     """Operator ``x -> A x`` on this process, without the zeros that ``A`` stores.
 
-    Rows whose entries are equally far from the diagonal are a run, as most are along beams.
+    Successive rows whose entries have the same distances from the diagonal are a run, as most rows
+    along beams are.
     """
 
     def __init__(self, A: Csr) -> None:
@@ -156,7 +158,7 @@ class Product:
         )  # fmt: skip
 
     def pairs(self) -> tuple[Index, Index]:
-        """Return row and column of each entry, in their order in :attr:`data`."""
+        """Return row and column of each entry, in the order of :attr:`data`."""
         rows = np.repeat(self._rows, self._widths)
         first = np.repeat(self._first[:-1], self._widths)
         before = np.cumsum(rows) - rows
@@ -164,7 +166,7 @@ class Product:
         return row, row + np.repeat(self._away, rows)
 
     def __call__(self, x: Array) -> Array:
-        """Return the product, a new array."""
+        """Return the product in a new array."""
         y = np.zeros(len(x))
         lib.add_product(self.c, doubles(x), doubles(y))
         return y
@@ -176,15 +178,15 @@ class Product:
 
 
 class StepProduct:
-    """Forces ``A (factor s - back v)``, s being (Δu, 2 tan(Δψ/2)), and their derivative.
+    """Forces ``A (factor s - back v)`` with s = (Δu, 2 tan(Δψ/2)), and their derivative.
 
-    ``A`` is constant; the derivative is added to ``tangent``, of the same structure.  ``scratch``
-    is space for as many numbers as there are rows, which others may use too.
+    ``A`` is constant and has the sparsity pattern of ``tangent``, to which the derivative is added.
+    ``scratch`` is space for a number in each row; others may use it too.
 
     Attributes:
-        c: ``step_product`` of loops.h; phases give it factors, velocities and the beginning.
-        loops: C functions of the forces and of their derivative.
-        rate: Place of the address of ``factor s - back v`` in the latest forces.
+        c: ``step_product`` of loops.h; phases of a step set factors, velocities and q0.
+        loops: C functions that add the forces and their derivative.
+        rate: Pointer to the address of ``factor s - back v`` in the latest forces.
     """
 
     def __init__(self, A: Csr, rotations: Index, tangent: Csr, scratch: Array) -> None:
@@ -203,7 +205,7 @@ class StepProduct:
         self.rate = ffi.addressof(self.c, "rate")
 
     def matrix(self) -> Csr:
-        """Return the matrix, a new one."""
+        """Return the matrix ``A`` as a new matrix."""
         A = self._tangent.zeros_like()
         A.data[A.positions(*self.A.pairs())] = self.A.data
         return A

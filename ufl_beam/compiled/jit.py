@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Compiled code: modules of C and forms of UFL, compiled once for the machine.
+"""Compilation of C modules and UFL forms, once for the machine.
 
 FFCx needs a C compiler at run time anyway.
 """
@@ -37,11 +37,11 @@ HEADERS = f"""\
 #include <malloc.h>
 #endif
 #define CALL(f, e, w, c, x) f(e, w, c, x, 0, 0{TABULATE[1]})"""
-"""Head of all files of C; CALL calls a kernel of FFCx."""
+"""Head of all C files; CALL calls a kernel of FFCx."""
 
 
 def text(name: str) -> str:
-    """Return the text of a file of C."""
+    """Return the text of a C file."""
     return (Path(__file__).parent / "c" / name).read_text()
 
 
@@ -49,30 +49,32 @@ DECLARATIONS = f"""\
 typedef void (kernel)({TABULATE[0]});
 typedef int{8 * np.dtype(PETSc.IntType).itemsize}_t petsc_int;
 {text("loops.h")}"""
-"""Declarations that all files of C share."""
+"""Declarations that all C files share."""
 
 SANITIZERS = [
     *("-O1", "-g1", "-fno-omit-frame-pointer", "-fno-wrapv"),
     *("-fsanitize=address,undefined,bounds-strict", "-fno-sanitize-recover=all"),
     *("-Wall", "-Wextra", "-Wno-unused-parameter", "-Werror"),
 ]
-"""Flags, -g1 for line numbers, that make the compiler check addresses and undefined behaviour; see
-`make sanitize`."""
+"""Flags that add checks of addresses and undefined behaviour, with line numbers (-g1); see `make
+sanitize`."""
 
 EXTRA = SANITIZERS if os.environ.get("UFL_BEAM_SANITIZE", "0") != "0" else []
-"""Flags after those of each library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
+"""Flags appended for every library: the sanitizers if ``UFL_BEAM_SANITIZE=1``, else none."""
 
 
 NATIVE = "-march=native"
 """Flag that lets the compiler use all instructions of the processor."""
 
 PROCESSOR = np.show_config(mode="dicts").get("SIMD Extensions", {})
-"""Its features that NumPy was compiled for, and those that it found besides: what is compiled for
-this processor may be of no use to another one with the same cache."""
+"""Features of the processor: the baseline of NumPy, and others that NumPy found.
+
+Code compiled for this processor may not run on another one that shares the cache.
+"""
 
 
 class CompilerError(RuntimeError):
-    """The C compiler is missing, or refuses the code."""
+    """The C compiler is missing or rejects the code."""
 
 
 class Refused(Exception):
@@ -88,17 +90,18 @@ def compiled(
     flags: Sequence[str],
     check: Callable[[ModuleType], None] = lambda _: None,
 ) -> ModuleType:
-    """Load a module of C, compiled first if it is not in the cache.
+    """Load a C module, which is compiled if it is not in the cache.
 
     Args:
         stem: Beginning of its name.
         declarations: C declarations of its functions and types for Python.
-        source: Its C; called if it is not in the cache; may raise :class:`Refused`.
-        made_of: Texts that the C, and the effect of the flags, depend on.
-        flags: For the compiler.
-        check: Called with the module once it has been compiled; may raise :class:`Refused`.
+        source: Function that returns its C code, called if the module is not in the cache; it may
+            raise :class:`Refused`.
+        made_of: Texts on which the C code and the effect of the flags depend.
+        flags: Compiler flags.
+        check: Function called with the newly compiled module; it may raise :class:`Refused`.
     """
-    # Python's own flags have -g: names for debuggers take a fifth of the time, and half of the file
+    # Python's own flags have -g; debug symbols take a fifth of the time and half of the file.
     flags = [*flags, "-g0", "-fvisibility=hidden", *EXTRA]
     name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version, repr(PROCESSOR))}"
 
@@ -123,7 +126,7 @@ def compiled(
     module, directory = kept(name, build, load)
     if isinstance(module, Refused):
         raise module
-    module.__file__ = str(directory / Path(str(module.__file__)).name)  # it was built elsewhere
+    module.__file__ = str(directory / Path(str(module.__file__)).name)  # built in another directory
     return module
 
 
@@ -143,7 +146,7 @@ def _imported(name: str, directory: Path) -> ModuleType:
 
 
 def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
-    """Load a form, compiled first if it is not in the cache; and the C that FFCx wrote for it."""
+    """Load a form, compiled if it is not in the cache, and return the path of its C code."""
 
     def build(directory: Path) -> fem.Form:
         with _explained("a form"):
@@ -161,7 +164,7 @@ def _digest(*texts: str) -> str:
 
 @contextmanager
 def _explained(code: str) -> Iterator[None]:
-    """Say what to do where the compiler fails."""
+    """Explain what to do if the compiler fails."""
     try:
         yield
     except cffi.VerificationError as error:

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """SIMD versions of FFCx's kernels: several cells at once, one in each lane of a vector.
 
-Kernels are straight-line arithmetic on the numbers of one cell.  Their text is compiled once more
-with vector types of GCC and Clang in the place of numbers, and compared with FFCx's kernel.
+Kernels are straight-line arithmetic on the numbers of one cell.  Their text is compiled again with
+vector types of GCC and Clang instead of numbers; the results are compared with FFCx's kernel.
 """
 
 from __future__ import annotations
@@ -36,14 +36,14 @@ LOGGER = logging.getLogger("ufl_beam")
 _WIDE = {"AVX512F", "X86_V4"} & {*PROCESSOR.get("baseline", ()), *PROCESSOR.get("found", ())}
 
 LANES = 8 if _WIDE else 4
-"""Cells that are computed at once, as many as AVX-512 or AVX have room for; compilers split vectors
-for less."""
+"""Number of cells that are computed at once: a vector of AVX-512 or AVX; compilers split vectors on
+other processors."""
 
 FLAGS = ["-O2", NATIVE, "-fno-math-errno", *(["-mprefer-vector-width=512"] if _WIDE else [])]
-"""Flags for the compiler; without the last it takes square roots in halves of a vector."""
+"""Compiler flags; without the last one, square roots are computed in halves of a vector."""
 
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
-"""Functions that lanes.h has for vectors; powers with integer exponents."""
+"""Functions that lanes.h provides for vectors; pow with integer exponents only."""
 
 INTERFACE = """
 void *address(void);
@@ -56,10 +56,13 @@ _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 
 
 def in_vectors(kernel: str) -> str:
-    """Rewrite the C of a kernel of FFCx with vectors in the place of numbers, if lanes.h can.
+    """Rewrite the C code of an FFCx kernel with vectors instead of numbers.
 
-    Divisions by numbers, and by what divides more than once, become multiplications.  Conditions
-    are masks, all bits of a lane zero or one, so that logical operators become those of bits.
+    Divisions by constants, and by variables that divide more than once, become multiplications.
+    Conditions become masks with all bits of a lane zero or one, logical operators bitwise ones.
+
+    Raises:
+        Refused: The kernel needs a function or a condition that lanes.h does not provide.
     """
     body = kernel[kernel.index("{") :]
     called = re.findall(r"\b(?!for\b)([a-z_]\w*)\(", body)
@@ -95,7 +98,7 @@ def in_vectors(kernel: str) -> str:
 
 
 def written(source: Path) -> str:
-    """Return the kernel that FFCx wrote for a cell form in the file ``source``."""
+    """Return the kernel that FFCx wrote into the file ``source`` for a cell form."""
     pattern = r"^void tabulate_tensor_.*?^}(?=\s*^(?:bool|ufcx_integral) )"
     if source.exists() and (found := re.search(pattern, source.read_text(), re.M | re.S)):
         return found[0]
@@ -103,7 +106,7 @@ def written(source: Path) -> str:
 
 
 def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
-    """Arrange rows of cells in batches, see loops.h; (num_batches, numbers, lanes)."""
+    """Arrange rows of cells in batches (num_batches, numbers, lanes), see loops.h."""
     rows = rows.reshape(len(rows), math.prod(rows.shape[1:]))
     if missing := -len(rows) % lanes:
         rows = np.concatenate([rows, np.repeat(rows[-1:], missing, axis=0)])
@@ -114,14 +117,14 @@ def in_batches(rows: npt.NDArray[Any], lanes: int) -> npt.NDArray[Any]:
 AGREEMENT = 1e-10
 """Tolerance on the difference from FFCx's kernel, relative to the largest entry of a cell.
 
-Round-off of the tangent of a cell of degree 3 is 1e-12 of it; a wrong kernel errs by far more.
+The round-off in the tangent of a cell of degree 3 is 1e-12 of it; wrong kernels have larger errors.
 """
 
 
 def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, int]) -> None:
-    """Refuse a kernel in vectors that differs from FFCx's on random cells.
+    """Refuse a vector kernel that differs from FFCx's kernel on random cells.
 
-    ``sizes`` are the numbers of its entries, values of coefficients, and constants.
+    ``sizes`` are the numbers of its entries, coefficient values and constants.
     """
     random, (entries, width, constants) = np.random.default_rng(0), sizes
     at, wrong = partial(module.ffi.from_buffer, "double[]"), 0
@@ -145,9 +148,10 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
 def in_lanes(
     source: Path, kernel: int, sizes: tuple[int, int, int], unknowns: tuple[int, int]
 ) -> int | None:
-    """Return the address of the SIMD loop of a compiled form, or None; see above for ``sizes``.
+    """Return the address of the SIMD loop of a compiled form, or None if there is none.
 
-    ``unknowns`` are the position of the first one among the coefficients, and their number.
+    ``sizes`` as in :func:`require_agreement`; ``unknowns`` are the position of the first unknown
+    among the coefficients, and the number of unknowns.
     """
     names = ("LANES", "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "AT", "UNKNOWNS")
     numbers = LANES, math.isqrt(sizes[0]), *sizes, *unknowns
@@ -158,7 +162,7 @@ def in_lanes(
             "ufl_beam_lanes",
             INTERFACE,
             lambda: "\n".join([head, in_vectors(written(source)), loop]),
-            # FFCx names what it makes by what is in it.
+            # FFCx names its files by a hash of their content.
             made_of=[source.name, head, loop, Path(__file__).read_text()],
             flags=FLAGS,
             check=lambda module: require_agreement(module, kernel, sizes),

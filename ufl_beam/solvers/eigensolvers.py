@@ -14,22 +14,23 @@ from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.csr import Csr
 
 TOLERANCE = 1e-12
-"""Residual of an eigenpair, as a part of its eigenvalue."""
+"""Tolerance of the residual of an eigenpair, relative to its eigenvalue."""
 
 SHIFT = 1e-13
-"""Shift as a part of the squared frequencies of single nodes; round-off hides smaller ones."""
+"""Shift relative to the squared frequencies of single nodes; round-off hides smaller shifts."""
 
 MORE = 8
-"""Eigenvalues that are sought beside those asked for, lest one of several alike be missed."""
+"""Additional eigenvalues that are computed, so that none of several similar ones is missed."""
 
 DENSE = 200
-"""Up to this number of unknowns LAPACK finds all eigenvalues, however often each is there."""
+"""Number of unknowns up to which LAPACK finds all eigenvalues with their multiplicities."""
 
 ROUND_OFF = 64 * float(np.finfo(np.float64).eps)
-"""Part of the largest entry of a matrix that its round-off may reach."""
+"""Bound on the round-off of a matrix, relative to its largest entry."""
 
 ZERO = ROUND_OFF / 8
-"""Part of the sum of sizes in a quadratic form below which it is round-off: a sixtieth was met."""
+"""Fraction of the sum of magnitudes in a quadratic form below which its value is round-off; a
+sixtieth was met."""
 
 
 def _slepc() -> Any:
@@ -52,10 +53,10 @@ def _petsc(A: csr_array) -> PETSc.Mat:
 def linear(
     A: csr_array, B: csr_array, n: int, *, most: int, shift: float = 0.0, definite: bool
 ) -> tuple[Array, Array]:
-    """The n eigenvalues of ``A x = λ B x`` nearest to ``shift``; values (n,), vectors (size, n).
+    """Compute the n eigenvalues of ``A x = λ B x`` nearest to ``shift``; (n,), vectors (size, n).
 
     A and B are symmetric, ``A - shift B`` is regular, and B has no negative eigenvalue if
-    ``definite``. There are ``most`` eigenvalues; a few more than n may be given.
+    ``definite``.  The pencil has ``most`` eigenvalues; the result may have a few more than n.
     """
     size, n = A.shape[0], min(n + MORE, most)
     if size <= DENSE:
@@ -74,10 +75,13 @@ def linear(
 def quadratic(
     K: csr_array, C: csr_array, M: csr_array, n: int, *, most: int, shift: float
 ) -> tuple[Complex, Complex]:
-    """The n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``, conjugates counted."""
+    """Compute the n exponents s of ``(K + s C + s² M) x = 0`` nearest to ``shift``.
+
+    Conjugate exponents count as two.
+    """
     size, n = K.shape[0], min(n + MORE, most)
     if size <= DENSE:
-        # In times of 1/shift, with velocities as unknowns: s x = v, s M v = -K x - C v.
+        # Linearization in the time unit 1/shift, with velocities v: s x = v, s M v = -K x - C v.
         one, none = eye_array(size), csr_array((size, size))
         A = block_array([[none, one], [-K, -shift * C]])
         B = block_array([[one, none], [none, shift**2 * M]])
@@ -94,7 +98,7 @@ def quadratic(
 
 
 def small(A: Array, B: Array) -> tuple[Array, Array]:
-    """All eigenvalues of small symmetric ``A x = λ B x``, rows of any units; (n,), (size, n)."""
+    """Compute all eigenvalues of a small symmetric ``A x = λ B x``, any units; (n,), (size, n)."""
     sizes = np.sqrt(np.abs(A.diagonal()) + np.abs(B.diagonal()))
     scale = 1 / np.where(sizes > 0, sizes, 1.0)
     across = np.outer(scale, scale)
@@ -103,7 +107,7 @@ def small(A: Array, B: Array) -> tuple[Array, Array]:
 
 
 def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
-    """Eigenvalues of A⁻¹ B and vectors, the largest first, zeros left out."""
+    """Compute the nonzero eigenvalues of A⁻¹ B, the largest first, and eigenvectors."""
     θ, x = np.linalg.eig(np.linalg.solve(A, B))
     order = np.argsort(-np.abs(θ), kind="stable")
     order = order[np.abs(θ[order]) > 0]
@@ -111,7 +115,7 @@ def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
 
 
 def _inverse_definite(A: Array, B: Array) -> tuple[Array, Array]:
-    """Compute the same by the symmetric matrix Fᵀ A⁻¹ F with B = F Fᵀ."""
+    """Compute the same from the symmetric matrix Fᵀ A⁻¹ F with B = F Fᵀ."""
     scale = np.sqrt(B.diagonal())
     there = np.flatnonzero(scale)
     F = np.zeros((len(A), len(there)))
@@ -136,7 +140,7 @@ def _solved(solver: Any, size: int, n: int, shift: float) -> tuple[Complex, Comp
     ksp = st.getKSP()
     ksp.setType("preonly")
     ksp.getPC().setType("lu")
-    # What constraints leave has zeros on the diagonal.
+    # Constraints leave zeros on the diagonal.
     ksp.getPC().setFactorSolverType("klu")
     # The same first vector on every process and in every run.
     first = np.random.default_rng(0).uniform(0.5, 1.0, size)

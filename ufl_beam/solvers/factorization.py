@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Direct factorisation of a square sparse matrix that may be indefinite, and the signs of it."""
+"""Direct factorisation of a square sparse matrix, and the number of its negative eigenvalues."""
 
 from __future__ import annotations
 
@@ -12,31 +12,31 @@ from ufl_beam.arrays import Array
 from ufl_beam.compiled.csr import Csr
 
 SCALINGS = 6
-"""Passes of the scaling; each one takes the square root of the range of sizes."""
+"""Number of scaling passes; each one reduces the range of magnitudes to its square root."""
 
 SYMMETRIC = 64 * float(np.finfo(np.float64).eps)
-"""Difference to the transposed matrix, in entries of size one, below which it is round-off."""
+"""Difference from the transposed scaled matrix up to which a matrix counts as symmetric."""
 
 DETERMINANT = 33
-"""Number of MUMPS's option that asks for the determinant."""
+"""Number of MUMPS's option that requests the determinant."""
 
 NEGATIVE_PIVOTS = 12
-"""Number of MUMPS's answer that counts negative pivots of a symmetric matrix."""
+"""Number of MUMPS's output with the number of negative pivots of a symmetric matrix."""
 
 MANTISSA = 12
-"""Number of MUMPS's answer that has the sign of the determinant."""
+"""Number of MUMPS's output with the sign of the determinant."""
 
 
 class Factorisation:
-    """L D Lᵀ factors of a symmetric matrix, or L U factors of another one, by MUMPS.
+    """L D Lᵀ factors of a symmetric matrix, or L U factors of an unsymmetric one, by MUMPS.
 
-    Rows and columns are exchanged, so zeros on the diagonal do no harm.  Before that they are
-    scaled such that the largest entry of each is about one: units do not matter.
+    Rows and columns are scaled so that the largest entry of each is about one; so the result does
+    not depend on units.  Then they are exchanged, so the diagonal may have zeros.
 
     Attributes:
-        symmetric: Whether the matrix is, up to round-off.
-        negative: Number of its negative eigenvalues if it is symmetric; else 1 where its
-            determinant is negative, and 0 where it is positive.
+        symmetric: Whether the matrix is symmetric up to round-off.
+        negative: Number of negative eigenvalues of a symmetric matrix; else 1 if the determinant
+            is negative, and 0 if it is positive.
 
     Raises:
         LinAlgError: The matrix has no inverse.
@@ -52,7 +52,7 @@ class Factorisation:
             np.maximum.at(largest, rows, scaled)
             np.maximum.at(largest, A.indices, scaled)
             scale /= np.sqrt(np.where(largest > 0, largest, 1.0))
-        self._scale = np.exp2(np.round(np.log2(scale)))  # powers of two: nothing is rounded
+        self._scale = np.exp2(np.round(np.log2(scale)))  # powers of two: no rounding
         scaled = A.data * (self._scale[rows] * self._scale[A.indices])
         S = csr_array((scaled, A.indices, A.indptr), shape=A.shape)
         self.symmetric = bool(abs(S - S.T).max() <= SYMMETRIC)
@@ -76,7 +76,7 @@ class Factorisation:
         )
 
     def solve(self, b: Array) -> Array:
-        """The solution for one right-hand side, refined once."""
+        """Solve for one right-hand side, with one step of iterative refinement."""
         rhs = self._scale * b
         x, more = np.zeros((2, len(b)))
         for _ in range(2):

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Multifrontal elimination of what the elimination along chains leaves."""
+"""Multifrontal elimination of the system that the elimination along chains leaves."""
 
 from __future__ import annotations
 
@@ -15,22 +15,23 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.memory import of_structure
 
 ONE_FRONT = int(lib.ONE_FRONT)
-"""Unknowns of a system that is one dense front at most."""
+"""Largest number of unknowns of a system that is one dense front."""
 
 
 class Multifrontal:
-    """Multifrontal elimination of all unknowns of a system, or of all but some.
+    """Multifrontal elimination of the unknowns of a system, except those that stay.
 
-    The order is that of :data:`ORDERINGS` which takes the fewest operations.  Each front exchanges
-    rows among its pivots only, see fronts.c: all rows of systems of :data:`ONE_FRONT` unknowns,
-    else few, so that the matrix must not have structural zeros on the diagonal.
+    Of :data:`ORDERINGS`, the ordering with the fewest operations is used.  Each front exchanges
+    rows among its pivots only, see fronts.c.  These are all rows of systems of up to
+    :data:`ONE_FRONT` unknowns, but few rows of larger systems, whose matrix must not have
+    structural zeros on the diagonal.
 
     Args:
         inner: The system, see substructuring.py.
         stays: Which of its unknowns stay.
 
     Attributes:
-        c: All of it in C, see loops.h.
+        c: ``fronts`` of loops.h.
     """
 
     def __init__(self, inner: Any, stays: npt.NDArray[np.bool_]) -> None:
@@ -52,11 +53,11 @@ class Multifrontal:
         )  # fmt: skip
 
     def drive(self, c: Any) -> None:
-        """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""
+        """Let Newton's method in C use these fronts; ``c`` is its ``equation`` of loops.h."""
         fill(c, fronts=self.c, found=np.zeros(self.c.size))
 
     def factor(self, b: Array) -> bool:
-        """Eliminate from matrix and right-hand side; return whether all of it is finite."""
+        """Eliminate from the matrix and right-hand side; return whether all factors are finite."""
         good: bool = self._inner.factor(b)
         good &= bool(lib.factor_fronts(self.c, doubles(self._inner.left.data)))
         lib.reduce_fronts(self.c, doubles(self._inner.f))
@@ -68,7 +69,7 @@ class Multifrontal:
         lib.reduce_fronts(self.c, doubles(self._inner.f))
 
     def expand(self, small: Array, x: Array) -> None:
-        """Find the solution after that of what is left."""
+        """Find the solution from the solution ``small`` of the reduced system."""
         self.f[:] = small
         of_inner = np.empty(self.c.size)
         lib.expand_fronts(self.c, doubles(of_inner))
@@ -76,8 +77,8 @@ class Multifrontal:
 
 
 ORDERINGS = ("amd", "nd")
-"""Orderings of PETSc: approximate minimum degree, which knows nothing of unknowns that stay, and
-nested dissection, which suits what many of them are next to."""
+"""Orderings of PETSc: approximate minimum degree, which ignores the unknowns that stay, and nested
+dissection, which suits systems with many such unknowns."""
 
 STRUCTURE = (
     "unknown", "first", "begin", "rest", "parent", "up", "order", "before", "children", "entries",
@@ -93,8 +94,8 @@ def _structure(
     """Find the fronts of a matrix.
 
     Returns:
-        :data:`STRUCTURE`; where the factors of each front begin, int64; numbers in the largest
-        front, pivots of a front and numbers on the stack at most.
+        :data:`STRUCTURE`; position at which the factors of each front begin, int64; largest numbers
+        of entries of a front, of pivots of a front, and of entries on the stack.
     """
     A = Csr(np.empty(0), indices, indptr)
     n = np.count_nonzero(stays)
@@ -118,7 +119,7 @@ def _structure(
     lib.place_in_fronts(c, len(entry), *map(integers, of_entries))
     stack = lib.order_fronts(c, *map(integers, (order, before, children)))
     at = np.append(0, np.cumsum(pivots * (pivots + 2 * others)))
-    # Products read a few numbers beyond the last one.
+    # Products read a few numbers beyond the end of a front.
     largest = [x[:-1].max(initial=0) for x in (pivots + others, pivots)]
     space = np.array([largest[0] ** 2 + 2 * lib.WIDE, largest[1], stack])
     return (
@@ -128,7 +129,7 @@ def _structure(
 
 
 def _order(A: csr_array, stays: npt.NDArray[np.bool_], kind: str) -> Index:
-    """Return all unknowns in an order of elimination of PETSc, those that stay at the end."""
+    """Return all unknowns in an elimination order of PETSc, followed by those that stay."""
     these: Index = np.arange(A.shape[0]) if kind == "nd" else np.flatnonzero(~stays)
     if len(these):
         part = A[these][:, these]

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Equilibrium of a step by Newton's method of newton.c, as a solver of PETSc.
 
-Its convergence is judged in tolerances without a dimension.
+Its convergence test has dimensionless tolerances.
 """
 
 from __future__ import annotations
@@ -36,7 +36,8 @@ from ufl_beam.solvers.static_condensation import ChainsFirst
 from ufl_beam.terms.base import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
-"""A norm in a line search would add forces and moments, and each search costs a residual."""
+"""Options for full steps: norms of a line search would add forces and moments, and cost residuals.
+"""
 
 REASONS = {
     lib.SINGULAR: "found a singular tangent",
@@ -45,13 +46,13 @@ REASONS = {
     lib.DIVERGED: "met a force that is not a finite number",
     -4: "met a force that is not a finite number",  # PETSc's name for it changed in 3.24
 }
-"""Reasons for which Newton's method stops, in words; by values of SNESConvergedReason."""
+"""Explanations why Newton's method stops, by values of SNESConvergedReason."""
 
 
 def _vector(share: Share) -> tuple[PETSc.Vec, Array]:
-    """A vector of the unknowns, and its local values; where processes share a scene, with ghosts.
+    """Create a vector of the unknowns; return it and its local values.
 
-    PETSc keeps the values where they are.
+    It has ghosts if processes share a scene.  PETSc does not move the values.
     """
     if share.alone:
         vector = PETSc.Vec().createSeq(share.size)
@@ -63,19 +64,19 @@ def _vector(share: Share) -> tuple[PETSc.Vec, Array]:
 
 
 class Solver:
-    """Newton's method of newton.c, with the objects of PETSc that it works on.
+    """Newton's method of newton.c, and the PETSc objects that it uses.
 
-    By default it is the solver of SNES.  Where options or monitors ask for PETSc's ``newtonls``,
-    that drives the same residuals, tangents and test of convergence.
+    By default it is the solver of SNES.  If options or monitors request PETSc's ``newtonls``, that
+    method calls the same residuals, tangents and convergence test.
 
     Args:
         equation: The :class:`StepEquation` of the steps.
-        least: Iterations before which a residual must be far below the tolerance.
+        least: Number of iterations before which a residual must be far below the tolerance.
 
     Attributes:
         c: ``equation`` of loops.h.
-        change: Of the latest iteration; between solutions others may use it.
-        unknowns: The latest iterate, converged or not, which C writes to; local values.
+        change: Change in the latest iteration; between solutions others may use the array.
+        unknowns: Local values of the latest iterate, converged or not; C writes them.
     """
 
     def __init__(self, share: Share, equation: Any, newton: Newton, least: int) -> None:
@@ -87,7 +88,7 @@ class Solver:
         )
         every = np.arange(share.size, dtype=np.int32)
         self._diagonal = A.positions(every, every)
-        self._stiffness: Array | None = None  # against idle motions, once a tangent was singular
+        self._stiffness: Array | None = None  # of zero-energy modes, after a singular tangent
         self._moves = np.ones(share.size, dtype=np.uint8)
         self._moves[equation.supports.dofs] = 0
         c = self.c = equation.c
@@ -102,7 +103,7 @@ class Solver:
             find_idle=lib.find_idle_in_python, forget_idle=lib.forget_idle_in_python,
             aside=np.zeros(share.size if c.search != ffi.NULL else 0),
         )  # fmt: skip
-        c.handle = equation.callbacks.handle(self)  # what `fill` keeps must not keep this object
+        c.handle = equation.callbacks.handle(self)  # `fill` would keep this object alive
         if share.alone:
             self._factors.drive(c)
         else:
@@ -136,11 +137,11 @@ class Solver:
             petsc("SNESShellSetSolve", snes, solve)
 
     def _let_c_fill(self) -> None:
-        """Give SNES the matrix: of PETSc where its own method needs that, else none."""
+        """Give SNES a matrix of PETSc if PETSc's own method needs it, else an empty matrix."""
         if self._share.alone and self.c.monitored:
             self._matrix = self._equation.A.petsc()
         else:
-            # Nothing but the preconditioner, which has its own, asks for the matrix.
+            # Only the preconditioner needs the matrix, and it has its own.
             self._equation.A.release()
             give_back_memory(self._share.size)
             sizes = (self._share.num_owned, self._share.grid.size)
@@ -151,23 +152,23 @@ class Solver:
 
     @property
     def snes(self) -> PETSc.SNES:
-        """SNES of the steps; from when it is asked for, their method is PETSc's ``newtonls``."""
+        """SNES of the steps; reading it changes their method to PETSc's ``newtonls``."""
         if not self.c.monitored:
             self.c.monitored = 1
             self._let_c_fill()
             self._snes.setType("newtonls")
-            take_options(self._snes, FULL_STEPS)  # SNES has forgotten its line search
+            take_options(self._snes, FULL_STEPS)  # setType has reset the line search
         return self._snes
 
     def destroy(self) -> None:
-        """Give back what PETSc holds."""
+        """Destroy the PETSc objects."""
         for one in (self._snes, self._x, self._matrix):
             one.destroy()
 
     # -- callbacks of C --------------------------------------------------------------------------
 
     def agree(self, how: Sequence[int], values: Array) -> None:
-        """Replace numbers by those of all processes; the largest is infinite if one is none."""
+        """Combine numbers over all processes; a maximum is infinite if a number is NaN."""
         comm = self._share.comm
         everywhere = np.empty((comm.size, len(values)))
         comm.Allgather(values, everywhere)
@@ -178,19 +179,19 @@ class Solver:
                 values[k] = math.hypot(*column) if kind == lib.HYPOT else column.sum()
 
     def solve(self, anew: bool) -> bool:
-        """Find the change of an iteration over all processes; return whether that fails."""
+        """Solve for the change of an iteration on all processes; return whether that fails."""
         owned = slice(self._share.num_owned)
         if anew and not self._factors.factor(self._r[owned]):
             return True
         return not self._factors.solve(self._r[owned], self.change[owned], reduced=bool(anew))
 
     def find_conjugates(self, q: Array) -> None:
-        """Find what a residual works on in a change."""
+        """Compute the conjugates, on which a residual does work in the change."""
         conjugate = self._equation.working(q, self.change)
         fill(self.c, conjugate=conjugate, start=np.empty(len(q)))
 
     def find_idle(self) -> bool:
-        """Look for more idle motions, and hold them; return whether there are any."""
+        """Find new zero-energy modes and hold them by springs; return whether there are any."""
         if self._stiffness is None:
             self._stiffness = np.zeros(self._share.size)
         of_tangent = self._equation.A, self._diagonal, self._equation.supports.dofs
@@ -200,7 +201,7 @@ class Solver:
         return found
 
     def forget_idle(self) -> bool:
-        """Hold idle motions no more; return whether any were held, on any process."""
+        """Release all zero-energy modes; return whether any were held, on any process."""
         if self._share.largest(float(self.c.idle)) == 0.0:
             return False
         if self._stiffness is not None:
@@ -209,9 +210,9 @@ class Solver:
         return True
 
     def _put_idle(self, stiffness: Array) -> None:
-        """Add stiffnesses against idle motions to tangents from now on.
+        """Add stiffnesses against zero-energy modes to tangents from now on.
 
-        No round-off is expected where they, or supports, hold.
+        Degrees of freedom that these or supports hold do not count in the round-off of forces.
         """
         here = np.flatnonzero(stiffness)
         idle = {"idle_entry": self._diagonal[here], "idle_stiffness": stiffness[here]}
@@ -222,7 +223,7 @@ class Solver:
     # -- paths -----------------------------------------------------------------------------------
 
     def follow(self, border: Any) -> None:
-        """Solve for the load factor of a :class:`PathCorrector`, too; with None no more."""
+        """Solve also for the load factor of a :class:`PathCorrector`; None ends that."""
         self._border, self.c.border = border, ffi.NULL
         if border is not None:
             self._t = np.array([border.t])
@@ -233,19 +234,19 @@ class Solver:
             self.c.border = self._border_in_c
 
     def arrive(self, x: Array) -> None:
-        """Let the border take note of an iterate."""
+        """Pass an iterate to the border."""
         self._border.t = float(self._t[0])
         self._border.arrive(x)
 
     def met(self) -> bool:
-        """Return whether the equation of the border is met."""
+        """Return whether the control equation is satisfied."""
         return bool(self._border.met())
 
     def change_along(self, x: Array) -> bool:
-        """Find the change of an iteration of the bordered equation; return whether that fails.
+        """Compute the change of an iteration of the bordered equation; return whether that fails.
 
-        By elimination of the border: one factorisation and two solutions, as the tangent alone is
-        banded.  Where that is nearly singular, the next iteration makes up for the lost digits.
+        The border is eliminated by one factorisation and two solutions, as only the tangent is
+        banded.  If the tangent is nearly singular, the next iteration recovers the lost digits.
         """
         border, share, owned = self._border, self._share, slice(self._share.num_owned)
         rates, y, z = np.zeros((3, len(x)))
@@ -263,19 +264,19 @@ class Solver:
         self.change[:], self._t[0] = y, border.t
         return not good
 
-    # -- sizes, in tolerances without a dimension --------------------------------------------------
+    # -- sizes for dimensionless tolerances --------------------------------------------------------
 
     def size(self, forces: Array) -> float:
-        """Euclidean norm over the scene of forces, and moments over its size; N."""
+        """Return the Euclidean norm of forces, and moments over the size of the scene; N."""
         here = lib.norm(self._share.size, ffi.NULL, doubles(self._weights), doubles(forces))
         return float(lib.over_processes(self.c, lib.HYPOT, here))
 
     def scale(self) -> float:
-        """Size of the loads and of the internal forces in the latest residual; N."""
+        """Return the size of the loads and of the internal forces in the latest residual; N."""
         return float(self.c.loads + lib.over_processes(self.c, lib.HYPOT, self.c.inner_size))
 
     def random_work(self, x: Array, s: Array) -> float:
-        """Work in a step ``s`` of the last digits at ``x``, were they independent; J."""
+        """Return the work of the round-off forces at ``x`` in a step ``s``, if independent; J."""
         forces = np.empty(self._share.size)
         lib.find_motion(self.c, doubles(x))
         lib.find_round_off(self.c, doubles(x), doubles(forces))
@@ -283,15 +284,18 @@ class Solver:
         return math.sqrt(self._share.total(float(np.sum(works**2))))
 
     def _residuals(self) -> Array:
-        """Sizes of the latest residual, moments over the size of the scene, ghosts zero; N."""
+        """Return magnitudes of the latest residual, moments over the size of the scene; N.
+
+        Ghosts are zero.
+        """
         return np.asarray(np.abs(self._r) * self._weights)
 
     def error(self) -> PETSc.Error | None:
-        """The error of PETSc that ended the latest solution, if one did."""
+        """Return the PETSc error that ended the latest solution, if any."""
         return PETSc.Error(self.c.error) if self.c.error else None
 
     def failure(self) -> StepFailed:
-        """Describe why Newton's method has stopped without a solution."""
+        """Return an error that describes why Newton's method has stopped without a solution."""
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         reason, residuals = self.c.reason, self._residuals()
         worst = self._share.grid.worst(self._share.gather(residuals))
@@ -306,7 +310,7 @@ class Solver:
         return failure
 
     def remember(self, memory: Memory) -> None:
-        """Pass on the number of iterations, and motions found to be idle."""
+        """Serialize the number of iterations and the stiffnesses against zero-energy modes."""
         self.c.total = int(memory.number("iterations", self.c.total))
         known = float(self._stiffness is not None)
         if memory.number("idle motions are known", known):
@@ -324,7 +328,7 @@ def agree_in_python(handle: Any, number: int, how: Any, values: Any) -> None:
 
 
 def _call(method: str, error: int | None, handle: Any, *given: Any) -> int | None:
-    """Callbacks of C, declared in c_library.py; the value of one that raises is ``error``."""
+    """Call a method of a solver from C, see c_library.py; an exception returns ``error``."""
     callbacks, solver, _ = ffi.from_handle(handle)
     size = 8 * callbacks.c.size
     vectors = (np.frombuffer(ffi.buffer(x, size)) if isinstance(x, ffi.CData) else x for x in given)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Options of Newton's method, PETSc's among them, which are refused if PETSc has no use."""
+"""Options of Newton's method, and checks that PETSc knows its options among them."""
 
 from __future__ import annotations
 
@@ -32,17 +32,17 @@ class Newton:
     """Options of Newton's method: tolerance, number of iterations, PETSc options.
 
     Args:
-        rtol: Tolerance of the residual, as a part of the forces in the scene.
-        max_iterations: Iterations before a step is cut.
+        rtol: Tolerance of the residual, relative to the forces in the scene.
+        max_iterations: Number of iterations after which a step is divided.
         petsc: PETSc options without their prefix, such as ``{"snes_monitor": None}``; in
-            ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option PETSc's Newton method
-            is used, otherwise an equivalent one in C, which is faster for few cells.  A
+            ``PETSC_OPTIONS`` they have the prefix ``ub_``.  With any option, PETSc's Newton method
+            is used, otherwise an equivalent method in C, which is faster for few cells.  A
             ``snes_linesearch_type`` replaces the line search after full steps.  A run raises
-            :class:`ArgumentError` for options that PETSc has no use for.
-        reference: Let the reference solver compute the run: the equations of the paper with forms
-            of DOLFINx, a return map in NumPy and PETSc's SNES, to compare with, or to read.  It is
-            ten to a thousand times slower; :func:`simulate` takes it with equal steps, on one
-            process.  See docs/theory.md.
+            :class:`ArgumentError` for options that PETSc does not use.
+        reference: Whether the reference solver computes the run: the equations of the paper with
+            DOLFINx forms, a return map in NumPy and PETSc's SNES, for comparison or for reading.
+            It is ten to a thousand times slower; :func:`simulate` accepts it with equal steps on
+            one process.  See docs/theory.md.
 
     Example:
         >>> newton = ub.Newton(rtol=1e-12, petsc={"snes_linesearch_type": "bt"})
@@ -67,7 +67,7 @@ class Newton:
 
 
 def require_plain(newton: Newton | None, what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` the reference solver does not compute."""
+    """Raise :class:`ArgumentError` if the reference solver is chosen, which cannot do ``what``."""
     if newton is not None and newton.reference:
         raise ArgumentError(
             f"Newton: reference=True does not go with {what}: the reference solver computes equal "
@@ -81,7 +81,7 @@ WHILE_SOLVING = (
     "snes_convergence_estimate", "snes_test_jacobian", "snes_test_jacobian_view", "snes_view",
     "snes_view_pre", "snes_view_solution",
 )  # fmt: skip
-"""Options that PETSc asks for when it solves, and only then: of ``PETSC_OPTIONS`` alone."""
+"""Options that PETSc reads only when it solves; they must be in ``PETSC_OPTIONS``."""
 
 USUAL = (
     *WHILE_SOLVING, "ksp_atol", "ksp_converged_reason", "ksp_error_if_not_converged",
@@ -95,7 +95,7 @@ USUAL = (
     "snes_monitor", "snes_monitor_residual", "snes_monitor_short", "snes_monitor_solution",
     "snes_rtol", "snes_stol", "snes_type",
 )  # fmt: skip
-"""Options that a misspelt one may stand for; PETSc has no list of those that it knows."""
+"""Options suggested for a misspelt one; PETSc has no list of its options."""
 
 
 def database() -> dict[str, Any]:
@@ -105,20 +105,20 @@ def database() -> dict[str, Any]:
 
 
 def take_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
-    """Let a SNES, its KSP and PC take options; return those that none of them has asked for.
+    """Apply options to a SNES, its KSP and PC; return the options that none of them has read.
 
-    The database is afterwards as it was: other solvers have the same prefix.
+    The database is restored afterwards, as other solvers have the same prefix.
     """
     options, before, unused = PETSc.Options(PREFIX), database(), list[str]()
     try:
         for name in before:
-            del options[name]  # it may be known as used
+            del options[name]  # which may be marked as used
         for name, value in chosen.items():
             options[name] = value
         snes.setFromOptions()
-        # PETSc may have given those of before 3.24 their new names.
+        # PETSc may have renamed options of versions before 3.24.
         for name in chosen.keys() & database().keys():
-            used = ffi.new("char[8]")  # a bool of whatever size
+            used = ffi.new("char[8]")  # a bool of any size
             of_petsc = ffi.new("char[]", (PREFIX + name).encode())
             petsc("PetscOptionsUsed", ffi.NULL, of_petsc, used)
             if not any(bytes(ffi.buffer(used))):
@@ -129,12 +129,12 @@ def take_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
         for name, value in before.items():
             options[name] = value
     for name in before.keys() - {*unused}:
-        options.hasName(name)  # or PETSc, at its end, would call it unused
+        options.hasName(name)  # otherwise PETSc would report it as unused when it finalizes
     return unused
 
 
 def checked_newton(newton: Newton | None, comm: MPI.Intracomm) -> Newton:
-    """Return the options of Newton's method, or those by default; all processes call it."""
+    """Check and return the options of Newton's method, or the defaults; all processes call it."""
     newton = Newton() if newton is None else newton
     require_kind(newton, Newton, "newton")
     Agreement(comm)(_require_known, newton)
@@ -142,7 +142,7 @@ def checked_newton(newton: Newton | None, comm: MPI.Intracomm) -> Newton:
 
 
 def _require_known(newton: Newton) -> None:
-    """Refuse options that PETSc would not use, before there is anything to solve.
+    """Refuse options that PETSc would not use, before anything is solved.
 
     Raises:
         ArgumentError: An option of ``newton`` or of ``PETSC_OPTIONS`` has no effect, or PETSc

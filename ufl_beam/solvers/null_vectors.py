@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Null vectors of singular tangents, and idle motions: those that no force resists or drives.
+"""Null vectors of singular tangents, and zero-energy modes, which no force resists or drives.
 
 The node where several members meet has no mass of its own.  When all plastic hinges around it have
 lost their strength, any rotation of the node is an equilibrium, and the tangent stiffness is
-singular.  Newton's method then keeps the node where it is: an entry on the diagonal of the tangent
-makes its equation solvable.  Residuals, hence forces, energies and solutions, know nothing of it.
+singular.  Newton's method then keeps the node at its position by a stiffness on the diagonal of
+the tangent.  Residuals, and so forces, energies and solutions, do not contain this stiffness.
 """
 
 from __future__ import annotations
@@ -19,19 +19,19 @@ from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
 
 DENSE = 300
-"""Up to this number of unknowns the null vector comes from a singular value decomposition."""
+"""Number of unknowns up to which null vectors come from a singular value decomposition."""
 
 SINGULAR = 1e-12
-"""Singular values of an equilibrated matrix up to this part of its entries count as zero."""
+"""Singular values of an equilibrated matrix that count as zero, relative to its entries."""
 
 ROUNDS = 40
-"""Largest number of times that rows and columns are scaled."""
+"""Largest number of scaling passes."""
 
 
 def free_matrix(share: Share, A: Csr, held: Index) -> tuple[csc_array, Index]:
-    """Assemble the tangent at what supports leave free, and its dofs in numbers of the grid.
+    """Assemble the tangent of the dofs that no support holds; return it and their global numbers.
 
-    All processes call it together, each with its part ``A``, and local numbers of what is ``held``.
+    All processes call it together, each with its part ``A`` and local numbers of ``held`` dofs.
     """
     here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs[held])
     parts = share.comm.allgather(here) if not share.alone else [here]
@@ -43,10 +43,11 @@ def free_matrix(share: Share, A: Csr, held: Index) -> tuple[csc_array, Index]:
 
 
 def null_vectors(K: csc_array) -> tuple[Array, Array]:
-    """Compute vectors that a matrix, its rows and columns scaled to size one, makes nothing of.
+    """Compute null vectors of a matrix whose rows and columns are scaled to size one.
 
-    The result is how much it makes of them, without dimension, the least last; and the vectors in
-    columns, in the units of the unknowns.  One at least; of large matrices one only.
+    Returns:
+        Their dimensionless singular values, the least last; and the vectors in columns, in the
+        units of the unknowns.  There is at least one; for large matrices there is only one.
     """
     n, scaled, factors = K.shape[0], K, np.ones(K.shape[0])
     for _ in range(ROUNDS):
@@ -61,7 +62,7 @@ def null_vectors(K: csc_array) -> tuple[Array, Array]:
         _, sizes, vectors = np.linalg.svd(scaled.toarray())
         number = max(1, int(np.count_nonzero(sizes <= SINGULAR)))
         return sizes[-number:], factors[:, None] * vectors[-number:].T
-    # A shift far below the entries makes the factors those of a regular matrix.
+    # A shift far below the entries makes the matrix regular.
     shifted = splu(csc_array(scaled + SINGULAR * eye_array(n)))
     y: Array = np.random.default_rng(0).normal(size=n)
     for _ in range(20):
@@ -70,36 +71,36 @@ def null_vectors(K: csc_array) -> tuple[Array, Array]:
     return np.array([np.linalg.norm(scaled @ y)]), (factors * y)[:, None]
 
 
-# -- idle motions ----------------------------------------------------------------------------------
+# -- zero-energy modes -----------------------------------------------------------------------------
 
 STIFFNESS = 0.01
-"""Stiffness against an idle motion in the tangent, as a part of the largest one in the scene.
+"""Stiffness against a zero-energy mode in the tangent, relative to the largest in the scene.
 
-A motion that is resisted after all converges the faster, the smaller this is; round-off moves what
-is idle the less, the larger it is.
+If forces resist the motion after all, a smaller stiffness makes it converge faster.  A larger
+stiffness reduces the motion of the mode by round-off.
 """
 
 DRIVEN = 1e-6
-"""Force, as a part of the forces in the scene, above which a motion is driven, and not idle."""
+"""Force above which a motion is driven, not a zero-energy mode; relative to forces in the scene."""
 
 
 def hold_idle_motions(
     stiffness: Array, share: Share, A: Csr, diagonal: Index, held: Index, forces: Array,
     scale: float,
 ) -> bool:  # fmt: skip
-    """Add stiffnesses against idle motions of the latest tangent; all processes call it together.
+    """Add stiffnesses against zero-energy modes of the latest tangent; all processes call it.
 
     Args:
-        stiffness: Of the local degrees of freedom; N/m, N m/rad.
-        share: Part of the scene of this process.
-        A: The tangent, of this process.
-        diagonal: Positions in it of the entries on the diagonal.
+        stiffness: Stiffnesses of the local degrees of freedom; N/m, N m/rad.
+        share: Subdomain of this process.
+        A: Tangent of this process.
+        diagonal: Positions of the diagonal entries in it.
         held: Degrees of freedom that supports hold.
-        forces: Sizes of the latest residual, moments over the size of the scene; N.
+        forces: Magnitudes of the latest residual, moments over the size of the scene; N.
         scale: Size of the forces in the scene; N.
 
     Returns:
-        Whether there are any more; false if a motion that meets no force is driven.
+        Whether there are new modes; false if a force drives a motion without resistance.
     """
     grid, (K, free) = share.grid, free_matrix(share, A, held)
     if not len(free) or not np.isfinite(K.data).all():
@@ -109,7 +110,7 @@ def hold_idle_motions(
     except (np.linalg.LinAlgError, RuntimeError):
         return False
     motions = grid.scales[free, None] * vectors
-    # One degree of freedom of each motion, such that these motions are independent there.
+    # One degree of freedom for each mode, chosen so that the modes are independent there.
     pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
     found = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
     here = np.isin(share.dofs, found)

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Gauss elimination of what lies between the ends of chains of cells, which needs no other process.
+"""Static condensation of chains of cells to their ends, without communication between processes.
 
 A beam of many cells is a chain of vertices that couple to their two neighbours only.  Each process
-eliminates them from its chains, by blocks, and leaves a small matrix of what remains: joints, ends,
-vertices at the border between processes, whatever else couples to more than two neighbours.
+eliminates them from its chains by blocks.  A small matrix remains for joints, ends, vertices at the
+border between processes, and all other unknowns that couple to more than two neighbours.
 """
 
 from __future__ import annotations
@@ -25,34 +25,34 @@ from ufl_beam.solvers.substructuring import BAD_PIVOT, GOOD, Klu, Summed, succee
 
 
 def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any, ...]:
-    """Vertices of the cells of one process that couple to their two neighbours and to nothing else.
+    """Find the vertices of the cells of one process that couple only to their two neighbours.
 
-    They are found in the structure of the matrix, so they remain right whatever comes to couple.
+    They are found in the pattern of the matrix, so any kind of coupling is taken into account.
     ``alone`` marks local degrees of freedom that no other process has.
 
     Returns:
         Degrees of freedom of the vertices, chain after chain; (num_vertices, 3).
         First vertex of each chain, and the number of vertices.
         Degrees of freedom of the left and the right end of each chain; (num_chains, 6).
-        Which chains have a left end, so that all their vertices come to couple to it; the others
-        begin at a vertex with one neighbour, and have their right end twice.
-        Where in the rows of a vertex the columns of the vertex before, of itself and of the vertex
-        after begin; (num_vertices, 3).
+        Whether each chain has a left end, to which elimination couples all its vertices; other
+        chains begin at a vertex with one neighbour, and have their right end twice.
+        Where the columns of the vertex before, of itself and of the vertex after begin in the rows
+        of each vertex; (num_vertices, 3).
     """
     nodes = cell_dofs.shape[1] // 3
     start, end = cell_dofs[:, 0::nodes], cell_dofs[:, 1::nodes]
-    # Vertex number k is the one between the cells k and k + 1.
+    # Vertex k is between the cells k and k + 1.
     around = np.hstack([start[:-1], end[:-1], end[1:]])
     inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)
     of_row, of_column = np.diff(A.indptr), np.bincount(A.indices, minlength=A.size)
     entries = np.where(alone & (of_row == of_column), of_row, 0)
 
     def has(number: int, dofs: Index) -> npt.NDArray[np.bool_]:
-        """Which vertices have so many entries in rows and columns, and unknowns in turn."""
+        """Tell which vertices have ``number`` entries in rows and columns, and successive dofs."""
         in_turn = (np.diff(dofs, axis=1) == 1).all(axis=1)
         return np.asarray((entries[dofs] == number).all(axis=1) & in_turn)
 
-    inside &= has(9, end[:-1])  # those of the vertex and of its two neighbours are all
+    inside &= has(9, end[:-1])  # of the vertex and its two neighbours
     first_of_vertex = np.zeros(len(inside), dtype=bool)
     first_of_vertex[np.unique(end[:-1, 0], return_index=True)[1]] = True
     inside &= first_of_vertex
@@ -72,7 +72,7 @@ def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any
     chain, first, last = _runs(inside)
     left, middle_, right = start[:-1][first], end[:-1][inside], end[1:][last]
     before, after = start[:-1][inside], end[1:][inside]
-    # A vertex with six entries has no neighbour but the first or last of its chain.
+    # A vertex with six entries has one neighbour, the first or last vertex of its chain.
     dead_left, dead_right = has(6, left), has(6, right)
     backward = dead_right & ~dead_left
     dead = dead_left | dead_right
@@ -98,7 +98,7 @@ def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
-    """Runs of true values: the run of each of them; first and last position of each run."""
+    """Find runs of true values: the run of each; first and last position of each run."""
     edges = np.diff(np.concatenate([[0], mask.astype(np.int8), [0]]))
     first, last = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1) - 1
     return np.repeat(np.arange(len(first)), last - first + 1), first, last
@@ -115,11 +115,11 @@ INDICES = (
 def _plan(
     cell_dofs: Index, indptr: Index, indices: Index, alone: Index, dofs: Index, num_owned: int
 ) -> tuple[Index, ...]:
-    """Find what can be eliminated, and where entries go.
+    """Find the vertices that can be eliminated, and the places of entries in the reduced matrix.
 
     Returns:
-        Degrees of freedom that are left, in the order of the grid; the last of :func:`_chains`;
-        ``indptr`` and ``indices`` of the matrix of what is left; :data:`INDICES`.
+        Degrees of freedom that remain, in the global order; the last result of :func:`_chains`;
+        ``indptr`` and ``indices`` of the reduced matrix; :data:`INDICES`.
     """
     A = Csr(np.empty(0), indices, indptr)
     vertices, first_of_chain, ends_of, spikes, at = _chains(cell_dofs, A, alone)
@@ -145,11 +145,11 @@ def _plan(
 
 
 def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index, ...]:
-    """Find the matrix of what is left; ``number`` in it is -1 of what is eliminated.
+    """Find the pattern of the reduced matrix; ``number`` of an eliminated dof is -1.
 
     Returns:
-        Its ``indptr`` and ``indices``; entries of ``A`` that stay, where they are in it, and where
-        the blocks of the ``ends`` (num_chains, 6) of the chains are.
+        Its ``indptr`` and ``indices``; entries of ``A`` that stay, their positions in it, and the
+        positions of the blocks of the ``ends`` (num_chains, 6) of the chains.
     """
     rows = np.flatnonzero(number >= 0)
     entries = A.entries_of(rows)
@@ -166,14 +166,14 @@ def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index,
 
 
 class Elimination:
-    """Solves with a matrix but for a small one of what cannot be eliminated in chains.
+    """Elimination of the chains of a matrix, which leaves a small reduced matrix.
 
-    See substructuring.py.  The entries of ``A`` must not change between its calls.  On one process
-    C does the same with :attr:`c`, see newton.c.
+    See substructuring.py.  The entries of ``A`` must not change between :meth:`factor` and the last
+    :meth:`expand` after it.  On one process, C uses :attr:`c` directly, see newton.c.
 
     Attributes:
-        shared: Which of the unknowns that are left other processes have too.
-        c: All of it in C, see loops.h.
+        shared: Which of the remaining unknowns other processes have too.
+        c: ``chains`` of loops.h.
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
@@ -205,21 +205,21 @@ class Elimination:
         lib.reduce(self.c, doubles(b))
 
     def expand(self, small: Array, x: Array) -> None:
-        """Find the solution after that of the small system."""
+        """Find the solution from the solution ``small`` of the reduced system."""
         lib.expand(self.c, doubles(small), doubles(x))
 
 
 class ChainsFirst:
     """Direct solver: condensation along the beams, then factorization of the rest.
 
-    Where processes share a scene, each eliminates the rest of its own part; what several of them
-    have is small, and factored by each instead of waiting for another.
+    If processes share a scene, each eliminates the rest of its subdomain.  The system of shared
+    unknowns is small; each process factors it, so that none waits for another.
     """
 
     def __init__(self, share: Share, A: Csr) -> None:
         self._elimination, self._is_new, self._good = Elimination(share, A), False, False
-        # A connector alone may hold a part whose own stiffness leaves zeros, or nothing but
-        # round-off, on the diagonal; several fronts exchange too few rows for that, KLU does not.
+        # If only a connector holds a part, the part's own stiffness may leave zeros or round-off on
+        # the diagonal.  Several fronts exchange too few rows for that, KLU exchanges enough.
         few_rows = not len(share.grid.multipliers)
         rest: Any = self._elimination
         if not share.alone:
@@ -231,20 +231,20 @@ class ChainsFirst:
         self._solved = Multifrontal(rest, none) if fronts else Klu(rest)
         self.factor = self._solved.factor
         if fronts:
-            del self._elimination.left.indices  # nobody asks for them again
+            del self._elimination.left.indices  # not needed any more
 
     def drive(self, c: Any) -> None:
-        """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""
+        """Let Newton's method in C use this solver; ``c`` is its ``equation`` of loops.h."""
         c.chains, self._elimination.c.f = self._elimination.c, c.change
         self._solved.drive(c)
 
     def setUp(self, pc: PETSc.PC) -> None:
-        """Factor with the next right-hand side; PETSc asks for it where the matrix has changed."""
+        """Factor with the next right-hand side; PETSc calls this if the matrix has changed."""
         self._is_new, self._good = True, True
         pc.setFailedReason(GOOD)
 
     def apply(self, pc: PETSc.PC, b: PETSc.Vec, x: PETSc.Vec) -> None:
-        """Solve; zero after a failure, where an error would leave objects of PETSc half done."""
+        """Solve; x is zero after a failure, as an error would leave PETSc objects inconsistent."""
         reduced, self._is_new = self._is_new, False
         if reduced:
             self._good = self.factor(b.array_r)
@@ -255,7 +255,7 @@ class ChainsFirst:
     def solve(self, b: Array, x: Array, *, reduced: bool) -> bool:
         """Solve for ``x``; return whether that succeeds.
 
-        A right-hand side that is ``reduced`` was eliminated by :meth:`factor`.
+        If ``reduced``, :meth:`factor` has already reduced the right-hand side.
         """
         good = reduced or succeeds(self._solved.reduce, b)
         if good:

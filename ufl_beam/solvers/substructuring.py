@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""Systems of which some unknowns are eliminated; their sum over processes; and KLU for all of one.
+"""Reduced systems, their sum over processes, and their factorization by KLU.
 
-Substructuring: each process factors what the elimination along chains leaves in its own part.  Only
-the Schur complement of the unknowns that several processes have is summed over them, and factored
-by each.
+Substructuring: each process factors the system that the elimination along chains leaves in its
+subdomain.  Only the Schur complement of the unknowns that several processes have is summed over
+them; each process factors the sum.
 
-A system of which some unknowns are eliminated (``Elimination``, ``Multifrontal``, ``Summed``,
-``Klu``) is made of one of which less are.  It has
+A reduced system (``Elimination``, ``Multifrontal``, ``Summed``, ``Klu``) is built on another one
+with more unknowns, except the first.  It has
 
-* ``numbers``: unknowns that are left, in numbers of the grid, ascending;
-* ``factor(b)``: elimination from the matrix and a right-hand side, which is at the degrees of
-  freedom owned here; returns whether all of the matrix is finite;
-* ``reduce(b)``: elimination from another right-hand side;
-* ``left``, ``f``: matrix and right-hand side of what is left, which the caller solves;
-* ``expand(small, x)``: the solution at the degrees of freedom owned here, after that.
+* ``numbers``: global numbers of the remaining unknowns, ascending;
+* ``factor(b)``: eliminates from the matrix and a right-hand side at the degrees of freedom owned by
+  this process; returns whether the whole matrix is finite;
+* ``reduce(b)``: eliminates from another right-hand side;
+* ``left``, ``f``: matrix and right-hand side of the reduced system, which the caller solves;
+* ``expand(small, x)``: computes the solution at the degrees of freedom owned by this process from
+  the solution of the reduced system.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from ufl_beam.compiled.csr import Csr
 
 
 class Summed:
-    """Condensed systems of several processes, summed over them; all of them have the sum."""
+    """Sum of the reduced systems of several processes, which all of them have."""
 
     def __init__(self, inner: Any, comm: MPI.Intracomm) -> None:
         self._inner, self._comm = inner, comm
@@ -43,14 +44,14 @@ class Summed:
         mine = self._number[A.rows()].astype(np.int64) * size + self._number[A.indices]
         keys = np.unique(np.concatenate(comm.allgather(mine)))
         self._place = np.searchsorted(keys, mine)
-        # Entries, right-hand side, and how many processes have failed.
+        # Entries, right-hand side, and number of processes that have failed.
         self._sums = np.zeros(len(keys) + size + 1)
         entries, self.f, self._failed = np.split(self._sums, [len(keys), len(keys) + size])
         indptr = np.searchsorted(keys, np.arange(size + 1) * size)
         self.left = Csr(entries, keys % size if size else keys, indptr)
 
     def factor(self, b: Array) -> bool:
-        """Eliminate on all processes; return whether all is finite on each of them."""
+        """Eliminate on all processes; return whether the matrix is finite on each of them."""
         good = self._inner.factor(b)
         self._sums[:] = 0.0
         self.left.data[self._place] = self._inner.left.data
@@ -67,7 +68,7 @@ class Summed:
         self._comm.Allreduce(MPI.IN_PLACE, self.f)
 
     def expand(self, small: Array, x: Array) -> None:
-        """Find the solution after that of what is left."""
+        """Find the solution from the solution ``small`` of the reduced system."""
         self._inner.expand(small[self._number], x)
 
 
@@ -78,7 +79,7 @@ BAD_PIVOT = int(PETSc.PC.FailedReason.FACTOR_NUMERIC_ZEROPIVOT)
 
 
 def succeeds(function: Callable[..., None], *arguments: Any) -> bool:
-    """Return False if KLU finds that the matrix is singular; its next factorisation works."""
+    """Return False if KLU finds a singular matrix; later factorisations work nevertheless."""
     try:
         function(*arguments)
     except PETSc.Error as error:
@@ -89,7 +90,7 @@ def succeeds(function: Callable[..., None], *arguments: Any) -> bool:
 
 
 class Klu:
-    """Factorization of all of a system, which exchanges rows wherever that is needed."""
+    """Factorization of an entire system, with all row exchanges that it needs."""
 
     def __init__(self, inner: Any) -> None:
         self._inner, self._matrix = inner, inner.left.petsc()
@@ -103,13 +104,13 @@ class Klu:
         self._solution = self._rhs.duplicate()
 
     def drive(self, c: Any) -> None:
-        """Let Newton's method in C do the same; ``c`` is its ``equation`` of loops.h."""
+        """Let Newton's method in C use these factors; ``c`` is its ``equation`` of loops.h."""
         of_petsc = self._factors, self._matrix, self._rhs, self._solution
         c.factors, c.left, c.left_f, c.left_x = map(opaque, of_petsc)
         fill(c, found=doubles(self._solution.array_r))
 
     def factor(self, b: Array) -> bool:
-        """Eliminate from matrix and right-hand side; return whether that succeeds."""
+        """Eliminate from the matrix and right-hand side; return whether that succeeds."""
         good: bool = self._inner.factor(b)
         self._matrix.stateIncrease()
         good = good and succeeds(self._factors.setUp)
@@ -120,7 +121,7 @@ class Klu:
         """Eliminate from another right-hand side.
 
         Raises:
-            PETSc.Error: The matrix is singular after all.
+            PETSc.Error: KLU finds the matrix singular.
         """
         self._inner.reduce(b)
         self._solve()

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
 /* Forces of cells in the equation of the accepted step; see cell_forces.py. */
 
-/* Take the forces of the latest residual as those of the accepted step. */
+/* Accept the forces of the latest residual as those of the accepted step. */
 void accept_cell_forces(cell_forces *c)
 {
   c->given = 0;
@@ -15,7 +15,7 @@ void accept_cell_forces(cell_forces *c)
   if (c->loads) memcpy(c->loads->accepted, c->loads->latest, c->loads->vectors * sizeof(double));
 }
 
-/* out += factor times the numbers that forces on the nodes of some cells mean, one batch of them. */
+/* out += factor times the resultants of the nodal forces of a batch of cells */
 static inline void add_numbers(const cell_forces *c, const int nodes, const int lanes, int some,
                                int kind, double factor, const double *restrict e,
                                const int32_t *cell, size_t row, double *restrict out)
@@ -40,15 +40,16 @@ static inline void add_numbers(const cell_forces *c, const int nodes, const int 
 #undef OUT
 }
 
-/* Where the numbers of cells are, in batches of `lanes`: `row` from one number to the next, `batch` from a
- * batch to the next over its cells. `first` of them are asked for. */
+/* Layout of the resultants of cells in batches of `lanes`: `row` is the distance from one number to
+ * the next, `batch` the distance per cell from one batch to the next. `first` is how many of the
+ * numbers are needed. */
 typedef struct {
   double *out;
   size_t row, batch;
   int lanes, first;
 } places;
 
-/* The same of some cells of a form, whose forces are in batches. */
+/* Add the resultants of some cells of a form, whose nodal forces are in batches. */
 static void add_some(const cell_forces *c, int lanes, int number, int kind, double factor,
                      const double *e, const int32_t *cell, places p)
 {
@@ -67,8 +68,8 @@ static void add_some(const cell_forces *c, int lanes, int number, int kind, doub
   }
 }
 
-/* Numbers of `number` cells from the first on, or of all; `now` says that the latest residual is that of
- * the accepted step. */
+/* Add the resultants of `number` cells from `first` on, or of all cells. `now` tells that the
+ * latest residual belongs to the accepted step. */
 static void add_forms(const cell_forces *c, int now, int first, int number, places p)
 {
   const int lanes = p.lanes;
@@ -85,14 +86,15 @@ static void add_forms(const cell_forces *c, int now, int first, int number, plac
   }
   for (int k = 0; c->loads && k < c->loads->vectors; ++k)
     for (int i = 0; c->loads->vector[k] && c->loads->accepted[k] != 0 && i < number; ++i) {
-      places one = p; /* loads are in no batches */
+      places one = p; /* loads are not in batches */
       one.out = p.out + (i - i % lanes) * p.batch + i % lanes;
       add_some(c, 1, 1, DENSITY, -c->loads->accepted[k],
                c->loads->vector[k] + (size_t)(first + i) * 3 * c->nodes, 0, one);
     }
 }
 
-/* CELL_NUMBERS of all cells: the first number of each, then the second ones, and so on. */
+/* Resultants (CELL_NUMBERS) of all cells: the first number of each cell, then the second ones, and
+ * so on. */
 void find_cell_forces(const cell_forces *c, int now, double *out)
 {
   const size_t size = (size_t)CELL_NUMBERS * c->cells * sizeof *out;
@@ -105,7 +107,7 @@ void find_cell_forces(const cell_forces *c, int now, double *out)
   add_forms(c, now, 0, c->cells, p);
 }
 
-/* Extend ranges, from `begin` on, by numbers of a time. */
+/* Extend the extremes from `begin` on by numbers at a time. */
 static void widen(const extent *e, size_t begin, int number, const double *restrict x, double t)
 {
   double *restrict low = e->low + begin, *restrict time_low = e->time_low + begin;
@@ -118,8 +120,8 @@ static void widen(const extent *e, size_t begin, int number, const double *restr
   }
 }
 
-/* Take in the state after a step; see find_cell_forces. Some cells after the other, so that the processor
- * keeps at hand what belongs to the next step. */
+/* Update the extremes by the state after a step; see find_cell_forces. Cells are processed in
+ * blocks, so that the data of a block stay in the cache. */
 void watch_step(const watch *w, int now, double t, const double *before, const double *q)
 {
   const cells *c = w->along;

@@ -1,7 +1,7 @@
 /* SPDX-License-Identifier: MIT */
-/* Connectors: the rows of their laws around an iterate, and what an iterate misses of them. */
+/* Connectors: rows of their laws linearized at an iterate, and the violation of the laws. */
 
-/* Motions of the links at q. */
+/* Motions of the connectors at q. */
 void find_motions(const couplings *c, const double *q)
 {
   const int n = c->components;
@@ -10,24 +10,25 @@ void find_motions(const couplings *c, const double *q)
   for (int k = 0; k < c->number; ++k) memcpy(c->e1 + n * c->link[k], c->by_cell + n * k, n * sizeof(double));
 }
 
-/* Numbers of the rows of a connector: in each row one of each motion, of the force, and the right side. */
+/* Numbers in the rows of a connector; each row has a coefficient for each motion and for the force,
+ * and the right side. */
 static int numbers_of_rows(const couplings *c) { return c->components * (c->components + 2); }
 
-/* Put the rows of a connector. */
+/* Write the rows of a connector into the coefficients of its cell. */
 static void put_row(const couplings *c, int cell, const double *row)
 {
   put_in_cell(c->work, cell, c->row, numbers_of_rows(c), row);
   put_in_cell(c->tangent, cell, c->row_of_tangent, numbers_of_rows(c), row);
 }
 
-/* Let springs answer their motions e1. */
+/* Compute the response of springs to their motions e1. */
 static void respond_springs(const couplings *c)
 {
   for (int i = 0; i < c->number; ++i) c->points->e1[3 * i] = c->e1[i];
   respond(c->points);
 }
 
-/* The laws of springs around their motions at q. */
+/* Rows of springs, linearized at the motions e1. */
 static void set_rows_of_springs(const couplings *c)
 {
   const points *p = c->points;
@@ -39,20 +40,23 @@ static void set_rows_of_springs(const couplings *c)
   }
 }
 
-/* Numbers of a law, which has no kernel where all of them are zero. */
+/* Evaluate a law; a law without a kernel is zero. */
 void ask_law(kernel *law, const double *w, int answers, double *s)
 {
   if (law) ask(law, w, answers, s);
   else memset(s, 0, answers * sizeof *s);
 }
 
-/* Rows of dry friction at the motions e1: a connector sticks while the force is below the limit, and slips
- * until the sliding velocity reverses, be it in the middle of the step or at its end. Both slipping to a
- * reversed velocity and rest can be solutions of a long step; rest is taken if it gives no energy.
+/* Rows of dry friction at the motions e1. A connector sticks while its force is below the limit. It
+ * slips until the sliding velocity reverses, in the middle of the step or at its end. In a long
+ * step, both slip with a reversed velocity and rest can be solutions; rest is taken if it gives no
+ * energy.
  *
- * Where the sliding force may be below the limit, to stick and to slide can both be solutions, too. While HOLD
- * is set, each connector of such a law goes on as in the last step until an equilibrium is found; what it does
- * not admit is the excess, by which the march lets them change. */
+ * If the sliding force can be below the limit, both sticking and sliding can be solutions. While
+ * HOLD is set, each connector of such a law stays on the branch of the last step until an
+ * equilibrium is found. The excess measures the violation of that branch; the time loop lets
+ * connectors change by it.
+ */
 static void find_rows_of_friction(friction *f, const double *e0, const double *e1, const double *force)
 {
   for (int i = 0; i < f->number; ++i) {
@@ -61,8 +65,8 @@ static void find_rows_of_friction(friction *f, const double *e0, const double *e
     const int stuck = *slip == 0;
     const int slows = !f->against[i] && *slip * f->way[i] > 0;
     const int back = !stuck && *slip * (slows ? step - f->way[i] : step) < -f->tiny[i];
-    /* To come to rest must not give energy; if it did, the place is held at once in this step. The force
-     * of the guess does not decide this: it belongs to another motion. */
+    /* Coming to rest must not give energy; if it does, the connector is held at once in this step.
+     * The force of the initial guess does not decide this, as it belongs to another motion. */
     const int gives = !f->guessed && !f->against[i] && stuck && λ * f->way[i] < 0;
     const int over = stuck && fabs(λ) > limit * (1 + 1e-12);
     if (f->search) f->excess[i] = 0;
@@ -96,11 +100,11 @@ static void get_forces(const couplings *c, const double *q, double *force)
   for (int i = 0; i < c->number; ++i) force[i] = q[c->force[i]];
 }
 
-/* The compiled laws around their motions e1. */
+/* Rows of compiled laws, linearized at the motions e1. */
 static void find_rows_of_laws(const connector_laws *p, const double *e1)
 {
   const int n = p->components;
-  double *w = p->w, *row = p->rows, s[12]; /* of three components, at most */
+  double *w = p->w, *row = p->rows, s[12]; /* for up to three components */
   for (int i = 0; i < p->number; ++i, w += p->width, e1 += n) {
     memcpy(w, e1, n * sizeof *e1);
     ask_law(p->force, w, n + n * n, s);
@@ -112,7 +116,7 @@ static void find_rows_of_laws(const connector_laws *p, const double *e1)
   }
 }
 
-/* What the law of connector i brings at the end of a step to the motions e1. */
+/* Outputs of the law of connector i at the end of a step to the motions e1. */
 static const double *end_of_law(const connector_laws *p, int i, const double *e1)
 {
   double *w = p->w + i * p->width;
@@ -121,7 +125,7 @@ static const double *end_of_law(const connector_laws *p, int i, const double *e1
   return p->answer;
 }
 
-/* Take the motions e1 as the new state of connector i, which has taken a work. */
+/* Accept the motions e1 as the new state of connector i, which has taken the work `work`. */
 static void commit_law(const connector_laws *p, int i, const double *e1, double work)
 {
   const int n = p->components;
@@ -138,7 +142,7 @@ static void commit_law(const connector_laws *p, int i, const double *e1, double 
   memcpy(w + n, e1, n * sizeof *e1);
 }
 
-/* The laws that depend on iterates, around the motions at q. */
+/* Write the rows that depend on the iterate, linearized at q. */
 static void set_rows(const couplings *c, const double *q)
 {
   const double *rows = 0;
@@ -163,7 +167,8 @@ static void set_rows(const couplings *c, const double *q)
   for (int k = 0; rows && k < c->number; ++k) put_row(c, k, rows + numbers_of_rows(c) * c->link[k]);
 }
 
-/* Rows of all connectors around their motions at q; as step begins have put those that stay in it. */
+/* Rows of all connectors, linearized at q; rows that are constant in a step are as its beginning
+ * has written them. */
 void find_rows(const couplings *c, const double *q, double *rows)
 {
   const int n = numbers_of_rows(c);
@@ -181,9 +186,9 @@ void add_couplings_force(void *self, const double *q, double *r)
   add_cells((void *)c->work, q, r);
 }
 
-/* Largest residual of a row: of motions as a part of 1 % of the largest motion in the scene, or of 1 %
- * of the scene if that is less; of forces as a part of the scale. What the last digits of the motions
- * make of a row does not count; far from where it began, or after many turns, it has fewer digits. */
+/* Largest residual of a row. Motions are relative to 1 % of the largest motion in the scene, at
+ * most to 1 % of the scene; forces are relative to the scale. Round-off of the motions does not
+ * count; it grows with the distance from the initial position and with the number of turns. */
 double missed_by_couplings(void *self, const double *q, const double *r, double scale, double moved)
 {
   const couplings *c = self;
@@ -220,7 +225,8 @@ static double taken_by(const couplings *c, int i, const double *q)
   return force * (c->e1[i] - c->e0[i]);
 }
 
-/* Take the end of the step as the new state; what all have taken in it. */
+/* Accept the end of the step as the new state; returns the work that all connectors have taken in
+ * it. */
 static double commit_couplings(const couplings *c, const double *q, double dt)
 {
   double sum = 0;

@@ -1,12 +1,13 @@
 /* SPDX-License-Identifier: MIT */
-/* Elimination of the interior vertices of chains, by blocks of 3 x 3; see static_condensation.py.
+/* Block elimination (3 x 3) of the interior vertices of chains; see static_condensation.py.
  *
- * A chain is left end - vertices - right end. Its vertices are eliminated from left to right, so that
- * each couples to the left end and to the next vertex when its turn comes. A chain that begins at a
- * vertex with one neighbour has no left end. Vertex v has the rows dof[v], dof[v] + 1 and dof[v] + 2 of
- * the matrix, one after the other from data[begin[v]] on. Each has nine entries, or six where there is
- * one neighbour; from at[3 v + n] on, three of them are the columns of the vertex before (n = 0), of v
- * (1) and of the vertex after (2). The degrees of freedom of an end may have any numbers.
+ * A chain is left end - vertices - right end. Its vertices are eliminated from left to right, so
+ * that each vertex couples to the left end and to the next vertex when it is eliminated. A chain
+ * that begins at a vertex with one neighbour has no left end. The rows dof[v], dof[v] + 1 and
+ * dof[v] + 2 of vertex v are contiguous in data from begin[v] on. Each row has nine entries, or six
+ * if there is only one neighbour. From at[3 v + n] on, three of them are the columns of the vertex
+ * before (n = 0), of v (1) and of the vertex after (2). The degrees of freedom of an end may have
+ * any numbers.
  */
 
 /* x = D^-1 b */
@@ -24,8 +25,8 @@ static inline void subtract(const double *A, const double *x, double *y)
   for (int i = 0; i < 3; ++i) y[i] -= A[3 * i] * x[0] + A[3 * i + 1] * x[1] + A[3 * i + 2] * x[2];
 }
 
-/* The block of a vertex, whose rows have `width` entries, with a neighbour in its chain or itself; its
- * numbers are written `apart` from each other. */
+/* Read the block of a vertex, whose rows have `width` entries, with a neighbour in its chain or
+ * with itself. The numbers are written `apart` from each other. */
 static inline void read_block(const chains *c, int vertex, int neighbour, int width, double *block,
                               int apart)
 {
@@ -34,14 +35,14 @@ static inline void read_block(const chains *c, int vertex, int neighbour, int wi
     for (int k = 0; k < 3; ++k, block += apart) *block = row[k];
 }
 
-/* One of the blocks of a chain with its ends, see `with_ends` */
+/* Read a block of a chain with its ends, see end_block. */
 static inline void read_block_of_end(const chains *c, int chain, int which, double *block, int apart)
 {
   const int32_t *entry = c->with_ends + 36 * chain + 9 * which;
   for (int k = 0; k < 9; ++k, block += apart) *block = c->data[entry[k]];
 }
 
-/* The rows of the block of the one after a vertex with the vertex */
+/* Read the block that couples the rows of the next vertex, or of the right end, to a vertex. */
 static inline void read_below(const chains *c, int chain, int vertex, double *block, int apart)
 {
   if (vertex + 1 < c->first[chain + 1])
@@ -50,7 +51,8 @@ static inline void read_below(const chains *c, int chain, int vertex, double *bl
     read_block_of_end(c, chain, RIGHT_LAST, block, apart);
 }
 
-/* The block of a vertex, whose rows have `width` entries, with the one after it */
+/* Read the block that couples the rows of a vertex, with `width` entries each, to the next vertex
+ * or right end. */
 static inline void read_after(const chains *c, int chain, int vertex, int width, double *block,
                               int apart)
 {
@@ -62,16 +64,17 @@ static inline void read_after(const chains *c, int chain, int vertex, int width,
 
 /* -- two chains at once ------------------------------------------------------------------------- */
 
-/* Each vertex waits for the one before it, but not for those of another chain: a number of each. */
+/* Each vertex depends on the previous vertex of its chain, but not on other chains. So each vector
+ * has one number of each of two chains. */
 enum { PAIR = 2 };
 typedef double pair __attribute__((vector_size(8 * PAIR)));
 typedef int64_t choice __attribute__((vector_size(8 * PAIR)));
 
-/* Two chains on the way: what the vertices so far make of the next one, and of the ends. */
+/* Two chains during elimination: modified blocks of the next vertices and of the ends. */
 typedef struct {
   int next, chain[PAIR], vertex[PAIR], last[PAIR], counts[PAIR];
   pair pivot[9], after[9], f[3];
-  pair to[9], from[9], faded, left[9], left_f[3]; /* where there are spikes */
+  pair to[9], from[9], faded, left[9], left_f[3]; /* if a chain has a left end */
 } chain_fronts;
 
 static inline pair absolute(pair x) { return (pair)((choice)x & INT64_MAX); }
@@ -85,8 +88,8 @@ static inline void exchange(choice which, int columns, pair *x, pair *y)
   }
 }
 
-/* Rows [D | B] become [LU | L^-1 B], with the largest pivot of each column, of which LU has the
- * reciprocal; `swap` takes the order of the rows. */
+/* Rows [D | B] become [LU | L^-1 B], with column pivoting. LU has the reciprocals of the pivots;
+ * `swap` gets the order of the rows. */
 static inline void factor_rows(const int columns, pair *row, choice *swap)
 {
   pair *a = row, *b = row + columns, *c = row + 2 * columns;
@@ -100,7 +103,7 @@ static inline void factor_rows(const int columns, pair *row, choice *swap)
   } while (0)
   PIVOT(a, b, 0, 1);
   PIVOT(a, c, 0, 2);
-  a[0] = 1 / a[0]; /* of a singular block not finite, and so all that comes of it */
+  a[0] = 1 / a[0]; /* not finite for a singular block, and so are the results */
   b[0] *= a[0], c[0] *= a[0];
   for (int j = 1; j < columns; ++j) b[j] -= b[0] * a[j], c[j] -= c[0] * a[j];
   PIVOT(b, c, 1, 2);
@@ -133,7 +136,8 @@ static inline void divide_by_rows(const int columns, const pair *row, pair *A)
   }
 }
 
-/* Y -= A X, of `columns` columns out of rows with `far` numbers; what is found last comes last */
+/* Y -= A X for `columns` columns of X, whose rows have `far` numbers; subtracts the latest results
+ * last */
 static inline void subtract_product(const pair *A, const int columns, const int far, const pair *X,
                                     pair *Y)
 {
@@ -143,16 +147,16 @@ static inline void subtract_product(const pair *A, const int columns, const int 
                            - A[3 * i + 2] * X[2 * far + j];
 }
 
-/* The coupling to the left end fades along a chain. Entries whose product with such others is nothing
- * beside the first ones become zero: arithmetic with numbers that are less than normal takes a hundred
- * times as long. */
+/* The coupling to the left end decays along a chain. Entries become zero if their products are
+ * negligible beside the first ones: arithmetic with subnormal numbers takes a hundred times as
+ * long. */
 static inline void drop_faded(pair *block, pair faded)
 {
   for (int k = 0; k < 9; ++k)
     block[k] = (pair)((choice)block[k] & (choice)(absolute(block[k]) >= faded));
 }
 
-/* Largest entry of the block of one chain */
+/* Largest entry of the block of one chain. */
 static inline double largest_entry(const pair *block, int lane)
 {
   double largest = 0;
@@ -175,8 +179,8 @@ static void begin_chain(const chains *c, chain_fronts *at, int lane, int chain)
   at->faded[lane] = 0x1p-511 * fmin(largest_entry(at->to, lane), largest_entry(at->from, lane));
 }
 
-/* What a chain makes of the blocks of its ends, left-left, left-right, right-left and right-right, and
- * of the right-hand side there. */
+/* Add the Schur complement of a chain to the blocks of its ends (left-left, left-right, right-left,
+ * right-right) and to the right-hand side there. */
 static void end_chain(const chains *c, const chain_fronts *at, int lane)
 {
   const int chain = at->chain[lane];
@@ -190,8 +194,8 @@ static void end_chain(const chains *c, const chain_fronts *at, int lane)
   }
 }
 
-/* The block of the vertex after that of each chain with the one before (0), itself (1) or the one after
- * (2), inside of the chains */
+/* Read the block of the next vertex of each chain with the vertex before it (0), itself (1) or the
+ * vertex after it (2), inside the chains. */
 static inline void read_blocks(const chains *c, const chain_fronts *at, int neighbour, pair *block)
 {
   const double *row[PAIR];
@@ -203,7 +207,7 @@ static inline void read_blocks(const chains *c, const chain_fronts *at, int neig
     for (int k = 0; k < 3; ++k) block[3 * r + k] = (pair){row[0][9 * r + k], row[1][9 * r + k]};
 }
 
-/* All three of them, the first into `below`. */
+/* Read all three blocks of the next vertices, the first into `below`. */
 static inline void read_next(const chains *c, chain_fronts *at, pair *below, const int inside)
 {
   if (inside) {
@@ -223,12 +227,12 @@ static inline void read_next(const chains *c, chain_fronts *at, pair *below, con
   }
 }
 
-/* The next vertex of each chain, and its part of the right-hand side b; without a spike nothing couples
- * to a left end, and inside of chains the next two vertices are none. */
+/* Eliminate the next vertex of each chain from the matrix and from the right-hand side b. `spike`:
+ * a chain has a left end. `inside`: the next two vertices of both chains are not ends. */
 static inline void eliminate_vertices(const chains *c, chain_fronts *at, const double *b,
                                       const int spike, const int inside)
 {
-  /* rows of [pivot | f | after | to] */
+  /* columns of the rows [pivot | f | after | to] */
   enum { F = 3, AFTER = 4, TO = 7 };
   const int far = spike ? 10 : 7;
   pair row[3 * 10], below[9];
@@ -282,15 +286,15 @@ static inline int to_go(const chain_fronts *at, int lane)
   return at->last[lane] - at->vertex[lane] + 1;
 }
 
-/* The next chain; where none is left, the other one again, which changes nothing. */
+/* Begin the next chain; if none is left, repeat the other chain, whose results are not used. */
 static void take_chain(const chains *c, chain_fronts *at, int lane)
 {
   at->counts[lane] = at->next < c->chains;
   begin_chain(c, at, lane, at->counts[lane] ? at->next++ : at->chain[1 - lane]);
 }
 
-/* Eliminate all vertices from the matrix, and from the right-hand side b: what is left is what stays
- * as it is, and what the chains make of their ends. */
+/* Eliminate all vertices from the matrix and from the right-hand side b. The reduced system
+ * consists of the entries that stay and the Schur complements of the chains. */
 void eliminate(const chains *c, const double *b)
 {
   memset(c->left_data, 0, c->left * sizeof *c->left_data);
@@ -327,7 +331,7 @@ static inline void write_vertex(const chains *c, const double *y, int vertex, do
   for (int r = 0; r < 3; ++r) f[c->dof[vertex] + r] = y[r];
 }
 
-/* y = D^-1 b of a vertex, and what that makes of the right-hand side of the next one, or of the right
+/* y = D^-1 b of a vertex, and its contribution to the right-hand side of the next vertex or right
  * end */
 static inline void go_on(const chains *c, int chain, int vertex, const double *b, double *y,
                          double *next)
@@ -339,8 +343,8 @@ static inline void go_on(const chains *c, int chain, int vertex, const double *b
   subtract(below, y, next);
 }
 
-/* Vertices of the longest of PAIR chains, or of the last one alone. Chains take turns: in each a vertex
- * waits for the one before it. */
+/* Number of vertices of the longest of PAIR chains, or of the last chain alone. Loops alternate
+ * between chains, as a vertex depends on the previous one of its chain. */
 static inline int most_vertices(const chains *c, int chain)
 {
   int most = 0;
@@ -351,7 +355,8 @@ static inline int most_vertices(const chains *c, int chain)
   return most;
 }
 
-/* What the left end of a chain feels of the first vertex while both ends are held, from f. */
+/* Contribution of the first vertex to the right-hand side of the left end with both ends held, from
+ * f. */
 static void feel_first_vertex(const chains *c, int chain, double *left)
 {
   const int end = c->first[chain + 1];
@@ -366,7 +371,8 @@ static void feel_first_vertex(const chains *c, int chain, double *left)
   subtract(from, y, left);
 }
 
-/* Eliminate all vertices from another right-hand side; f takes what pivots make of it. */
+/* Eliminate all vertices from another right-hand side; f gets D^-1 times the reduced right-hand
+ * side. */
 void reduce(const chains *c, const double *b)
 {
   memset(c->left_f, 0, c->left_size * sizeof *c->left_f);
@@ -396,7 +402,7 @@ void reduce(const chains *c, const double *b)
   }
 }
 
-/* Add to f what pivots make of the motion of the left end, as far as it does not fade. */
+/* Add the effect of the motion of the left end to f, until it has decayed. */
 static void follow_left_end(const chains *c, int chain, const double *left)
 {
   double to[9], y[3], next[3] = {0};
@@ -410,7 +416,8 @@ static void follow_left_end(const chains *c, int chain, const double *left)
   }
 }
 
-/* The unknowns of all vertices into x, from those that are left; f as reduce left it, which may be x. */
+/* Compute the unknowns of all vertices in x from the reduced solution. f is as reduce has left it;
+ * x may be f. */
 void expand(const chains *c, const double *left, double *x)
 {
   for (int k = 0; k < c->rows; ++k) x[c->kept[k]] = left[c->number[k]];

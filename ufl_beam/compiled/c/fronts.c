@@ -1,26 +1,29 @@
 /* SPDX-License-Identifier: MIT */
 /* Multifrontal elimination of the first unknowns of a sparse system; see multifrontal.py.
  *
- * A front is a dense matrix: the rows and columns of some pivots, which are eliminated in it, and of
- * the later unknowns that these couple to. What elimination makes of the latter is added to the front
- * of the first of them. The last front has no pivots: it is the Schur complement of the unknowns that
- * stay. Rows are exchanged among the pivots of a front; a small system is one front.
+ * A front is a dense matrix with the rows and columns of some pivots, which are eliminated in it,
+ * and of the later unknowns that couple to them. The Schur complement of the later unknowns is
+ * added to the front of the first of them. The last front has no pivots: it is the Schur complement
+ * of the unknowns that stay. Rows are exchanged among the pivots of a front; a small system is one
+ * front.
  */
 
-enum { FEW = 64 }; /* entries by which a front may grow for each pivot, so that it takes one more */
+enum { FEW = 64 }; /* entries by which a front may grow per pivot to take one more pivot */
 
-/* Find the fronts of a matrix with a symmetric pattern whose first `eliminated` unknowns are to be.
+/* Find the fronts of a matrix with a symmetric pattern for the elimination of its first
+ * `eliminated` unknowns.
  *
- * Front k has the pivots first[k]... to those of the next; its other unknowns, in order, are
- * rest[begin[k]...]. The arrays have room for as many fronts as unknowns are eliminated, and two;
- * rest has `room`. `mark` and `next` are space for as many as there are unknowns. Returns the number of
- * fronts, or -1 if there is too little room.
+ * Front k has the pivots from first[k] to the first pivot of the next front. Its other unknowns, in
+ * order, are rest[begin[k]...]. The arrays have space for `eliminated` + 2 fronts; rest has space
+ * for `room` numbers. `mark` (unknowns) and `next` (2 unknowns) are scratch space. Returns the
+ * number of fronts, or -1 if `room` is too small.
  */
 int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32_t *indices,
                 int room, int32_t *first, int32_t *begin, int32_t *rest, int32_t *mark,
                 int32_t *next)
 {
-  /* Fronts whose first other unknown is j are a list: next[j], then next[unknowns + front]. */
+  /* Fronts with the same first other unknown j form a linked list: next[j], then next[unknowns +
+   * front]. */
   int count = 0;
   for (int j = 0; j < 2 * unknowns; ++j) next[j] = -1;
   for (int j = 0; j < unknowns; ++j) mark[j] = -1;
@@ -68,7 +71,7 @@ int find_fronts(int unknowns, int eliminated, const int32_t *indptr, const int32
   return count;
 }
 
-/* Row or column of an unknown in a front */
+/* Row or column of an unknown in a front. */
 static int where(const fronts *c, int front, int unknown)
 {
   const int pivots = c->first[front + 1] - c->first[front];
@@ -88,8 +91,8 @@ static inline int front_size(const fronts *c, int front)
   return c->first[front + 1] - c->first[front] + c->begin[front + 1] - c->begin[front];
 }
 
-/* Where entries (row, column) are in the fronts that they belong to; parent and up of all fronts;
- * front_of: of the unknowns. */
+/* Find the indices of the entries (row, column) in their fronts, and parent and up of all fronts.
+ * front_of is the front of each unknown. */
 void place_in_fronts(const fronts *c, int entries, const int32_t *row, const int32_t *column,
                      const int32_t *front_of, int32_t *place, int32_t *parent, int32_t *up)
 {
@@ -103,22 +106,22 @@ void place_in_fronts(const fronts *c, int entries, const int32_t *row, const int
   }
 }
 
-/* Put the fronts in an order in which the children of a front are together before it: order; before:
- * the place before the first front that one place depends on; children: of each front, but for those of
- * the last. Of the children, that which depends on most comes first, so that little waits on the stack
- * meanwhile. Returns how many numbers the stack has at most. */
+/* Order the fronts so that the children of a front are together before it. order: the fronts.
+ * before: the place before the first front on which the front at a place depends. children: number
+ * for each front, except children of the last front. The child that depends on most fronts comes
+ * first, so that the stack stays small. Returns the largest number of entries of the stack. */
 int64_t order_fronts(const fronts *c, int32_t *order, int32_t *before, int32_t *children)
 {
   const int last = c->fronts - 1;
   int32_t place = 0;
   int64_t most = 0, stack = 0;
-  int32_t *below = before, *from = order; /* what a front depends on; where that begins, for now */
+  int32_t *below = before, *from = order; /* fronts that a front depends on; where they begin */
   for (int s = 0; s < last; ++s) below[s] = 1, children[s] = 0;
   for (int s = 0; s < last; ++s)
     if (c->parent[s] < last) below[c->parent[s]] += below[s], ++children[c->parent[s]];
   int32_t *space = calloc(4 * (size_t)last + 1, sizeof *space);
   if (!space) return -1;
-  /* Those that depend on most come first, and so parents before their children. */
+  /* Fronts that depend on most others come first, and so parents before their children. */
   int32_t *found = space, *first = space + 2 * last, *sorted = first + last + 1;
   for (int s = 0; s < last; ++s) ++first[last - below[s] + 1];
   for (int k = 0; k < last; ++k) first[k + 1] += first[k];
@@ -147,12 +150,13 @@ int64_t order_fronts(const fronts *c, int32_t *order, int32_t *before, int32_t *
 
 /* -- dense elimination -------------------------------------------------------------------------- */
 
-/* Pivots that are eliminated from all of a front at once; rows of a product that stay in registers. */
+/* pivots that are eliminated from the entire front at once; rows of a product in registers */
 enum { PANEL = 24, ROWS = 4 };
 typedef double wide __attribute__((vector_size(8 * WIDE), aligned(8), may_alias));
 
-/* C -= A B, of so many rows and vectors of columns, the last of which may have fewer; rows of all three
- * have `stride` numbers. Beyond the last column there are numbers, too. */
+/* C -= A B for `rows` rows and `vectors` vectors of columns, the last of which may be
+ * incomplete. Rows of all three matrices have `stride` numbers. Memory beyond the last column
+ * must be readable. */
 static inline __attribute__((always_inline)) void subtract_block(
     const int rows, const int vectors, int columns, int depth, int stride, const double *A,
     const double *B, double *C)
@@ -184,7 +188,7 @@ static inline __attribute__((always_inline)) void subtract_columns(
     subtract_block(1, vectors, columns, depth, stride, A, B, C);
 }
 
-/* C -= A B, C of rows x columns */
+/* C -= A B for C of rows x columns */
 static void subtract_dense(int rows, int columns, int depth, int stride, const double *A,
                            const double *B, double *C)
 {
@@ -196,9 +200,10 @@ static void subtract_dense(int rows, int columns, int depth, int stride, const d
   if (j < columns) subtract_columns(1, rows, columns - j, depth, stride, A, B + j, C + j);
 }
 
-/* Eliminate the pivots of a front, rows exchanged among them; reciprocals of the pivots on the
- * diagonal, multipliers below it; whether they are finite. `unit` is space for the largest number of
- * each row, by which those of rows with other dimensions are compared. */
+/* Eliminate the pivots of a front with row exchanges among them. The diagonal gets reciprocals of
+ * the pivots, the columns below it multipliers. Returns whether the pivots are finite. `unit` is
+ * space for the scale of each row: pivots of rows with different dimensions are compared relative
+ * to their largest entries. */
 static int eliminate_pivots(int size, int pivots, double *F, int32_t *swap, double *unit)
 {
   int finite = 1;
@@ -241,7 +246,7 @@ static int eliminate_pivots(int size, int pivots, double *F, int32_t *swap, doub
 
 /* -- the fronts --------------------------------------------------------------------------------- */
 
-/* Add what a front makes of the rest of its unknowns, a matrix with rows of `stride`, to the parent. */
+/* Add the Schur complement of a front, a matrix with rows of `stride` numbers, to its parent. */
 static void add_to_parent(const fronts *c, int front, const double *made, int stride, double *to)
 {
   const int rest = c->begin[front + 1] - c->begin[front], size = front_size(c, c->parent[front]);
@@ -257,10 +262,11 @@ static void add_entries(const fronts *c, int front, const double *data, double *
   for (int k = c->entries[front]; k < c->entries[front + 1]; ++k) F[c->place[k]] += data[c->entry[k]];
 }
 
-/* Factors of the system whose entries are `data`, and the Schur complement of what stays. Returns
- * whether all pivots are finite.
+/* Factorize the system with the entries `data` and compute the Schur complement of the unknowns
+ * that stay. Returns whether all pivots are finite.
  *
- * Parents come after their children: what these make of the rest is at the end of the stack. */
+ * Parents come after their children, whose Schur complements are at the end of the stack.
+ */
 int factor_fronts(const fronts *c, const double *data)
 {
   const int last = c->fronts - 1, stay = front_size(c, last);
@@ -292,7 +298,8 @@ int factor_fronts(const fronts *c, const double *data)
   return finite;
 }
 
-/* The right-hand side b in x: what pivots make of it, then that of the Schur complement. */
+/* Reduce the right-hand side b in x: eliminated pivots, then the right-hand side of the Schur
+ * complement. */
 void reduce_fronts(const fronts *c, const double *b)
 {
   for (int i = 0; i < c->size; ++i) c->x[i] = b[c->unknown[i]];
@@ -316,7 +323,7 @@ void reduce_fronts(const fronts *c, const double *b)
   }
 }
 
-/* The solution, from that of what stays at the end of x. */
+/* Compute the solution from the solution of the unknowns that stay, at the end of x. */
 void expand_fronts(const fronts *c, double *found)
 {
   for (int k = c->fronts - 2; k >= 0; --k) {

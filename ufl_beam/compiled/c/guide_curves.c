@@ -1,20 +1,22 @@
 /* SPDX-License-Identifier: MIT */
-/* Points held on curves that only Python knows, see connectors.py.
+/* Points guided along curves that are Python functions, see connectors.py.
  *
- * Python is asked for five points of a curve at a time. The polynomial through them says where the nearest
- * point is, until that is the one in the middle but for its last digits; and gives the derivatives there. */
+ * Python computes five points of a curve at a time. The polynomial through them yields the nearest
+ * point. This repeats around the nearest point until that coincides with the middle point up to
+ * round-off. The polynomial also yields the derivatives there.
+ */
 
-enum { PROJECTIONS = 50, MOST_REFINEMENTS = 20 }; /* largest numbers of iterations */
+enum { PROJECTIONS = 50, MOST_REFINEMENTS = 20 }; /* largest numbers of polynomials, and of corrections for each */
 
-/* Steps of the parameter up to which a polynomial says where to go; of which Newton's method leaves nothing;
- * what the last search may leave, as a part of the scene. */
+/* Number of parameter steps up to which a polynomial is trusted; correction that ends Newton's
+ * method; tolerance of the last projection, relative to the scene. */
 static const double TRUSTED = 32, NOTHING_LEFT = 1e-12, CLOSE_ENOUGH = 1e-9;
 
 static double product_of(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1]; }
 
 static double last_digit(double x) { return nextafter(x, INFINITY) - x; }
 
-/* The polynomial around the parameter s. */
+/* Compute the polynomial around the parameter s. */
 static void expand_curve(const guides *g, int k, double s, curve_around *c)
 {
   double p[CURVE_POINTS][2];
@@ -31,7 +33,7 @@ static void expand_curve(const guides *g, int k, double s, curve_around *c)
   }
 }
 
-/* The way from the point in its middle to that u steps on, and the derivatives by u. */
+/* Displacement from the middle point to the point u steps further, and its derivatives by u. */
 static void derive(const curve_around *c, double u, double *way, double *slope, double *bend)
 {
   for (int i = 0; i < 2; ++i) {
@@ -42,7 +44,8 @@ static void derive(const curve_around *c, double u, double *way, double *slope, 
   }
 }
 
-/* Steps from the middle to the point nearest to p; far away along the tangent. */
+/* Steps from the middle to the point nearest to p; beyond the trusted range, steps along the
+ * tangent. */
 static double steps_to(const curve_around *c, const double *p)
 {
   double u = 0, along_tangent = NAN;
@@ -60,7 +63,8 @@ static double steps_to(const curve_around *c, const double *p)
   return along_tangent;
 }
 
-/* The point of a curve nearest to p, from the latest one on, and derivatives; whether there is one. */
+/* Find the point of a curve nearest to p, starting from the latest one, and the derivatives there;
+ * returns whether there is one. */
 static int find_nearest(const guides *g, int k, const double *p, double *on, double *slope, double *bend)
 {
   curve_around *c = g->around + k;
@@ -80,7 +84,8 @@ static int find_nearest(const guides *g, int k, const double *p, double *on, dou
   return 0;
 }
 
-/* Direction of a short chord: that of the curve in its middle; and its change with the end. */
+/* Direction of a short chord, taken as the tangent in its middle, and its derivative by the end
+ * point. */
 static void find_direction_in_middle(const guides *g, int k, double *d, double *change)
 {
   curve_around c;
@@ -91,7 +96,8 @@ static void find_direction_in_middle(const guides *g, int k, double *d, double *
   for (int i = 0; i < 2; ++i) change[i] = (bend[i] - d[i] * along) / 2;
 }
 
-/* Distance of a point from the curve, the normals, and how that over the step changes with the point. */
+/* Distance of a point from the curve, normals, and the derivative of the normal over the step by
+ * the point. */
 static int find_frame(const guides *g, int k, const double *p, guide_frame *f)
 {
   double bend[2], t[2], d[2], change[2];
@@ -104,7 +110,8 @@ static int find_frame(const guides *g, int k, const double *p, guide_frame *f)
   const double chord[2] = {f->on[0] - g->on0[2 * k], f->on[1] - g->on0[2 * k + 1]};
   const double length = sqrt(product_of(chord, chord));
   if (!g->over_step) {
-    /* The normal at the end turns by the curvature: dn = -curvature t t.dp / (1 - curvature distance). */
+    /* The normal at the end rotates by the curvature: dn = -curvature t t.dp / (1 - curvature
+     * distance). */
     const double curvature = product_of(f->n, bend) / square;
     for (int i = 0; i < 2; ++i) d[i] = t[i], change[i] = f->n[i] * curvature / (1 - curvature * f->distance);
   } else if (length > g->shortest[k]) {
@@ -121,7 +128,8 @@ static int find_frame(const guides *g, int k, const double *p, guide_frame *f)
   return 1;
 }
 
-/* Those of all guides at q, unless they are known; whether they are found. Python says what is lost. */
+/* Find the frames of all guides at q, unless they are known; returns whether all are found. Python
+ * reports the guide that is lost. */
 int find_frames(guides *g, const double *q)
 {
   for (int k = 0; k < g->number; ++k) {
@@ -167,7 +175,7 @@ void add_guides_tangent(void *self, const double *q, double *tangent)
   }
 }
 
-/* Largest distance, as a part of 1 % of the scene; what the last digits make of it does not count. */
+/* Largest distance from a curve, relative to 1 % of the scene; round-off does not count. */
 double missed_by_guides(void *self, const double *q, const double *r, double scale, double moved)
 {
   const guides *g = self;
@@ -182,8 +190,8 @@ double missed_by_guides(void *self, const double *q, const double *r, double sca
   return most;
 }
 
-/* Begin at the points of the last step. What iterates have found since is forgotten: a restart from a
- * checkpoint does not have it. */
+/* Begin at the points of the last step. Later results of iterates are discarded, as a restart from
+ * a checkpoint does not have them. */
 void begin_guides_again(void *self)
 {
   const guides *g = self;
@@ -198,7 +206,7 @@ void begin_guides(void *self, const time_step *step, const double *q1, const dou
   begin_guides_again(self);
 }
 
-/* Remember the points on the curves; nothing is, if one is lost. */
+/* Store the points on the curves as the accepted state, unless a guide is lost. */
 void accept_guides(void *self, const time_step *step, const double *q1, const double *s)
 {
   guides *g = self;

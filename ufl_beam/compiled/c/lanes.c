@@ -1,18 +1,20 @@
 /* SPDX-License-Identifier: MIT */
-/* What add_cells of loops.c does, for LANES cells at a time; the last ones may be fewer. */
+/* The loop of add_cells in loops.c for LANES cells at a time; the last batch may have fewer. */
 
 enum { NUMBERS = CONSTANTS + (CONSTANTS == 0), COEFFICIENTS = WIDTH + (WIDTH == 0) };
 
-/* Two and four numbers anywhere */
+/* Two and four numbers at any address. */
 typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
-/* What add_batch does for cells with two vertices whose six entries of a row stand side by side, vertex
- * by vertex; a cell has them in the order u u v v ψ ψ. Additions are fewer and wider than one by one. */
+/* Do the work of add_batch for cells with two vertices if the six entries of a row are adjacent,
+ * vertex by vertex; a cell has them in the order u u v v ψ ψ. Additions are fewer and wider than
+ * for single entries. */
 static inline void add_rows_of_six(const cells *c, const lanes *e, const int32_t *dofs,
                                    const uint8_t *pattern, double *b)
 {
-  /* Rows of the second vertices last: cells side by side add to the same, and would wait. */
+  /* Rows of the second vertices come last: adjacent cells add to the same rows, and would wait for
+   * each other. */
   for (int k = 0; k < 6; ++k) {
     const int i = k % 3 * 2 + k / 3;
     double *row[LANES];
@@ -44,8 +46,9 @@ static inline void add_rows_of_six(const cells *c, const lanes *e, const int32_t
   }
 }
 
-/* A batch of which `some` are cells; if entries are a matrix, it has SIDE rows. All lanes add one entry,
- * then the next one: cells side by side add to the same places, and would wait for each other. */
+/* Add a batch of `some` cells; if the entries are a matrix, it has SIDE rows. All lanes add one
+ * entry, then the next one: adjacent cells add to the same indices, and would wait for each
+ * other. */
 static inline void add_batch(const cells *c, const lanes *e, int first, int some, double *b)
 {
   const int32_t *dofs = c->dofs + (size_t)first * c->of_cell;
@@ -79,7 +82,7 @@ static inline void add_batch(const cells *c, const lanes *e, int first, int some
       for (int l = 0; l < some; ++l) b[dofs[l * ENTRIES + i]] += e[i][l];
 }
 
-/* The unknowns of a batch of which `some` are cells, and the first one in the place of others. */
+/* Gather the unknowns of a batch of `some` cells; the first cell fills up the batch. */
 static inline void take_unknowns(const int32_t *dofs, const double *q, int some, lanes *w)
 {
 #define Q(l) q[dofs[(l < some ? l * UNKNOWNS : 0) + i]]
@@ -112,7 +115,8 @@ static void add_in_lanes(const cells *c, const double *q, double *b)
 
 void *address(void) { return (void *)add_in_lanes; }
 
-/* The entries of a batch, cell after cell by FFCx's kernel and by this one. */
+/* Entries of a batch, computed cell by cell with FFCx's kernel, and at once with the kernel of this
+ * file. */
 void compute_both(void *of_ffcx, const double *w, const double *constants, const double *x,
                   double *one, double *several)
 {

@@ -1,9 +1,8 @@
 /* SPDX-License-Identifier: MIT */
-/* Vectors of numbers, one for each of the cells that are computed at once, and what FFCx's kernels
- * ask of them; see simd_kernels.py.
- */
+/* Vectors of numbers, with one number for each of the cells that are computed at once, and the
+ * functions that FFCx's kernels need; see simd_kernels.py. */
 
-/* Numbers that NumPy has put somewhere. */
+/* Vectors at any address of numbers, as NumPy allocates them. */
 typedef double lanes __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
 typedef int64_t mask __attribute__((vector_size(8 * LANES), aligned(8), may_alias));
 
@@ -25,9 +24,9 @@ typedef int64_t mask __attribute__((vector_size(8 * LANES), aligned(8), may_alia
  * is preserved.
  */
 
-/* sin(x + quarter π/2): the nearest multiple of π/2 is taken off in three parts (Cody and Waite); the
- * polynomials between -π/4 and π/4 are good to the last digit. x loses digits beyond 1e6, where it has
- * few itself, and must stay below 1e15. */
+/* sin(x + quarter π/2). The nearest multiple of π/2 is subtracted in three parts (Cody and Waite).
+ * The polynomials are accurate to the last digit between -π/4 and π/4. The result loses digits for
+ * x beyond 1e6, where x itself has few; x must stay below 1e15. */
 static inline lanes trigonometric(lanes x, int64_t quarter)
 {
   const lanes shifted = x * 0x1.45f306dc9c883p-1 + 0x1.8p52, k = shifted - 0x1.8p52;
@@ -57,8 +56,8 @@ static inline lanes lanes_sqrt(lanes x)
   return x;
 }
 
-/* a / b to the last digit but rarely, from 1 / b: a division takes as long as sixteen products. The rest
- * must not be rounded: without it, cells at rest are strained by a last digit. */
+/* a / b from 1 / b, nearly always accurate to the last digit; a division takes as long as sixteen
+ * products. The remainder must not be rounded: otherwise round-off would strain cells at rest. */
 static inline lanes quotient(lanes a, lanes b, lanes over_b)
 {
 #ifdef __FP_FAST_FMA

@@ -1,14 +1,14 @@
 /* SPDX-License-Identifier: MIT */
-/* The loops over cells and rows that a Newton iteration consists of; see loops.h. */
+/* Loops over cells and rows of a Newton iteration; see loops.h. */
 
-/* The coefficients of a cell from `at` on; the way from one to the next is c->lanes, a power of two:
- * before the batch of a cell there are cell & -lanes cells. */
+/* Coefficients of a cell from `at` on, c->lanes apart from each other. c->lanes is a power of two,
+ * so cell & -lanes cells come before the batch of the cell. */
 static inline double *in_cell(const cells *c, int cell, int at)
 {
   return c->w + (cell & -c->lanes) * c->width + at * c->lanes + (cell & (c->lanes - 1));
 }
 
-/* The values q of the cells into their packed coefficients, from `at` on. */
+/* Write the values q at the unknowns of the cells into their packed coefficients, from `at` on. */
 void set_cells(const cells *c, const double *q, int at)
 {
   const int32_t *dofs = c->dofs;
@@ -19,14 +19,15 @@ void set_cells(const cells *c, const double *q, int at)
       for (int i = 0; i < c->of_cell; ++i) batch[i * n + l] = q[dofs[i]];
 }
 
-/* Some values into the packed coefficients of a cell. */
+/* Write some values into the packed coefficients of a cell. */
 static inline void put_in_cell(const cells *c, int cell, int at, int number, const double *values)
 {
   double *w = in_cell(c, cell, at);
   for (int i = 0; i < number; ++i) w[i * c->lanes] = values[i];
 }
 
-/* Add the form at the unknowns q to a vector, or to the entries of a matrix; or to none. */
+/* Add the form at the unknowns q to a vector, to the entries of a matrix, or to nothing if b is
+ * null. */
 void add_cells(void *self, const double *q, double *b)
 {
   const cells *c = self;
@@ -61,7 +62,7 @@ void add_cells(void *self, const double *q, double *b)
   }
 }
 
-/* e = factor e + strains, with the weights of the points, that are linear about a configuration. */
+/* e = factor e + weighted strains of p->change, linearized about a configuration */
 static void add_linear_strains(const predicted_strains *p, const double *about, double factor)
 {
   for (int i = 0; i < p->strains->number * p->of_cell; ++i) p->e[i] *= factor;
@@ -69,8 +70,8 @@ static void add_linear_strains(const predicted_strains *p, const double *about, 
   add_cells((void *)p->strains, p->change, p->e);
 }
 
-/* Strains at q that are linear about the configuration of the latest tangent; first those at the
- * beginning, extrapolated as the configuration is. */
+/* Strains at q, linearized about the configuration of the latest tangent. The first strains are
+ * strains at the beginning of the step, extrapolated like the configuration. */
 static void predict_strains(predicted_strains *p, const double *q)
 {
   double *e = p->e, factor = 1;
@@ -87,14 +88,14 @@ static void predict_strains(predicted_strains *p, const double *q)
   p->stale = 0;
 }
 
-/* Take q as the configuration of the latest tangent. */
+/* Store q as the configuration of the latest tangent. */
 static void predict_from(predicted_strains *p, const double *q)
 {
   memcpy(p->about, q, p->size * sizeof *q);
   p->begins = 0, p->stale = 1;
 }
 
-/* The tangent of a static step at q, with the forces that the latest one has predicted. */
+/* Tangent of a static step at q, with the forces that the latest tangent predicts. */
 void add_static_tangent(void *self, const double *q, double *tangent)
 {
   static_tangent *t = self;
@@ -120,21 +121,21 @@ static void combine(int size, double a, const double *x, double b, const double 
   for (int i = 0; i < size; ++i) out[i] = a * x[i] + b * y[i];
 }
 
-/* Parts one after the other. */
+/* Add all contributions. */
 void add_calls(void *self, const double *q, double *out)
 {
   const calls *c = self;
   for (int i = 0; i < c->number; ++i) c->part[i].add(c->part[i].self, q, out);
 }
 
-/* b -= a, which has some of its numbers */
+/* b -= a at its degrees of freedom */
 void subtract_vector(void *self, const double *q, double *b)
 {
   const vector *a = self;
   for (int i = 0; i < a->size; ++i) b[a->dof[i]] -= a->values[i];
 }
 
-/* Follower load k in the plane at q. */
+/* Follower load k at q in the axes of the plane. */
 static void turn_load(const follower_loads *f, int k, const double *q, double *x, double *y)
 {
   const double turn = f->turn0[k] + f->part * (q[f->turning[k]] - f->turn0[k]);
@@ -165,7 +166,7 @@ void add_tangent_of_follower_loads(void *self, const double *q, double *tangent)
   }
 }
 
-/* Where a matrix holds an entry, -1 if nowhere; columns are in order. */
+/* Index of an entry of a matrix with sorted columns, or -1 if it has none. */
 static inline int32_t find_entry(int rows, const int32_t *indptr, const int32_t *indices, int32_t row,
                                  int32_t column)
 {
@@ -178,7 +179,7 @@ static inline int32_t find_entry(int rows, const int32_t *indptr, const int32_t 
   return *at == column ? (int32_t)(at - indices) : -1;
 }
 
-/* Where a matrix holds the entries (row, column); whether it has them all. */
+/* Find the indices of the entries (row, column) of a matrix; returns whether it has all of them. */
 int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int number,
                  const int32_t *row, const int32_t *column, int32_t *found)
 {
@@ -187,9 +188,10 @@ int find_entries(int rows, const int32_t *indptr, const int32_t *indices, int nu
   return 1;
 }
 
-/* Where a matrix holds the entries of all pairs of the `of_cell` unknowns of each cell, row by row, in
- * batches of `lanes` cells, the last of them filled up with the last cell; whether it has them all.
- * The place, or if that is null, how far from the beginning of its row. */
+/* Find the entries of a matrix for all pairs of the `of_cell` unknowns of each cell, row by row.
+ * The results are in batches of `lanes` cells; copies of the last cell fill up the last batch. They
+ * are indices in `place`, or, if that is null, distances from the beginning of the row in `column`.
+ * Returns whether the matrix has all entries. */
 int find_blocks(int rows, const int32_t *indptr, const int32_t *indices, int number, int of_cell,
                 int lanes, const int32_t *dofs, int32_t *place, uint8_t *column)
 {
@@ -213,9 +215,10 @@ static int in_order(const void *a, const void *b)
   return (i > j) - (i < j);
 }
 
-/* The pattern of a matrix that has its diagonal and all pairs of unknowns of each group: group g is
- * dof[first[g]...first[g + 1]]. `begin` and `group` take the groups of each unknown, `seen` is space.
- * Fills indptr and, unless it is null, `indices`; the number of entries, -1 where there are too many. */
+/* Find the pattern of a matrix with its diagonal and all pairs of the unknowns of each group. Group
+ * g is dof[first[g]...first[g + 1]]. `begin` and `group` get the groups of each unknown; `seen` is
+ * space. Fills indptr and, unless it is null, `indices`. Returns the number of entries, or -1 if
+ * there are too many. */
 int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *dof, int32_t *begin,
                      int32_t *group, int32_t *seen, int32_t *indptr, int32_t *indices)
 {
@@ -255,8 +258,8 @@ int64_t find_pattern(int size, int groups, const int32_t *first, const int32_t *
   return number;
 }
 
-/* CALL of the number of entries in a row, which the compiler knows where it is usual: one of lumped
- * masses, three of consistent ones. */
+/* Expand CALL for the number of entries of a row. The compiler knows the usual numbers: one for
+ * lumped masses, three for consistent masses. */
 #define FOR_WIDTH(width, CALL) \
   switch (width) { \
   case 1: CALL(1); break; \
@@ -341,7 +344,8 @@ void add_tangent_of_frame(void *self, const double *q, double *tangent)
   for (int i = 0; i < f->entries; ++i) tangent[i] += f->turns[i] / f->dt - pulled * f->pulls[i];
 }
 
-/* tan(x/2) for the increment x of rotation k: forces and their tangent are asked at the same. */
+/* tan(x/2) for the increment x of rotation k, stored because forces and their tangent use the same
+ * increment. */
 static inline double half_tangent(const step_product *p, int k, double x)
 {
   if (p->turn[k] != x) p->turn[k] = x, p->half[k] = tan(x / 2);
@@ -362,7 +366,7 @@ void add_step_force(void *self, const double *q, double *r)
   add_product(p->A, s, r);
 }
 
-/* The derivatives, over those of q - q0, of the step of the nodes times the factor: factor (1 + half^2) */
+/* Derivatives by q of factor times the step of the nodes: factor (1 + half^2) */
 static void find_growth(const step_product *p, const double *q)
 {
   double *growth = p->space;
@@ -374,7 +378,7 @@ static void find_growth(const step_product *p, const double *q)
   }
 }
 
-/* tangent += A, column by column times these derivatives; some of the rows */
+/* tangent += A, each column times its derivative, for a range of rows */
 static void add_rows(const step_product *p, int first, int last, double *tangent)
 {
   const constant_matrix *A = p->A;
@@ -388,7 +392,7 @@ static void add_rows(const step_product *p, int first, int last, double *tangent
     const int rows = A->first[g + 1] - A->first[g];
     const int end = A->first[g + 1] < last ? A->first[g + 1] : last;
     const int32_t *away = A->away + A->begin[g];
-    const int64_t at = A->at[g] - A->first[g]; /* of the row 0, as if it were in this run */
+    const int64_t at = A->at[g] - A->first[g]; /* where row 0 would be in this run */
 #define ADD(width, place) \
   for (; first < end; ++first) \
     for (int k = 0; k < (width); ++k) \
@@ -411,7 +415,7 @@ void add_step_tangent(void *self, const double *q, double *tangent)
   add_rows(p, 0, p->size, tangent);
 }
 
-/* Give memory that was used and is free to the system: the C library of GNU keeps it otherwise. */
+/* Return freed memory to the system; the GNU C library keeps it otherwise. */
 void give_back_memory(void)
 {
 #ifdef __GLIBC__
@@ -419,8 +423,8 @@ void give_back_memory(void)
 #endif
 }
 
-/* Euclidean norm of w f, also where its squares are too small or too large to have all digits. f has all
- * rows, or if `at` is not null those. */
+/* Euclidean norm of w f, with all digits even if its squares are very small or large. f has all
+ * rows, or the rows `at` if that is not null. */
 double norm(int rows, const int32_t *at, const double *w, const double *f)
 {
   double sum = 0, largest = 0, scaled = 0;
@@ -436,7 +440,8 @@ double norm(int rows, const int32_t *at, const double *w, const double *f)
   return largest * sqrt(scaled);
 }
 
-/* Largest displacement in q, and rotation times the size of the scene; w as for forces. */
+/* Largest displacement in q, or rotation times the size of the scene; w are the weights of
+ * forces. */
 static double largest_motion(int rows, const double *w, const double *q)
 {
   double largest = 0;

@@ -1,10 +1,10 @@
 /* SPDX-License-Identifier: MIT */
-/* Steps one after the other with no Python between them; see stepper.py.
+/* The time loop without Python; see stepper.py.
  *
- * A step that fails leaves the state as it was, and is taken in parts.
+ * A step that fails leaves the state unchanged and is divided into substeps.
  */
 
-/* As numpy.interp has it. */
+/* Interpolate as numpy.interp does. */
 double value_at(const time_function *f, double t)
 {
   const int last = f->points - 1;
@@ -34,8 +34,9 @@ static double dot(int size, const double *x, const double *y)
   return sum;
 }
 
-/* Work of forces in a step s: of those in its equation, and with the weight a of those in the one before.
- * The forces are at the degrees of freedom `dof`, or if that is none at all of them. */
+/* Work in a step s of the weighted mean of the forces in the previous equation (weight a) and in
+ * the equation of this step. The forces are at the degrees of freedom `dof`, or at all if that is
+ * null. */
 static double work_in_step(int size, const int32_t *dof, double a, const double *before, const double *force,
                            const double *s)
 {
@@ -107,7 +108,8 @@ void begin_predicted_strains(void *self, const time_step *step, const double *q1
   p->begins = 1, p->exact = 0;
 }
 
-/* Elastic cells have no branches to find: forces before the step do as well, and cost less. */
+/* Elastic cells have no branches: forces before the step suffice for the first tangent, and cost
+ * less. */
 void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s)
 {
   const static_tangent *t = self;
@@ -200,7 +202,7 @@ void accept_frame(void *self, const time_step *step, const double *q1, const dou
   }
 }
 
-/* Give a number to the forms of a work that have it, if it has changed. */
+/* Write a parameter into the forms of a work that depend on it, if it has changed. */
 static void put_number(const user_work *w, int k, double value)
 {
   if (value == w->number[k]) return;
@@ -220,7 +222,7 @@ static void put_time(const user_work *w, double t)
   for (int k = WORK_NUMBERS; k < w->numbers; ++k) put_number(w, k, value_at(w->of_time + k - WORK_NUMBERS, t));
 }
 
-/* Longest step that works are told of, in which all rates vanish. */
+/* Longest time step that works get; all rates vanish with it. */
 static const double AT_REST = 1e300;
 
 void begin_works(void *self, const time_step *step, const double *q1, const double *s)
@@ -238,7 +240,7 @@ void begin_works(void *self, const time_step *step, const double *q1, const doub
   }
 }
 
-/* What the scheme lost of a potential in a step, and what a change in time supplied. */
+/* Enter the loss of a potential by the scheme, and the energy that its change in time supplied. */
 static void account_for(const user_work *w, const user_works *all, const double *q0, const double *q1)
 {
   const double a = all->weight_of_before;
@@ -284,7 +286,7 @@ void add_energy_of_works(void *self, const time_step *step, const double *q1, co
   }
 }
 
-/* out = sum of numbers times rates, from the one with number `first` on */
+/* out = sum of coefficients times rates, from the index `first` on */
 static void combine_rates(const rates *r, const double *numbers, int first, double *out)
 {
   int begun = 0;
@@ -319,7 +321,8 @@ int find_numbers(rates *r, double dt)
   return 1;
 }
 
-/* A row for the step and the rates: factor s - back v, v being a sum of rates or one of them. */
+/* Write a row of coefficients as factor s - back v. v is a rate, or a sum if several coefficients
+ * are nonzero. */
 static void begin_product(const matrix_of_rates *m, const time_step *step, const double *row)
 {
   step_product *p = m->product;
@@ -357,7 +360,7 @@ void accept_inertia(void *self, const time_step *step, const double *q1, const d
     combine_rates(r, r->now->slip, 0, r->new_rate[2]);
     *m->lost += dot(r->size, r->new_rate[2], m->momentum);
   }
-  double *last = r->rate[2] == r->new_rate[1] ? r->rate[1] : r->rate[2]; /* v becomes that before */
+  double *last = r->rate[2] == r->new_rate[1] ? r->rate[1] : r->rate[2]; /* v becomes the previous velocity */
   r->rate[2] = r->rate[1], r->rate[1] = r->new_rate[1], r->new_rate[1] = last;
   for (int j = 3; j < r->number; ++j) {
     last = r->rate[j];
@@ -395,7 +398,7 @@ static void begin_points(points *p, double *dt, double new_dt)
   p->tried = p->predicts = 0;
 }
 
-/* What points dissipated in the step, into the ledger. */
+/* Add the dissipation of points in the step to the ledger. */
 static void enter_losses(const inelastic_term *t, const double *sum)
 {
   if (t->plastic) *t->plastic += sum[0];
@@ -414,7 +417,7 @@ void begin_inelastic(void *self, const time_step *step, const double *q1, const 
 {
   const inelastic_term *t = self;
   begin_points(t->cells->points, t->dt, step->dt);
-  t->cells->latest[0] = NAN; /* respond to whatever comes next */
+  t->cells->latest[0] = NAN; /* compute the next response in any case */
 }
 
 void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
@@ -431,7 +434,7 @@ void add_energy_of_points(void *self, const time_step *step, const double *q1, c
   enter_stored(t, t->cells->points->sum);
 }
 
-/* Rows of what damps, drives or pushes, which stay the same during a step. */
+/* Rows of dampers, motors and actuators, which are constant during a step. */
 static void put_rows_of_step(const coupling_term *t, const time_step *step)
 {
   const couplings *c = t->links;
@@ -462,14 +465,16 @@ static void begin_friction_again(friction *f)
   f->guessed = 1;
 }
 
-/* With its way the velocity of what sticks is zero at the end; with none, that before would come back. */
+/* A sticking connector moves by `way` in the step, so that its velocity is zero at the end. Without
+ * this motion, the previous velocity would come back. */
 static void begin_friction(const couplings *c, const time_step *step)
 {
   friction *f = c->friction;
   double way_to_rest = 0;
   memset(c->by_cell, 0, c->number * sizeof *c->by_cell);
   if (f->rates) {
-    const double *of = f->rates->now->rates[0]; /* v1 = of step, v and v before: as if there was none before */
+    const double *of = f->rates->now->rates[0]; /* v1 as a function of the step and v, with v instead of
+                                                 * v_before */
     way_to_rest = -(of[1] + of[2]) / of[0];
     set_cells(f->rate, f->rates->rate[1], f->at_v);
     add_cells((void *)f->rate, step->q0, c->by_cell);
@@ -501,7 +506,8 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
   }
   if (c->friction) begin_friction(c, step);
   if (c->asked) {
-    /* Parts of a step go in proportion to its loads; a path, whose parts are one, has no beginning. */
+    /* Substeps go in proportion to the loads of the step. A path has no beginning, as its fractions
+     * are 1. */
     const double way = step->fraction * step->at;
     const double t1 = way == 1 ? step->load_time : step->t0 + way * (step->load_time - step->t0);
     c->asked->begin(c->asked->begin_self, t1, step->dt);
@@ -559,7 +565,8 @@ void add_energy_of_couplings(void *self, const time_step *step, const double *q1
   if (t->links->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
 }
 
-/* What the latest response would add to what points have stored and dissipated; see Points.change. */
+/* Energy stored and dissipated by points in the latest response, less the present one; see
+ * Points.change. */
 static double change_by_response(const points *p, points *copy)
 {
   memcpy(copy->w, p->w, (size_t)p->cells * p->of_cell * p->width * sizeof *p->w);
@@ -615,17 +622,18 @@ int springs_dissipate(void *self, const double *q1)
 
 /* -- prediction of the end of a step, from which Newton's method starts; see stepper.py ---------------- */
 
-/* Root mean square of the motions in a step, as a part of the size of the scene. */
+/* Root mean square of motions up to which a step resolves them, relative to the scene's size. */
 static const double FAR = 1. / 8;
 
-/* Return 1 if a step is as long as the last one. Differences of times have fewer digits than the times. */
+/* Return 1 if a step is as long as the last one. Differences of times have fewer digits than the
+ * times. */
 static int as_last(const prediction *p, double dt)
 {
   return fabs(dt - p->dt) <= 1e-6 * dt;
 }
 
-/* out: from q on, at the velocity of the last step and, after steps of equal length, with the part of
- * its acceleration that repeats itself. */
+/* Extrapolate from q at the velocity of the last step. After steps of equal length, add the
+ * fraction of its acceleration that is expected to repeat. */
 void predict(const prediction *p, double dt, const double *q, double *out)
 {
   const double ratio = dt / p->dt, *before = p->q_before, *second = p->second;
@@ -636,7 +644,8 @@ void predict(const prediction *p, double dt, const double *q, double *out)
     for (int i = 0; i < p->size; ++i) out[i] = q[i] + ratio * (q[i] - before[i]);
 }
 
-/* Enter a step from q to q1; products are sums over the degrees of freedom that this process owns. */
+/* Enter a step from q to q1; products are sums over the degrees of freedom that this process
+ * owns. */
 void enter_step(prediction *p, double dt, const double *q, const double *q1)
 {
   p->equal = as_last(p, dt) ? p->equal + (p->equal < 3) : 1;
@@ -656,9 +665,9 @@ void enter_step(prediction *p, double dt, const double *q, const double *q1)
   p->before = p->now, p->now = now, p->both = both, p->step = step;
 }
 
-/* Which part of the last second difference repeats itself, by the products over all processes. None
- * where steps do not resolve the motion: second differences are not small beside steps, or a step goes
- * far in the scene. */
+/* Fraction of the last second difference that is expected to repeat, from the products over all
+ * processes. It is zero if steps do not resolve the motion: second differences are not small
+ * relative to steps, or a step is long relative to the scene. */
 void compare_differences(prediction *p)
 {
   const double larger = fmax(p->now, p->before);
@@ -668,7 +677,7 @@ void compare_differences(prediction *p)
 
 /* -- the step ------------------------------------------------------------------------------------ */
 
-/* A step from the present time to t1, which is a part of one to `end`. */
+/* Set the step from the present time to t1, a substep of one to `end`. */
 static int set_step(march *m, double t1, double end)
 {
   time_step *step = &m->step;
@@ -682,15 +691,15 @@ static int set_step(march *m, double t1, double end)
   return !m->rates || find_numbers(m->rates, dt);
 }
 
-/* Let all terms begin the step; whether no function of a user has raised anything. */
+/* Begin the step in all terms; returns whether no function of a user has raised an exception. */
 static int begin_terms(march *m)
 {
   run(&m->begin, &m->step, 0, 0);
   return raised_anywhere(m->equation) == NOTHING;
 }
 
-/* A guess of the end of the step, in the axes of supports: as the last ones went on, and what supports
- * give. */
+/* Initial guess of the end of the step in the axes of supports: extrapolation of the last steps,
+ * and the prescribed motions of supports. */
 static void guess(march *m)
 {
   const moving_supports *p = m->supports;
@@ -709,7 +718,8 @@ static void guess(march *m)
   }
 }
 
-/* Begin the step, at a guess of its end; whether no function of a user has raised anything. */
+/* Begin the step and compute its initial guess; returns whether no function of a user has raised an
+ * exception. */
 static int begin_at_guess(march *m)
 {
   run(&m->begin, &m->step, 0, 0);
@@ -731,9 +741,9 @@ static double size_of_loads(const march *m)
 
 /* -- places that open: see material_points.py ------------------------------------------------------------ */
 
-/* Held places open from the largest excess over their limit on, then from this part of it on, ...; so the
- * number of solutions stays small where many open in a step. Of excesses that differ by less than TIE none
- * is larger. */
+/* Held places open in rounds: first places with the largest excess over their limit, then places
+ * above the fraction FALL of it, and so on. So the number of solutions stays small if many places
+ * open in a step. Excesses that differ by less than TIE count as equal. */
 static const double FALL = 0.7, TIE = 1e-9;
 
 static double largest_excess(const march *m)
@@ -749,7 +759,7 @@ static double largest_excess(const march *m)
   return most;
 }
 
-/* Let held places open from now on whose excess is so large. */
+/* Let held places open whose excess is at least `least`. */
 static void open_places(march *m, double least)
 {
   for (int k = 0; k < m->places; ++k) {
@@ -767,7 +777,7 @@ static void open_places(march *m, double least)
   }
 }
 
-/* End a search: places that may have opened are closed again, until the step is accepted. */
+/* End a search: close the released places again until the step is accepted. */
 static void end_search(march *m, int opened)
 {
   memset(m->equation->search, 0, SEARCH_FLAGS * sizeof(int32_t));
@@ -781,7 +791,8 @@ static void end_search(march *m, int opened)
   }
 }
 
-/* Find the end of the step from the guess; what does not flow is held closed, but for what must open. */
+/* Find the end of the step from the initial guess. With `hold`, places that do not flow are held
+ * closed, except those that must open. */
 static int solve(march *m, int hold)
 {
   equation *e = m->equation;
@@ -817,8 +828,8 @@ static int fails(march *m, enum failure why)
   return 0;
 }
 
-/* The end of the step in the axes of the plane, and the step of the nodes; whether no node turns further
- * than it may. */
+/* Compute the end of the step in the axes of the plane and the step of the nodes; check that no
+ * node rotates further than allowed. */
 static int measure(march *m)
 {
   equation *e = m->equation;
@@ -841,8 +852,8 @@ static int measure(march *m)
   return 1;
 }
 
-/* Whether a static step was followed: no mechanism, and the internal forces account for what it stores and
- * dissipates; see step_equation.py. */
+/* Check that a static step has followed its path: no node moves as a mechanism does, and the work
+ * of internal forces equals the energy stored and dissipated; see step_equation.py. */
 static int followed(march *m)
 {
   static_path *p = m->path;
@@ -867,15 +878,17 @@ static int followed(march *m)
   agree(e, SUMS, how, of);
   p->work = of[OF_FORCES];
   p->stored = of[BEAMS] + of[CONNECTORS];
-  /* A motor that stretches a spring gives what the spring takes; their sum measures nothing. Connectors
-   * count one by one, so that the size is the same on any number of processes. */
+  /* A motor that stretches a spring does the work that the spring takes; their sum is no measure.
+   * Works of connectors are summed one by one, so that the size does not depend on the number of
+   * processes. */
   const double size = fabs(p->work) + fabs(of[BEAMS]) + of[EFFORT];
   const double slack = p->slack * size + of[ROUND_OFF] + DBL_MIN;
   if (fabs(p->work - p->stored) <= slack + p->kink * of[THROUGH]) return 1;
   return fails(m, LEAPS);
 }
 
-/* Solve the step, whose terms have begun it, from the guess; whether its end can be trusted. */
+/* Solve a step that its terms have begun from the initial guess; returns whether its end is
+ * accepted. */
 static int solve_step(march *m, int hold)
 {
   equation *e = m->equation;
@@ -888,11 +901,12 @@ static int solve_step(march *m, int hold)
   return !m->path || followed(m);
 }
 
-/* Part of the first step after which accelerations are taken for those at the beginning. Shorter ones are
- * nearer to it, but magnify the velocities of supports that do not begin with theirs. */
+/* Fraction of the first step after which the acceleration is taken as the initial one. Shorter
+ * trial steps come closer to it, but amplify velocities of supports that do not fit the initial
+ * velocities. */
 static const double FIRST_TRIAL = 1. / 16;
 
-/* Solve the step to t1, which is a part of one to `end`; the state changes if it is accepted. */
+/* Solve the step to t1, a substep of one to `end`; the state changes only if it is accepted. */
 int attempt_step(march *m, double t1, double end)
 {
   equation *e = m->equation;
@@ -907,7 +921,7 @@ int attempt_step(march *m, double t1, double end)
   return solve_step(m, 1);
 }
 
-/* The same of a step of a path, which Python has set. */
+/* Solve a step of a path that Python has set. */
 int solve_begun_step(march *m, int hold)
 {
   m->equation->raised = NOTHING;
@@ -926,7 +940,7 @@ static void accept_supports(march *m)
   memcpy(p->before, p->reactions, p->held * sizeof *p->before);
 }
 
-/* Note forces that change their direction at each step or sample. */
+/* Count successive changes of direction of the watched forces, by steps or samples. */
 static void watch_forces(force_watch *w, const march *m)
 {
   for (int i = 0; i < w->number; ++i) {
@@ -945,8 +959,8 @@ static void watch_forces(force_watch *w, const march *m)
   }
 }
 
-/* Take the end of the step for the state; whether no function of a user has raised anything. If one has, the
- * step is taken all the same: part of the terms have accepted it. */
+/* Accept the end of the step as the state. Returns whether no function of a user has raised an
+ * exception. The step is accepted even if one has, because some terms have accepted it already. */
 int accept_step(march *m)
 {
   equation *e = m->equation;
@@ -976,7 +990,7 @@ int accept_step(march *m)
   return raised_anywhere(e) == NOTHING || fails(m, RAISED);
 }
 
-/* Go to a time at once or, where that fails, in parts; whether it is reached. */
+/* Go to a time in one step or, if that fails, in substeps; returns whether the time is reached. */
 int go_to_time(march *m, double end)
 {
   const double begin = m->t;
@@ -985,7 +999,7 @@ int go_to_time(march *m, double end)
     if (attempt_step(m, t1, end)) {
       if (!accept_step(m)) return 0;
       done += some;
-      /* A part grows again where the larger one would begin anyway. */
+      /* Double the substep at the times where a larger one would begin. */
       if (done % (2 * some) == 0 && some < MOST_PARTS) some *= 2;
     } else {
       m->failed_end = t1;
@@ -1003,7 +1017,7 @@ static double seconds_now(void)
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* The state, or the part of it that this process has, as a row; see state_rows.py. */
+/* Write the state, or the share of this process, into a row; see state_rows.py. */
 void keep_state(const march *m, double *row)
 {
   memset(row + m->sums, 0, (m->after_sums - m->sums) * sizeof *row);
@@ -1017,9 +1031,9 @@ void keep_state(const march *m, double *row)
   }
 }
 
-/* Steps to the times `ends`, up to the first that fails, or that ends so many seconds later; how many
- * were taken. Each is kept in one of `rows`, if `keeps`; one that was cut is the last, as
- * its last part does not begin where the one before has ended. */
+/* Take steps to the times `ends` until one fails, or ends more than `seconds` after the call;
+ * returns the number of steps. If `keeps`, their states are written into `rows`. A step that was
+ * divided is the last one, as its last substep does not begin at the end of the previous step. */
 int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
 {
   const double end = steps > 1 ? seconds_now() + seconds : 0;

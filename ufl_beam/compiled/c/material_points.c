@@ -17,7 +17,7 @@ static inline void exchange_rows(int size, double *a, double *b)
   }
 }
 
-/* Solve A x = b for several b, the columns of B, which x replace; zero if A is singular. */
+/* Solve A X = B for the columns of B, which X replaces; returns zero if A is singular. */
 static inline int solve_dense(int n, double *A, int columns, double *B)
 {
   for (int k = 0; k < n; ++k) {
@@ -45,7 +45,7 @@ static inline int solve_dense(int n, double *A, int columns, double *B)
   return 1;
 }
 
-/* Largest part that the residuals of a law are of their sizes. */
+/* Largest ratio of the residuals of a law to their sizes. */
 static double part_of(int m, const double *residuals, const double *sizes)
 {
   double largest = 0;
@@ -56,12 +56,14 @@ static double part_of(int m, const double *residuals, const double *sizes)
   return largest;
 }
 
-/* Improve the m variables of a law of d strains until its residuals vanish, by Newton's method. Returns
- * one and the number of corrections; zero if it fails. s gets the stresses and their derivatives by the implicit function theorem.
+/* Solve the residuals of a law of d strains for its m variables by Newton's method. Returns one
+ * plus the number of corrections, or zero if it fails. s gets the stresses and their derivatives by
+ * the implicit function theorem.
  *
- * The law answers with residuals R, their derivatives J by the variables and E by the strains; with
- * stresses, and their derivatives by strains and by variables. A correction is halved until the largest
- * residual falls, each as a part of the terms that the correction cancels in it and their round-off.
+ * The law computes residuals R, their derivatives J by the variables and E by the strains,
+ * stresses, and their derivatives by strains and by variables. A correction is halved until the
+ * largest residual falls. Residuals are relative to the terms that the correction cancels in them,
+ * plus the round-off of these.
  */
 static inline int improve_sized(int m, int d, const points *p, double *w, double *s)
 {
@@ -88,7 +90,7 @@ static inline int improve_sized(int m, int d, const points *p, double *w, double
         digits += fabs(a[m + m * i + j] * z[j]);
       }
       for (int k = 0; k < d; ++k) digits += fabs(E[d * i + k] * w[p->strain + k]);
-      /* Round-off of the terms, or a correction whose square is none. */
+      /* Round-off of the terms, or a correction whose square is negligible. */
       const int small = fabs(B[(1 + d) * i]) <= 1e-9 * fabs(z[i]);
       digits *= 4 * DBL_EPSILON;
       sizes[i] += digits;
@@ -118,7 +120,7 @@ static inline int improve_sized(int m, int d, const points *p, double *w, double
   }
 }
 
-/* The same; frequent sizes are known to the compiler. */
+/* The same; the compiler knows frequent sizes as constants. */
 static int improve(const points *p, double *w, double *s)
 {
   const int m = p->variables, d = p->components;
@@ -127,10 +129,10 @@ static int improve(const points *p, double *w, double *s)
   return improve_sized(m, d, p, w, s);
 }
 
-/* Variables are found to so small a part of them; the square of the last correction is none. */
+/* Relative precision of the variables; the square of the last correction is negligible. */
 const double NO_ENERGY = 1e-9;
 
-/* What a law dissipates by itself in the step, as a part of its size; zero if that is no number. */
+/* Dissipation of a law in the step, relative to its size; zero if that is not finite. */
 static double own_dissipation(const points *p, const double *w)
 {
   double s[2];
@@ -139,7 +141,7 @@ static double own_dissipation(const points *p, const double *w)
   return isfinite(share) ? share : 0;
 }
 
-/* Number of the point that gives most energy in the latest response, or -1; see Points. */
+/* Number of the point that gives the most energy in the latest response, or -1; see Points. */
 int gives_energy(const points *p)
 {
   double least = -NO_ENERGY;
@@ -151,13 +153,14 @@ int gives_energy(const points *p)
   return worst;
 }
 
-/* Corrections after which a solution is near the one of the last iterate, and like it. */
+/* Corrections up to which a solution is close to the last iterate and on the same branch. */
 enum { NEARBY = 2 };
 
-/* Stresses and derivatives of a law that solves for its variables, or no numbers.
+/* Stresses and derivatives of a law that solves for its variables, or NaN.
  *
- * It starts from the variables of the last iterate of the step; if there is none, if that fails, or if
- * it leads to a solution that gives energy, from those before the step.
+ * The solution starts from the variables of the last iterate in the step. It starts from the
+ * variables before the step if there is no iterate, if the first solution fails, or if that gives
+ * energy.
  */
 static void solve_law(const points *p, double *w, double *s)
 {
@@ -170,31 +173,32 @@ static void solve_law(const points *p, double *w, double *s)
   for (int i = 0; i < d + d * d; ++i) s[i] = NAN;
 }
 
-/* Stresses of the bulk, and their derivatives by the strains at the end of the step. */
+/* Stresses of the bulk and their derivatives by the strains at the end of the step. */
 static inline void answer(const points *p, double *w, double *s)
 {
   if (p->solves) solve_law(p, w, s);
-  else if (p->components == 1) ask(p->law, w, 2, s); /* the size is known to the compiler */
+  else if (p->components == 1) ask(p->law, w, 2, s); /* the compiler knows the size */
   else ask(p->law, w, p->components * (1 + p->components), s);
 }
 
-/* Growth at which the excess of what the bulk bears over the resistance vanishes, or NAN; s gets the
- * stress, and its derivative with the growth condensed.
+/* Growth of the jump at which the stress of the bulk equals the resistance, or NAN. s gets the
+ * stress and its derivative with the growth condensed.
  *
- * The excess is positive at zero, falls, and is concave unless the bulk flows back in tension:
- * Newton's method comes to its root from above, from where the bulk would be unloaded. Bisection
- * stands by: beyond the bounds, and where steps go to and fro without growing shorter.
+ * The excess of the stress over the resistance is positive for zero growth, falls, and is concave
+ * unless the bulk flows back in tension. So Newton's method approaches the root from above, from a
+ * growth that would unload the bulk. Bisection takes over outside the bounds, and if steps
+ * alternate without becoming shorter.
  */
 static double growth(const points *p, double *w, double *s)
 {
   double t[2];
   const double *strain = w + p->strain, theta = w[THETA], way = w[DIRECTION], length = w[LENGTH];
   const double bound = fabs(s[0]) / strain[2] * length / theta + DBL_MIN;
-  /* Where a jump has relieved the strain, what the bulk bears has the last digits of both. */
+  /* If a jump has relieved the strain, the stress of the bulk has the round-off of both. */
   const double far = fmax(fabs(strain[1]), fabs(strain[0])) * length + fabs(w[JUMP]);
   ask(p->resistance, w, 2, t);
   double excess = way * s[0] - t[0], slope = -s[1] / length - t[1];
-  if (excess <= 0) return 0; /* over the limit by a last digit */
+  if (excess <= 0) return 0; /* the excess is round-off */
   double a = slope < 0 ? fmin(bound, -excess / slope) : bound, low = 0, high = INFINITY;
   double last = INFINITY;
   int turns = 0;
@@ -208,7 +212,7 @@ static double growth(const points *p, double *w, double *s)
     if (excess > 0) low = a;
     else high = a;
     double next = a - excess / slope, step = fabs(next - a);
-    /* So small a relative step was the last but none: the next one would be its square. */
+    /* With a step as small as this, the error of the next iterate is about its square. */
     if (step <= 1e-9 * a || step <= 4 * DBL_EPSILON * (bound + far)) return next > 0 ? next : a;
     const int wanders = turns && step > last / 2;
     last = step;
@@ -219,7 +223,7 @@ static double growth(const points *p, double *w, double *s)
   return NAN;
 }
 
-/* Let a point open until nothing is over the resistance; s becomes its stress and the derivative. */
+/* Open a point until its stress equals the resistance; s becomes the stress and its derivative. */
 static void open_point(const points *p, double *w, double *s)
 {
   double t[2];
@@ -230,14 +234,15 @@ static void open_point(const points *p, double *w, double *s)
   s[1] *= t[1] / (s[1] / w[LENGTH] + t[1]); /* P(76) */
 }
 
-/* Strains of a point in a cell of strains e; b are its d rows of B. */
+/* Strains of a point from the strains e of its cell; b are its d rows of B. */
 static inline void find_strains(int d, const double *b, const double *e, double *strain)
 {
   for (int a = 0; a < d; ++a)
     strain[a] = b[3 * a] * e[0] + b[3 * a + 1] * e[1] + b[3 * a + 2] * e[2];
 }
 
-/* Add stresses s of a point and their derivatives, which follow them, to those of its cell. */
+/* Add stresses s of a point, and the derivatives that follow them in s, to the resultants of its
+ * cell. */
 static inline void add_answer(int d, const double *b, double weight, const double *s, double *r,
                               double *D)
 {
@@ -250,26 +255,29 @@ static inline void add_answer(int d, const double *b, double weight, const doubl
     }
 }
 
-/* Resistance of a point to a change of its branch beside the stress that was predicted, as a part of
- * the elastic stiffness: without any, material that flows freely had no strain for a stress. */
+/* Stiffness, relative to the elastic one, against a change of branch in addition to the predicted
+ * stress. Without it, freely flowing material has no unique strain for a stress. */
 static const double BESIDE_STRESS = 0.01;
 
-/* Deviation from the prediction up to which a point answers as it does, as a part of what an elastic
- * one would bear for the change of its strain; and digits of strains. */
+/* Deviation from the prediction up to which a point answers for its own strain, relative to the
+ * elastic stress of its change of strain; and round-off of strains. */
 static const double ALIKE = 0.01, DIGITS = 1e-9;
 
-/* Let a point of one strain answer as on the branch on which it bears what the last tangent predicts.
+/* Answer of a point of one strain on the branch where it bears the stress that the last tangent
+ * predicts.
  *
- * Tangents are lines, (strain, stress, slope) of each point. Where a point leaves its line, as one that
- * begins to flow or to unload, the strain of the iterate is wrong by as much as the line was, and the
- * more the softer it is. Its stress is right by equilibrium, and smooth along a beam, however fine the
- * cells. So the next line is the tangent at the strain that goes with this stress, and the residual is
- * that of this line: Newton's method for strains and stresses as unknowns, the stresses condensed.
+ * The tangent of each point is a line (strain, stress, slope). If a point leaves its line, as when
+ * it begins to flow or to unload, the strain of the iterate has the error of the line, which grows
+ * with the softness of the point. Its stress is right by equilibrium, and smooth along a beam for
+ * any size of the cells. So the next line is the tangent at the strain that belongs to this stress,
+ * and the residual uses this line. This is Newton's method for strains and stresses as unknowns,
+ * with the stresses condensed.
  *
- * In statics `linear`, the strain that the iteration predicts, takes the place of that of the iterate;
- * before the first tangent, where there is no line, the point answers as on the branch of this strain.
+ * In statics, `linear`, the strain that the iteration predicts, replaces the strain of the iterate.
+ * Before the first tangent there is no line; the point then answers on the branch of this strain.
  *
- * s, the stress and its derivative, changes; returns how far the stress is from that of the strain.
+ * Changes s, the stress and its derivative. Returns the difference between the stress and the
+ * stress of the strain.
  */
 static double follow_prediction(const points *p, double *w, double linear, const double *line,
                                 double *s)
@@ -303,12 +311,12 @@ static double follow_prediction(const points *p, double *w, double linear, const
 
 /* Resultants r of cells whose strains grow from e0 to e1, and their derivatives D.
  *
- * `search` notes that a point opens, and may ask for stiff points: those that do not open answer
- * with their elastic stiffness. Where one opens, those around it unload, which their own tangents
- * do not tell, and Newton's method would close what it just opened, again and again.
+ * `search` records that a point opens, and may request stiff points: points that do not open then
+ * answer with their elastic stiffness. Points around one that opens unload, which their own
+ * tangents do not predict, and Newton's method would close the point again and again.
  *
- * While `search` asks to hold, closed points stay closed whatever they bear, and `over` is the
- * largest of |stress| / limit - 1 of those that bear more than their limit, else zero.
+ * If `search` has HOLD set, closed points stay closed for any stress. `over` is the largest
+ * |stress| / limit - 1 of points beyond their limit, else zero.
  */
 void respond(points *p)
 {
@@ -358,7 +366,8 @@ void respond(points *p)
   p->tried = 1;
 }
 
-/* Let the closed points open, in this step, whose excess in the latest response is so large. */
+/* Release the closed points whose excess in the latest response is at least `least`; they may open
+ * in this step. */
 static void release(const points *p, double least)
 {
   double s[3 + 9], *w = p->w;
@@ -375,8 +384,8 @@ static inline void multiply(const double *D, const double *e, double *x)
   for (int k = 0; k < 3; ++k) x[k] = D[3 * k] * e[0] + D[3 * k + 1] * e[1] + D[3 * k + 2] * e[2];
 }
 
-/* Resultants as affine functions b + D e of the strains, for the tangent; at the strains they are the
- * forces of its geometric part. */
+/* Write the resultants as affine functions b + D e of the strains into the tangent. Their values at
+ * the strains are the forces of its geometric part. */
 static void linearise(const inelastic *m, const double *forces)
 {
   const points *p = m->points;
@@ -390,7 +399,7 @@ static void linearise(const inelastic *m, const double *forces)
   }
 }
 
-/* Take the response as the latest tangent. */
+/* Store the response as the latest tangent. */
 static void take_tangent(const inelastic *m)
 {
   const points *p = m->points;
@@ -402,9 +411,10 @@ static void take_tangent(const inelastic *m)
   }
 }
 
-/* Forces for the tangent of a static step: first those before it, or of points that have lines those at
- * the extrapolated strains; then those that the latest tangent predicts for the strains that it
- * predicts; see predicted_strains in beams.py. Stiff points are no prediction. */
+/* Forces for the tangent of a static step. The first are the forces before the step, or, for points
+ * with tangent lines, forces at the extrapolated strains. Later ones are predicted by the latest
+ * tangent for the strains that it predicts; see predicted_strains in beams.py. Stiff points predict
+ * nothing. */
 static const double *predict_forces(const inelastic *m, const double *q)
 {
   const points *p = m->points;
@@ -425,10 +435,8 @@ static const double *predict_forces(const inelastic *m, const double *q)
   return f;
 }
 
-/* Resultants and their derivatives at q; nothing is to do if q is the latest.
- *
- * First the strains at q, then what responds to them, then where it goes.
- */
+/* Resultants and their derivatives at q, unless q is the latest one: compute the strains at q, the
+ * response to them, and write the resultants into the form of the forces. */
 void respond_at(const inelastic *m, const double *q)
 {
   points *p = m->points;
@@ -466,11 +474,12 @@ void add_inelastic_tangent(void *self, const double *q, double *tangent)
   if (p->line) {
     memcpy(p->predicted, p->line, LINE * p->cells * p->of_cell * sizeof *p->line);
     p->predicts = 1;
-    m->latest[0] = NAN; /* where supports hold all motions, the same q is asked with other lines */
+    m->latest[0] = NAN; /* if supports hold all motions, the same q is evaluated with new lines */
   }
 }
 
-/* Largest force of a point at q that is not that of its strain, as a part of the forces. */
+/* Largest difference at q between the force of a point and the force of its strain, relative to
+ * `scale`. */
 double missed_by_points(void *self, const double *q, const double *r, double scale, double moved)
 {
   const inelastic *m = self;
@@ -480,12 +489,13 @@ double missed_by_points(void *self, const double *q, const double *r, double sca
   return largest > 0 ? largest / scale : 0;
 }
 
-/* Take the end of the step as the new state.
+/* Accept the end of the step as the new state.
  *
- * Each cell keeps what it bears (3), the jump of its last point, and what it dissipated by plastic
- * strains and by discontinuities; sum gets what all cells dissipated so in the step, what they lost
- * numerically at theta = 1, what they store elastically and by hardening, what breaking points let go
- * of and steps miss of elasticity that is not linear, and what mean stresses do more on plastic strains than those at the end, where these are less.
+ * `kept` of a cell has its resultants (3), the jump of its last point, and the dissipation by
+ * plastic strains and by discontinuities. `sum` gets, over all cells: these dissipations in the
+ * step; the numerical loss at theta = 1; the elastic energy and the energy stored by hardening; the
+ * energy released by breaking points and the error of steps for nonlinear elasticity; the excess of
+ * the work of mean stresses on plastic strains over that of smaller end stresses.
  */
 void commit(points *p)
 {
@@ -515,8 +525,9 @@ void commit(points *p)
       w[GROWTH] = w[DIRECTION] = 0;
       if (w[TRACTION] < INFINITY) w[TRACTION] = s[RESISTANCE];
       if (w[TRACTION] == 0) {
-        /* Broken: the mean stress of each step is zero from now on, but stresses at the ends may
-         * alternate about that. The discontinuity takes the elastic strain, which nothing holds. */
+        /* Broken: the mean stress of each step is zero from now on, but stresses at the ends of
+         * steps might alternate about zero. The discontinuity takes over the elastic strain, which
+         * nothing holds any more. */
         w[JUMP] += stress[0] / strain[2] * w[LENGTH];
         sum[5] += volume * (s[ELASTIC] - s[LEFT]);
         s[ELASTIC] = s[LEFT];

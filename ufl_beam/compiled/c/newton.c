@@ -1,12 +1,12 @@
 /* SPDX-License-Identifier: MIT */
-/* The equation of a step as SNES asks for it, without Python; see newton.py.
+/* The equation of a step and Newton's method, as SNES calls them without Python; see newton.py.
  *
- * What has no loop in C is a part all the same: a function that calls Python.
+ * Contributions without a loop in C are functions that call Python.
  */
 
 /* -- processes that share a scene -------------------------------------------------------------- */
 
-/* Replace numbers by those of all processes. */
+/* Combine numbers over all processes. */
 static void agree(const equation *e, int number, const enum agreement *how, double *values)
 {
   if (e->agree) e->agree(e->handle, number, (const int *)how, values);
@@ -18,7 +18,8 @@ double over_processes(const equation *e, enum agreement how, double here)
   return here;
 }
 
-/* Norm over the scene of forces, and moments over its size, at the degrees of freedom of this process. */
+/* Norm of forces, and of moments over the size of the scene; each process passes its degrees of
+ * freedom. */
 static double norm_of(const equation *e, const double *forces)
 {
   return over_processes(e, HYPOT, norm(e->size, 0, e->weight, forces));
@@ -31,16 +32,19 @@ static int exchange_ghosts(const equation *e, void *v, int mode, int way)
   return error ? error : petsc.VecGhostUpdateEnd(v, mode, way);
 }
 
-/* Values of a vector of PETSc that other processes own; or what this one has for them, added there. */
+/* Update the ghost values of a PETSc vector; or add them to the values of the processes that own
+ * them. */
 static int update_ghosts(const equation *e, void *v) { return exchange_ghosts(e, v, INSERT_VALUES, FORWARD); }
 static int add_ghosts(const equation *e, void *v) { return exchange_ghosts(e, v, ADD_VALUES, REVERSE); }
 
-/* What a function of a user has raised on any process, see enum raised; all know it then. */
+/* Exception raised by a function of a user on any process, see enum raised; synchronizes
+ * e->raised. */
 static int raised_anywhere(equation *e) { return e->raised = (int)over_processes(e, LARGEST, e->raised); }
 
 /* -- supports at an angle ---------------------------------------------------------------------- */
 
-/* A vector in the axes of supports (way = 1), or from these in those of the plane (-1), in place. */
+/* Rotate a vector into the axes of supports (way = 1), or back into the axes of the plane (-1), in
+ * place. */
 void turn_axes(int number, const turned_axes *axes, double *x, int way)
 {
   for (int k = 0; k < number; ++k) {
@@ -70,14 +74,15 @@ static void turn_entries(double *data, int number, const int32_t *first, const i
 
 /* -- residual and tangent ---------------------------------------------------------------------- */
 
-/* What is asked of the internal forces, which r consists of so far. */
+/* Store the norm and a copy of the internal forces, which r consists of so far. */
 static void note_inner_forces(equation *e, const double *r)
 {
   e->inner_size = norm(e->size, 0, e->weight, r);
   if (e->inner_force) memcpy(e->inner_force, r, e->size * sizeof *r);
 }
 
-/* The residual r at x, which the vector f of PETSc has; what supports carry is noted and removed. */
+/* Residual r at x, the array of the PETSc vector f. Support reactions are stored and removed from
+ * r. */
 int residual(equation *e, const double *x, double *r, void *f)
 {
   const double *q = in_plane(e, x);
@@ -94,7 +99,7 @@ int residual(equation *e, const double *x, double *r, void *f)
   return error;
 }
 
-/* Rows of the tangent with nothing in them but the product. */
+/* Initialize rows of the tangent with the product of the constant matrix. */
 static void begin_rows(const equation *e, int first, int last)
 {
   const int32_t begin = e->indptr[first];
@@ -102,7 +107,7 @@ static void begin_rows(const equation *e, int first, int last)
   if (e->product) add_rows(e->product, first, last, e->tangent);
 }
 
-/* The cells from `first` on */
+/* The cells from `first` on, SOME at most. */
 static cells some_cells(const cells *c, int first)
 {
   cells some = *c;
@@ -114,7 +119,8 @@ static cells some_cells(const cells *c, int first)
   return some;
 }
 
-/* All parts of the tangent at q, in the axes of the plane; rows are begun shortly before cells need them. */
+/* Assemble the tangent at q in the axes of the plane. Rows are initialized shortly before cells add
+ * to them, so that they are still in the cache. */
 void fill_tangent(const equation *e, const double *q)
 {
   int begun = 0;
@@ -133,9 +139,10 @@ void fill_tangent(const equation *e, const double *q)
     e->stiffness[k].add(e->stiffness[k].self, q, e->tangent);
 }
 
-/* A tangent in the axes of supports, with what they hold held. What stands on the diagonal has the right
- * dimension and size for that; where material that flows freely leaves nothing, or the digits of motions
- * that fade, what stood there before does as well. */
+/* Rotate a tangent into the axes of supports and constrain the held degrees of freedom. Their
+ * diagonal entries remain, as these have the right dimension and size. The last normal value
+ * replaces an entry that vanishes or is subnormal, as material that flows freely or motions that
+ * fade can make it. */
 void hold_tangent(const equation *e)
 {
   for (int k = 0; k < e->turned; ++k) {
@@ -149,7 +156,7 @@ void hold_tangent(const equation *e)
   for (int k = 0; k < e->held; ++k) e->tangent[e->pivot[k]] = e->pivots[k];
 }
 
-/* The tangent at x. */
+/* Tangent at x, with springs that hold zero-energy modes. */
 static void assemble(const equation *e, const double *x)
 {
   fill_tangent(e, in_plane(e, x));
@@ -159,13 +166,14 @@ static void assemble(const equation *e, const double *x)
 
 /* -- convergence ------------------------------------------------------------------------------- */
 
-/* Part of the tolerance that is met by no luck, before the least number of iterations. */
+/* Fraction of the tolerance that an iterate meets only if Newton's method has converged; required
+ * before the least number of iterations. */
 static const double SURE = 1e-4;
 
-/* Times the tolerance that are about as good, unless laws of connectors may be steep. */
+/* Multiple of the tolerance that is nearly as good, unless laws of connectors may be steep. */
 static const double CLOSE = 8;
 
-/* Whether laws of connectors and points are met by x and its residual, on all processes. */
+/* Whether x and its residual satisfy the laws of connectors and points on all processes. */
 static int demands_met(const equation *e, const double *x, double scale)
 {
   if (!e->demanding) return 1;
@@ -178,47 +186,49 @@ static int demands_met(const equation *e, const double *x, double scale)
   return over_processes(e, LARGEST, most) <= e->rtol;
 }
 
-/* Whether Newton's method has arrived, goes on, or goes nowhere.
+/* Test whether Newton's method has converged, continues, or stalls.
  *
- * `floor` is several times the residual that the last digits of the unknowns make.
+ * `floor` is several times the residual caused by the round-off of the unknowns.
  */
 static int judge(equation *e, const double *q, int iteration, double residual, double scale, double floor,
                  int switched)
 {
   const double wanted = e->rtol * scale;
-  /* Small loads beside large ones, such as those that make columns buckle, are lost in a guess that
-   * just meets the tolerance; the residual of an iterate is about the square of the one before. */
+  /* The initial guess may just meet the tolerance without the effect of small loads beside large
+   * ones, such as imperfections that make columns buckle. The residual of an iterate is about the
+   * square of the previous one. */
   const double enough = iteration < e->least ? SURE * wanted : wanted;
   const int met = residual > wanted || demands_met(e, q, scale);
   if (residual <= enough && met) return CONVERGED;
   const int kept = e->near;
   e->near = 0;
   if (iteration > 1) {
-    /* A fraction of the last digit is luck; a few of them that Newton's method no longer halves are
-     * all that can be had: it may go round between two such states for ever. With the tangent of the
-     * iterate before that is no proof, but does close to what is wanted. */
+    /* A residual of a fraction of the round-off is luck, and final. A residual of a few times the
+     * round-off is final if Newton's method no longer halves it; the method may cycle between two
+     * such states for ever. With a kept tangent that is no proof, but it suffices close to the
+     * tolerance. */
     const int close = residual <= CLOSE * wanted && !e->demanding;
     const int stays = e->last / 2 < residual && residual <= floor && (!kept || close);
     if ((stays || residual <= floor / 80) && demands_met(e, q, scale)) return AT_ROUND_OFF;
-    /* With that tangent, the residual falls by twice the last factor; works are to come out as with a
-     * new one, so it must be far enough. */
+    /* With a kept tangent, the residual falls by twice the last factor. It must fall far enough
+     * that works are the same as with a new tangent. */
     e->near = !kept && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
   }
-  /* With the tangent of a row about a motion, one about a force would move the iterate by as many metres
-   * as newtons are missing. */
+  /* A tangent with the row of a motion does not fit the row of a force: newtons of the residual
+   * would become metres of the change. */
   if (switched) e->near = *e->switched = 0;
   e->slow += 1;
-  /* Where a connector has just been released, it is no measure for what follows that forces are in
-   * balance, as long as its law is not met. */
+  /* Directly after the activation of a connector, balanced forces are no measure of convergence, as
+   * its law is not met yet. */
   const double size = iteration > 0 || met ? residual : scale;
   if (size <= e->best / 2) e->best = size, e->slow = 0;
   e->last = residual;
   return e->slow == e->patience ? STALLED : ITERATING;
 }
 
-/* Forces that the last digits of displacements and rotations make: of the numbers that they are part of.
- * Strains are computed from them to their own relative precision, as long as rotations are small. The
- * next number has the next pattern of bits. */
+/* Forces from the round-off of displacements and rotations, estimated with the diagonal of the
+ * tangent. Strains have their own relative precision as long as rotations are small. The next
+ * floating-point number has the next pattern of bits. */
 void find_round_off(const equation *e, const double *q, double *forces)
 {
   const double amplitude = e->moved / e->scene;
@@ -236,7 +246,7 @@ void find_motion(equation *e, const double *x)
   e->moved = fmin(over_processes(e, LARGEST, largest_motion(e->size, e->weight, x)), e->scene);
 }
 
-/* Whether, and why, to stop at an iterate x with the latest residual. */
+/* Check an iterate x with the latest residual: the reason to stop, or ITERATING. */
 static int verdict(equation *e, const double *x, int iteration)
 {
   const enum agreement how[] = {HYPOT, HYPOT, LARGEST, LARGEST};
@@ -270,7 +280,8 @@ static int note_change(void *matrix)
   return petsc.PetscObjectStateSet(matrix, state + 1);
 }
 
-/* Factors of the tangent, and what they make of the residual on the way; *failed if it is singular. */
+/* Factorize the tangent and eliminate the residual in the chains; *failed if the tangent is
+ * singular. */
 int factor_tangent(const equation *e, int *failed)
 {
   eliminate(e->chains, e->residual);
@@ -286,7 +297,8 @@ int factor_tangent(const equation *e, int *failed)
   return error == OF_LIBRARY ? 0 : error;
 }
 
-/* What Newton's method subtracts from the iterate; `reduced` says that the residual is eliminated. */
+/* Compute the change that Newton's method subtracts from the iterate; `reduced` says that the
+ * residual is already eliminated in the chains. */
 int solve_tangent(const equation *e, int reduced)
 {
   if (!reduced) reduce(e->chains, e->residual);
@@ -298,7 +310,7 @@ int solve_tangent(const equation *e, int reduced)
   return 0;
 }
 
-/* The change of an iteration, with a new tangent if `anew`; *failed if that is singular. */
+/* Compute the change of an iteration, with a new tangent if `anew`; *failed if that is singular. */
 static int find_change(equation *e, const double *x, int anew, int *failed)
 {
   *failed = 0;
@@ -324,11 +336,12 @@ static int residual_at(equation *e, double *x)
   return residual(e, x, e->residual, e->f);
 }
 
-/* Residuals that a search may cost; part of the first work that it must come down to; its limits. */
+/* Limits of the line search: number of residuals, fraction of the initial work that ends it,
+ * longest and shortest step. */
 enum { EVALUATIONS = 4 };
 static const double PART = 0.5, LONGEST = 1, SHORTEST = 1e-12;
 
-/* Work of the latest residual on the conjugates. */
+/* Work of the latest residual on the conjugates of the change. */
 static double work_of_residual(const equation *e)
 {
   double sum = 0;
@@ -336,16 +349,19 @@ static double work_of_residual(const equation *e)
   return over_processes(e, TOTAL, sum);
 }
 
-/* Go the part of the full change at which the residual does no work on it, found by secants.
+/* Line search by secants: take the fraction of the full change at which the residual does no work
+ * on it.
  *
- * Forces that grow in an S, as in a point that yields one way or the other, send full steps from one
- * branch to the other and back for ever. Work is the only product of residuals and steps that adds forces
- * and moments, and it is the same in all units. Forces of connectors are unknowns of their own: the law
- * of a connector, in the place of its force, does work on the change of its motion. */
+ * Forces may have an S-shaped characteristic, for example at a point that can yield in two
+ * directions. Full steps then alternate between two branches for ever. Work is the only product of
+ * residuals and steps that adds forces and moments consistently, and it does not depend on units.
+ * Forces of connectors are unknowns: the residual of a connector's law, instead of its force, does
+ * work on the change of its motion.
+ */
 static int search(equation *e, double *x)
 {
   TRY(update_ghosts(e, e->y));
-  e->find_conjugates(e->handle, in_plane(e, x)); /* which makes room for them, and for the start */
+  e->find_conjugates(e->handle, in_plane(e, x)); /* allocates conjugates and start */
   memcpy(e->start, x, e->size * sizeof *x);
   double before = work_of_residual(e), last = 0, way = 1;
   const double first = fabs(before);
@@ -361,7 +377,7 @@ static int search(equation *e, double *x)
   }
 }
 
-/* Newton's method from the iterate x; why it ends is `reason`. */
+/* Newton's method from the iterate x; `reason` tells why it ends. */
 static int newton(equation *e, double *x)
 {
   e->iterations = 0;
@@ -390,10 +406,10 @@ static int newton(equation *e, double *x)
   }
 }
 
-/* -- what SNES calls --------------------------------------------------------------------------- */
+/* -- callbacks of SNES ------------------------------------------------------------------------- */
 
-/* This method as a solver of SNES: what its own does beside that takes as long as all the rest where
- * there are few unknowns. */
+/* Newton's method as a solver of SNES. The overhead of PETSc's own method takes as long as the
+ * remaining computation if there are few unknowns. */
 int snes_newton(void *snes, void *x)
 {
   equation *e;
@@ -406,7 +422,7 @@ int snes_newton(void *snes, void *x)
   return petsc.SNESSetConvergedReason(snes, e->reason);
 }
 
-/* Local values of a vector, ghosts included, to be read or to be written. */
+/* Local values of a vector including ghosts, for reading or writing. */
 static int open_vector(const equation *e, void *v, void **local, double **values, int read)
 {
   *local = v;
@@ -456,7 +472,7 @@ int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int
 
 /* -- the equilibrium of a step ------------------------------------------------------------------ */
 
-/* Begin to iterate anew, with tangents of a kind. */
+/* Restart the predicted strains for iterations with a kind of tangents. */
 void restart(const equation *e, enum tangents kind)
 {
   for (int k = 0; k < e->predictions; ++k) {
@@ -465,7 +481,7 @@ void restart(const equation *e, enum tangents kind)
   }
 }
 
-/* Take a guess for the unknowns. */
+/* Set the unknowns to an initial guess. */
 static int go_to(equation *e, const double *guess, enum tangents kind)
 {
   double *q;
@@ -476,7 +492,7 @@ static int go_to(equation *e, const double *guess, enum tangents kind)
   return 0;
 }
 
-/* Let a vector be written again that PETSc keeps locked after a linear solution has failed. */
+/* Remove the locks that PETSc leaves on a vector after a failed linear solution. */
 static void unlock(void *v)
 {
   petsc_int locks = 0;
@@ -484,35 +500,35 @@ static void unlock(void *v)
   while (locks-- > 0) petsc.VecLockReadPop(v);
 }
 
-/* Iterations in a row without half the least residual that are one too many: of full steps, of steps that a
- * search shortens or stiffer tangents make, and along paths. Those that wander longer find a solution by
- * luck: the last digits of the data would decide. */
+/* Iterations in a row that do not halve the least residual, at which the method stalls: for full
+ * steps; for steps that a line search shortens or with stiffer tangents; along paths. Iterates that
+ * wander longer find a solution by luck: round-off of the data would decide. */
 enum { SHORT_PATIENCE = 2, LONG_PATIENCE = 10, PATIENCE_ALONG = 12 };
 
-/* Iterate from the unknowns; the reason to end is the return value. */
+/* Iterate from the unknowns; returns the reason to end. */
 static int iterate(equation *e, int patience, int careful)
 {
   const int by_petsc = e->monitored && !e->border && !(careful && e->searches);
   e->last = e->best = INFINITY;
   e->near = e->slow = 0;
-  if (e->raised == STEP_FAILED) e->raised = NOTHING; /* at an iterate that is left */
+  if (e->raised == STEP_FAILED) e->raised = NOTHING; /* the failure belongs to a discarded iterate */
   e->patience = patience;
   e->careful = careful && !by_petsc;
   const int error = by_petsc || !e->monitored ? petsc.SNESSolve(e->snes, 0, e->x) : newton(e, e->unknowns);
   e->total += e->iterations;
   if (error) {
-    if (error != OF_LIBRARY) e->error = error; /* KLU stops PETSc where it finds no pivot */
+    if (error != OF_LIBRARY) e->error = error; /* KLU raises an error if it finds no pivot */
     e->reason = SINGULAR;
   } else if (by_petsc) {
     petsc.SNESGetConvergedReason(e->snes, &e->reason);
-    e->error = update_ghosts(e, e->x); /* PETSc copies what a process owns */
+    e->error = update_ghosts(e, e->x); /* PETSc copies only the values that a process owns */
   }
   if (e->reason <= 0 && by_petsc) unlock(e->f);
   return e->reason;
 }
 
-/* The same from a guess, with idle motions held if the tangent is singular; without any if that does not
- * help. */
+/* Iterate from an initial guess. If the tangent is singular, hold zero-energy modes by springs; if
+ * that does not help, iterate again without these. */
 static int iterate_from(equation *e, const double *guess, int patience, enum tangents kind)
 {
   const double start = e->border ? *e->border->t : 0;
@@ -528,7 +544,8 @@ static int iterate_from(equation *e, const double *guess, int patience, enum tan
   }
 }
 
-/* Stiffer tangents of points that do not open, or the true ones again; whether they differ. */
+/* Set stiffer tangents of points that do not open, or restore the true ones; returns whether they
+ * differ. */
 static int stiffen(equation *e, int stiff)
 {
   const int opened = over_processes(e, LARGEST, e->search && e->search[OPENED]) > 0;
@@ -537,8 +554,8 @@ static int stiffen(equation *e, int stiff)
   return opened;
 }
 
-/* Find the unknowns at which the residual vanishes from a guess; the reason to end is the return value,
- * positive if they are found. */
+/* Find the unknowns at which the residual vanishes from an initial guess. Returns the reason to
+ * end, which is positive on success. */
 static int find_equilibrium(equation *e, const double *guess)
 {
   e->error = 0;
@@ -549,7 +566,7 @@ static int find_equilibrium(equation *e, const double *guess)
     reason = iterate(e, LONG_PATIENCE, 1);
   }
   if (reason > 0 || e->error || raised_anywhere(e) == OTHER || !stiffen(e, 1)) return reason;
-  /* Stiffer tangents come near, but slowly; then true ones. */
+  /* Stiffer tangents approach the solution slowly; true tangents finish it. */
   go_to(e, guess, PREDICTED);
   const int slow = iterate(e, LONG_PATIENCE, 0);
   stiffen(e, 0);

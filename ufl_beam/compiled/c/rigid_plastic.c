@@ -1,5 +1,6 @@
 /* SPDX-License-Identifier: MIT */
-/* Rigid-plastic connectors, such as plastic hinges: held up to a limit, then following a law. */
+/* Rigid-plastic connectors, such as plastic hinges: held up to a limit force, then following a
+ * law. */
 
 static void set_slip(double *w, double motion, int way)
 {
@@ -8,12 +9,12 @@ static void set_slip(double *w, double motion, int way)
 
 /* Direction in which connector i slips in an iterate, or 0 if it is held.
  *
- * With R the resistance after the motion m, and any r > 0, the equation for the force f is
+ * With the motion m, the resistance R after it, and any r > 0, the equation for the force f is
  *
  *     r m = 0 where |f + r m| <= R, else f = R or -R:
  *
- * its residual is continuous in f and m, as Newton's method wants. While HOLD is set, those that did
- * not slip in the last step are held, and their excess is |force| / limit - 1.
+ * its residual is continuous in f and m, as Newton's method requires. While HOLD is set, connectors
+ * that did not slip in the last step are held; their excess is |force| / limit - 1.
  */
 static int direction_of_slip(const rigid_plastic *p, int i, double *w, double motion, double force)
 {
@@ -41,8 +42,8 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
   return way;
 }
 
-/* Rows of the connectors at their motions c->e1 and forces in q: the equations above over -r, which
- * leaves the tangent of held ones symmetric. */
+/* Rows of the connectors at their motions c->e1 and forces in q: the equations above over -r, so
+ * that the tangent of held connectors is symmetric. */
 static void set_rows_of_rigid_plastic(const couplings *c, const double *q)
 {
   const rigid_plastic *p = c->rigid_plastic;
@@ -61,8 +62,8 @@ static void set_rows_of_rigid_plastic(const couplings *c, const double *q)
   }
 }
 
-/* What the connectors dissipate in a step to the motions e1; a held one that bears more than its
- * limit counts with its excess times a unit of motion. */
+/* Dissipation of the connectors in a step to the motions e1. A held connector that bears more than
+ * its limit counts with its excess times a unit of motion. */
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force)
 {
   double *w = p->w, s[SLIP_OUTPUTS], sum = 0;
@@ -78,8 +79,8 @@ double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, co
   return sum;
 }
 
-/* Take the motions e1 as the new state, those of held connectors as they were; sums get what the step
- * dissipated and lost numerically, and what the connectors store. */
+/* Accept the motions e1 as the new state; held connectors do not change. sums get the dissipation
+ * and the numerical loss in the step, and the energy that the connectors store. */
 static void commit_rigid_plastic(const rigid_plastic *p, const double *e1, double *sums)
 {
   double *w = p->w, s[SLIP_OUTPUTS];
