@@ -16,8 +16,14 @@ import pytest
 import random_machines
 
 import ufl_beam as ub
-from ufl_beam.reference import beams, cells, connectors, loads, points
-from ufl_beam.reference.connector_laws import _Slipping
+from ufl_beam.reference import (
+    beam_residuals,
+    cell_forms,
+    connector_residuals,
+    load_vectors,
+    return_map,
+)
+from ufl_beam.reference.connector_updates import _Slipping
 from ufl_beam.reference.solver import Solver
 
 WANDERING = (9, 19, 22, 25, 26, 32, 35, 36, 38, 42, 43, 45, 60, 79, 83, 86, 99, 106, 111, 115)
@@ -256,35 +262,35 @@ def test_a_step_without_equilibrium():
 
 def sign_of_jump(patch):
     """A hinge that opens adds to the strain of the bulk."""
-    bulk = points.MaterialPoints._bulk
+    bulk = return_map.MaterialPoints._bulk
     wrong = lambda self, at: bulk(self, {**at, "jump": -at["jump"]})  # noqa: E731
-    patch.setattr(points.MaterialPoints, "_bulk", wrong)
+    patch.setattr(return_map.MaterialPoints, "_bulk", wrong)
 
 
 def hardening_twice(patch):
     """Accumulated plastic strain counts twice."""
-    accept = points.MaterialPoints.accept
+    accept = return_map.MaterialPoints.accept
 
     def wrong(self):
         before = self.at["state accumulated"].copy()
         accept(self)
         self.at["state accumulated"] += self.at["state accumulated"] - before
 
-    patch.setattr(points.MaterialPoints, "accept", wrong)
+    patch.setattr(return_map.MaterialPoints, "accept", wrong)
 
 
 def factor_of_forms(patch):
     """Forms are too large by a part in a million."""
-    joined = cells.Form.joined
+    joined = cell_forms.Form.joined
     wrong = lambda self, entries: (1 + 1e-6) * joined(self, entries)  # noqa: E731
-    patch.setattr(cells.Form, "joined", wrong)
+    patch.setattr(cell_forms.Form, "joined", wrong)
 
 
 def motion_of_connectors(patch):
     """Relative motions are too large by a part in a million."""
-    motion = connectors.Connectors.motion
+    motion = connector_residuals.Connectors.motion
     wrong = lambda self, q: (1 + 1e-6) * motion(self, q)  # noqa: E731
-    patch.setattr(connectors.Connectors, "motion", wrong)
+    patch.setattr(connector_residuals.Connectors, "motion", wrong)
 
 
 def limit_of_slips(patch):
@@ -304,7 +310,7 @@ def limit_of_slips(patch):
 
 def energy_of_points(patch):
     """What points dissipate is entered with the wrong sign."""
-    accept = points.MaterialPoints.accept
+    accept = return_map.MaterialPoints.accept
 
     def wrong(self):
         lost = self._ledger.lost
@@ -313,21 +319,21 @@ def energy_of_points(patch):
         if "plastic" in lost:
             lost["plastic"] = 2 * before - lost["plastic"]
 
-    patch.setattr(points.MaterialPoints, "accept", wrong)
+    patch.setattr(return_map.MaterialPoints, "accept", wrong)
 
 
 def time_of_loads(patch):
     """Loads are taken at the end of the step."""
-    respond = loads.LoadForce.respond
+    respond = load_vectors.LoadForce.respond
     wrong = lambda self, step, q1: respond(self, step._replace(load_time=step.t1), q1)  # noqa: E731
-    patch.setattr(loads.LoadForce, "respond", wrong)
+    patch.setattr(load_vectors.LoadForce, "respond", wrong)
 
 
 def mass_of_beams(patch):
     """Inertia is too large by a part in a million."""
-    respond = beams.MatrixForce.respond
+    respond = beam_residuals.MatrixForce.respond
     wrong = lambda self, *at: tuple((1 + 1e-6) * x for x in respond(self, *at))  # noqa: E731
-    patch.setattr(beams.MatrixForce, "respond", wrong)
+    patch.setattr(beam_residuals.MatrixForce, "respond", wrong)
 
 
 MISTAKES = [

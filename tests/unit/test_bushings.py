@@ -12,7 +12,7 @@ from law_runs import require_reference, require_restart
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import doubles, lib
-from ufl_beam.terms.force_laws import LawForms, inputs
+from ufl_beam.terms.compiled_connector_laws import LawForms, inputs
 
 f = ub.law_functions
 SECTION = ub.Section(EA=1e5, GA=1e5, EI=3.0, rhoA=1.0, rhoI=1e-2)

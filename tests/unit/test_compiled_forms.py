@@ -20,7 +20,7 @@ from ufl_beam.discretization.function_spaces import DolfinxFields, Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, strain
-from ufl_beam.terms.beams import elastic_forms
+from ufl_beam.terms.beam_forces import elastic_forms
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 
@@ -211,7 +211,7 @@ def no_points(monkeypatch):
     forget_forms()
     monkeypatch.setattr("ufl_beam.terms.material_points.Points.__init__", refuse)
     monkeypatch.setattr("ufl_beam.terms.material_points.PointForms.__init__", refuse)
-    monkeypatch.setattr("ufl_beam.terms.beams.InelasticBeams.__init__", refuse)
+    monkeypatch.setattr("ufl_beam.terms.beam_forces.InelasticBeams.__init__", refuse)
     monkeypatch.setattr("ufl_beam.model.softening_laws.Softening.traction", refuse)
     monkeypatch.setattr("ufl_beam.mechanics.point_equations.PointEquations.__init__", refuse)
 

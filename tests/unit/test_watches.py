@@ -15,7 +15,7 @@ import ufl_beam as ub
 from ufl_beam.model.material_law import has_quadratic_energies, judges_dissipation
 from ufl_beam.output.state_rows import DISSIPATED, HINGE, PLASTIC
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms import connector_laws
+from ufl_beam.terms import connector_rows
 
 STEEL = {"EA": 4e8, "GA": 1e8, "EI": 1.4e6, "rhoA": 40.0}
 
@@ -131,7 +131,7 @@ def test_a_damper_that_drives():
 
 def test_friction_that_drives(monkeypatch):
     """With the sign of the entry turned round."""
-    given = connector_laws.GIVEN
+    given = connector_rows.GIVEN
     monkeypatch.setitem(given, ub.Coulomb, (*given[ub.Coulomb][:3], -1.0))
     said, solution = run(held_at_the_end(ub.Coulomb(1e3)), t=(0, 0.05), dt=1e-3)
     about(said, solution, "'friction'", "falls by")

@@ -36,9 +36,9 @@ from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.terms.base import InCells
-from ufl_beam.terms.beams import elastic_forms
+from ufl_beam.terms.beam_forces import elastic_forms
 from ufl_beam.terms.cell_forces import CellForces
+from ufl_beam.terms.term import InCells
 
 MOST_TITLES = 4  # most modes that a text of one line names
 AMPLITUDE = 0.1  # largest displacement of a mode in pictures, as a fraction of the scene's size

@@ -24,7 +24,7 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
-from ufl_beam.terms.base import Term
+from ufl_beam.terms.term import Term
 
 MOST_DOUBLINGS = 30  # most doublings of a step until something dissipates in it
 ONSET_PART = 1e-6  # fraction of a step's dissipated energy that defines the onset of dissipation

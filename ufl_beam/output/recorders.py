@@ -31,7 +31,7 @@ from ufl_beam.output.state_rows import FORCE, Connection, connection
 from ufl_beam.output.states import States
 from ufl_beam.parallel import on_first
 from ufl_beam.solvers.newton import Solver
-from ufl_beam.terms.beams import InelasticBeams
+from ufl_beam.terms.beam_forces import InelasticBeams
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.inertia_and_damping import Inertia
 

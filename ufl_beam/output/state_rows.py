@@ -23,9 +23,9 @@ from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.partition import Share
 from ufl_beam.display import in_one_line
 from ufl_beam.mechanics.time_schemes import V
+from ufl_beam.terms.boundary_conditions import Supports
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.supports import Supports
 
 LEDGER = ("state", "supplied", "lost")
 """The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""

@@ -31,16 +31,16 @@ from ufl_beam.output.postprocessing import turned
 from ufl_beam.output.recorders import PresentState
 from ufl_beam.output.state_rows import BEFORE, FORCES, Block, Columns, Connection
 from ufl_beam.output.states import States
-from ufl_beam.reference.beams import (
+from ufl_beam.reference.beam_residuals import (
     ElasticBeams,
     Inertia,
     YieldingBeams,
     damping_forces,
     inelastic_cells,
 )
-from ufl_beam.reference.cells import Force, Memory, Response, Setting
-from ufl_beam.reference.connectors import Connectors, connectors_of
-from ufl_beam.reference.loads import Supports, loads_of
+from ufl_beam.reference.cell_forms import Force, Memory, Response, Setting
+from ufl_beam.reference.connector_residuals import Connectors, connectors_of
+from ufl_beam.reference.load_vectors import Supports, loads_of
 
 LARGEST_TURN = 0.75 * math.pi
 """Largest rotation of a node in a step before it is cut; the algorithmic strains end at π."""

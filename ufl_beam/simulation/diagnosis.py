@@ -33,7 +33,7 @@ from ufl_beam.simulation.step_equation import StepEquation
 from ufl_beam.solvers.factorization import Factorisation
 from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
-from ufl_beam.terms.base import KINDS
+from ufl_beam.terms.term import KINDS
 
 SHARE = 0.1
 """Least motion or deformation that is named, as a part of the largest motion."""

@@ -24,11 +24,11 @@ from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
-from ufl_beam.terms.base import Callbacks, Term
-from ufl_beam.terms.beams import Cells, ElasticBeams, InelasticBeams
+from ufl_beam.terms.beam_forces import Cells, ElasticBeams, InelasticBeams
+from ufl_beam.terms.boundary_conditions import Supports
 from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.connector_laws import Setting
-from ufl_beam.terms.connectors import couplings
+from ufl_beam.terms.connector_forces import couplings
+from ufl_beam.terms.connector_rows import Setting
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inertia_and_damping import (
     BEFORE,
@@ -36,10 +36,10 @@ from ufl_beam.terms.inertia_and_damping import (
     SecondDifferences,
     damping_forces,
 )
-from ufl_beam.terms.loads import DeadLoads, FollowerLoads, FrameForces, LoadTerm
+from ufl_beam.terms.load_forces import DeadLoads, FollowerLoads, FrameForces, LoadTerm
 from ufl_beam.terms.material_points import expect_entries
-from ufl_beam.terms.supports import Supports
-from ufl_beam.terms.works import Works
+from ufl_beam.terms.term import Callbacks, Term
+from ufl_beam.terms.user_forces import Works
 
 MOVING = "inertia", "damping"
 """Kinds of terms that depend on velocities."""

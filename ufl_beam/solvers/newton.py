@@ -33,7 +33,7 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.newton_options import PREFIX, Newton, database, take_options
 from ufl_beam.solvers.null_vectors import hold_idle_motions
 from ufl_beam.solvers.static_condensation import ChainsFirst
-from ufl_beam.terms.base import from_c
+from ufl_beam.terms.term import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
 """Options for full steps: norms of a line search would add forces and moments, and cost residuals.

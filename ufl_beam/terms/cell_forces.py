@@ -18,7 +18,7 @@ from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.dolfinx_compat import fem
-from ufl_beam.terms.base import InCells
+from ufl_beam.terms.term import InCells
 
 
 class CellForces:

@@ -43,9 +43,9 @@ from ufl_beam.mechanics.time_schemes import (
     with_half_tangents,
 )
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
-from ufl_beam.terms.base import Callbacks, InCells, Phases, Term, knowing
-from ufl_beam.terms.beams import OfForms
+from ufl_beam.terms.beam_forces import OfForms
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, knowing
 
 BEFORE = "velocity before"
 """Name in saved data of the velocities at the beginning of the last step."""

@@ -52,7 +52,7 @@ struct cells {
   double *each; /* entries of all cells in the latest evaluation, in batches; or none */
 };
 
-/* Strains whose forces are in the tangent of a static step, see predicted_strains in beams.py. */
+/* Strains whose forces are in the tangent of a static step, see predicted_strains in beam_forces.py. */
 typedef struct {
   const cells *strains;           /* form of the strains, linearized about a configuration */
   int at_about;                   /* position of that configuration in its coefficients */
@@ -262,7 +262,7 @@ enum slip_output {
   SLIP_DISSIPATED, SLIP_LOST, SLIP_STORED, SLIP_LIMIT, SLIP_BACK_FORCE, SLIP_OUTPUTS
 };
 
-/* Rigid-plastic connectors, see connector_laws.py. */
+/* Rigid-plastic connectors, see connector_rows.py. */
 typedef struct {
   int32_t *search;             /* the flags of points */
   kernel *force, *end;         /* force of a slip and its derivative; outputs at the end of a step */
@@ -279,7 +279,7 @@ typedef struct {
 
 typedef struct friction friction;
 
-/* Connectors whose laws are Python functions of a user, see force_laws.py. */
+/* Connectors whose laws are Python functions of a user, see compiled_connector_laws.py. */
 typedef struct {
   double *force, *rows; /* forces in the iterate; linearized rows of the laws, three of each */
   double *held;         /* energy that the connectors store */
@@ -291,7 +291,7 @@ typedef struct {
 /* Outputs of a connector law at the end of a step; its variables follow. */
 enum law_output { LAW_STORED, LAW_NUMERICAL, LAW_OUTPUTS };
 
-/* Connectors with compiled laws, see force_laws.py. Inputs of a law are its motions, the motions
+/* Connectors with compiled laws, see compiled_connector_laws.py. Inputs of a law are its motions, the motions
  * before the step, dt, theta, the variables before the step, and the parameters of the law. */
 typedef struct {
   kernel *force, *end;        /* forces and their derivatives by the motions; outputs at the end of a step */
@@ -517,7 +517,7 @@ enum agreement { TOTAL, HYPOT, LARGEST };
  * the run. */
 enum raised { NOTHING, STEP_FAILED, OTHER };
 
-/* Forces in the tangents of static steps, see predicted_strains in beams.py. PREDICTED: forces
+/* Forces in the tangents of static steps, see predicted_strains in beam_forces.py. PREDICTED: forces
  * before the step, then forces that the last iteration predicted. FIRST: forces before the step,
  * then forces at the iterate. EXACT: always forces at the iterate. */
 enum tangents { PREDICTED, FIRST, EXACT };
@@ -738,7 +738,7 @@ typedef struct {
  * follow. */
 enum work_number { WORK_TIME, WORK_STEP, WORK_PART, WORK_NUMBERS };
 
-/* A work of a user on cells, see works.py. */
+/* A work of a user on cells, see user_forces.py. */
 typedef struct {
   const cells *residual;
   int forms, numbers;

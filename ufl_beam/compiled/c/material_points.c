@@ -413,7 +413,7 @@ static void take_tangent(const inelastic *m)
 
 /* Forces for the tangent of a static step. The first are the forces before the step, or, for points
  * with tangent lines, forces at the extrapolated strains. Later ones are predicted by the latest
- * tangent for the strains that it predicts; see predicted_strains in beams.py. Stiff points predict
+ * tangent for the strains that it predicts; see predicted_strains in beam_forces.py. Stiff points predict
  * nothing. */
 static const double *predict_forces(const inelastic *m, const double *q)
 {

@@ -28,9 +28,9 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import HELD, ForceLaw, Guide, Law, RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import REACH, parameter_step
-from ufl_beam.terms.base import Callbacks, Phases, Term, beginning
-from ufl_beam.terms.connector_laws import GivenLaws, Response, RigidPlasticLaws, Setting, Springs
-from ufl_beam.terms.force_laws import AskedLaws, CompiledLaws
+from ufl_beam.terms.compiled_connector_laws import AskedLaws, CompiledLaws
+from ufl_beam.terms.connector_rows import GivenLaws, Response, RigidPlasticLaws, Setting, Springs
+from ufl_beam.terms.term import Callbacks, Phases, Term, beginning
 
 
 def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:

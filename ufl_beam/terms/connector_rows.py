@@ -42,9 +42,9 @@ from ufl_beam.model.functions import TimeFunction
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.softening_laws import SofteningLaw
-from ufl_beam.terms.base import Callbacks
 from ufl_beam.terms.energy_ledger import Account, Ledger
 from ufl_beam.terms.material_points import NOTHING, SPENT, Points, expect_entries
+from ufl_beam.terms.term import Callbacks
 
 CREEP = 1e-12
 """Creep in a step of a sticking connector under its limit; over the size of the scene, or rad.

@@ -23,9 +23,9 @@ from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.functions import Constant
 from ufl_beam.model.works import Potential, Work
-from ufl_beam.terms.base import Callbacks, InCells, Phases, entering
 from ufl_beam.terms.energy_ledger import Ledger
-from ufl_beam.terms.loads import LoadTerm
+from ufl_beam.terms.load_forces import LoadTerm
+from ufl_beam.terms.term import Callbacks, InCells, Phases, entering
 
 
 class Acting:

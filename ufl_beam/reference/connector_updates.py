@@ -38,8 +38,8 @@ from ufl_beam.model.fibres import Layout
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.material_law import State
 from ufl_beam.model.material_laws import ElastoPlastic
-from ufl_beam.reference.cells import Setting
-from ufl_beam.reference.points import MaterialPoints, derivative
+from ufl_beam.reference.cell_forms import Setting
+from ufl_beam.reference.return_map import MaterialPoints, derivative
 
 CREEP = 1e-12
 """Creep in a step of a sticking connector under its limit; over the size of the scene, or rad.

@@ -19,7 +19,7 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.law_functions import Values
-from ufl_beam.reference.cells import Setting
+from ufl_beam.reference.cell_forms import Setting
 
 CLOSED, FLOWING = 0.0, 1.0
 """Flags of a discontinuity that did not grow, or grew, in the last step."""

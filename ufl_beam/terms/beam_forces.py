@@ -26,9 +26,9 @@ from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.fibres import Layout
-from ufl_beam.terms.base import Callbacks, InCells, Phases, Term, beginning, entering
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points
+from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, beginning, entering
 
 
 class OfForms(Term):

@@ -28,8 +28,8 @@ from ufl_beam.model.checks import require_returned
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, stated_at
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_law import State
-from ufl_beam.terms.base import Callbacks
-from ufl_beam.terms.connector_laws import Response, Setting
+from ufl_beam.terms.connector_rows import Response, Setting
+from ufl_beam.terms.term import Callbacks
 
 # -- energy and resistance -------------------------------------------------------------------------
 

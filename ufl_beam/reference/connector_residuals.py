@@ -18,7 +18,7 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import REACH, nearest, parameter_step, tangent
-from ufl_beam.reference.cells import (
+from ufl_beam.reference.cell_forms import (
     Force,
     Form,
     Memory,
@@ -29,7 +29,7 @@ from ufl_beam.reference.cells import (
     put,
     separate_cells,
 )
-from ufl_beam.reference.connector_laws import law_in_step
+from ufl_beam.reference.connector_updates import law_in_step
 
 NEAR = 1e-5
 """Increment of differences of the forces of guides, over the size of the scene.

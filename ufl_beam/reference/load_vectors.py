@@ -19,8 +19,8 @@ from ufl_beam.model.bodies import GROUND, carries
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
 from ufl_beam.model.works import Potential, Work
-from ufl_beam.reference.beams import Mass
-from ufl_beam.reference.cells import (
+from ufl_beam.reference.beam_residuals import Mass
+from ufl_beam.reference.cell_forms import (
     CellForce,
     Cells,
     Force,

@@ -28,7 +28,7 @@ from ufl_beam.mechanics.time_schemes import (
 )
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
-from ufl_beam.reference.cells import (
+from ufl_beam.reference.cell_forms import (
     CellForce,
     Cells,
     Force,
@@ -38,7 +38,7 @@ from ufl_beam.reference.cells import (
     lumps,
     put,
 )
-from ufl_beam.reference.points import MaterialPoints
+from ufl_beam.reference.return_map import MaterialPoints
 
 
 class ElasticBeams(CellForce):

@@ -17,8 +17,8 @@ from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.functions import TimeFunction, value_at
 from ufl_beam.model.supports import Support
-from ufl_beam.terms.base import Callbacks
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.term import Callbacks
 
 
 class Supports:

@@ -30,8 +30,8 @@ from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame
-from ufl_beam.terms.base import Callbacks, InCells, Phases, Term
 from ufl_beam.terms.energy_ledger import Ledger
+from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
 
 
 class LoadTerm(Term):
