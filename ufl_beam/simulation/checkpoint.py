@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checkpoints: a run goes on after whatever has stopped it."""
+"""Checkpoints, from which an interrupted run continues."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Solution
 
 FORMAT = "checkpoint of ufl_beam, 4"
-"""The number grows whenever the meaning of files changes."""
+"""Format of the file; its number grows whenever the meaning of files changes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +50,15 @@ class Checkpoint:
 
     Args:
         path: File.
-        every: Write every so many steps.
-        minutes: Write after so many minutes of wall time.
+        every: Number of steps between two files.
+        minutes: Wall time between two files; min.
         also: Further objects with a state, besides those that functions in the scene use: random
             generators of NumPy, and objects with ``state()`` and ``restore(state)``, where the
             state consists of numbers, texts, lists and dicts.
 
     Raises:
-        ArgumentError: Neither ``every`` nor ``minutes``, or a bad number; no state in ``also``.
+        ArgumentError: Both ``every`` and ``minutes`` are missing, a number is out of range, or an
+            object in ``also`` has no state.
 
     Example:
         >>> backup = ub.Checkpoint("run.checkpoint", every=1000)
@@ -90,7 +91,7 @@ class Checkpoint:
 
     @property
     def files(self) -> tuple[Path, ...]:
-        """The file, and the one that takes its place; no other output may write them."""
+        """The checkpoint file and its temporary file; no other output may write them."""
         path = Path(self.path)
         return path, beside(path)
 
@@ -98,8 +99,9 @@ class Checkpoint:
 class Keeper:
     """The checkpoint of one run; its file is locked until the :attr:`lock` is released.
 
-    The ``call`` is what the run is, by name.  If its steps are equal, ``step`` long (s), it may go
-    on to another end ``t1`` (s).  What the file had is in ``found``, until :meth:`resume`.
+    The ``call`` holds the arguments of the run by name.  A run with equal steps of length ``step``
+    (s) may continue to another end ``t1`` (s).  ``found`` is the content of the file until
+    :meth:`resume`.
     """
 
     def __init__(
@@ -113,7 +115,7 @@ class Keeper:
     ) -> None:
         for recorder in recorders:
             if type(recorder).state is Recorder.state:
-                recorder.state()  # raises: it does not say how to go on
+                recorder.state()  # raises, as it cannot be restarted
         self._choice, self._call, self._step, self._t1, self._comm = choice, call, step, t1, comm
         self.path, self._recorders = Path(choice.path), recorders
         self._described = Description(call)
@@ -130,7 +132,7 @@ class Keeper:
             self.found = comm.bcast(self.found)
         self._last_time, self._last_step = time.perf_counter(), -1
 
-    # -- going on ------------------------------------------------------------------------------
+    # -- restart -------------------------------------------------------------------------------
 
     def _find(self) -> None:
         """Lock the file, and read it if it exists."""
@@ -175,7 +177,7 @@ class Keeper:
         require_writable(self.path)
 
     def resume(self, simulation: Simulation, pace: Any) -> None:
-        """Restore all from the file: the run, its step control ``pace``, recorders; forget it."""
+        """Restore the run, its step control ``pace`` and recorders; then drop the content."""
         found, solution = self.found, simulation.solution
         with decoding(self.path, FORMAT):
             simulation.remember(Memory(simulation.share, below("state/", found)))
@@ -206,8 +208,8 @@ class Keeper:
     # -- writing -------------------------------------------------------------------------------
 
     def due(self, steps: int) -> bool:
-        """Return whether to write after so many steps; all processes ask after each of them."""
-        if self._last_step < 0:  # better now than after an hour
+        """Return whether to write after ``steps`` steps; all processes call it after each step."""
+        if self._last_step < 0:  # report an error now rather than after an hour
             self._require_told()
             self._last_step = 0
         every, minutes = self._choice.every, self._choice.minutes
@@ -218,7 +220,7 @@ class Keeper:
         return due
 
     def write(self, simulation: Simulation, pace: Any, seconds: float) -> None:
-        """Write the file after so many seconds of the run; all processes call it together."""
+        """Write the file after ``seconds`` of the run; all processes call it together."""
 
         def states() -> dict[str, Any]:
             found = dict[str, Any]()
@@ -251,7 +253,7 @@ class Keeper:
         self._last_time, self._last_step = time.perf_counter(), pace.steps
 
     def _require_told(self) -> None:
-        """Raise if what functions use changes without their saying so: it would be lost."""
+        """Raise if functions have changed data that no checkpoint contains: it would be lost."""
         changed = difference(Description(self._call).texts, self._described.texts)
         if changed:
             raise ArgumentError(
@@ -266,7 +268,7 @@ PYTHON = ".".join(map(str, sys.version_info[:2]))
 
 
 def end_of(start: Solution | None) -> str:
-    """A checksum of what a run begins with."""
+    """Return a checksum of the state with which a run begins."""
     if start is None:
         return "nothing"
     total = hashlib.sha256()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Forces of controllers and limits of friction: evaluated as steps begin, and watched."""
+"""Forces of controllers and limits of friction: evaluation at the start of steps, and checks."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ from ufl_beam.model.connector_laws import (
 from ufl_beam.model.connectors import Connector
 
 SAME = 1e-9
-"""Part of a sample time by which the end of a step may miss it."""
+"""Distance between the end of a step and a sample that is round-off; fraction of a sample time."""
 
 
 class Controllers:
     """Forces of controllers and limits of friction in a step; the same on all processes.
 
     Attributes:
-        at: Places of connectors in the arrays.
-        numbers: The forces and limits, where C finds them; N or N m.
-        sampled: Sample times of controllers that have one, by place; s.
+        at: Index of each connector in the arrays.
+        numbers: Forces and limits, which C reads; N or N m.
+        sampled: Sample times of sampled controllers, by index; s.
         fresh: Whether controllers were evaluated since these flags were cleared.
-        asks: True if anything is to be evaluated when steps begin.
+        asks: True if a force or limit is evaluated at the start of steps.
     """
 
     def __init__(self, share: Share) -> None:
@@ -51,24 +51,24 @@ class Controllers:
                 self.sampled[i] = link.law.sample
         self.asks = bool(self._changing)
         self._numbers = np.array([i for i, link in enumerate(links) if link in self.at], dtype=int)
-        # Of each that has a sample time: time of the first sample (s), number of the last one.
+        # Time of the first sample (s) and number of the last sample; NaN without a sample time.
         self._samples = np.full((len(asked), 2), math.nan)
 
     def place(self, link: Connector) -> Any:
-        """Address of the number of a connector."""
+        """Return the address of the force or limit of a connector."""
         return doubles(self.numbers) + self.at[link]
 
     def ask(self, now: Running) -> None:
-        """Evaluate what is due at the time ``now.t``; all processes call it together."""
+        """Evaluate forces and limits that are due at ``now.t``; all processes call it together."""
         for i, link in self._changing:
             sample = self._due(i, now.t)
-            if sample[1] != self._samples[i, 1]:  # NaN, without a sample time, is due each time
+            if sample[1] != self._samples[i, 1]:  # always for NaN, without a sample time
                 self.numbers[i] = link.law.ask(now, link)  # type: ignore[union-attr]
                 self.fresh[i] = 1
                 self._samples[i] = sample
 
     def _due(self, i: int, t: float) -> tuple[float, float]:
-        """Time of the first sample, and the number of the one that holds from ``t`` on, if any."""
+        """Return the time of the first sample and the number of the sample at ``t``, or NaN."""
         if i not in self.sampled:
             return math.nan, math.nan
         first, sample = float(self._samples[i, 0]), self.sampled[i]
@@ -86,9 +86,9 @@ class Controllers:
         return stop
 
     def remember(self, memory: Memory, t: float) -> None:
-        """Pass on the forces and limits in the state at ``t``, and the samples.
+        """Save or restore forces, limits and samples at the time ``t``.
 
-        Where a run begins at another time, sampling begins anew.
+        Sampling begins anew if the run begins at another time.
         """
         if not len(self.numbers):
             return
@@ -100,20 +100,20 @@ class Controllers:
 
 
 def _rounding(sample: float, *times: float) -> float:
-    """Difference of times that is due to their last digits; s."""
+    """Return the difference of times that is round-off; s."""
     return SAME * sample + 4 * math.ulp(max(map(abs, times)))
 
 
 # -- forces that alternate -------------------------------------------------------------------------
 
 ALTERNATIONS = 20
-"""Number of successive changes of direction of a force that is a fault."""
+"""Number of successive reversals of a force that is reported as a fault."""
 
 LARGE = 0.5
-"""Least change of such a force, as a part of the largest force so far."""
+"""Least change of such a force, as a fraction of the largest force so far."""
 
 MOVED = 1e-9
-"""Least motion of such a step, as a part of the size of the scene, or rad."""
+"""Least motion in such a step, as a fraction of the size of the scene or in rad."""
 
 CONTROLLED = (
     "the controller answers the motion that it has caused by the time it is asked again. A force "
@@ -126,11 +126,11 @@ DRIVEN = (
     "it drives a motion that is too fast for the steps. Use smaller ones, or a scheme that damps "
     "such motions, as EnergyMomentum(alpha=0.05, beta=0.05) does"
 )
-"""Reasons and remedies, of a controller and of a force law."""
+"""Reasons and remedies for a controller and for a force law."""
 
 
 class ForceWatch:
-    """Watches forces of controllers and force laws, of :class:`Links`, that alternate in each step.
+    """Check for forces of controllers and force laws in :class:`Links` that reverse in each step.
 
     Attributes:
         c: ``force_watch`` of loops.h; None if there are no such laws.
@@ -164,7 +164,7 @@ class ForceWatch:
         self._alive = couplings, controllers
 
     def told(self) -> Iterator[str]:
-        """Yield warnings that have not been told, one a connector."""
+        """Yield new warnings, one for each connector."""
         if self.c is None or not self.c.tells:
             return
         self.c.tells = 0

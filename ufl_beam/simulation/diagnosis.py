@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Diagnosis of failed steps, open ledgers and wrong signs: forces, what gives way, round-off."""
+"""Diagnosis of failed steps (forces, mechanisms, limit loads) and of the energy ledger."""
 
 from __future__ import annotations
 
@@ -36,27 +36,28 @@ from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
 from ufl_beam.terms.term import KINDS
 
 SHARE = 0.1
-"""Least motion or deformation that is named, as a part of the largest motion."""
+"""Least motion or deformation that is named, as a fraction of the largest motion."""
 
 SOFT = 1e-3
-"""Largest stiffness of a connector or a cell that gives way, as a part of its elastic one."""
+"""Largest stiffness of a yielding connector or cell, as a fraction of its elastic stiffness."""
 
 NEAR = 1e-3
-"""Motion from the beginning of a step, in sizes of the scene or radians, after which the tangent
-tells what yields as the step begins."""
+"""Distance from the initial state of a step, in sizes of the scene or radians, at which the tangent
+shows which parts yield at the start of the step."""
 
 NOT_HELD = (
     "Loads can hold it where they balance, as a weight below its hinge, and there is no such state "
     f"near that in which the run begins. Begin there. {INSTEAD}. In the first step: "
 )
-"""What is said of a run of statics whose first step fails where a motion without strain is free."""
+"""Message of a static run whose first step fails while a motion without strain is free."""
 
 WEAK = 0.1
-"""Part of the least stiffness in the first state that is left near a limit load: the root of 1/4096
-where it is as far away as the smallest part of a step."""
+"""Least stiffness near a limit load, as a fraction of the least stiffness in the first state.
+
+It is the root of 1/4096 if the limit load is as far away as the smallest substep."""
 
 ROOM = 10.0
-"""Largest imbalance of an exact ledger over the tolerance of the solver."""
+"""Largest ratio of the imbalance of an exact ledger to the tolerance of the solver."""
 
 NAMED = 3
 """Largest number of names in a list."""
@@ -65,8 +66,8 @@ NAMED = 3
 class Deformed(NamedTuple):
     """Connectors, or cells, that deform in a motion."""
 
-    soft: Index  # numbers of those that have given way, the largest first
-    stiff: bool  # True if one deforms that has its stiffness
+    soft: Index  # numbers of yielding connectors or cells, the largest deformation first
+    stiff: bool  # True if a connector or cell deforms that has not yielded
 
 
 def no_equilibrium(
@@ -81,7 +82,7 @@ def no_equilibrium(
 ) -> ConvergenceError | ArgumentError:
     """Describe why even the smallest step, from ``q0``, failed; all processes call it together.
 
-    In the first step a motion without strain may be ``loose``, which no equilibrium has held yet.
+    ``loose`` describes a motion without strain that no equilibrium has held yet; it may be empty.
     """
     if loose:
         return ModelError(f"{loose}{NOT_HELD}{failure}")
@@ -102,8 +103,8 @@ def no_equilibrium(
     if not isinstance(failure, NoNumber):  # where a function has no value there is no tangent
         near = _near(equation, q0, q1)
         why = _singularity(equation, q1)
-        # If the latest tangent says nothing, Newton's method may have been sent far away by a
-        # tangent before it.  Then one near the beginning of the step tells.
+        # If the latest tangent is inconclusive, an earlier tangent may have sent Newton's method
+        # far away.  Then the tangent near the beginning of the step is examined.
         if not why and near is not q0 and equation.respond_at(near):
             why = _singularity(equation, near)
         why = why or _near_limit(equation, solution, q0, near)
@@ -115,10 +116,11 @@ def no_equilibrium(
 
 
 def _near_limit(equation: StepEquation, solution: Solution, q0: Array, near: Array) -> str:
-    """Say that a limit load or bifurcation is near the state ``q0`` of a static run; else empty.
+    """Return a message if a limit load or bifurcation is near ``q0`` in statics, else empty.
 
-    There the least stiffness is a small part of that in the first state, or the tangent has other
-    signs, perhaps only a little beyond, ``near`` it, where what yields has less stiffness.
+    There the least stiffness is a small fraction of its value in the first state, or the number of
+    negative pivots of the tangent differs.  The pivots are also counted a little beyond ``q0``, at
+    ``near``, because yielding reduces the stiffness there.
     """
     if not len(equation.force) or not len(solution):
         return ""
@@ -143,7 +145,7 @@ def _near_limit(equation: StepEquation, solution: Solution, q0: Array, near: Arr
 
 
 def _near(equation: StepEquation, q0: Array, q1: Array) -> Array:
-    """A state on the way from ``q0`` to ``q1``, at most :data:`NEAR` away."""
+    """Return a state between ``q0`` and ``q1``, at most :data:`NEAR` away from ``q0``."""
     share = equation.share
     way = np.abs(q1 - q0) * share.grid.scales[share.dofs]
     far = share.largest(float(way.max(initial=0.0)))
@@ -151,7 +153,7 @@ def _near(equation: StepEquation, q0: Array, q1: Array) -> Array:
 
 
 def _singularity(equation: StepEquation, q: Array) -> str:
-    """Describe why the latest tangent, which is that at ``q``, is singular; empty if it is not."""
+    """Describe why the latest tangent, evaluated at ``q``, is singular; empty if it is regular."""
     grid, scene = equation.share.grid, equation.share.grid.scene
     K, free = free_matrix(equation.share, equation.A, equation.supports.dofs)
     if not len(free) or not np.isfinite(K.data).all():
@@ -183,7 +185,7 @@ def _singularity(equation: StepEquation, q: Array) -> str:
 
 
 def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
-    """Deformations of the connectors and of the cells in a motion from ``q``, all of them."""
+    """Return the deformations of all connectors and of all cells in a motion ``x`` from ``q``."""
     share, grid, scene = equation.share, equation.share.grid, equation.share.grid.scene
     here, ε = x[share.dofs], 1e-6
     links, left = np.zeros(len(scene.links)), np.ones(len(scene.links))
@@ -191,7 +193,7 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
         try:
             change = (one.motion(q + ε * here) - one.motion(q - ε * here)) / (2 * ε)
         except StepFailed:
-            continue  # a guide that ends has no motion there, which the failure of the step says
+            continue  # no motion beyond the end of a guide; the failure of the step reports it
         links[one.numbers] = np.abs(change)
         left[one.numbers] = one.response.remaining()
     links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
@@ -225,8 +227,8 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
 
 
 def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> str:
-    """Words for a motion that meets no force; ``motions`` are the sizes of its parts."""
-    alike = np.round(motions, 6)  # the order of equal ones must not be that of their round-off
+    """Describe a motion without resistance; ``motions`` are the magnitudes of its components."""
+    alike = np.round(motions, 6)  # round-off must not determine the order of equal motions
     parts = []
     for words in grid.worst(np.where(alike >= 1 / 2, alike, 0.0)):
         component, _, place = words.partition(" of ")
@@ -255,13 +257,13 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
 
 
 def _named(sizes: Array) -> Index:
-    """The largest of those that are large enough to be named."""
+    """Return the indices of all sizes from :data:`SHARE` on, in descending order."""
     order = np.argsort(-sizes, kind="stable")
     return order[sizes[order] >= SHARE]
 
 
 def _list(names: list[str]) -> str:
-    """Names in a sentence, the first ones of many."""
+    """Join the first :data:`NAMED` names for a sentence, and count the rest."""
     names, more = names[:NAMED], len(names) - NAMED
     if more > 0:
         return f"{', '.join(names)} and {more} more"
@@ -271,28 +273,28 @@ def _list(names: list[str]) -> str:
 # -- signs in the ledger of a run ------------------------------------------------------------------
 
 STATES = 100
-"""Number of successive steps in which numerical losses are added."""
+"""Number of successive steps over which numerical losses are added."""
 
 TURNOVER = 5.0
-"""Numerical loss in so many steps, over the largest energy in the scene meanwhile, that is wrong.
+"""Numerical loss in these steps, over the largest energy of the scene in them, that is reported.
 
-A motion that steps resolve loses a small part of its energy in each.
+A motion that the steps resolve loses a small fraction of its energy in each step.
 """
 
 LITTLE = 1e-6
-"""Numerical loss that does not matter, as a part of the energy that went through."""
+"""Negligible numerical loss, as a fraction of the energy transferred."""
 
 
 class LedgerWatch:
-    """Judges the kept states of a run, each once.
+    """Check of the energy ledger in the kept states of a run, each once.
 
     Args:
-        grid: Its scene is watched.
+        grid: Grid of the scene.
         scheme: The time scheme.
-        claimed: Part of the energy that went through by which entries may err.
+        claimed: Error of entries that the scheme allows; fraction of the energy transferred.
 
     Attributes:
-        judged: Number of the last state that was judged; all are if states were thinned.
+        judged: Number of the last state that was checked.
     """
 
     def __init__(self, grid: Grid, scheme: Scheme, claimed: float) -> None:
@@ -322,10 +324,10 @@ class LedgerWatch:
         self._told: set[str] = set()
 
     def judge(self, states: States, every: int, *, last: bool = False) -> Iterator[str]:
-        """Judge what was kept since the last call, if it is enough or the ``last``.
+        """Yield warnings of the states since the last call, in groups of :data:`STATES`.
 
-        ``every`` is the number of steps from one state to the next.  Yields warnings, of each kind
-        the first.
+        ``every`` is the number of steps between states; ``last`` includes an incomplete group.
+        Only the first warning of each kind is yielded.
         """
         number = len(states) - 1 - self.judged
         number -= 0 if last else number % STATES
@@ -384,7 +386,7 @@ class LedgerWatch:
             )
 
     def _where(self, name: str, states: States, n: int) -> str:
-        """Cell or connector whose dissipated energy falls most in a step."""
+        """Name the cell or connector whose dissipated energy falls most in a step."""
         kind = {"friction": Coulomb, "damping": Damper}.get(name)
         falls: dict[str, float] = {}
         for i, link in enumerate(self._grid.scene.links):

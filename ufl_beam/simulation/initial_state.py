@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The grid and the state that a run begins with, and checks before anything is computed."""
+"""Grid and initial state of a run, and checks before anything is computed."""
 
 from __future__ import annotations
 
@@ -42,10 +42,10 @@ from ufl_beam.simulation.solution import Solution
 
 @no_garbage_collection()
 def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool) -> tuple[Grid, str]:
-    """Make the grid of a scene, once the scheme is known to be able to compute it.
+    """Check that the scheme can compute a scene, and make its grid.
 
-    ``fresh`` says that the run begins with the undeformed scene.  Also describe a motion that only
-    loads may hold in statics; empty if there is none.
+    ``fresh`` says that the run begins with the undeformed scene.  The second result describes a
+    motion that only loads may hold in statics; it is empty if there is none.
     """
     loose = ""
     require_kind(scene, Scene, "scene")
@@ -94,7 +94,7 @@ def require_scheme(scheme: Any, what: str) -> None:
 
 
 def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
-    """Return the mesh that a call names, that of the solution it starts with, or the default."""
+    """Return the given mesh, else the mesh of the solution ``start``, else the default."""
     if mesh is not None:
         require_kind(mesh, Mesh, "mesh")
         return mesh
@@ -115,7 +115,7 @@ def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, Sta
 
 
 def _initial_velocity(grid: Grid) -> Array:
-    """Velocities of :class:`Velocity`; zero elsewhere."""
+    """Return the initial velocities by :class:`Velocity`; zero elsewhere."""
     v: Array = np.full(grid.size, np.nan)
     for velocity in grid.scene.initial:
         for beam in velocity.beams:
@@ -138,9 +138,9 @@ def _initial_velocity(grid: Grid) -> Array:
 
 
 def _require_agreement(grid: Grid, v: Array) -> None:
-    """Velocities must agree with what joints hold, or they would ring for ever, and with supports.
+    """Raise if initial velocities violate joints, which would vibrate for ever, or supports.
 
-    Refuse those that supports take away altogether, and warn of those that lose a part.
+    Supports that cancel all velocities of a beam are an error; a warning, if they cancel some.
     """
     size, nodes = grid.scene.size, np.vstack([grid.dofs, grid.dofs_of_bodies])
     fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()

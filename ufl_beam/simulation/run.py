@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""A run from beginning to end: steps, what is kept, what is written on the way."""
+"""Run from beginning to end: steps, kept states, output files and checkpoints."""
 
 from __future__ import annotations
 
@@ -65,31 +65,30 @@ def simulate(
 
     Args:
         scene: Model.
-        scheme: :class:`Static`, :class:`EnergyMomentum` or another one, see docs/schemes.md.
+        scheme: :class:`Static`, :class:`EnergyMomentum` or another scheme, see docs/schemes.md.
         t: Beginning and end; s.  In statics time is the load parameter.
-        dt: Step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A step
-            without convergence is cut into parts.  :class:`Adaptive` steps are as long as an
-            accuracy allows.
-        record: Files to write on the way, such as :class:`XDMF` and :class:`History`.
-        every: Keep every so many steps in the solution; the last one always.
-        max_states: Largest number of states in the solution, besides the initial and the last one.
-            When it is exceeded, every other state is deleted, and half as many steps are kept from
-            then on.
+        dt: Time step; s.  All steps are a little shorter if ``dt`` does not divide the time.  A
+            step without convergence is divided into substeps.  :class:`Adaptive` steps are as long
+            as a tolerance allows.
+        record: Recorders of files or results, such as :class:`XDMF` and :class:`History`.
+        every: Number of steps between kept states; the last state is always kept.
+        max_states: Largest number of states in the solution, besides the initial and the last
+            state.  When it is exceeded, every other state is deleted and ``every`` is doubled.
         start: Solution of the same beams whose last state is the initial state.  Joints may be
-            removed, or added where places are together.
+            removed, or added where places coincide.
         newton: Tolerances and PETSc options.
-        mesh: Discretization; as ``start``, or with the cells of the beams.
-        checkpoint: Checkpoint file from which the run goes on if the script is run again.
+        mesh: Discretization; by default as in ``start``, or the cells of the beams.
+        checkpoint: Checkpoint file from which the run continues if the script is run again.
         progress: Show a progress bar in a terminal or notebook.
-        comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.  A
-            small scene is computed by each of them.
+        comm: Processes that share the scene; by default all, or in a :func:`study` this process
+            alone.  Each process computes a small scene as a whole.
 
     Returns:
-        The motion, the forces and the ledger.
+        The motion, the forces and the energy ledger.
 
     Raises:
         ArgumentError: The call or the scene is wrong; nothing was computed.
-        ConvergenceError: A step failed; it carries the solution so far, and files are complete.
+        ConvergenceError: A step failed; the error has the solution so far, and files are complete.
 
     Example:
         >>> run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05)
@@ -172,17 +171,17 @@ def take_steps(
     keeper: Keeper | None = None,
     begin: float = 0.0,
 ) -> None:
-    """Take the steps of a run: keep states, judge the ledger, write files, show the progress.
+    """Take the steps of a run: keep states, check the ledger, write files, show the progress.
 
     Args:
-        simulation: At the beginning.
-        pace: Which step comes next: :class:`EqualSteps`, :class:`AdaptiveSteps`, or a path.
-        recorders: What is written after each step.
+        simulation: Simulation in its initial state.
+        pace: Step control: :class:`EqualSteps`, :class:`AdaptiveSteps`, or a path.
+        recorders: Recorders of each step.
         bar: Progress bar.
         max_states: Largest number of kept states, see :func:`simulate`.
         until: The run ends after the first step for which this is true.
-        keeper: Of checkpoints.
-        begin: Value of the clock as the run began, for checkpoints; s.
+        keeper: Writer of checkpoints.
+        begin: Value of the clock at the beginning of the run, for checkpoints; s.
     """
     solution, ended = simulation.solution, False
     claimed = ROOM * simulation.solver.c.rtol
@@ -224,7 +223,7 @@ def take_steps(
                 left = solution.every - pace.steps % solution.every
                 pace.advance(left if quiet else 1)
                 ended = simulation.together(after_step)
-                if until is not None:  # which processes need not agree on
+                if until is not None:  # on which processes may disagree
                     ended = simulation.share.largest(ended) > 0
             if not bar.disable:
                 bar.set_postfix_str(simulation.parameter.at(simulation.t), refresh=False)
@@ -234,12 +233,12 @@ def take_steps(
 
 
 def check_ledger(simulation: Simulation) -> None:
-    """Warn, and note in the solution, if a ledger is open that the scheme claims to close.
+    """Warn, also in the solution, if a ledger is open although the scheme claims to close it.
 
-    All processes call it together, at the end of a run, and know all warnings then.
+    All processes call it together at the end of a run.  Then all of them have all warnings.
 
     Warns:
-        ModelWarning: It is open, perhaps by round-off.
+        ModelWarning: The ledger is open, perhaps by round-off.
     """
     solution, share = simulation.solution, simulation.share
     if not share.alone:  # forces are watched by the process that has the connector
@@ -261,10 +260,11 @@ def check_ledger(simulation: Simulation) -> None:
 def running(
     simulation: Simulation, recorders: Sequence[Recorder], outputs: Sequence[Output], begin: float
 ) -> Iterator[None]:
-    """Close what a run has opened at its end, and let whatever stops it carry ``error.solution``.
+    """Close the simulation and its recorders at the end; errors carry ``error.solution``.
 
-    Meanwhile no other run writes its files; ``begin`` is the value of a clock for its seconds.  A
-    run that reaches its end is judged: the ledger, and hinges that depend on the mesh.
+    Meanwhile no other run may write the files.  ``begin`` is the value of the clock at the
+    beginning of the run.  After the last step the ledger and the mesh dependence of hinges are
+    checked.
     """
     with ExitStack() as stack:
         stack.callback(simulation.close)
@@ -277,7 +277,7 @@ def running(
         except BaseException as error:
             simulation.copies.leave()
             if simulation.share.comm.size == 1 or error is simulation.together.raised:
-                simulation.end()  # else the processes may not all be here
+                simulation.end()  # else some processes may not get here
             stopped: Any = error
             stopped.solution = simulation.solution
             raise
@@ -308,7 +308,7 @@ def simulate_by_reference(
     start: Solution | None, mesh: Mesh | None, every: int, max_states: int, comm: MPI.Intracomm,
     progress: bool,
 ) -> Solution:  # fmt: skip
-    """Simulate a scene by so many equal steps; arguments are those of ``simulate``."""
+    """Simulate a scene in ``number`` equal steps; other arguments are as in ``simulate``."""
     if comm.size > 1:
         require_plain(newton, f"mpirun, here with {comm.size} processes")
     newton = checked_newton(newton, comm)
@@ -331,7 +331,7 @@ def simulate_by_reference(
     def keep() -> None:
         columns, row = solver.now.row(0)
         if solver.parts == 0 and has_inertia(scheme):
-            columns.of_rows("reactions", row).fill(math.nan)  # nobody knows them
+            columns.of_rows("reactions", row).fill(math.nan)  # unknown before the first step
         solution.append(columns, row)
         solution.count(solver.parts, solver.iterations)
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Simulation: a scene in motion, one state and the step to the next."""
+"""Simulation: the present state of a scene and the step to the next state."""
 
 from __future__ import annotations
 
@@ -36,36 +36,37 @@ from ufl_beam.simulation.stepper import Stepper
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
 APPLYING = 1 / 8
-"""Part of the first step in which loads that are there from the start are applied."""
+"""Fraction of the first step in which loads that act from the start are applied."""
 
 LONGEST = 0.05
 """Time after which C returns, so that a run can be interrupted and shows its progress; s."""
 
 ROOM = 2**20
-"""Numbers that C writes of states in a call."""
+"""Limit of the numbers that C writes in a call, for the states of all its steps."""
 
 
 class Simulation(Stepper):
-    """Time stepper of a scene: its present state and the step to the next.
+    """Time stepper of a scene: its present state and the step to the next state.
 
     :func:`simulate` is a loop over :meth:`step_to`; use this class for loops of your own.
 
     Args:
         scene: Model.
-        scheme: :class:`Static`, :class:`EnergyMomentum` or another one, see docs/schemes.md.
+        scheme: :class:`Static`, :class:`EnergyMomentum` or another scheme, see docs/schemes.md.
         t0: Time of the initial state; s.
         start: Solution of the same beams whose last state is the initial state.  Joints may be
-            removed, or added where places are together.
+            removed, or added where places coincide.
         newton: Tolerances and PETSc options.
-        mesh: Discretization; as ``start``, or with the cells of the beams.
-        comm: Processes that share the scene; all of them, or in a :func:`study` this one alone.
+        mesh: Discretization; by default as in ``start``, or the cells of the beams.
+        comm: Processes that share the scene; by default all, or in a :func:`study` this process
+            alone.
         kind: Class of the solution.
 
     Attributes:
         t: Time; s.
-        solution: The motion so far.
-        parts: Number of parts that steps were cut into, those not cut included.
-        copies: Comparison of processes that each compute a copy of a small scene.
+        solution: Solution so far.
+        parts: Number of substeps; an undivided step counts as one substep.
+        copies: Comparison of the processes if each computes a small scene as a whole.
 
     Example:
         >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
@@ -143,7 +144,7 @@ class Simulation(Stepper):
         solution.of_record = self.cell_forces.of_record if share.alone else None
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())
-        # Where forces act over a step, loads that act from the start are applied before it.
+        # If forces act before the end of a step, loads that act from the start are applied first.
         self._applies = fresh and inertia is None and solution.between != 1.0 and acts
         give_back_memory(len(q_here))
         if inertia is not None and (scene.links or scene.supports):
@@ -153,23 +154,23 @@ class Simulation(Stepper):
     # -- stepping ------------------------------------------------------------------------------
 
     def step_to(self, t1: float) -> None:
-        """Go to the time ``t1``, in one step or, where that fails, in parts.
+        """Advance to the time ``t1`` in one step or, if it fails, in substeps.
 
         Raises:
-            ConvergenceError: Even the smallest part failed; the state is that of the last part that
-                was accepted, which the solution of the error ends with.
+            ConvergenceError: Even the smallest substep failed.  The last accepted substep gives
+                the state, with which the solution of the error ends.
         """
         self.steps_to(np.array([t1]))
 
     def steps_to(self, ends: Array, *, keep: bool = False) -> int:
-        """Go to the first of these times, and on to others for a moment.
+        """Advance to the first of these times, and to more of them within :data:`LONGEST`.
 
         Args:
             ends: Ends of steps; (n,); s.
             keep: Append the state at the end of each step to the solution.
 
         Returns:
-            How many steps were taken: at least one, and no more than take a moment.
+            Number of steps taken, at least 1.
 
         Raises:
             ConvergenceError: See :meth:`step_to`.
@@ -185,7 +186,7 @@ class Simulation(Stepper):
         """
         c, solution, room, rows = self.march, self.solution, 0, ffi.NULL
         ends = np.ascontiguousarray(ends, dtype=np.float64)
-        number = len(ends) if self.share.alone else 1  # a moment differs between processes
+        number = len(ends) if self.share.alone else 1  # clocks of processes differ
         try:
             if self._applies and self.parts == 0:
                 self._applies = False
@@ -196,7 +197,7 @@ class Simulation(Stepper):
                 c.applies = 0
                 if not reached:
                     self._fail()
-                c.prediction.dt = math.inf  # the next step does not go on as this one did
+                c.prediction.dt = math.inf  # the next step is not extrapolated from this step
             if keep:
                 if self.share.alone and (
                     not solution.begun or solution.parts_of_last == self.parts
@@ -208,7 +209,7 @@ class Simulation(Stepper):
             with self._in_c():
                 taken: int = lib.take_steps(c, number, doubles(ends), LONGEST, room > 0, rows)
             if keep and taken:
-                # A step in parts is written anew: the last one begins after the state before it.
+                # A divided step is written again: its last substep begins after the kept state.
                 in_parts = solution.begun and room > 0 and c.parts_of_last > 1
                 if room and taken > in_parts:
                     solution.grow(taken - in_parts)
@@ -222,7 +223,7 @@ class Simulation(Stepper):
         return taken
 
     def watch(self, parts: Array) -> ExtremesInC | None:
-        """Begin to take in extremes after each step in C, or return None if that cannot be."""
+        """Let C update extremes after each step, or return None if processes share the scene."""
         if not self.share.alone:
             return None
         along = ForcesAlongCells(self.grid), self.solution.between
@@ -232,7 +233,7 @@ class Simulation(Stepper):
         return one
 
     def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
-        """End the run where it is, because even the smallest step, to ``end``, failed.
+        """End the run in its present state, because even the smallest step, to ``end``, failed.
 
         Raises:
             ConvergenceError: With the solution so far.
@@ -249,9 +250,9 @@ class Simulation(Stepper):
 
     @property
     def now(self) -> States:
-        """The present state, read as a solution; all processes call it together.
+        """The present state in the form of a solution; all processes call it together.
 
-        Before the first step of a dynamic run, reactions are those of the scene at rest.
+        Before the first step of a dynamic run, reactions belong to the scene at rest.
 
         Example:
             >>> simulation = ub.Simulation(scene, ub.EnergyMomentum())
@@ -282,11 +283,11 @@ class Simulation(Stepper):
 
     @property
     def _gathers(self) -> bool:
-        """True if rows have no record that forces of cells follow from."""
+        """True if rows lack the record from which forces of cells are computed."""
         return not self.share.alone or bool(self.cell_forces.c.given)
 
     def _gathered_forces(self, parts: int, *_: Array) -> Array:
-        """``cell_number`` of loops.h of all cells after so many steps, which are the present."""
+        """Return ``cell_number`` of loops.h of all cells; ``parts`` must be the present number."""
         if parts != self.parts:
             raise ArgumentError("section forces of an earlier state: ask for simulation.now again")
         forces = self._put_forces(np.empty((lib.CELL_NUMBERS, len(self.grid.cells))))
@@ -295,13 +296,13 @@ class Simulation(Stepper):
         return forces
 
     def _put_forces(self, out: Array) -> Array:
-        """Put the forces of the cells of this process among zeros; sums over processes are all."""
+        """Put the forces of the cells of this process among zeros, to be added over processes."""
         out.fill(0.0)
         out[:, self.share.cells] = self.cell_forces(self.q, self.q_before)
         return out
 
     def keep(self, solution: Solution | None = None) -> None:
-        """Append the state to the solution, or to another one; all processes call it together."""
+        """Append the state to a solution, by default its own; all processes call it together."""
         solution = self.solution if solution is None else solution
         columns, alone = self._writer.columns, self.share.alone
         follows = not solution.begun or solution.parts_of_last == self.parts - 1
@@ -331,7 +332,7 @@ class Simulation(Stepper):
                 columns.of_rows("reactions", row).fill(math.nan)
         solution.count(self.parts, self.iterations)
 
-    # -- the end, and going on -----------------------------------------------------------------
+    # -- end and restart -----------------------------------------------------------------------
 
     @cached_property
     def dolfinx(self) -> DolfinxView:
@@ -339,15 +340,15 @@ class Simulation(Stepper):
         return DolfinxView(self)
 
     def end(self) -> None:
-        """Let the solution have the last state, and what another run that starts there needs."""
+        """Give the solution the last state and the internal variables for a continued run."""
         self.copies.settle()
         if self.t not in self.solution.times[-1:]:
             self.keep()
-        self.solution.parts, self.solution.iterations = self.parts, self.iterations  # of failures
+        self.solution.parts, self.solution.iterations = self.parts, self.iterations  # with failures
         self.solution.internal = self.equation.internal_variables(self.q, self.t)
 
     def snapshot(self) -> Solution:
-        """The state now, as a solution that other runs may start with; all processes call it."""
+        """Return the present state as a solution for ``start=``; all processes call it."""
         self.copies.settle()
         now = Solution(self.scene, self.grid, self.solution)
         self.keep(now)
@@ -355,7 +356,7 @@ class Simulation(Stepper):
         return now
 
     def remember(self, memory: Memory) -> None:
-        """State what later steps depend on; a restored state may be of other processes.
+        """Save or restore the data of later steps; the number of processes may have changed.
 
         All processes call it together.
         """
@@ -382,5 +383,5 @@ class Simulation(Stepper):
             give_back_memory(len(self.q))
 
     def close(self) -> None:
-        """Give back what PETSc holds."""
+        """Free the objects of PETSc."""
         self.solver.destroy()

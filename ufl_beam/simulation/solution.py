@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Solutions: what a run has kept, in files and in words, and the cells that opened in it."""
+"""Solutions: kept states of a run, their files and summary, and cells with open hinges."""
 
 from __future__ import annotations
 
@@ -48,30 +48,31 @@ from ufl_beam.output.states import States
 from ufl_beam.parallel import active_comm, on_first
 
 UNKNOWN = -2
-"""Number of parts up to a state that no step goes on from."""
+"""Value of ``parts_of_last`` if no step begins at the last kept state."""
 
 
 class Solution(States, Rich):
     """Results of a run: motions and forces at the kept times; the same on every process.
 
-    It can be saved, see :meth:`save`, and pickled, with what a file has.
+    It can be saved, see :meth:`save`, and pickled with the same content.
 
     Attributes:
         scene: Model.
         grid: Its vertices, cells and numbering.
-        parts: Number of steps that were taken, parts of cut steps counted each.
+        parts: Number of steps taken; each substep is counted.
         iterations: Number of Newton iterations.
         time_error: Sum of the estimated errors of :class:`Adaptive` steps, relative to the size of
             the scene, or in rad; NaN with equal steps.
         seconds: Wall time of the run, building the scene included; s.
         building: Wall time of building the scene in :func:`simulate`, which is not saved; s.
-        every: Steps from one that was kept to the next.
-        parameter: Words for :attr:`times`, which are load factors in a path.
-        open_ledger: How far the energy ledger is open, in words; empty if it closes as claimed.
-        warnings: What the run has warned of, a line each; see docs/warnings.md.
+        every: Number of steps between kept states.
+        parameter: Axis labels and units of :attr:`times`, which are load factors in a path.
+        open_ledger: Message on an open energy ledger; empty if the ledger closes as claimed.
+        warnings: Warnings of the run, one in a line; see docs/warnings.md.
         internal: Internal variables of cells and connectors at the end of the run.
-        scheme: Of the run; None if the solution was loaded.
-        parts_of_last: Number of parts up to the last state; :data:`UNKNOWN` if it is not here.
+        scheme: Time scheme of the run; None if the solution was loaded.
+        parts_of_last: Number of steps up to the last state; :data:`UNKNOWN` if no step begins
+            there.
 
     Example:
         >>> print((1e3 * solution.displacement(beam.end)[-1]).round(1))  # mm, mm, mrad, at t = 1 s
@@ -95,11 +96,11 @@ class Solution(States, Rich):
         self.parts_of_last = UNKNOWN
 
     def count(self, parts: int, iterations: int) -> None:
-        """Take note of what was done up to the last state."""
+        """Store the numbers of steps and iterations up to the last state."""
         self.parts, self.iterations, self.parts_of_last = parts, iterations, parts
 
     def thin(self) -> None:
-        """Forget every other state; the first one stays."""
+        """Delete every other state; the first state stays."""
         self.parts_of_last = self.parts_of_last if len(self) % 2 else UNKNOWN
         super().thin()
 
@@ -108,7 +109,7 @@ class Solution(States, Rich):
         return {**super().history(), "every": np.array([self.every])}
 
     def resume(self, history: State) -> None:
-        """Go on after what another run kept, see :meth:`history`."""
+        """Restore the states of another run, see :meth:`history`."""
         super().resume(history)
         self.every, self.parts_of_last = int(history["every"][0]), UNKNOWN
 
@@ -118,12 +119,12 @@ class Solution(States, Rich):
         """Write a file with a checksum, which :meth:`load` reads; all processes call it together.
 
         It has all results and the numbers of the scene, but no code: functions of time are saved
-        as values at the kept times, curves as points, other functions and laws of a user by name.
-        A file that is there is replaced once the new one is complete.
+        as values at the kept times, curves as points, other functions and user laws by their names.
+        An existing file is replaced once the new file is complete.
 
         Raises:
             ArgumentError: The file cannot be written, or an object of the scene is no dataclass.
-            OSError: There is no space for it.
+            OSError: The disk is full.
         """
         file = require_path(path, "save")
         on_first(active_comm(), lambda: write(file, FORMAT, self._content()))
@@ -132,19 +133,18 @@ class Solution(States, Rich):
     def load(cls, path: str | Path, *, scene: Scene | None = None) -> Solution:
         """Read a solution that :meth:`save` wrote.
 
-        Its places are those of its own scene: ``loaded.displacement(loaded.scene["left"].end)``.
+        Places belong to the loaded scene: ``loaded.displacement(loaded.scene["left"].end)``.
 
         Args:
             path: File.
-            scene: The scene of the run, built by the script: the solution has this one then, with
-                its functions and with laws of your own, which files do not contain.  All numbers,
-                classes and names must be those of the file, and functions of time must have the
-                same values.
+            scene: Scene of the run, built by the script.  The solution then uses this scene with
+                its functions and user laws, which files do not contain.  All numbers, classes and
+                names must agree with the file, and functions of time must have the same values.
 
         Raises:
-            ArgumentError: There is no such file, or it holds no solution, or is damaged, or is of a
-                version that numbers degrees of freedom otherwise, or of another scene; or it has
-                laws of a user, and no scene is given.
+            ArgumentError: The file is missing, damaged, no solution, or of another scene; its
+                version numbers degrees of freedom differently; or it has user laws, and no scene
+                is given.
 
         Example:
             >>> solution.save("beam.h5")
@@ -196,16 +196,16 @@ class Solution(States, Rich):
 
     @property
     def progress(self) -> Array:
-        """Abscissa that grows along the kept states; here the time; (n+1,)."""
+        """Increasing abscissa of the kept states, here the time; (n+1,)."""
         return self.times
 
     def hinge_place_error(self) -> dict[Member, float]:
-        """Largest part of its limit by which the place of an embedded hinge shifts it, by beam.
+        """Return the largest relative shift of the limit by the place of an embedded hinge.
 
-        A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens where the
+        A hinge of ``Section(hinge=)`` is in the middle of its cell of length h and opens when the
         moment there reaches the limit; at the ends of the cell the moment differs by ``|V| h/2``.
-        The number is ``|V| h / (2 limit)``, V being that of the last kept time before the opening.
-        Beams without embedded hinges that opened in the run are left out.
+        The shift is ``|V| h / (2 limit)`` with V at the last kept time before the opening.  Keys
+        are the beams with embedded hinges that opened in the run.
         """
         return {one.beam: one.error for one in Opened(self).hinges()}
 
@@ -236,7 +236,7 @@ class Solution(States, Rich):
 
 
 def restored(content: Content, scene: Scene | None = None) -> Solution:
-    """Make a solution from what was saved of it, with a scene of its own or the given one."""
+    """Make a solution from the content of a file, with the saved scene or the given scene."""
     of = from_data(content["scene"]) if scene is None else scene
     grid = Grid(of, from_data(content["mesh"]))
     if grid.checksum() != content["numbering"]:
@@ -265,17 +265,17 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
 # of the cell the moment differs by |V| h/2, so a hinge that belongs there opens at another load.
 
 LARGE = 0.05
-"""Shift of a limit by the place of its hinge from which a run warns, as a part of the limit."""
+"""Shift of a limit by the place of its hinge above which a run warns; fraction of the limit."""
 
 TINY = 1e-6
-"""Opening, as a part of energy / limit, over which the first slope of a resistance is taken."""
+"""Increment of the opening for the slope of a resistance, as a fraction of energy / limit."""
 
 
 class OpenedHinges(NamedTuple):
     """Embedded hinges of a beam that opened in a run.
 
     The error is the largest |V| h / (2 limit): the difference between the moments in the middle and
-    at the ends of such a cell, as a part of the limit.
+    at the ends of such a cell, as a fraction of the limit.
     """
 
     beam: Member
@@ -288,11 +288,11 @@ class Opened:
     """Cells that opened in a run.
 
     Attributes:
-        first: Number of the first kept time after the opening; 0 of cells that were open at the
-            beginning, -1 of those that stayed closed; (num_cells,).
-        shear: |V| at the kept time before that one, or at that one where the run began in between;
-            (num_cells,); N.
-        dissipated: By hinges and cracks at the end; (num_cells,); J.
+        first: Number of the first kept time after the opening; 0 if the cell was open at the
+            beginning, -1 if it stayed closed; (num_cells,).
+        shear: |V| at the kept time before ``first``, or at ``first`` if the time before is the
+            beginning of the run; (num_cells,); N.
+        dissipated: Energy dissipated by hinges and cracks at the end; (num_cells,); J.
     """
 
     def __init__(self, states: States) -> None:
@@ -308,12 +308,12 @@ class Opened:
         rows = np.searchsorted(grid.inelastic_cells, cells)
         dissipated, V = (states.column("material")[:, rows, k] for k in (HINGE, 1))
         self.first[cells] = first = (dissipated > 0).argmax(axis=0)
-        # After an opening in a jump V is that of vibrations.
+        # After a sudden opening V is dominated by vibrations.
         n = np.where(first > 1, first - 1, first)
         self.shear[cells] = np.abs(V[n, np.arange(len(cells))])
 
     def hinges(self) -> list[OpenedHinges]:
-        """Embedded hinges, laws of sections, that opened in the run; beam by beam."""
+        """Return the embedded hinges (laws of sections) that opened in the run, beam by beam."""
         grid = self._grid
         found = []
         for beam in grid.scene.beams:
@@ -329,9 +329,9 @@ class Opened:
         return found
 
     def warn(self, scheme: Scheme) -> None:
-        """Issue a :class:`ModelWarning` for each beam where much depends on the mesh.
+        """Issue a :class:`ModelWarning` for each beam whose results depend on the mesh.
 
-        First of resistances that fall faster with the opening than the stress of the cell.  The
+        Resistances that fall faster with the opening than the stress of the cell come first.  The
         stiffness of a cell against an opening is θ EI/h, or θ E/h of a fibre.
         """
         grid, times = self._grid, self._times
@@ -366,20 +366,20 @@ class Opened:
 
 
 def _cells_in_words(number: int) -> str:
-    """A number of cells in words: "1 cell", "2 cells"."""
+    """Return a number of cells in words: "1 cell", "2 cells"."""
     return f"{number} cell{'s'[: number != 1]}"
 
 
 def _percent(part: float) -> str:
-    """A part in words: "12 %", or "more than 100 %" where the limit is next to nothing."""
+    """Return a fraction in words: "12 %", or "more than 100 %" if the limit is near zero."""
     return f"{100 * part:.2g} %" if part <= 1 else "more than 100 %"
 
 
 def _fall(layout: Layout | None, scheme: Scheme) -> tuple[float, float]:
-    """Fall of the resistance per opening, over θ times the stiffness of the points; 1/m.
+    """Return the softening slope over θ times the stiffness of the points (1/m), and an energy.
 
-    It is that at the opening where the traction falls most; with the least energy that a cell
-    dissipates before; J.
+    The slope is taken at the opening where the traction falls most steeply.  The energy is the
+    least that a cell dissipates before that opening; J.
     """
     law = None if layout is None else layout.softening
     if layout is None or law is None or law.limit == 0:
@@ -403,11 +403,11 @@ NAMED = {
 """Attributes that are saved as they are, and their types."""
 
 TIME_FUNCTIONS = ("amplitude", "u", "v", "psi", "motion", "force", "numbers")
-"""Fields that are functions of time, but for the forces of controllers and functions."""
+"""Fields that are functions of time, except the forces of controllers and force laws."""
 
 
 def _used_curve(solution: Solution, curve: Curve) -> SavedCurve:
-    """The part of a guide curve that was used, a tenth more, and what tangents need."""
+    """Return the used interval of a guide curve, with a tenth and the steps of tangents added."""
     scene, used = solution.scene, [0.0]
     for link in scene.links:
         if isinstance(link.law, Guide) and link.law.curve is curve:

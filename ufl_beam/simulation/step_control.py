@@ -15,22 +15,22 @@ from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.stepper import Trial
 
 GROWTH = 1.5
-"""Largest ratio of the length of a step to that of the one before it."""
+"""Largest ratio of the length of a step to the length of the previous step."""
 
 MOST = 2**14
-"""Steps that are asked for at once; they end much sooner if they take long."""
+"""Largest number of steps in a call, which returns much sooner if steps take long."""
 
 SAMPLES = (0.01, 0.5, 0.99)
-"""Parts of a step at which loads are asked for."""
+"""Fractions of a step at which loads are evaluated."""
 
 
 def number_of_steps(time: float, dt: float) -> int:
-    """Return the least number of equal steps not longer than ``dt``, but for rounding."""
+    """Return the least number of equal steps not longer than ``dt``, up to rounding."""
     return max(1, math.ceil(time / dt * (1 - 1e-9)))
 
 
 class EqualSteps:
-    """Steps of one size, a little shorter than asked for where that does not divide the time."""
+    """Steps of equal size, a little shorter than ``dt`` if ``dt`` does not divide the time."""
 
     def __init__(self, simulation: Simulation, t1: float, dt: float) -> None:
         self._simulation, self._t0, self._time = simulation, simulation.t, t1 - simulation.t
@@ -44,11 +44,11 @@ class EqualSteps:
 
     @property
     def progress(self) -> float:
-        """Part of the steps that are done."""
+        """Fraction of the steps that are done."""
         return self.steps / self._all
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take steps, up to ``most``, and keep each of them; those that fail in parts."""
+        """Take up to ``most`` steps, in substeps if they fail; ``keep`` keeps each state."""
         steps = np.arange(self.steps, min(self.steps + min(most, MOST), self._all)) + 1
         ends = self._t0 + self._time * steps / self._all
         self.steps += self._simulation.steps_to(ends, keep=keep)
@@ -58,28 +58,29 @@ class EqualSteps:
         return {"steps": float(self.steps)}
 
     def restore(self, state: dict[str, float]) -> None:
-        """Go on after that many."""
+        """Restore the number of steps."""
         self.steps = int(state["steps"])
 
 
 @dataclass(frozen=True)
 class Adaptive:
-    """Adaptive time steps of a given local error; given in the place of ``dt``.
+    """Adaptive time steps with a given local error, as an argument ``dt``.
 
     The error of a step is estimated from the change of accelerations between steps, and from the
-    error of loads that are taken in the middle of the step.  As in other integrators, the tolerance
-    is that of one step; the sum over a run is :attr:`Solution.time_error`.  Errors of the cells are
-    not included.
+    error of loads that are evaluated in the middle of the step.  As in other integrators, the
+    tolerance applies to one step; the sum over a run is :attr:`Solution.time_error`.  Errors of
+    the spatial discretization are not included.
 
-    Steps end at the times of every :class:`Table` in the scene, at those that other functions of
-    time name in an attribute ``kinks``, and at ``stops``.
+    Steps end at the times of every :class:`Table` in the scene, at the times in an attribute
+    ``kinks`` of other functions of time, and at ``stops``.
 
     Args:
         tolerance: Largest error of a step: of positions relative to the size of the scene, of
-            rotations in rad, of the impulse of a load relative to that of its largest value.
+            rotations in rad, of the impulse of a load relative to its largest value times the run.
         first: First step to be tried; s.  By default a hundredth of the run.
         longest: Longest step; s.
-        shortest: A run that needs shorter steps ends with an error; s.  By default 1e-12 of it.
+        shortest: Shortest step; s.  If a shorter step is needed, the run ends with an error.  By
+            default 1e-12 of the run.
         stops: More times at which steps must end; s.
 
     Raises:
@@ -123,7 +124,7 @@ class AdaptiveSteps:
         self._functions = list(dict.fromkeys(functions))
         self._largest = [0.0] * len(self._functions)
         kinks = {float(t) for f in self._functions for t in getattr(f, "kinks", ())}
-        # Times that differ by rounding alone are one.
+        # Times that differ by rounding alone are merged.
         same = max(1e-9 * (t1 - t0), self._shortest)
         inside = sorted(t for t in (*kinks, *choice.stops) if t0 + same < t < t1 - same)
         apart = [t for before, t in pairwise([t0, *inside]) if t - before > same]
@@ -143,11 +144,11 @@ class AdaptiveSteps:
 
     @property
     def progress(self) -> float:
-        """Part of the time that is over."""
+        """Fraction of the time that has passed."""
         return (self._simulation.t - self._t0) / (self._t1 - self._t0)
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take one step that is accurate, after rejected ones; and keep it."""
+        """Take one step, shortened until its error is allowed; ``keep`` keeps its state."""
         simulation = self._simulation
         stop = next(t for t in self._stops if t > simulation.t)
         stop = simulation.controllers.next_sample(simulation.t, stop)
@@ -171,24 +172,23 @@ class AdaptiveSteps:
         self.error += error
         self.steps += 1
         self._dt = min(dt * min(change, GROWTH), self._longest)
-        # The acceleration may jump at a stop, so what was before tells nothing about what comes.
+        # The acceleration may jump at a stop, so earlier steps do not predict the next step.
         self._fresh = simulation.t == stop
         if keep:
             simulation.keep()
 
     def _attempt(self, stop: float) -> tuple[Trial, float]:
-        """Solve the next step.
+        """Solve the next step and estimate its error.
 
-        Also return its error: the largest of a position over the size of the scene, of a rotation,
-        or of a load.
+        The error is the largest of a position over the size of the scene, a rotation, or a load.
         """
         simulation, supports = self._simulation, self._simulation.supports
         inertia = simulation.inertia
         left = stop - simulation.t
-        # Two equal steps to a stop in the place of a long and a tiny one
+        # Two equal steps to a stop instead of a long and a tiny step
         dt = left if self._dt >= left else min(self._dt, left / 2)
         if self._fresh:
-            # Nothing to compare with: half of a step is compared with the whole.
+            # Without an earlier step, half of the step is compared with the whole step.
             whole = simulation.attempt(simulation.t + dt)
             before, between = (inertia.after(whole.s, whole.step.dt)[0] - inertia.v) / dt, -dt / 4
             dt /= 2
@@ -204,7 +204,7 @@ class AdaptiveSteps:
         error[self._turns] += (trial.q1 - simulation.q - trial.s)[self._turns]
         supports.enter(error)
         error[supports.dofs] = 0.0
-        # Rotations without inertia follow the others, at once where a load jumps.
+        # Rotations without inertia follow the other motions, and jump with a load.
         error[self._massless] = 0.0
         supports.leave(error)
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
@@ -215,7 +215,7 @@ class AdaptiveSteps:
         )
 
     def _missed(self, dt: float) -> float:
-        """Return the error of the midpoint rule for a load, as a part of its largest impulse."""
+        """Return the largest error of the midpoint rule for loads, relative to their impulses."""
         missed, t = 0.0, self._simulation.t
         for i, function in enumerate(self._functions):
             # Not at the ends, where there may be jumps
@@ -230,7 +230,7 @@ class AdaptiveSteps:
         return {**{name: float(getattr(self, name)) for name in self._STATE}, **largest}
 
     def restore(self, state: dict[str, float]) -> None:
-        """Go on from there."""
+        """Restore the numbers of :meth:`state`."""
         for name in self._STATE:
             setattr(self, name, type(getattr(self, name))(state[name]))
         self._largest = [state[f"largest {i}"] for i in range(len(self._largest))]

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""The equation of a step: the terms of a scene and their sum; and the check of static steps."""
+"""Equation of a step: the terms of a scene and their sum; and checks of static steps."""
 
 from __future__ import annotations
 
@@ -46,26 +46,26 @@ MOVING = "inertia", "damping"
 
 
 class StepEquation:
-    """Sum of the virtual works of all terms, less what supports carry, at local degrees of freedom.
+    """Sum of the virtual works of all terms, minus reactions, at local degrees of freedom.
 
-    The terms are made for a scene that begins at t0 (s), on the part of one process.  Supports stop
-    the initial local velocities ``v`` in place.
+    The terms are made for a scene that begins at t0 (s), on the subdomain of one process.  The
+    initial local velocities ``v`` are set to zero in place where supports do not move.
 
     Attributes:
-        A: Matrix that takes the tangent.
-        fields: On the cells of this process.
+        A: Matrix of the tangent.
+        fields: Fields on the cells of this process.
         ledger: Energies of this process.
         controllers: Forces of controllers and limits of friction in the step.
-        beams: Those with material points, which are ``inelastic``, first.
-        couplings: Connectors, those alike together.
-        inertia: None in statics.
-        terms: All of them; the forces of ``inner`` ones, ``beams`` and ``couplings``, are internal.
-        weights: Of the residuals: 1 for forces, 1 over the size of the scene for moments, 0 for
-            ghosts and forces of connectors.
+        beams: Terms of cells; ``inelastic`` cells, which have material points, come first.
+        couplings: Terms of connectors, grouped by kind.
+        inertia: Inertia; None in statics.
+        terms: All terms; the forces of ``inner`` terms, ``beams`` and ``couplings``, are internal.
+        weights: Weights of residuals: 1 for forces, 1 over the size of the scene for moments, 0
+            for ghosts and forces of connectors.
         force: Internal forces in the latest residual, in statics; else empty.
-        c: ``equation`` of loops.h, which a solver completes with its own numbers.
-        callbacks: Python functions that take part.
-        phases: Of the terms.
+        c: ``equation`` of loops.h, which a solver completes with its own data.
+        callbacks: Python functions that C calls.
+        phases: Phases of the terms.
         cell_forces: Forces of the terms on the nodes of cells.
     """
 
@@ -79,8 +79,8 @@ class StepEquation:
         self.A = A = fields.matrix()
         setting = (scheme, A, ledger)
 
-        # Each kind makes its entries of the ledger: their order is that of the columns of tables.
-        # It follows from the scene alone, also where a process lacks cells or connectors of a kind.
+        # Each kind makes its entries of the ledger, in the order of the columns of tables.  The
+        # order follows from the scene alone, even if a process lacks cells or connectors of a kind.
         self.inelastic, elastic = list[InelasticBeams](), np.ones(len(share.cells), dtype=bool)
         for layout, cells in share.grid.inelastic:
             expect_entries(layout, scheme, ledger)
@@ -141,7 +141,7 @@ class StepEquation:
         self.cell_forces = CellForces(share, in_cells, *in_c)
 
     def _give_to_c(self, search: Index, switched: Index) -> None:
-        """Fill ``equation`` of loops.h, and let terms state their phases."""
+        """Fill ``equation`` of loops.h, and get the phases of the terms."""
         share, A, supports = self.share, self.A, self.supports
         self.c = struct("equation", size=A.size, owned=share.num_owned, weight=self.weights)
         self.callbacks = callbacks = Callbacks(self.c)
@@ -149,7 +149,7 @@ class StepEquation:
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
 
         def take(name: str) -> Any:
-            """Data of the first stiffness of a name, which is taken out; null without any."""
+            """Remove the first stiffness of this name, and return its data, or null."""
             found = (one for one in stiffnesses if one[0] == ffi.addressof(lib, name))
             if (one := next(found, None)) is None:
                 return ffi.NULL
@@ -177,17 +177,17 @@ class StepEquation:
             search=search, switched=switched,
         )  # fmt: skip
         self._alive = loops, demands, predicted
-        # Where nothing has inertia, the work of the internal forces is compared with energies.
+        # In statics the work of the internal forces is compared with energies.
         self.force = np.zeros(0 if self.inertia is not None else share.size)
         if self.inertia is None:
             fill(self.c, inner_force=self.force)
-        # The ledger has all its entries now, to whose places phases write.
+        # The ledger has all its entries now.  Phases write to their addresses.
         self.phases = [one.phases(callbacks) for one in self.terms]
 
-    # -- runs that go on -----------------------------------------------------------------------
+    # -- continued runs ------------------------------------------------------------------------
 
     def internal_variables(self, q: Array, t: float) -> State:
-        """Return what a run that starts here takes over: internal variables, reactions, rates."""
+        """Return the data for a run that starts here: internal variables, reactions, rates."""
         memory = Memory(self.share)
         self.controllers.remember(memory, t)
         for one in (*self.inelastic, *self.couplings):
@@ -205,7 +205,7 @@ class StepEquation:
     def take_over(self, q: Array, t: float, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
-        ``same`` says that no force has changed since, so that accelerations are what they were.
+        ``same`` says that no force has changed since, so that accelerations are unchanged.
         """
         memory = Memory(self.share, internal)
         self.controllers.remember(memory, t)
@@ -220,7 +220,7 @@ class StepEquation:
                 self._pass_on_step(memory, q)
 
     def _pass_on_step(self, memory: Memory, q: Array) -> None:
-        """State the changes of the last step, if the next one of the scheme depends on them."""
+        """Save or restore the increments of the last step, if the next step depends on them."""
         if self.inertia is not None and isinstance(self.scheme, EnergyMomentumDecaying):
             self.inertia.pass_on_step(memory)
             for term in self.terms:
@@ -230,7 +230,7 @@ class StepEquation:
     # -- forces and tangent --------------------------------------------------------------------
 
     def begin(self, step: Step, terms: Sequence[Term] | None = None) -> None:
-        """Let terms begin a step, by default all; beams have exact tangents in it."""
+        """Begin a step in some terms, by default all; beams then have exact tangents."""
         some = self.terms if terms is None else terms
         before = step.q0 if step.q_before is None else step.q_before
         q0, q_before = (np.ascontiguousarray(q) for q in (step.q0, before))
@@ -241,7 +241,7 @@ class StepEquation:
             "motion_time": step.motion_time, "fraction": step.fraction, "at": step.at,
             "ratio": step.ratio, "q0": doubles(q0), "q_before": doubles(q_before),
         })  # fmt: skip
-        self._begun = c, q0, q_before  # as long as forms and terms know them
+        self._begun = c, q0, q_before  # as long as forms and terms refer to them
         with self.callbacks.raising():
             for term, phases in zip(self.terms, self.phases, strict=True):
                 for begin, data in phases.begin if term in some else ():
@@ -252,9 +252,9 @@ class StepEquation:
                 of.begins, of.stale, of.exact = 0, 1, 1
 
     def inner_forces(self, q: Array, t: float | None = None) -> Array:
-        """Forces of beams at ``q``, in a step so short that nothing viscous flows.
+        """Return the forces of beams at ``q``, in a step too short for viscous flow.
 
-        With a time ``t``, also those of connectors then, which have theirs among ``q``.
+        With a time ``t``, forces of connectors at ``t`` are added; ``q`` has their multipliers.
         """
         short, forces = sys.float_info.min, np.zeros(self.share.size)
         self.begin(Step.of(self.scheme, 0.0, short, short, q), self.beams)
@@ -268,16 +268,16 @@ class StepEquation:
         return forces
 
     def add_state(self, q: Array) -> None:
-        """Enter the energies that the scene holds at ``q``."""
+        """Enter the energies of the scene at ``q`` into the ledger."""
         with self.callbacks.raising():
             for phases in self.phases:
                 for add, data in phases.add_state:
                     add(data, ffi.NULL, doubles(q), ffi.NULL)
 
     def tangent_at(self, x: Array, v: Array, r: Array) -> Csr:
-        """Return the tangent at ``x``; add to ``r`` what it makes of a motion ``v`` of supports.
+        """Return the tangent at ``x``; add its product with a motion ``v`` of supports to ``r``.
 
-        All are in the axes of the supports, and the local part.
+        All are local, and in the axes of the supports.
         """
         lib.fill_tangent(self.c, doubles(self.supports.in_plane(x)))
         if len(self.supports.moving):
@@ -288,7 +288,7 @@ class StepEquation:
         return self.A
 
     def respond_at(self, q1: Array) -> bool:
-        """Evaluate forces and tangent of the present step at ``q1``; false if a process cannot."""
+        """Evaluate forces and tangent of the present step at ``q1``; False if a process fails."""
         lib.restart(self.c, lib.EXACT)
         self.c.raised = 0
         try:
@@ -299,7 +299,7 @@ class StepEquation:
         return self.share.largest(float(self.c.raised)) == 0.0
 
     def forces(self, q1: Array) -> Array:
-        """Return the sum of the forces of all terms at ``q1``, those of this process."""
+        """Return the sum of the forces of all terms at ``q1`` on this process."""
         r = np.zeros(self.share.size)
         with self.callbacks.raising():
             for term in self.terms:
@@ -307,9 +307,9 @@ class StepEquation:
         return r
 
     def tangent(self, q1: Array) -> None:
-        """Fill the matrix with the derivative at ``q1``, in the axes of supports, with these held.
+        """Fill the matrix with the tangent at ``q1``, in the axes of supports, with these held.
 
-        What functions of users raise there is in :attr:`callbacks`.
+        Errors of user functions are stored in :attr:`callbacks`.
         """
         lib.fill_tangent(self.c, doubles(q1))
         lib.hold_tangent(self.c)
@@ -317,7 +317,7 @@ class StepEquation:
     def working(self, q: Array, y: Array) -> Array:
         """Return the conjugates of residuals in a step ``y`` in the axes of supports; a new array.
 
-        They are the step itself, and motions of connectors in the place of their forces.
+        They are the step itself, with motions of connectors instead of their forces.
         """
         v, works = self.supports.in_plane(y), y.copy()
         for coupling in self.couplings:
@@ -327,9 +327,9 @@ class StepEquation:
     # -- derivatives about a state -------------------------------------------------------------
 
     def linearise(self, q: Array, step: Step) -> tuple[Array, Array]:
-        """Return all forces but those of inertia in a step to ``q``, and their derivatives.
+        """Return all forces except inertia in a step to ``q``, and their derivatives.
 
-        Both are in the axes of the plane, nothing held; the derivatives as entries of the matrix.
+        Both are in the axes of the plane, without supports; derivatives are entries of the matrix.
         """
         r = np.zeros(self.share.size)
         self.begin(step)
@@ -342,14 +342,14 @@ class StepEquation:
         return r, self.A.data.copy()
 
     def tangent_change(self, q: Array, u: Array) -> Array:
-        """Derivative along ``u`` of the latest tangent of :meth:`linearise`, at ``q``; entries."""
+        """Return the derivative along ``u`` of the tangent of :meth:`linearise`; entries."""
         self.A.data.fill(0.0)
         for one in (*self.inner, *self.loads):
             one.add_tangent_change(q, u)
         return self.A.data.copy()
 
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
-        """Works of the tangent of :meth:`linearise`, each column of X on its own of Y; J."""
+        """Return works of the tangent of :meth:`linearise` for pairs of columns of X and Y; J."""
         self.A.data.fill(0.0)
         for term in (*self.couplings, *self.others):
             if term.kind != "inertia":
@@ -361,7 +361,7 @@ class StepEquation:
         return works
 
     def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
-        """Works of the tangent for motions X on Y, and of its derivative along u; symmetric; J."""
+        """Return works of the tangent and of its derivative along u for X on Y; symmetric; J."""
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
             x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))
@@ -380,26 +380,26 @@ class StepEquation:
         return works[0], works[1]
 
 
-# -- whether a static step was followed ------------------------------------------------------------
+# -- checks of static steps ------------------------------------------------------------------------
 
 FAR = 1e3
-"""Largest motion of a node in a static step that is no mechanism; sizes of the scene or radians."""
+"""Largest motion of a node in a step without a mechanism; sizes of the scene or radians."""
 
 KINK = 1e-6
-"""Work that a kink of a law may leave unexplained, as a part of the energy that went through."""
+"""Imbalance of work that a kink of a law may cause, as a fraction of the energy transferred."""
 
 
 class StaticPath:
-    """Checks of a static step before it is accepted, from the state in which the path begins.
+    """Checks of each static step before it is accepted.
 
-    The internal forces must account for what a step stores and dissipates.  Otherwise Newton's
-    method may have found another branch of equilibria: beyond a limit load, or where softening lets
-    go more than it dissipates.  The ``slack`` of the scheme says how much work may stay
-    unexplained; ``force`` are the internal forces at the end of the last step.
+    The work of the internal forces must equal the energy that a step stores and dissipates.
+    Otherwise Newton's method may have found another branch of equilibria: beyond a limit load, or
+    where softening releases more energy than it dissipates.  The ``slack`` of the scheme limits
+    the imbalance of work.  ``force`` are the internal forces at the end of the last step.
 
-    The first state, ``q`` at ``t0``, is in equilibrium with ``loads``; none if nothing acts yet.
-    Reactions are set to those of it.  A path that ``goes_on`` from a static run of the same scene
-    has them already, with the forces of what is viscous.
+    The first state, ``q`` at ``t0``, is in equilibrium with ``loads``, which are empty if nothing
+    acts yet.  Reactions are set from this equilibrium.  A path that ``goes_on`` from a static run
+    of the same scene has them already, with viscous forces.
 
     Attributes:
         c: ``static_path`` of loops.h.
@@ -430,11 +430,11 @@ class StaticPath:
         )  # fmt: skip
 
     def remember(self, memory: Memory) -> None:
-        """The internal forces at the end of the last step."""
+        """Save or restore the internal forces at the end of the last step."""
         self.force[:] = memory.added("internal forces", self.force)
 
     def failure(self, mechanism: bool) -> StepFailed:
-        """Describe why the latest step was not followed: it leaves a mechanism, or leaps."""
+        """Return why the latest step is rejected: it leaves a mechanism, or changes the branch."""
         c = self.c
         if mechanism:
             return StepFailed(

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Steps of a scene, which march.c takes: solved, judged, accepted, and cut where they fail.
+"""Steps of a scene in march.c: they are solved, checked, accepted, and divided if they fail.
 
-In statics, where forces act over the step, a step that turns a node far does not end in
-equilibrium.  So loads that act at once are applied in parts that turn nodes little, and the rest of
-the first step has nothing left to do but to follow them.
+In statics, if forces act before the end of a step, a step with large nodal rotations does not end
+in equilibrium.  So loads that act from the start are applied in substeps with small rotations, and
+the rest of the first step follows the loads.
 """
 
 from __future__ import annotations
@@ -38,14 +38,15 @@ from ufl_beam.solvers.null_vectors import free_matrix, null_vectors
 
 
 class Prediction:
-    """Goes on as the last steps did: at their velocity and, ``in_motion``, with their acceleration.
+    """Initial guess of a step by the last velocity and, ``in_motion``, by the last acceleration.
 
-    After steps of equal length, a part of the last second difference of the configuration is added:
-    that which the one before was like.  It is 1 in smooth motion, and 0 where second differences
-    change their sign from step to step, or where steps do not resolve the motion.
+    After steps of equal length, a fraction of the last second difference of the configuration is
+    added.  The fraction measures its agreement with the previous second difference: it is 1 in
+    smooth motion, and 0 if second differences change sign from step to step, or if steps do not
+    resolve the motion.
 
     Args:
-        weights: Of residuals, see :class:`StepEquation`.
+        weights: Weights of residuals, see :class:`StepEquation`.
 
     Attributes:
         c: ``prediction`` of loops.h; C writes to it when a step is accepted.
@@ -62,7 +63,7 @@ class Prediction:
             fill(self.c, second=self._second, weight=weights, **size)
 
     def remember(self, memory: Memory) -> None:
-        """State it in numbers of the grid; see state_io.py."""
+        """Save or restore the data in the numbering of the grid; see state_io.py."""
         self.c.dt = memory.number("last dt", self.c.dt)
         bytes_now = ffi.buffer(self.c.q_before, 8 * self._share.size)
         q_before = memory.at_dofs("q before", np.frombuffer(bytes_now).copy())
@@ -77,36 +78,37 @@ class Prediction:
 # -- check of static steps -------------------------------------------------------------------------
 
 LARGEST_TURN = 0.75 * math.pi
-"""A step that turns a node further is cut; the algorithmic strains end at π."""
+"""Largest rotation of a node in a step; the algorithmic strains are valid up to π; rad."""
 
 LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
 """Least iterations in statics and in dynamics, unless a residual is far below its tolerance.
 
-A column that nearly buckles magnifies a load that is hardly larger than the tolerance.  In motion
-its inertia holds it meanwhile.
+Near buckling, a column magnifies a load that is hardly larger than the tolerance.  In dynamics its
+inertia prevents this.
 """
 
 APPLYING_TURN = 0.02
-"""Largest turn of a node meanwhile in a part; rad.
+"""Largest rotation of a node in a substep while loads are applied; rad.
 
-Over a part a moment is in error by a quarter of the square: some 1e-4 of it.
+The relative error of a moment in a substep is a quarter of the square, about 1e-4.
 """
 
 HELD = 1e-3
-"""Stiffness against a motion without strain, as a part of the forces over the size of the scene,
-below which loads do not hold it: weights and tensions are some tenths of it."""
+"""Stiffness against a motion without strain below which loads do not hold it, as a fraction of the
+forces over the size of the scene.  Weights and tensions reach some tenths."""
 
 SHORT_PART = 512
-"""Parts shorter by this factor may turn nodes further: shorter ones would turn them as far."""
+"""Substeps shorter by this factor have no such limit: still shorter substeps rotate as far."""
 
 MOST_PARTS: int = lib.MOST_PARTS
-"""Largest number of parts that a step is cut into."""
+"""Largest number of substeps of a step."""
 
 
 class Trial(NamedTuple):
-    """A step that was solved but not yet accepted, and the configuration ``q1`` at its end.
+    """Solved step that is not yet accepted, and the configuration ``q1`` at its end.
 
-    Forces work on ``s``, see :meth:`Scheme.nodal_step`; in dynamics the mean velocity times ``dt``.
+    Forces do work on the nodal step ``s``, see :meth:`Scheme.nodal_step`; in dynamics it is the
+    mean velocity times ``dt``.
     """
 
     step: Step
@@ -117,27 +119,27 @@ class Trial(NamedTuple):
 class Stepper(StateView):
     """Steps of a scene in C, see march.c: the base class of :class:`Simulation`.
 
-    The state is that of C.  What there is to see of it is in Python after each call: time,
-    configuration, velocities, reactions and ledger.
+    C holds the state.  After each call Python has its time, configuration, velocities, reactions
+    and ledger.
 
     Args:
         comm: Processes of the run.
         newton: Tolerances and PETSc options.
         t: Time of the initial state; s.
-        q: Local configuration then.
+        q: Local configuration of the initial state.
         path: Check of static steps; None in dynamics.
-        loose: Motion that only loads may hold, in words; empty if there is none.
+        loose: Description of a motion that only loads may hold; empty if there is none.
 
     Attributes:
         t: Time; s.
-        parts: Number of parts that steps were cut into, those not cut included.
-        equation: The equation of a step; ``ledger``, ``controllers`` and terms are those of it.
+        parts: Number of substeps; an undivided step counts as one substep.
+        equation: Equation of a step, with its ``ledger``, ``controllers`` and terms.
         solver: Newton's method.
-        prediction: What the guess of the next step needs of the last ones.
-        solution: The motion so far.
+        prediction: Data of the last steps from which the initial guess is extrapolated.
+        solution: Solution so far.
         march: ``march`` of loops.h.
-        copies: Comparison of processes that each compute a copy of the scene.
-        together: Calls that raise on all processes of a shared scene what they raise on one.
+        copies: Comparison of the processes if each computes the scene as a whole.
+        together: Calls whose errors are raised on all processes that share the scene.
     """
 
     def __init__(
@@ -197,7 +199,7 @@ class Stepper(StateView):
         if path is not None:
             fill(self.march, path=path.c)
         self._alive: list[Any] = [opens]
-        self._watches = list[Any]()  # extremes that C takes in after each step
+        self._watches = list[Any]()  # extremes that C updates after each step
         self._force_watch = ForceWatch(equation.couplings, self.controllers, self.scene.size)
         if self._force_watch.c is not None:
             fill(self.march, forces=self._force_watch.c)
@@ -205,9 +207,9 @@ class Stepper(StateView):
         self._moved(t)
 
     def _add_callbacks(self) -> None:
-        """Let functions of Python take part in the phases of a step, with those of terms.
+        """Add functions of Python to the phases of the terms in a step.
 
-        They are not kept by `fill`, which would keep this object.
+        `fill` does not store references to them, which would keep this object alive.
         """
         c, callbacks, controllers = self.march, self.equation.callbacks, self.controllers
         loops = {
@@ -220,7 +222,7 @@ class Stepper(StateView):
         if controllers.sampled:
             c.stop = lib.time_in_python
             c.stops = callbacks.handle(lambda t: controllers.next_sample(c.t, t))
-        # What may raise comes first, before other loops of C have accepted anything.
+        # Calls that may raise come first, before other loops of C have accepted the step.
         asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
         mine = [one for one in loops["accept"] if one[0] in asking]
         if self._loose:
@@ -240,12 +242,12 @@ class Stepper(StateView):
     # -- callbacks -----------------------------------------------------------------------------
 
     def _ask(self, *_: Any) -> None:
-        """Let controllers and friction ask the scene, which has the state of C."""
+        """Evaluate controllers and limits of friction in the state of C."""
         self._moved(self.march.t)
         self.together(self.controllers.ask, self)
 
     def _prepare(self) -> None:
-        """Take from a trial step what the scheme keeps besides the velocities."""
+        """Store the quantities of a trial step that the scheme keeps besides the velocities."""
         c = self.march
         _, *more = self.inertia.after(self._copy(c.s), c.step.dt)
         self.inertia.keep(*more)
@@ -255,9 +257,9 @@ class Stepper(StateView):
             one.take(q1)
 
     def _require_held(self, step: Any, q1: Any, s: Any) -> None:
-        """Raise if loads do not hold in an equilibrium what nothing else holds.
+        """Raise if a motion that only loads can hold is free in the equilibrium.
 
-        The tangent is regular if they do, and needs no stiffness against idle motions.  All
+        If loads hold it, the tangent is regular without stiffness against zero-energy modes.  All
         processes call it together.
         """
         equation, newton, grid, loose = self.equation, self.solver, self.grid, self._loose
@@ -276,11 +278,11 @@ class Stepper(StateView):
     # -- steps ---------------------------------------------------------------------------------
 
     def attempt(self, t1: float, end: float | None = None) -> Trial:
-        """Solve the next step, to ``t1``; the state changes if :meth:`accept` takes it.
+        """Solve the next step, to ``t1``; the state changes in :meth:`accept`.
 
         Args:
             t1: End of the step; s.
-            end: End of the whole step where this is a part of one; s.
+            end: End of the whole step if this is a substep; s.
 
         Raises:
             StepFailed: There is no equilibrium, or it is too far away.
@@ -290,10 +292,10 @@ class Stepper(StateView):
         return self._trial(solved)
 
     def attempt_along(self, step: Step, guess: Array, border: Any, *, hold: bool = True) -> Trial:
-        """Solve a step, whose times are those of the guess, together with the load factor.
+        """Solve a step together with the load factor; its times belong to the guess.
 
-        With ``hold`` what does not flow stays closed if it can, see material_points.py.  The guess
-        is in the axes of supports.
+        With ``hold`` points that do not flow are held closed if possible, see material_points.py.
+        The guess is in the axes of supports.
         """
         c = self.march
         self.solver.follow(border)
@@ -309,7 +311,7 @@ class Stepper(StateView):
         return self._trial(solved)
 
     def accept(self, trial: Trial) -> None:
-        """Go where the latest :meth:`attempt` went."""
+        """Accept the step of the latest :meth:`attempt`."""
         self.march.step.t1 = trial.step.t1
         with self._in_c():
             accepted = lib.accept_step(self.march)
@@ -327,7 +329,7 @@ class Stepper(StateView):
 
     @contextmanager
     def _in_c(self) -> Iterator[None]:
-        """Context in which C takes steps; then Python sees the state that follows."""
+        """Context in which C takes steps; at its end Python gets the new state."""
         c = self.march
         c.parts, c.failure, self.equation.callbacks.error = 0, lib.SUCCEEDS, None
         try:
@@ -345,10 +347,10 @@ class Stepper(StateView):
         self.warn(self._force_watch.told(), here=not self.share.alone)
 
     def _fail(self) -> None:
-        """Raise why the latest step failed; all processes call it together."""
+        """Raise the error of the latest step; all processes call it together."""
         c, callbacks = self.march, self.equation.callbacks
         error, callbacks.error = callbacks.error, None
-        if not self.equation.c.raised:  # at an iterate that was left
+        if not self.equation.c.raised:  # at a discarded iterate
             error = None
         failure, c.failure = c.failure, lib.SUCCEEDS
         if failure == lib.RAISED:
@@ -377,7 +379,7 @@ class Stepper(StateView):
         raise StepFailed("the step cannot be trusted")
 
     def warn(self, found: Iterable[str], *, here: bool = False) -> None:
-        """Warn, and note in the solution, of what it does not say; by one process or ``here``."""
+        """Issue and store warnings that the solution lacks; one process warns, or ``here``."""
         for said in found:
             if said not in self.solution.warnings:
                 self.solution.warnings += f"{said}\n"
@@ -387,7 +389,7 @@ class Stepper(StateView):
     # -- the state -----------------------------------------------------------------------------
 
     def _moved(self, t: float) -> None:
-        """Take note that the state is another one, at the time ``t``."""
+        """Set the time ``t`` of a new state, and drop cached data of the old state."""
         self.t = t
         self._q: Array | None = None  # copied when Python asks for it
         self._now: States | None = None
