@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: MIT
-"""Files, recorders, and what they ask of a run."""
+"""Output files, recorders, and their view of a run."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""State of a simulation as functions and forms of DOLFINx, for forms and files of users."""
+"""State of a simulation as functions and forms of DOLFINx, for user forms and files."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from ufl_beam.terms.beam_forces import elastic_forms, inelastic_forms
 class BeamForms(NamedTuple):
     """Forms of the resultants and the inertia of the beams.
 
-    What a scene has besides, such as joints, loads and supports, is in none of them.
+    They do not contain joints, loads and supports.
 
     Attributes:
         q0, q1: Configurations at the beginning and at the end of a step.
         work: Virtual work of the resultants in the step from q0 to q1, P(12); linear.
-        tangent: Its derivative by q1; bilinear.
+        tangent: Derivative of ``work`` by q1; bilinear.
         mass: Mass of the beams without point masses and bodies, P(67); bilinear.
     """
 
@@ -45,7 +45,7 @@ class BeamForms(NamedTuple):
 
 
 def put_in_cells(function: fem.Function, values: Array) -> fem.Function:
-    """Give a function values at the degrees of freedom of each cell; (num_cells, ...)."""
+    """Set the values of a function at the degrees of freedom of each cell; (num_cells, ...)."""
     dofs = dofs_of_cells(function.function_space)
     function.x.array[dofs] = values.reshape(dofs.shape)
     return function
@@ -54,14 +54,14 @@ def put_in_cells(function: fem.Function, values: Array) -> fem.Function:
 class DolfinxView:
     """Mesh, functions and forms of a simulation, in the types of DOLFINx; ``simulation.dolfinx``.
 
-    A function is made when it is asked for first.  It is the same object ever after, and has the
-    values of the accepted state when it was asked for last.  All are copies: nothing that is done
-    to them changes the run.  With several processes that share a scene each has a mesh of its own
-    cells; all of them ask together.  The communicator of the mesh is that of one process, so sums
-    over ``view.mesh.comm`` are parts: :meth:`total` integrates over the whole scene.
+    A function is made at its first access.  Each access returns the same object, updated to the
+    accepted state.  Functions are copies: changes of them do not affect the run.  If several
+    processes share a scene, each has a mesh of its own cells, and all access properties together.
+    The communicator of the mesh has one process, so sums over ``view.mesh.comm`` are incomplete:
+    :meth:`total` integrates over the whole scene.
 
-    Beams have vertices of their own, also where joints connect them: a function of the mesh may
-    jump there, and :attr:`dofs` leads from it to the unknowns of the scene, which joints share.
+    Each beam has its own vertices, also at joints.  So a function of the mesh may jump there, and
+    :attr:`dofs` maps it to the unknowns of the scene, which joints share.
 
     Example:
         >>> from dolfinx import fem
@@ -92,7 +92,7 @@ class DolfinxView:
 
     @cached_property
     def cells(self) -> Index:
-        """Number in the scene of each cell of the mesh: row of section forces, and the like.
+        """Number in the scene of each cell of the mesh: index of rows such as section forces.
 
         Example:
             >>> simulation.section_forces()[view.cells].shape
@@ -121,7 +121,7 @@ class DolfinxView:
 
     @cached_property
     def dofs(self) -> Index:
-        """Local degree of freedom of the scene of each of :attr:`function_space`.
+        """Local scene degree of freedom for each degree of freedom of :attr:`function_space`.
 
         Example:
             >>> import ufl
@@ -141,18 +141,18 @@ class DolfinxView:
 
     @property
     def dx(self) -> ufl.Measure:
-        """Integration over the cells with the points of the resultants, one for degree 1."""
+        """Measure of the cells with the quadrature points of the resultants, 1 for degree 1."""
         return self._fields.element.dx(1)
 
     def total(self, integral: ufl.Form | Expr) -> float:
-        """Integrate over all beams of the scene, on whatever processes; all call it together.
+        """Integrate over the beams of the scene on all processes; all call it together.
 
         Args:
             integral: Form over cells without arguments, or a scalar expression, which is integrated
                 with the degree that UFL estimates.
 
         Raises:
-            ArgumentError: It is neither, or it is of another mesh.
+            ArgumentError: ``integral`` is neither, or is of another mesh.
 
         Example:
             >>> length = view.total(1.0 * view.dx)
@@ -166,7 +166,7 @@ class DolfinxView:
 
     @property
     def stiffness(self) -> fem.Function:
-        """Elastic stiffnesses (EA, GA, EI) of the sections, constant in a cell; N, N, N m².
+        """Elastic stiffnesses (EA, GA, EI) of the sections, constant in each cell; N, N, N m².
 
         Example:
             >>> bool(view.stiffness.x.array[2] == section.EI)
@@ -190,7 +190,7 @@ class DolfinxView:
         """Velocity of the configuration in the accepted state; m/s, m/s, rad/s.
 
         Raises:
-            ArgumentError: The scheme is a static one.
+            ArgumentError: The scheme is static.
         """
         if not has_inertia(self._of.scheme):
             raise ArgumentError("dolfinx.velocity: a static scheme has no velocities; run dynamics")
@@ -200,7 +200,7 @@ class DolfinxView:
     def strains(self) -> fem.Function:
         """Strains (Σ, Γ, K) of the configuration, means of the cells; 1, 1, 1/m.
 
-        Those of the bulk have no part of a jump, see ``mechanics/functional.py``.
+        Strains of the bulk do not include jumps, see ``mechanics/functional.py``.
         """
         return self._function("strains", self._of.now.mean_strains(0)[self.cells])
 
@@ -220,7 +220,7 @@ class DolfinxView:
         """Jump α of the rotation in the hinge of each cell, in DG0; rad.
 
         A plastic hinge of zero length belongs to the cell before it, at the start of a beam to the
-        first one; of several jumps of a cell it is the largest.
+        first cell.  If a cell has several jumps, the value is the largest jump.
 
         Raises:
             ArgumentError: Nothing in the scene can hinge.
@@ -240,7 +240,7 @@ class DolfinxView:
         return self._function("jump", self._of.damage()[0][self.cells])
 
     def _function(self, name: str, values: Array) -> fem.Function:
-        """The function of a quantity, with values at the degrees of freedom of the cells."""
+        """Return the function of a quantity, with values at the degrees of freedom of cells."""
         if name not in self._functions:
             of = self._fields.element
             space = of.stiffness.function_space
@@ -255,10 +255,10 @@ class DolfinxView:
 
     @property
     def forms(self) -> BeamForms:
-        """Forms of the beams as the time scheme has them, at a step that has not begun: q0 is q1.
+        """Forms of the beams in the time scheme, at the beginning of a step: q0 is q1.
 
         Cells that may yield or break have the resultants of the state, and the consistent tangent
-        of a step like the last one.
+        of a step like the last step.
 
         Example:
             >>> forms = view.forms
@@ -282,9 +282,9 @@ class DolfinxView:
 
     @cached_property
     def _forms(self) -> BeamForms:
-        """Forms that are stated once.
+        """Forms, which are made once.
 
-        Cells with material points have no elastic stiffness, the others no b and D.
+        Cells with material points have no elastic stiffness; elastic cells have no b and D.
         """
         of, scheme = self._fields.element, self._of.scheme
         self._around: tuple[fem.Function, ...] = ()

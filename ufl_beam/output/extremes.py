@@ -25,23 +25,23 @@ from ufl_beam.output.postprocessing import ForcesAlongCells, in_section, section
 from ufl_beam.output.recorders import Restartable, StateView
 from ufl_beam.terms.cell_forces import CellForces
 
-# -- extremes that C takes in after each step ------------------------------------------------------
+# -- extremes that C updates after each step -------------------------------------------------------
 
 EXTENT = ("low", "high", "time_low", "time_high")
 """Fields of ``extent`` of loops.h."""
 
 
 class AlongCells(NamedTuple):
-    """Form of the section forces in points of cells, and what it depends on.
+    """Form of the section forces in points of cells, and its coefficients.
 
-    At both ends of cells, displacements and what is between the ends do not matter.
+    At the ends of cells the form does not depend on displacements and on forces between the ends.
 
     Attributes:
         motions: The last degrees of freedom of a cell: all, or rotations.
-        numbers: Forces of the cells, the first ones of ``cell_number`` of loops.h.
+        numbers: Forces of the cells, the first components of ``cell_number`` of loops.h.
         angles: :attr:`ForcesAlongCells.angles`.
-        first: How many numbers.
-        moves: How many degrees of freedom.
+        first: Number of components of ``numbers``.
+        moves: Number of degrees of freedom in ``motions``.
     """
 
     form: ufl.Form
@@ -58,7 +58,7 @@ def along_cells(of: Element, parts: tuple[float, ...], works: bool) -> AlongCell
     mesh, h, between = Mesh(degree=of.degree), of.axis.h, set(parts) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
-    # All are constant in cells: to interpolate in a cell would take longer than the rest.
+    # All are constant in cells: interpolation in a cell would take longer than the evaluation.
     motions, numbers, angles, values = map(of.in_cells, (moves, first, 2, 3 * len(parts)))
     order = [0, *range(2, n), 1]  # of the nodes along a cell
     *displacements, rotations = ([motions[k + i] for i in order] for k in range(0, moves, n))
@@ -86,11 +86,11 @@ def along_cells(of: Element, parts: tuple[float, ...], works: bool) -> AlongCell
 
 
 class ExtremesInC:
-    """Extremes of section forces at parts of cells, and of motions, of a scene on one process.
+    """Extremes of section forces in points of cells and of motions, for a scene on one process.
 
     Attributes:
         c: ``watch`` of loops.h.
-        seen: Number of steps up to the state that was taken in last.
+        seen: Number of steps up to the last state that is included.
     """
 
     def __init__(
@@ -121,7 +121,7 @@ class ExtremesInC:
                 setattr(c, name, doubles(values))
 
     def take(self, parts: int, t: float, q: Array, before: Array) -> None:
-        """Take in the state after so many steps, if C has not."""
+        """Include the state after ``parts`` steps, if C has not."""
         if parts == self.seen:
             return
         numbers = self._forces(q, before)
@@ -131,7 +131,7 @@ class ExtremesInC:
         self.seen = parts
 
     def begin(self, parts: int, extents: Any) -> None:
-        """Begin with extremes after so many steps, as :meth:`extents` returns them."""
+        """Begin with the extremes after ``parts`` steps, as :meth:`extents` returns them."""
         for to, of in zip(self._extents, extents, strict=True):
             for name, values in zip(EXTENT, of, strict=True):
                 batches = in_batches(values, self._lanes) if values.ndim == 3 else values
@@ -139,7 +139,7 @@ class ExtremesInC:
         self.seen = parts
 
     def extents(self) -> list[list[Array]]:
-        """Low, high and their times: of forces, (num_cells, points, 3), and of motions, (size,)."""
+        """Return extremes and times: of forces, (num_cells, points, 3), and motions, (size,)."""
         forces, motion = ([of[name] for name in EXTENT] for of in self._extents)
         shape = -1, 3 * self._points, self._lanes
         in_cells = [
@@ -159,8 +159,8 @@ class Extent(NamedTuple):
     Attributes:
         low: The least values.
         high: The largest values.
-        time_low: When the least were reached first; s.
-        time_high: When the largest were reached first; s.
+        time_low: Times at which the least values were first reached; s.
+        time_high: Times at which the largest values were first reached; s.
 
     Example:
         >>> extremes = ub.Extremes()
@@ -183,8 +183,8 @@ class Extent(NamedTuple):
 class Extremes(Restartable):
     """Recorder of the extremes of section forces along all cells and of motions of all nodes.
 
-    Each step counts, whatever the solution keeps; memory does not grow.  Section forces are those
-    of diagrams in equally spaced points of each cell, both ends included.
+    All steps are included, even if the solution does not keep them; memory does not grow.  Section
+    forces agree with diagrams in equally spaced points of each cell, both ends included.
 
     Args:
         points: Number of points of a cell, at least 2.
@@ -207,7 +207,7 @@ class Extremes(Restartable):
         self._taken: list[Extent] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Begin with the initial state, or go on after a :meth:`state`."""
+        """Begin with the initial state, or continue from a :meth:`state`."""
         self._grid: Grid = simulation.grid
         self._solution = simulation.solution
         self._in_c = simulation.watch(self._parts)
@@ -227,7 +227,7 @@ class Extremes(Restartable):
             self.write(simulation)
 
     def write(self, simulation: StateView) -> None:
-        """Take in the state of a step."""
+        """Include the state of a step."""
         if self._in_c is not None:
             self._in_c.take(simulation.parts, simulation.t, simulation.q, simulation.q_before)
             return
@@ -243,12 +243,12 @@ class Extremes(Restartable):
                     when[beyond] = simulation.t
 
     def close(self) -> None:
-        """End the record; what was reached stays."""
+        """End the record; the extremes remain."""
         self._taken, self._in_c = self._extents, None
 
     @property
     def _extents(self) -> list[Extent]:
-        """Those of forces and of motions."""
+        """Extremes of forces and of motions."""
         if self._in_c is not None:
             return [Extent(*of) for of in self._in_c.extents()]
         return self._taken
@@ -282,7 +282,7 @@ class Extremes(Restartable):
     def section_forces(self, beam: Member) -> Extent:
         """Return extremes of (N, V, M) in points of the cells of a beam, N, N, N m.
 
-        They are in the order of a :class:`Diagram` with as many points; (num_cells points, 3).
+        Rows have the order of a :class:`Diagram` with the same points; (num_cells points, 3).
 
         Raises:
             ArgumentError: The beam is not in the scene, or nothing was run.
@@ -294,10 +294,10 @@ class Extremes(Restartable):
         """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
 
         Rows follow a beam from start to end: its vertices, between them the inner nodes of a mesh
-        of higher degree.  At a hinge ψ is that of :meth:`Solution.displacement` at the place.
+        of higher degree.  At a hinge ψ agrees with :meth:`Solution.displacement` at the place.
 
         Raises:
-            ArgumentError: It is not in the scene, or nothing was run.
+            ArgumentError: The object is not in the scene, or nothing was run.
         """
         if isinstance(one, Body):
             return self._extents[1].of(self.grid.node(one.middle).reshape(1, 3))

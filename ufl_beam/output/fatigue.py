@@ -28,7 +28,7 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
 from ufl_beam.output.recorders import Restartable, StateView
 
-BLOCK = 1000  # steps that are collected before their cycles are counted
+BLOCK = 1000  # steps that are collected before cycles are counted
 
 # -- mean stresses and S-N curves -----------------------------------------------------------------
 
@@ -37,8 +37,8 @@ BLOCK = 1000  # steps that are collected before their cycles are counted
 class Goodman(Record):
     """Goodman's line: equivalent range S / (1 − mean / ultimate) about a tensile mean stress.
 
-    The straight line of the Haigh diagram; with the yield stress it is Soderberg's.  Compression
-    has no effect.  At a mean stress of ``ultimate`` the life is zero.
+    It is the straight line of the Haigh diagram, and Soderberg's line with the yield stress as
+    ``ultimate``.  Compression has no effect.  At a mean stress of ``ultimate`` the life is zero.
 
     Args:
         ultimate: Ultimate stress; Pa.
@@ -55,7 +55,7 @@ class Goodman(Record):
     _power: ClassVar[int] = 1
 
     def __call__(self, range: Array, mean: Array) -> Array:
-        """Equivalent ranges of cycles; Pa; infinite where the mean stress leaves no strength."""
+        """Compute equivalent ranges of cycles; infinite if the mean leaves no strength; Pa."""
         left = 1 - (np.maximum(mean, 0.0) / self.ultimate) ** self._power
         infinite = np.full_like(range, np.inf)
         return np.asarray(np.divide(range, left, out=infinite, where=left > 0))
@@ -78,7 +78,7 @@ class Gerber(Goodman):
 
 
 def any_mean(range: Array, mean: Array) -> Array:
-    """Equivalent ranges of welded details, of which the mean does not count."""
+    """Return the ranges as they are: the mean stress does not affect welded details."""
     return range
 
 
@@ -96,10 +96,10 @@ class SNCurve(Record):
         range: Stress range that leads to failure after ``cycles``; Pa.
         cycles: Number of cycles to failure at ``range``.
         slope: m of N = cycles (range / S)^m.
-        knee: Number of cycles from which on the slope is another.
-        slope_beyond: The other slope, above ``knee`` cycles.
-        limit: Ranges with more cycles to failure than this do no damage.
-        mean: Equivalent range of ranges about mean stresses, such as :class:`Goodman`.
+        knee: Number of cycles at which the slope changes.
+        slope_beyond: Slope above ``knee`` cycles.
+        limit: Number of cycles to failure above which a range does no damage.
+        mean: Function of ranges and mean stresses for equivalent ranges, such as :class:`Goodman`.
 
     Raises:
         ArgumentError: A number is not positive, or ``limit`` is less than ``knee``.
@@ -134,13 +134,13 @@ class SNCurve(Record):
         """Make a curve of EN 1993-1-9: slope 3 to 5e6 cycles, 5 to 1e8, no damage beyond.
 
         Args:
-            category: Detail category, the range that is borne for 2e6 cycles; Pa: 71e6.
+            category: Detail category, the range for 2e6 cycles to failure, such as 71e6; Pa.
         """
         require_number(category, "SNCurve.eurocode: category", positive=True)
         return cls(range=category, cycles=2e6, slope=3.0, knee=5e6, slope_beyond=5.0, limit=1e8)
 
     def endurance(self, range: npt.ArrayLike, mean: npt.ArrayLike = 0.0) -> Array:
-        """Compute cycles to failure of ranges about means, both Pa; infinite below the limit."""
+        """Compute cycles to failure of ranges about means, both Pa; infinite beyond the limit."""
         ranges, means = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (range, mean)))
         with np.errstate(divide="ignore"):
             first = self.cycles * (self.range / self.mean(ranges, means)) ** self.slope
@@ -159,9 +159,9 @@ class Cycles:
     """Cycles of a stress history, sorted by range, the smallest first.
 
     Attributes:
-        range: Their ranges; (n,); Pa.
-        mean: Their mean stresses; (n,); Pa.
-        count: How many there were, halves included; (n,).
+        range: Stress ranges; (n,); Pa.
+        mean: Mean stresses; (n,); Pa.
+        count: Numbers of cycles, half cycles included; (n,).
 
     Example:
         >>> cycles = ub.rainflow([0, 100e6, -50e6, 80e6, 0])  # Pa
@@ -178,14 +178,14 @@ class Cycles:
     __repr__ = one_line
 
     def damage(self, curve: SNCurve) -> float:
-        """Compute Miner's sum: the part of the life that these cycles take, 1 at failure."""
-        with np.errstate(divide="ignore"):  # what breaks at once
+        """Compute Miner's sum: the fraction of the life that is used, 1 at failure."""
+        with np.errstate(divide="ignore"):  # zero cycles to failure
             return float(np.sum(self.count / curve.endurance(self.range, self.mean)))
 
     def equivalent(self, curve: SNCurve) -> float:
-        """Compute the constant range that does the same damage in as many cycles; Pa.
+        """Compute the constant range that does the same damage in the same number of cycles; Pa.
 
-        By the first slope alone, as damage equivalent ranges are given.
+        It uses the first slope alone, as usual for damage equivalent ranges.
         """
         m, ranges = curve.slope, curve.mean(self.range, self.mean)
         total = self.count.sum()
@@ -196,10 +196,10 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
     """Count the rainflow cycles of a series by ASTM E1049-85.
 
     Args:
-        series: Stresses, or whatever goes to and fro; (n,).
+        series: Stresses or another alternating quantity; (n,).
 
     Raises:
-        ArgumentError: It is not one row of finite numbers.
+        ArgumentError: The series is not one row of finite numbers.
 
     Example:
         >>> cycles = ub.rainflow([0, 3, 1, 2, 0])
@@ -214,9 +214,9 @@ def rainflow(series: npt.ArrayLike) -> Cycles:
 class RainflowCounter:
     """Rainflow counter of a series that comes in pieces, in constant memory.
 
-    Values are rounded to multiples of ``resolution`` (Pa), so that cycles fall into classes, and no
-    more turning points wait than there are classes.  Without it they are counted as they are.  It
-    goes on after what :meth:`state` returned, ``counted`` and ``waiting``.
+    Values are rounded to multiples of ``resolution`` (Pa).  So cycles fall into classes, whose
+    number limits the number of waiting turning points.  Without a resolution values are not
+    rounded.  ``counted`` and ``waiting`` are the results of :meth:`state` for a restart.
     """
 
     def __init__(
@@ -229,7 +229,7 @@ class RainflowCounter:
         self._counts: defaultdict[tuple[float, float], float] = defaultdict(float)  # by both ends
         for low, high, count in () if counted is None else counted:
             self._counts[float(low), float(high)] = float(count)
-        # Turning points between which ranges become smaller
+        # Turning points with decreasing ranges between them
         self._waiting: list[float] = [*map(float, waiting)]
 
     def add(self, series: Array) -> None:
@@ -248,7 +248,7 @@ class RainflowCounter:
                 del points[-3 : -2 if half else -1]
 
     def cycles(self) -> Cycles:
-        """Return all cycles so far; between the points that wait there are half cycles."""
+        """Return all cycles so far; ranges between waiting points count as half cycles."""
         counts = self._counts.copy()
         for ends in pairwise(self._waiting):
             counts[min(ends), max(ends)] += 0.5
@@ -275,7 +275,7 @@ class HotSpot(Record):
         stress: Stress from N, V (N) and M (N m) at many times; (n,) each; Pa.
 
     Raises:
-        ArgumentError: The place is none, or the stress no function.
+        ArgumentError: ``place`` is no place, or ``stress`` is no function.
 
     Example:
         >>> nominal = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9, factor=1.5)
@@ -302,9 +302,9 @@ class HotSpot(Record):
 
         Args:
             place: Where on a beam.
-            y: Distance from the axis, positive on the left of the way from start to end; m.
+            y: Distance from the axis, positive to the left of the direction from start to end; m.
             E: Young's modulus; Pa.
-            factor: Stress concentration: hot-spot over nominal stress.
+            factor: Stress concentration factor: hot-spot stress over nominal stress.
         """
         require_kind(place, Place, "HotSpot: place")
         require_number(y, f"HotSpot {place}: y")
@@ -321,17 +321,17 @@ class HotSpot(Record):
 class Fatigue(Restartable):
     """Recorder of the rainflow cycles of the stress at named places.
 
-    Its memory does not grow with the number of steps.  Section forces are those of the equation of
+    Its memory does not grow with the number of steps.  Section forces follow from the equation of
     each step at the place, see :meth:`Solution.diagram`.
 
     Args:
-        spots: Where.
+        spots: Places and their stresses.
         curve: S-N curve of all spots.
         resolution: Stresses are rounded to multiples of it; Pa.  By default a hundredth of the
-            range that the curve is named by.
+            ``range`` of the curve.
 
     Raises:
-        ArgumentError: A spot or the curve is none, or the resolution is not positive.
+        ArgumentError: A spot or the curve has another type, or the resolution is negative.
 
     Example:
         >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
@@ -357,7 +357,7 @@ class Fatigue(Restartable):
         self._counters: dict[HotSpot, RainflowCounter] = {}
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Begin to count, with the initial state, or go on after a :meth:`state`."""
+        """Begin to count with the initial state, or continue from a :meth:`state`."""
         at = [simulation.grid.cell_and_part(spot.place) for spot in self.spots]
         self._cells = np.array([cell for cell, _ in at], dtype=np.int64)
         self._parts, self._part = np.unique([part for _, part in at], return_inverse=True)
@@ -371,10 +371,10 @@ class Fatigue(Restartable):
         else:
             self._begin = simulation.t
             self.write(simulation)
-            self._count()  # A stress that is no number is found at once.
+            self._count()  # A stress that is no number raises an error at once.
 
     def write(self, simulation: StateView) -> None:
-        """Note the section forces, and count now and then."""
+        """Store the section forces, and count after each block of steps."""
         forces = simulation.now.cell_forces(0, self._parts)
         self._block.append(forces[self._cells, self._part])
         self._end = simulation.t
@@ -391,12 +391,12 @@ class Fatigue(Restartable):
             self._counters[spot].add(stress)
 
     def close(self) -> None:
-        """Count the steps that are left."""
+        """Count the remaining steps."""
         if self._counters and self._block:
             self._count()
 
     def state(self) -> State:
-        """Return the time that was counted, cycles and waiting turning points of each spot."""
+        """Return the counted time, and cycles and waiting turning points of each spot."""
         self.close()
         state: State = {"duration": np.array([self._begin, self._end])}
         for i, counter in enumerate(self._counters.values()):
@@ -412,7 +412,7 @@ class Fatigue(Restartable):
         """Return the cycles at a spot.
 
         Raises:
-            ArgumentError: The spot is not one of these, or nothing was run.
+            ArgumentError: The spot is not among ``spots``, or nothing was run.
         """
         if spot not in self._counters:
             raise ArgumentError(f"Fatigue: nothing was counted at {spot}; name it, and run")

@@ -44,21 +44,20 @@ CONNECTOR = ("motion", "force", "work")  # columns of a connector
 class History(Restartable):
     """Table (CSV) of the motion of places and of the energy ledger, complete after a crash.
 
-    Columns: t, or the load factor of a path; u, v, psi of each place; motion, force, work of each
-    connector; then the entries of the ledger.  The names of the columns end in their units.
+    The columns are t, or the load factor of a path; u, v, psi of each place; motion, force, work
+    of each connector; and the entries of the ledger.  The names of the columns end in their units.
 
     Args:
         path: File, ending in ``.csv``.
         places: Places to follow, on beams and bodies.
         connectors: Connectors to follow, see
-            :class:`~ufl_beam.output.state_rows.Connection`; of joints, all the connectors that
-            hold them.
-        every: Write every so many steps.
-        max_rows: Largest number of rows, besides the initial one.  When it is exceeded, every other
-            row is deleted, and half as many steps are written from then on.
+            :class:`~ufl_beam.output.state_rows.Connection`; for a joint, all its connectors.
+        every: Number of steps between rows.
+        max_rows: Largest number of rows, besides the initial row.  When it is exceeded, every
+            other row is deleted, and the interval of rows is doubled.
 
     Raises:
-        ArgumentError: ``every`` or ``max_rows`` is no whole number, at least 1.
+        ArgumentError: ``every`` or ``max_rows`` is not a whole number of at least 1.
 
     Example:
         >>> table = ub.History("tip.csv", [beam.end])
@@ -80,7 +79,7 @@ class History(Restartable):
         require_count(max_rows, f"History {path}: max_rows")
         self._first_every, self._max_rows = every, max_rows
         self._path = require_path(path, "History")
-        self._part = beside(self._path)  # takes its place when rows go
+        self._part = beside(self._path)  # replaces it when rows are deleted
         self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._part)
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")
@@ -91,7 +90,7 @@ class History(Restartable):
         self._open: list[OutputFile] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Write the header and the initial state, or cut off what was written after a state."""
+        """Write the header and the initial state, or cut off rows written after a state."""
         self._comm = simulation.comm
         self._links = {
             link: name
@@ -110,7 +109,7 @@ class History(Restartable):
                 "energy ledger; give the work that is called so another name"
             )
         columns = [simulation.parameter.column, *names, *energies]
-        # Spreadsheets take what begins so for a formula, which may run programs
+        # Spreadsheets read such beginnings as formulas, which may run programs
         self._header = _line([f"'{c}" if c.startswith(FORMULA) else c for c in columns])
         if state is None:
             row = self._row(simulation)
@@ -127,12 +126,12 @@ class History(Restartable):
         self._append(content)
 
     def _append(self, line: bytes) -> None:
-        """Write at the end of the complete part: an interrupted line is written over."""
+        """Write at the end of the complete lines; an interrupted line is overwritten."""
         self._open[0].put(self._length, line)
         self._length += len(line)
 
     def write(self, simulation: StateView) -> None:
-        """Write the row of the state, every so many steps."""
+        """Write the row of the state if it is due."""
         self._steps += 1
         if self._steps == (self._max_rows + 1) * self._every:
             on_first(simulation.comm, self._thin)
@@ -142,7 +141,7 @@ class History(Restartable):
             on_first(simulation.comm, lambda: self._append(row))
 
     def _thin(self) -> None:
-        """Leave out every other row; at no time is there less than one whole file."""
+        """Delete every other row; a whole file exists at any time."""
         rows = self._open[0].read(len(self._header), self._length).splitlines(keepends=True)
         self._write_anew(self._part, self._header + b"".join(rows[::2]))
         self._open[0].rename(self._path)
@@ -156,7 +155,7 @@ class History(Restartable):
         return _line([repr(float(x)) for x in numbers])
 
     def state(self) -> State:
-        """Return the length of the file and its checksum; all of it where rows may go again."""
+        """Return the length of the file and its checksum, or its content if rows may be deleted."""
         rows = self._steps // self._every
         counts = np.array([self._every, self._steps, rows, 0], dtype=float)
         content = digest = b""
@@ -176,7 +175,7 @@ class History(Restartable):
         return {"counts": counts, **{n: np.frombuffer(x, dtype=np.uint8) for n, x in texts.items()}}
 
     def _go_on(self, content: bytes, digest: bytes, length: int) -> None:
-        """Open the file that a state knows, or write its content, and cut off what is behind."""
+        """Open the file of a state, or write its content, and cut off later rows."""
         if content:
             self._path.write_bytes(content)
         try:
@@ -192,7 +191,7 @@ class History(Restartable):
         file.cut(length)
 
     def close(self) -> None:
-        """Close the file, without what an interrupt has left behind the last complete row."""
+        """Close the file, and cut off an interrupted row after the last complete row."""
         files, self._open = self._open, []
         for file in files:
             file.cut(self._length)
@@ -200,14 +199,14 @@ class History(Restartable):
 
 
 def _line(cells: Sequence[str]) -> bytes:
-    """A line of a CSV file."""
+    """Return a line of a CSV file."""
     text = io.StringIO(newline="")
     csv.writer(text).writerow(cells)
     return text.getvalue().encode()
 
 
 def _named_links(scene: Scene, followed: Connector | Joint) -> list[tuple[int, str]]:
-    """Numbers of links and their names, which tell alike ones between the same places apart."""
+    """Return numbers and names of links; names of links between the same places differ."""
     links = links_of(scene, followed)
     if isinstance(followed, Connector):
         names = COMPONENTS if followed.components else (type(followed.law).__name__,)
@@ -227,8 +226,8 @@ Flags = npt.NDArray[np.bool_]
 IN_CELLS = ("yields", "opens", "is free")  # once in a cell; hinges and cracks open and end
 OF_CONNECTORS = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # with their ends
 KINDS = (*IN_CELLS, *(kind for pair in OF_CONNECTORS.values() for kind in pair))  # all events
-Row = tuple[float, int, str]  # time, number of the cell or connector, what
-BROKEN_PART = 0.999  # part of the energy of a hinge after which it is called a joint
+Row = tuple[float, int, str]  # time, number of the cell or connector, kind of event
+BROKEN_PART = 0.999  # fraction of the energy of a hinge after which it is called a joint
 
 
 class Event(NamedTuple):
@@ -236,9 +235,9 @@ class Event(NamedTuple):
 
     Attributes:
         time: End of the step; s; on a path its load factor.
-        where: A place in the middle of a cell, that of a plastic hinge, or a connector.
+        where: Place in the middle of a cell, place of a plastic hinge, or connector.
         what: "yields", "opens", "is free" in a cell; "touches", "lets go", "slides", "sticks".
-        parameter: Words for the time.
+        parameter: Name and formats of ``time``.
 
     Example:
         >>> events = ub.Events()
@@ -271,7 +270,7 @@ class Events(Restartable):
         tell: Called on the first process with each event as it happens, such as ``print``.
 
     Attributes:
-        found: The events in their order, the same on all processes.
+        found: Events in chronological order, the same on all processes.
 
     Example:
         >>> events = ub.Events(tell=print)
@@ -290,12 +289,12 @@ class Events(Restartable):
         return f"<Events: {len(self.found)}>"
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Take note of the initial state, or go on after the events of a state."""
+        """Begin with the initial state, or continue from the events of a state."""
         self.found, self._rows = [], []
         if state is not None:
             rows = [(float(t), int(n), KINDS[int(kind)]) for t, n, kind in state["events"]]
             self._add(simulation, rows)
-        # The events that the scene may have, and those before the run
+        # Events that the scene may have, and events before the run
         grid = simulation.grid
         in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
@@ -322,13 +321,13 @@ class Events(Restartable):
         if not self._links:
             return in_cells, np.zeros(0, dtype=bool)
         forces = np.abs(simulation.connections()[self._links, FORCE])
-        # Forces above which they touch, or slide; the limit of friction is known to some digits
+        # Forces above which they touch or slide; the limit of friction holds to some digits
         links = (simulation.scene.links[link] for link in self._links)
         limits = [(1 - 1e-9) * simulation.asked.get(link, 0.0) for link in links]
         return in_cells, np.asarray(forces > limits)
 
     def write(self, simulation: StateView) -> None:
-        """Note the changes of a step."""
+        """Record the events of a step."""
         (in_cells, on), t = self._look(simulation), simulation.t
         changes = np.argwhere(in_cells & ~self._in_cells)
         new = [(t, int(cell), IN_CELLS[n]) for cell, n in changes]

@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: MIT
-"""Output files: checks of their paths, errors that name them, and the container of what is saved.
+"""Output files: checks of their paths, errors that name them, and the container of saved data.
 
 The container of solutions, studies and checkpoints has named arrays and JSON, with a checksum.
-It is a zip archive as ``numpy.savez`` writes it, which ``numpy.load`` reads; its member
-``text.json`` has what is no array.  The comment at its end names the content, the number of the
-format, the version of ufl_beam, and the SHA-256 of all bytes before.
+It is a zip archive as ``numpy.savez`` writes it, which ``numpy.load`` reads.  Its member
+``text.json`` has all content except arrays.  The comment at its end names the content, the number
+of the format, the version of ufl_beam, and the SHA-256 of all bytes before the checksum.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ufl_beam.errors import ArgumentError, shorten
 from ufl_beam.file_system import is_at, sync
 
 Output = tuple[str, tuple[Path, ...]]  # name of a writer in messages, and the files that it writes
-_in_use: list[Output] = []  # outputs of the runs that go on in this process, the outer ones first
+_in_use: list[Output] = []  # outputs of present runs in this process, outer runs first
 
 BLOCK = 1 << 20  # bytes that are read at once for a checksum
 
@@ -47,7 +47,7 @@ def require_path(path: str | Path, what: str) -> Path:
 def require_writable(path: Path) -> None:
     """Raise :class:`ArgumentError` if a file cannot be written.
 
-    Its content stays as it is, and no file is made, as a kill would leave an empty one.
+    The content does not change, and no file is made, as a kill would leave an empty file.
     """
     why = ""
     try:
@@ -66,7 +66,7 @@ def require_writable(path: Path) -> None:
 
 
 def require_apart(outputs: Sequence[Output], call: str) -> None:
-    """Raise :class:`ArgumentError` if two outputs, one perhaps of an outer run, share a file.
+    """Raise :class:`ArgumentError` if two outputs share a file; outer runs are included.
 
     Files are compared through symbolic and hard links; devices such as ``/dev/null`` may be shared.
     """
@@ -104,13 +104,13 @@ def reserved(outputs: Iterable[Output]) -> Iterator[None]:
 
 
 def beside(path: Path, ending: str = ".part") -> Path:
-    """Path of a file beside another one, such as that which takes its place once complete."""
+    """Return the path of a file in the same directory, such as a temporary file."""
     return path.with_name(f"{path.name}{ending}")
 
 
 @contextmanager
 def naming(path: Path) -> Iterator[None]:
-    """Let errors of writing say which file, why, how much space there is, and what is kept."""
+    """Let errors of writing name the file, the reason, the free space and the kept content."""
     try:
         yield
     except OSError as error:
@@ -141,7 +141,7 @@ class OutputFile:
         return os.fstat(self._file).st_size
 
     def put(self, at: int, data: bytes | bytearray) -> None:
-        """Write at a position of the file; pipes and terminals have none."""
+        """Write at a position of the file; pipes and terminals have no positions."""
         rest = memoryview(data)
         with naming(self.path):
             while rest:
@@ -156,7 +156,8 @@ class OutputFile:
     def digest(self, length: int) -> bytes:
         """Return the SHA-256 of the first bytes, which do not change any more; each is read once.
 
-        Later calls ask for at least as many.  A file that is too short has another digest.
+        ``length`` must not decrease from call to call.  A file that is too short has another
+        digest.
         """
         while self._regular and self._hashed < length:
             block = self.read(self._hashed, min(length - self._hashed, BLOCK))
@@ -172,23 +173,23 @@ class OutputFile:
             os.ftruncate(self._file, length)
 
     def allocate(self, length: int) -> None:
-        """Let the disk be full now rather than when a library writes up to a length."""
+        """Allocate disk space, so that a full disk raises now rather than in a library."""
         missing = length - self.size
         if missing > 0 and hasattr(os, "posix_fallocate"):
             with naming(self.path):
                 try:
                     os.posix_fallocate(self._file, self.size, missing)
                 except OSError as error:
-                    if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # no such thing there
+                    if error.errno not in (errno.EOPNOTSUPP, errno.EINVAL):  # not supported there
                         raise
 
     def rename(self, path: Path) -> None:
-        """Move the file, in the place of another one if that exists."""
+        """Move the file; an existing file is replaced."""
         os.replace(self.path, path)
         self.path = path
 
     def sync(self) -> None:
-        """Bring everything to the disk; :class:`FileNotFoundError` if the file was removed."""
+        """Write everything to the disk; :class:`FileNotFoundError` if the file was removed."""
         if not is_at(self._file, self.path):
             raise FileNotFoundError(
                 errno.ENOENT,
@@ -204,7 +205,7 @@ class OutputFile:
                     raise
 
     def close(self) -> None:
-        """Close the file; warn if it is not where it was."""
+        """Close the file; warn if it was removed or replaced."""
         there = is_at(self._file, self.path)
         os.close(self._file)
         if not there:
@@ -217,7 +218,7 @@ class OutputFile:
 
 
 def put_in_place(path: Path, data: bytes | memoryview) -> None:
-    """Write a whole file; the one before stays until the new one is on the disk."""
+    """Write a whole file; the previous file stays until the new file is on the disk."""
     part = beside(path)
     try:
         with part.open("wb") as file:
@@ -232,7 +233,7 @@ def put_in_place(path: Path, data: bytes | memoryview) -> None:
 
 
 def changed(what: str) -> ArgumentError:
-    """Return the error of an output that is not as the checkpoint knows it."""
+    """Return the error of an output that differs from its state in the checkpoint."""
     return ArgumentError(
         f"{what}: it is not what was written up to the checkpoint: it is missing, or was changed "
         "while the run was down; bring it back, or delete the checkpoint to begin anew"
@@ -242,17 +243,17 @@ def changed(what: str) -> ArgumentError:
 # -- the container ---------------------------------------------------------------------------------
 
 Content = dict[str, Any]
-"""Arrays by name; what is not an array is JSON."""
+"""Arrays by name; other content is JSON."""
 
 ADVICE = {
     "solution": "Take another copy of the file, or save the solution again",
     "study": "Delete the file to compute all members, or name another",
     "checkpoint": "Delete the file to begin anew, or name another",
 }
-"""What to do about a file that cannot be used."""
+"""Remedies for a file that cannot be used."""
 
 NPY: Any = np.lib.format
-"""NumPy's reader and writer of arrays; it has no types."""
+"""NumPy's reader and writer of arrays, which has no type annotations."""
 
 DIGEST = 64
 """Bytes of the checksum at the end of a file."""
@@ -263,7 +264,7 @@ END = re.compile(rb"(?s).*?(\w+ of ufl_beam, \d+); written by ufl_beam ([!-~]+);
 
 @cache
 def version() -> str:
-    """The version of the source tree that is imported, else that of the installed package."""
+    """Return the version of the imported source tree, else of the installed package."""
     project = Path(__file__).resolve().parents[2] / "pyproject.toml"
     if project.is_file():
         text = project.read_text(encoding="utf-8")
@@ -285,15 +286,15 @@ def below(prefix: str, content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def write(path: Path, format: str, content: Content, at: str = "") -> None:
-    """Write a file; there is always a whole one, the new or the one before.
+    """Write a file; a whole file exists at any time, either the new or the previous file.
 
     The ``format`` names the content and its number, "solution of ufl_beam, 2"; the number grows
     whenever the meaning of files changes.  ``at`` is a part of messages, such as the time.
 
     Raises:
-        ArgumentError: The file cannot be written, or the content is something else than numbers,
+        ArgumentError: The file cannot be written, or the content has other types than numbers,
             texts, lists and dicts.
-        OSError: There is no space for it.
+        OSError: The disk is full.
     """
     require_writable(path)
     what, file = format.partition(" ")[0], io.BytesIO()
@@ -328,7 +329,7 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
 
 
 def plain(value: Any) -> Any:
-    """Return arrays and numbers of NumPy as JSON has them; TypeError for other objects."""
+    """Convert arrays and numbers of NumPy for JSON; TypeError for other objects."""
     if isinstance(value, np.generic | np.ndarray):
         return value.tolist()
     raise TypeError(repr(value))
@@ -336,13 +337,13 @@ def plain(value: Any) -> Any:
 
 @contextmanager
 def decoding(path: Path, format: str) -> Iterator[None]:
-    """Make every error of reading a file a :class:`ArgumentError` with its name and what to do."""
+    """Turn every error of reading a file into an :class:`ArgumentError` with name and remedy."""
     what = format.partition(" ")[0]
     try:
         yield
     except ArgumentError as error:
         raise ArgumentError(f"{what} {path}: {error}. {ADVICE[what]}") from None
-    except Exception as error:  # of any library, as a file may have anything
+    except Exception as error:  # of any library, as a file may have any content
         raise ArgumentError(
             f"{what} {path}: the file is damaged: {error!r}. {ADVICE[what]}"
         ) from error

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Time series for ParaView and PyVista: a scene as lines, files valid after a kill, recorders."""
+"""Time series for ParaView and PyVista: scenes as lines, files valid after a kill, recorders."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ class Lines(NamedTuple):
 
     points: Array  # (n, 3); m
     cells: Index  # points at both ends of each line; (m, 2)
-    parts: Array  # number of the part of the scene to which each line belongs; (m,)
+    parts: Array  # kind of each line: 0 for beams, BODY or LINK; (m,)
 
 
 BODY, LINK = 1, 2
-"""Numbers of bodies and links among the parts of a scene; beams are 0."""
+"""Numbers of lines of bodies and of links; lines of beams are 0."""
 
 
 class Rod(NamedTuple):
@@ -50,15 +50,15 @@ class Rod(NamedTuple):
     a: Anchor
     b: Anchor
     part: int  # BODY or LINK
-    along: Connector | None = None  # whose force acts along it
+    along: Connector | None = None  # connector whose force acts along it
 
 
 def rods_of(scene: Scene) -> list[Rod]:
-    """Lines from the centre of each body to its points, and along links and springs."""
+    """Return lines from the centre of each body to its points, and along links and springs."""
     spots, rods = spots_of(scene), list[Rod]()
     for body in scene.bodies:
         x, y = body.center
-        # If something is attached to its centre alone, it is shown too, and turns.
+        # A body with attachments at its centre alone also gets a line, which shows its rotation.
         beside = body.at(x + 0.02 * scene.size, y)
         others = [s for s in spots[body] if s.point != body.center] or [beside]
         rods += [Rod(body.middle, spot, BODY) for spot in others]
@@ -78,8 +78,8 @@ def rods_of(scene: Scene) -> list[Rod]:
 class LineData:
     """Geometry of beams, bodies and connectors as lines, and the fields of a state on it.
 
-    Beams come first, node after node; behind them each line of a body or connector with two points
-    of its own.  N is the force of a connector that acts along its line; V and M are zero there.
+    Beams come first, node after node.  Each line of a body or connector follows with two separate
+    points.  N is the force of a connector that acts along its line; V and M are zero there.
     """
 
     def __init__(self, simulation: StateView) -> None:
@@ -96,7 +96,7 @@ class LineData:
         self._ends = slice(len(grid.points), None)
         self._arms = np.reshape([arm(anchor) for anchor in ends], (-1, 2))
         links = simulation.scene.links
-        # Lines, and the links whose forces act along them
+        # Lines, and links whose forces act along them
         self._pulls = {k: links.index(rod.along) for k, rod in enumerate(rods) if rod.along}
         self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
 
@@ -133,31 +133,30 @@ HEAD = (
     b'<Grid Name="scene" GridType="Collection" CollectionType="Temporal">\n'
 )
 TAIL = b"</Grid></Domain></Xdmf>\n<?spare "  # steps to come are written into the instruction
-CLOSING = b"<?e?>"  # its end; an instruction of its own once the one before has lost its end
+CLOSING = b"<?e?>"  # its end; a separate instruction once the previous one has lost its end
 PAGE, ROOM = mmap.PAGESIZE, 1 << 16
 
 
 class Complete(NamedTuple):
-    """Sizes of the complete part of both files."""
+    """Sizes of the complete steps in both files."""
 
-    steps: int  # their number
+    steps: int  # number of steps
     tail: int  # position of TAIL, the end of the document
     room: int  # position of CLOSING, the end of the spare instruction
     data: int  # length of the numbers
 
 
 class XdmfWriter:
-    """Writer of a time series as XDMF: one grid a step, numbers in a binary file beside the text.
+    """Writer of a time series as XDMF: text with a grid for each step, numbers in a binary file.
 
-    The text is followed by a processing instruction of spaces, ``<?spare ... ?>``.  A step is
-    written into it together with new closing tags; then spaces over the old closing tags, within
-    one page of memory, make the step part of the document.  So even a write that a kill cuts off
-    leaves valid XML, and a step costs the same at any time.  Numbers are written before the text
-    names them.
+    A processing instruction of spaces, ``<?spare ... ?>``, follows the text.  A step is written
+    into it with new closing tags.  Then the old closing tags, within one page of memory, are
+    overwritten with spaces, so that the step belongs to the document.  Thus an interrupted write
+    leaves valid XML, and the cost of a step does not grow.  Numbers are written before the text
+    that refers to them.
 
-    ``complete`` are the sizes after the last complete step.  Given, it goes on from there, and
-    raises :class:`ValueError` if the files are not those that were written up to there; ``digest``
-    is that of :meth:`sync`.
+    For a restart ``complete`` are the sizes after the last complete step, and ``digest`` is the
+    result of :meth:`sync`.  If the files differ, :class:`ValueError` is raised.
     """
 
     def __init__(
@@ -169,7 +168,7 @@ class XdmfWriter:
         for values in (lines.cells.astype("<i8"), lines.points, lines.parts):
             items.append(self._item(values, len(mesh)))
             mesh += values.tobytes()
-        self._mesh = (  # named anew in each step, written once
+        self._mesh = (  # text of each step; its numbers are written once
             f'<Topology TopologyType="Polyline" NodesPerElement="2" '
             f'NumberOfElements="{len(lines.cells)}">{items[0]}</Topology>'
             f'<Geometry GeometryType="XYZ">{items[1]}</Geometry>'
@@ -190,7 +189,7 @@ class XdmfWriter:
             self._cut()
 
     def _item(self, values: Array | Index, at: int) -> str:
-        """The element that says where numbers are in the binary file."""
+        """Return the element with the position of numbers in the binary file."""
         kind = "Int" if values.dtype.kind == "i" else "Float"
         shape = " ".join(map(str, values.shape))
         return (
@@ -200,7 +199,7 @@ class XdmfWriter:
 
     def write(self, t: float, fields: LineFields) -> None:
         """Append a step with its fields."""
-        if self._data.size > self.complete.data:  # an interrupt has left a part of a step
+        if self._data.size > self.complete.data:  # after an interrupted step
             self._cut()
         steps, tail, room, length = self.complete
         text = f'<Grid Name="{steps}" GridType="Uniform"><Time Value="{t!r}"/>{self._mesh}'
@@ -213,7 +212,7 @@ class XdmfWriter:
                 text += f"{item}</Attribute>"
                 data += values.tobytes()
         self._data.put(length, data)
-        # The text goes into the instruction, with a tail of its own that lies within one page.
+        # The text goes into the instruction, with a new tail that lies within one page.
         grid, start = (text + "</Grid>\n").encode(), tail + len(TAIL)
         new_tail = start + len(grid)
         if new_tail % PAGE + len(TAIL) > PAGE:
@@ -230,7 +229,7 @@ class XdmfWriter:
         self.complete = Complete(steps + 1, new_tail, room, length + len(data))
 
     def _cut(self) -> None:
-        """Cut off what is behind the last complete step; the document is valid all the time.
+        """Cut off data after the last complete step; the document is valid at any time.
 
         Numbers of a step are written before its text, and cut off after it.
         """
@@ -244,7 +243,7 @@ class XdmfWriter:
         self._data.cut(length)
 
     def sync(self) -> bytes:
-        """Bring everything to the disk; return SHA-256 of the document up to its tail, and of data.
+        """Write everything to the disk; return SHA-256 of the document up to its tail and of data.
 
         Raises:
             FileNotFoundError: A file was removed.
@@ -265,7 +264,7 @@ class XdmfWriter:
 
 # -- VTKHDF ---------------------------------------------------------------------------------------
 
-LAYOUT = (2, 0)  # of the format; VTK 9.3 warns of later ones
+LAYOUT = (2, 0)  # version of the format; VTK 9.3 warns of later versions
 LINE = 3  # VTK's number of the type of a cell
 KINDS = ("PointData", "CellData")  # groups of fields
 SAME = {  # rows of each step, since all have one mesh
@@ -273,9 +272,9 @@ SAME = {  # rows of each step, since all have one mesh
     "Steps/CellOffsets": np.array([[0]]),
     "Steps/NumberOfParts": np.array([1]),
 }
-ROWS = 1024  # steps in a chunk of what has one number a step
-BLOCK = 4096  # rows in a chunk of a field, at least those of one step
-INDEX = 1 << 20  # bytes that the indices of all data sets grow by in a step, and some more
+ROWS = 1024  # steps in a chunk of a data set with one number for each step
+BLOCK = 4096  # rows in a chunk of a field, at least the rows of one step
+INDEX = 1 << 20  # upper bound of the growth of the indices of all data sets in a step; bytes
 
 
 class VtkhdfWriter:
@@ -283,13 +282,13 @@ class VtkhdfWriter:
 
     The layout is "UnstructuredGrid" of version 2.0 with "Steps", see the documentation of VTK's
     file formats; VTK 9.3, PyVista and ParaView 5.13 read it.  All data sets are made at the
-    beginning: a process that is killed while one is made damages the file more easily than while
-    one grows.  HDF5 crashes when a disk is full, so the space that a step may need is allocated
-    before.
+    beginning: a kill during the creation of a data set damages the file more easily than a kill
+    during its growth.  HDF5 crashes when a disk is full, so the space for a step is allocated
+    first.
 
-    ``complete`` is the number of steps after which it goes on.  Of the ``fields`` only names and
-    shapes count.  It raises :class:`ValueError` if the file is not the one that was
-    written up to there; ``digest`` is that of :meth:`sync`.
+    Only names and shapes of ``fields`` are used.  For a restart ``complete`` is the number of
+    complete steps, and ``digest`` is the result of :meth:`sync`.  If the file differs,
+    :class:`ValueError` is raised.
     """
 
     def __init__(
@@ -302,21 +301,21 @@ class VtkhdfWriter:
         rows = _rows(0.0, 0, fields)
         self._output = OutputFile(path if complete is None else beside(path, ".part"))
         self._output.put(0, _empty_file(lines, rows, fields))
-        # Without a lock others may look at the file while the run goes on.
+        # Without a lock other programs may read the file during the run.
         self._file = h5py.File(self._output.path, "r+", locking=False)
         self._root = self._file["VTKHDF"]
         self._growing = {name: (self._root[name], len(values)) for name, values in rows.items()}
         self._hashes = [hashlib.sha256() for _ in rows]
-        self._hashed = 0  # steps that the checksums have
+        self._hashed = 0  # steps that the checksums include
         chunks = (dataset.chunks for dataset, _ in self._growing.values())
         self._room = INDEX + sum(8 * math.prod(chunk) for chunk in chunks)
         if complete is not None:
             self._take_over(path, digest)
 
     def _take_over(self, path: Path, digest: bytes) -> None:
-        """Copy the complete steps of a file, and put this one in its place if they are the same.
+        """Copy the complete steps of a file, and replace it by the copy if the digest agrees.
 
-        So the run does not append to HDF5 that may be damaged, of which HDF5 may crash.
+        So the run does not append to a damaged file, in which HDF5 may crash.
         """
         import h5py
 
@@ -329,7 +328,7 @@ class VtkhdfWriter:
                         new.resize(self.complete[0] * rows, axis=0)
                         for first in range(0, len(new), BLOCK):
                             new[first : first + BLOCK] = old[first : min(first + BLOCK, len(new))]
-            except Exception:  # of HDF5, which has many for what is damaged
+            except Exception:  # many kinds, which HDF5 raises for damaged files
                 raise ValueError("the file is damaged") from None
             self._cut()
             if self.sync() != digest:
@@ -348,14 +347,14 @@ class VtkhdfWriter:
         for name, values in others:
             self._put(name, values)
         self._file.flush()
-        # All that the step has is in the file; that it is there comes last, and at once.
+        # The data of the step are in the file.  Last, its time and the number of steps follow.
         self._put(times, time)
         self._root["Steps"].attrs.modify("NSteps", np.int64(steps + 1))
         self._file.flush()
         self.complete = (steps + 1,)
 
     def _put(self, name: str, values: Array) -> None:
-        """Write the rows of the next step by HDF5's own functions, which are the fastest."""
+        """Write the rows of the next step by HDF5's low-level functions, which are the fastest."""
         from h5py import h5s
 
         dataset, (rows, *components) = self._growing[name][0].id, values.shape
@@ -366,7 +365,7 @@ class VtkhdfWriter:
         dataset.write(h5s.create_simple(values.shape), space, np.ascontiguousarray(values))
 
     def _cut(self) -> None:
-        """Cut off what is behind the last step; times first, of too many VTK 9.3 crashes."""
+        """Cut off data after the last step; times first, as VTK 9.3 crashes on extra times."""
         (times, _), *others = self._growing.values()
         times.resize(self.complete[0], axis=0)
         self._file.flush()
@@ -377,7 +376,7 @@ class VtkhdfWriter:
         self._file.flush()
 
     def sync(self) -> bytes:
-        """Bring everything to the disk; return the SHA-256 of all numbers; each is read once.
+        """Write everything to the disk; return the SHA-256 of all numbers; each is read once.
 
         Raises:
             OSError: The file was removed.
@@ -394,7 +393,7 @@ class VtkhdfWriter:
         return whole.digest()
 
     def close(self) -> None:
-        """Close the file, without what an interrupt has left behind the last complete step."""
+        """Close the file, and cut off an interrupted step after the last complete step."""
         try:
             self._cut()
         finally:
@@ -403,7 +402,7 @@ class VtkhdfWriter:
 
 
 def _rows(t: float, n: int, fields: LineFields) -> dict[str, Array]:
-    """Rows that the n-th step adds to each data set that grows; its time is the first."""
+    """Return the rows that the n-th step adds to each growing data set; its time comes first."""
     rows = {"Steps/Values": np.array([t])}
     offsets = {}
     for kind, by_name in zip(KINDS, fields, strict=True):
@@ -414,7 +413,7 @@ def _rows(t: float, n: int, fields: LineFields) -> dict[str, Array]:
 
 
 def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> bytes:
-    """A file without steps, made in memory."""
+    """Make a file without steps in memory."""
     import h5py
 
     with h5py.File("vtkhdf", "w", driver="core", backing_store=False) as file:
@@ -438,7 +437,7 @@ def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> byt
             root.create_dataset(
                 name, (0, *shape), values.dtype, maxshape=(None, *shape), chunks=(chunk, *shape)
             )
-        # What all steps, or all fields of a kind, have in common is one data set of several names.
+        # Data that all steps, or all fields of a kind, share are one data set with several names.
         steps["PointOffsets"] = steps["CellDataOffsets/part"] = steps["PartOffsets"]
         steps["ConnectivityIdOffsets"] = steps["CellOffsets"]
         for kind, (first, *others) in zip(KINDS, fields, strict=True):
@@ -456,9 +455,9 @@ class TimeSeries(Restartable):
 
     Attributes:
         ending: End of the name of the file.
-        second: What is behind it in the name of the other file that is written.
-        writer: Class of the writer, made of path, lines and fields of the first state; and to go
-            on of what ``complete`` and ``sync()`` of an earlier one gave.
+        second: Ending that is added for the name of the second file.
+        writer: Class of the writer.  Its arguments are path, lines and fields of the first state;
+            for a restart also ``complete`` and the result of ``sync()`` of the earlier writer.
     """
 
     ending: ClassVar[str]
@@ -473,10 +472,10 @@ class TimeSeries(Restartable):
         self._every, self._count = every, 0
         if self._path.suffix != self.ending:
             raise ArgumentError(f"{kind} {path}: the name of the file must end in {self.ending}")
-        self._writers: list[Any] = []  # on the first process one, while it is open
+        self._writers: list[Any] = []  # one writer on the first process while it is open
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Write the mesh and the initial state, or cut off what was written after a state."""
+        """Write the mesh and the initial state, or cut off steps written after a state."""
         self._comm: MPI.Intracomm = simulation.comm
         self._scene, self._count, before = LineData(simulation), 0, tuple[Any, ...]()
         if state is not None:
@@ -498,14 +497,14 @@ class TimeSeries(Restartable):
         on_first(self._comm, make)
 
     def write(self, simulation: StateView) -> None:
-        """Write the state, every so many steps."""
+        """Write the state if it is due."""
         self._count += 1
         if self._count % self._every == 0:
             fields = self._scene.fields(simulation)
             on_first(self._comm, lambda: self._writers[0].write(simulation.t, fields))
 
     def state(self) -> State:
-        """Return the number of steps, and sizes and checksum of what is complete, on the disk."""
+        """Return the number of steps, and sizes and checksum of the complete steps on the disk."""
         digests: list[bytes] = []
         on_first(self._comm, lambda: digests.extend(writer.sync() for writer in self._writers))
         sizes = [n for writer in self._writers for n in writer.complete]
@@ -524,19 +523,19 @@ class TimeSeries(Restartable):
 class XDMF(TimeSeries):
     """Time series for ParaView: all fields of a step on one data set of lines.
 
-    At points ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
-    ``velocity`` (m/s) and ``angular velocity`` (rad/s).  In cells ``N``, ``V`` (N), ``M`` (N m), as
-    in their middle; where something yields or breaks, also the ``jump`` of the hinge (rad) and the
+    Points have ``displacement`` (3 components; m) and ``rotation`` (rad), in dynamics also
+    ``velocity`` (m/s) and ``angular velocity`` (rad/s).  Cells have ``N``, ``V`` (N), ``M`` (N m)
+    in their middle; if something yields or breaks, also the ``jump`` of the hinge (rad) and the
     ``dissipated energy`` (J).  ``part`` is 0 in beams; 1 in lines from the centre of each body to
-    its points; 2 along links and springs, where N is the force of what pulls along its line.
+    its points; 2 along links and springs, where N is the force along the line.
 
-    The file is valid and has all complete steps at any moment, also after a kill.  A step costs the
-    same however many there are.  On a path the time is the load factor.
+    The file is valid and has all complete steps at any moment, also after a kill.  The cost of a
+    step does not grow with their number.  On a path the time is the load factor.
 
     Args:
-        path: File, ending in ``.xdmf``; its numbers are beside it in a file of the same name with
-            ``.bin`` behind it.
-        every: Write every so many steps.
+        path: File, ending in ``.xdmf``; its numbers are in a second file, with ``.bin`` added to
+            the name.
+        every: Number of steps between written states.
 
     Raises:
         ArgumentError: ``every`` is no whole number of steps, or the path does not end in ``.xdmf``.
@@ -552,7 +551,7 @@ class XDMF(TimeSeries):
     writer = XdmfWriter
 
     def require_writable(self) -> None:
-        """Raise :class:`ArgumentError` if a file cannot be written, or its name stand in XML."""
+        """Raise :class:`ArgumentError` if a file cannot be written, or XML cannot hold its name."""
         name = self._path.name
         if name != name.strip() or not name.isprintable():
             raise ArgumentError(
@@ -566,12 +565,12 @@ class VTKHDF(TimeSeries):
     """Time series for ParaView, VTK and PyVista in one HDF5 file, with the fields of :class:`XDMF`.
 
     Each step is flushed, so the file can be read during the run.  After a kill it has all complete
-    steps, except if HDF5 was just rearranging its index, for some microseconds.  A restarted run
-    compares the numbers and goes on in a copy, as HDF5 may crash in a damaged file.
+    steps, unless HDF5 was just rearranging its index, for some microseconds.  A restarted run
+    compares the numbers and continues in a copy, as HDF5 may crash in a damaged file.
 
     Args:
         path: File, ending in ``.vtkhdf``.
-        every: Write every so many steps.
+        every: Number of steps between written states.
 
     Raises:
         ArgumentError: ``every`` is no whole number of steps, or the path does not end in

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Results that follow from states: motions of places, forces of joints, section forces along cells.
+"""Results from states: motions of places, forces of joints, section forces along cells.
 
-At both ends of a cell section forces are its forces on the nodes there: of stresses, inertia,
-damping, loads and works, see :mod:`ufl_beam.terms.cell_forces`.  So they are in equilibrium with
-supports, joints and what else acts at nodes, to the residual of the step.  Between the ends they
-change by what acts along the cell: its resultant, its couple, and how it is distributed, as far as
-that is known.
+At both ends of a cell the section forces are the forces of the cell on the nodes, by stresses,
+inertia, damping, loads and works, see :mod:`ufl_beam.terms.cell_forces`.  So they are in
+equilibrium with supports, joints and other nodal forces, up to the residual of the step.  Between
+the ends they change by the forces along the cell: their resultant, their couple, and their
+distribution as far as it is known.
 """
 
 from __future__ import annotations
@@ -33,15 +33,15 @@ Vectors: TypeAlias = Any
 
 @in_one_line
 class JointHistory(NamedTuple):
-    """History of a joint, b being its second place and a its first.
+    """History of a joint with the first place a and the second place b.
 
     Attributes:
         motion: Displacement of b relative to a, in axes that turn with a, and rotation of b
             relative to a; zero in the undeformed scene; (n+1, 3); m, m, rad.
-        force: That the joint exerts on b, in the plane; (n+1, 2); N.
-        in_a, in_b: The same in axes that turn with a and with b; (n+1, 2); N.
-        moment: That it exerts on b, about the place b; (n+1,); N m.  Not a number where the places
-            share their rotation, so that nobody knows it.
+        force: Force of the joint on b, in the plane; (n+1, 2); N.
+        in_a, in_b: The same force in axes that turn with a and with b; (n+1, 2); N.
+        moment: Moment of the joint on b, about the place b; (n+1,); N m.  It is NaN, for unknown,
+            if the places share their rotation.
     """
 
     motion: Array
@@ -52,7 +52,7 @@ class JointHistory(NamedTuple):
 
 
 def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
-    """Numbers of the links of a connector, or of those that hold a joint of the scene."""
+    """Return the numbers of the links of a connector, or of the links that hold a joint."""
     if isinstance(of, Connector):
         links = of.components or (of,)
         if links[0] not in scene.links:
@@ -68,14 +68,14 @@ def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
 
 
 def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
-    """A vector, or one for each angle, turned by angles; (n, 2)."""
+    """Rotate one vector, or a vector for each angle, by angles; (n, 2)."""
     a, b = np.asarray(x, dtype=np.float64).T
     cos, sin = np.cos(angle), np.sin(angle)
     return np.column_stack([cos * a - sin * b, sin * a + cos * b])
 
 
 def values_at(grid: Grid, place: Anchor, states: Vectors) -> Array:
-    """Values at what a place moves with; interpolated in cells; (n, 3)."""
+    """Return values at the node that moves a place, or interpolated in its cell; (n, 3)."""
     if isinstance(place, Spot):
         if node(place) is GROUND:
             return np.zeros((len(states), 3))
@@ -87,7 +87,7 @@ def values_at(grid: Grid, place: Anchor, states: Vectors) -> Array:
 
 
 def velocity_of(grid: Grid, place: Anchor, states: Vectors, velocities: Vectors) -> Array:
-    """Velocity of a place; (n, 3); m/s, m/s, rad/s."""
+    """Return the velocity of a place; (n, 3); m/s, m/s, rad/s."""
     motion = values_at(grid, place, velocities)
     if isinstance(place, Spot):
         x, y = turned(arm(place), values_at(grid, place, states)[:, 2]).T
@@ -100,13 +100,13 @@ def velocity_of(grid: Grid, place: Anchor, states: Vectors, velocities: Vectors)
 
 @in_one_line
 class Diagram(NamedTuple):
-    """Section forces along a beam; at a vertex the values before and after it.
+    """Section forces along a beam, with the values before and after each vertex.
 
     Attributes:
         s: Parameter of the beam, from 0 at its start to 1; (num_cells points,).
         N: Axial force, positive in tension; N.
         V: Shear force, along the normal to the left of the direction of the beam; N.
-        M: Bending moment, positive with tension to the right of that direction; N m.
+        M: Bending moment, positive with tension to the right of this direction; N m.
 
     Example:
         >>> diagram = solution.diagram(beam, points=2)  # at both ends of the four cells
@@ -138,23 +138,25 @@ class Material(NamedTuple):
 
 
 MIDDLE: Array = np.full(1, 0.5)
-"""The middle of a cell, as a part of it."""
+"""Middle of a cell, as a fraction of its length."""
 
 POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS = [(float(1 + x) / 2, float(w) / 2) for x, w in zip(POINTS, WEIGHTS, strict=True)]
-"""Points of Gauss's rule on a cell, and their weights; exact for all here."""
+"""Points and weights of the Gauss rule on a cell, which is exact for all integrals here."""
 
 Way = Callable[[Any], tuple[Any, Any]]
-"""Derivative of the place by the part of the cell, at a part."""
+"""Derivative of the position by the fraction of the cell, at a fraction."""
 
 
 def section_force(numbers: Any, way: Way, *, works: bool) -> Callable[[Any], tuple[Any, Any, Any]]:
-    """State the force in the plane and the moment at a part of a cell, from 0 to 1 at its end.
+    """Return the force in the plane and the moment as a function of the fraction of a cell.
+
+    The fraction is 0 at the start of the cell and 1 at its end.
 
     Args:
         numbers: Forces of the cell, ``cell_number`` of loops.h: arrays, or expressions of UFL.
-        way: In the configuration in which they are in equilibrium.
-        works: Whether forces across the cell may be distributed in any way, by works of a user.
+        way: Derivative of the position in the configuration of equilibrium.
+        works: Whether forces across the cell may have any distribution, due to works of a user.
     """
     start, end, skew = ((numbers[k], numbers[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X))
     at_start, at_end, couple = (numbers[k] for k in (lib.START_M, lib.END_M, lib.COUPLE))
@@ -164,11 +166,11 @@ def section_force(numbers: Any, way: Way, *, works: bool) -> Callable[[Any], tup
         return [part * (a + b) - a + bend * c for a, b, c in zip(start, end, skew, strict=True)]
 
     def lever(part: Any) -> Any:
-        """Moment of the section forces up to a part about the place there, over the part."""
+        """Return the moment of the forces up to ``part`` about the point there, over ``part``."""
         pairs = ((weight, way(at * part), force(at * part)) for at, weight in GAUSS)
         return sum(weight * (x[0] * f[1] - x[1] * f[0]) for weight, x, f in pairs)
 
-    # What moments at both ends say besides: couples, or how works are distributed across.
+    # The moments at both ends also determine couples, or the distribution of works across.
     missed = at_start + at_end - couple + lever(1.0)
     if works:
         ways = [[6 * w * at * (1 - at) * x for x in way(at)] for at, w in GAUSS]
@@ -181,7 +183,7 @@ def section_force(numbers: Any, way: Way, *, works: bool) -> Callable[[Any], tup
 
 
 def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, Any]:
-    """(N, V, M) of a force in the plane and a moment; (c, s) is the axis of the section."""
+    """Return (N, V, M) from force and moment in the plane; (c, s) is the axis of the section."""
     x, y, M = plane
     return c * x + s * y, c * y - s * x, M
 
@@ -193,7 +195,7 @@ class ForcesAlongCells:
         grid: Cells and numbering.
 
     Attributes:
-        angles: Of the undeformed axis at both ends of the cells; (num_cells, 2); rad.
+        angles: Angles of the undeformed axis at both ends of the cells; (num_cells, 2); rad.
         dofs: Degrees of freedom (u, v, ψ) of the nodes of cells; (num_cells, 3, degree + 1).
     """
 
@@ -209,14 +211,14 @@ class ForcesAlongCells:
         self.angles = angles[:, None] + _turns(grid, angles)
 
     def __call__(self, cells: Index | slice, parts: Array, numbers: Array, q: Array) -> Array:
-        """Compute them at parts of cells, from 0 at the start to 1 at the end; N, N, N m.
+        """Compute section forces at fractions of cells; N, N, N m.
 
         Args:
             cells: Numbers of the cells, or of one cell at many times.
-            parts: Parts; (points,).
+            parts: Fractions from 0 at the start to 1 at the end; (points,).
             numbers: Forces of the cells, ``cell_number`` of loops.h; (9, num_cells).
-            q: Configurations (u, v, ψ) of their nodes, those between the ends of the step at which
-                its forces are in equilibrium; (num_cells, 3, degree + 1).
+            q: Configurations (u, v, ψ) of the nodes at the time within the step at which its
+                forces are in equilibrium; (num_cells, 3, degree + 1).
 
         Returns:
             (N, V, M); (num_cells, points, 3).
@@ -235,9 +237,10 @@ class ForcesAlongCells:
 
 
 def _turns(grid: Any, angles: Array) -> Array:
-    """Angles to the smooth axis of a curved beam from both ends of its cells; (num_cells, 2); rad.
+    """Return angles from both ends of cells to the smooth axis of beams; (num_cells, 2); rad.
 
-    Vertices halve the angle between two cells, but at corners of the beam; it is linear in a cell.
+    The axis halves the angle between two cells at a vertex, except at corners of the beam.  Its
+    angle is linear in a cell.
     """
     half = np.angle(np.exp(1j * np.diff(angles))) / 2
     half[np.diff(grid.beam_of_cell) != 0] = np.nan
@@ -246,6 +249,6 @@ def _turns(grid: Any, angles: Array) -> Array:
             at_corners = np.isin(grid.parameters(beam)[1:-1], beam.corners)
             half[grid.cells_of(beam)[:-1][at_corners]] = np.nan
     start, end = np.append(np.nan, -half), np.append(half, np.nan)
-    # As a circle where there is no neighbour
+    # The axis is a circle in cells without a neighbour
     both = np.where(np.isnan(start), -end, start), np.where(np.isnan(end), -start, end)
     return np.nan_to_num(np.column_stack(both))

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Recorders of runs: their base class, the view of a run that they get, and checks."""
+"""Recorders of runs: their base class, their view of a run, and checks."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ from ufl_beam.terms.inertia_and_damping import Inertia
 
 
 class PresentState(ABC):
-    """State at the present time, by objects of the scene; all processes call methods together."""
+    """Present state for objects of the scene; all processes call its methods together."""
 
     scene: Scene
     grid: Grid
@@ -47,32 +47,32 @@ class PresentState(ABC):
     @property
     @abstractmethod
     def now(self) -> States:
-        """The present state, read as a solution; all processes call it together."""
+        """The present state in the form of a solution; all processes call it together."""
 
     def entries(self) -> tuple[dict[str, float], ...]:
-        """The ledger over all processes: state, supplied, lost; J."""
+        """Return the ledger over all processes: state, supplied, lost; J."""
         columns, row = self.now.row(0)
         numbers: Any = row.tolist()
         return tuple({name: numbers[at] for name, at in of.items()} for of in columns.ledger)
 
     def connections(self) -> Array:
-        """Columns of :class:`Connection` for all links of the scene; (num_links, columns)."""
+        """Return columns of :class:`Connection` for all links of the scene; (links, columns)."""
         return np.asarray(self.now.column("connectors")[0,])
 
     def connector(self, connector: Connector) -> Connection:
         """Return motion, force, work and rate of a connector at the end of the last step.
 
         Raises:
-            ArgumentError: It is not in the scene.
+            ArgumentError: The connector is not in the scene.
         """
         return connection(self.connections()[links_of(self.scene, connector)])
 
     def displacement(self, place: Anchor) -> Array:
-        """Displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
+        """Return displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
         return np.asarray(self.now.displacement(place)[0])
 
     def velocity(self, place: Anchor) -> Array:
-        """Velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s.
+        """Return the velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s.
 
         Raises:
             ArgumentError: The run is static; it has no velocities.
@@ -85,7 +85,7 @@ class PresentState(ABC):
         return np.asarray(self.now.velocity(place)[0])
 
     def press(self, joint: Joint | Support) -> float:
-        """Size of the force of a joint or a support at the end of the last step; N.
+        """Return the magnitude of the force of a joint or support at the end of the step; N.
 
         Raises:
             ArgumentError: The joint shares its displacement; make it with ``multipliers=True``.
@@ -98,7 +98,7 @@ class PresentState(ABC):
         return float(np.linalg.norm(self.connections()[numbers, FORCE]))
 
     def section_forces(self) -> Array:
-        """(N, V, M) in the middle of all cells; (num_cells, 3); N, N, N m.
+        """Return (N, V, M) in the middle of all cells; (num_cells, 3); N, N, N m.
 
         They belong to the equation of the last step, see :meth:`Solution.diagram`.
         """
@@ -106,13 +106,13 @@ class PresentState(ABC):
 
 
 class StateView(PresentState):
-    """State of a run, as recorders and controllers see it."""
+    """State of a run for recorders and controllers."""
 
     comm: MPI.Intracomm  # all processes of the run
     share: Share  # degrees of freedom of this process
     fields: Fields
-    parameter: Parameter  # words for `t`: time, or the load factor of a path
-    parts: int  # steps so far, parts of cut steps counted each
+    parameter: Parameter  # names and formats of `t`: time, or the load factor of a path
+    parts: int  # steps so far; each substep is counted
     cell_forces: CellForces
     solution: Any  # `Solution` of the run
     inertia: Inertia
@@ -143,11 +143,11 @@ class StateView(PresentState):
 
     @property
     def snes(self) -> Any:
-        """SNES that solves the steps, of petsc4py; it takes monitors, histories and other methods.
+        """SNES of petsc4py that solves the steps; it takes monitors, histories and other methods.
 
-        From when it is asked for, steps are solved by PETSc's ``newtonls``, also in the compiled
-        path, where an equivalent method in C is faster for few cells.  Its norms add forces (N),
-        moments (N m) and what connectors miss; convergence is judged by :class:`Newton`'s ``rtol``.
+        After the first access PETSc's ``newtonls`` solves the steps, also in the compiled path,
+        where an equivalent method in C is faster for few cells.  Its norms add forces (N), moments
+        (N m) and residuals of connectors; :class:`Newton`'s ``rtol`` determines convergence.
         Monitors are also called in line searches and along paths.
 
         Example:
@@ -160,7 +160,7 @@ class StateView(PresentState):
         return self.solver.snes
 
     def velocities(self) -> list[Array]:
-        """Velocities at the local degrees of freedom; none in statics."""
+        """Return velocities at the local degrees of freedom; none in statics."""
         return [self.inertia.v] if has_inertia(self.scheme) else []
 
     @property
@@ -169,20 +169,20 @@ class StateView(PresentState):
         return bool(self.now.column("material")[0,].size or self.scene.hinges)
 
     def damage(self) -> tuple[Array, Array]:
-        """Jump of rotation (rad) and dissipated energy (J) of each cell; see :class:`States`."""
+        """Return jump of rotation (rad) and dissipated energy (J) of cells; see :class:`States`."""
         return self.now.damage()
 
     def watch(self, parts: Array) -> Any:
-        """Begin to take in extremes after each step in C, or return None if that cannot be."""
+        """Let C update extremes after each step, or return None if that is not possible."""
         return None
 
 
 class Recorder(ABC):
-    """Base class of recorders, which see each accepted step; called by all processes together.
+    """Base class of recorders, which get each accepted step; all processes call it together.
 
     Attributes:
-        files: Paths that it writes: two outputs of a run must not share one.
-        by_itself: Whether it needs no call of :meth:`write` after steps, once it is open.
+        files: Paths of output files; two outputs of a run must not share a file.
+        by_itself: True if an open recorder needs no call of :meth:`write` after steps.
 
     Example:
         >>> class Speed(ub.Recorder):
@@ -200,13 +200,13 @@ class Recorder(ABC):
         return f"<{' '.join([type(self).__name__, *map(str, self.files)])}>"
 
     def require_writable(self) -> None:
-        """Raise :class:`ArgumentError` if a file cannot be written; the first process asks."""
+        """Raise :class:`ArgumentError` if a file cannot be written; the first process calls it."""
         for path in self.files:
             require_writable(path)
 
     @abstractmethod
     def open(self, simulation: StateView) -> None:
-        """Begin, with the initial state."""
+        """Begin with the initial state."""
 
     @abstractmethod
     def write(self, simulation: StateView) -> None:
@@ -216,10 +216,10 @@ class Recorder(ABC):
         """End the record; also called when the run fails."""
 
     def state(self) -> State:
-        """Return the arrays for :meth:`resume`, by name; those of the first process count.
+        """Return the arrays for :meth:`resume` by name; the first process provides them.
 
         Raises:
-            ArgumentError: The recorder has none.
+            ArgumentError: The recorder cannot be restarted.
         """
         raise ArgumentError(
             f"{type(self).__name__}: this recorder cannot go on from a checkpoint; give it methods "
@@ -227,34 +227,34 @@ class Recorder(ABC):
         )
 
     def resume(self, simulation: StateView, state: State) -> None:
-        """Go on from a :meth:`state`, in the place of :meth:`open`; nothing is recorded yet.
+        """Continue from a :meth:`state` instead of :meth:`open`; nothing is recorded yet.
 
         Raises:
-            ArgumentError: What was written before is not there any more.
+            ArgumentError: Earlier output is missing or changed.
         """
         self.state()
 
 
 class Restartable(Recorder):
-    """Base of the recorders of the package: :meth:`begin` is for new runs and restarted ones."""
+    """Base of the recorders of the package: :meth:`begin` is for new and restarted runs."""
 
     @abstractmethod
     def begin(self, simulation: StateView, state: State | None = None) -> None:
-        """Begin with the initial state, or go on after a :meth:`state`."""
+        """Begin with the initial state, or continue from a :meth:`state`."""
 
     def open(self, simulation: StateView) -> None:
-        """Begin, with the initial state."""
+        """Begin with the initial state."""
         self.begin(simulation)
 
     def resume(self, simulation: StateView, state: State) -> None:
-        """Go on from a :meth:`state`; see :meth:`Recorder.resume`."""
+        """Continue from a :meth:`state`; see :meth:`Recorder.resume`."""
         self.begin(simulation, state)
 
 
 def recorders_of(
     record: Sequence[Recorder] | Recorder, comm: MPI.Intracomm, call: str, *others: Output
 ) -> tuple[tuple[Recorder, ...], list[Output]]:
-    """Check the recorders of a run; return them, and all its outputs with the others."""
+    """Check the recorders of a run; return them and all outputs, ``others`` included."""
     recorders = (record,) if isinstance(record, Recorder) else require_sequence(record, "record")
     outputs = []
     for i, recorder in enumerate(recorders):

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Scenes as JSON data: each record with the exact numbers that made it.
+"""Scenes as JSON data: each record with its exact arguments.
 
-Functions of a user are no data.  Those of time are saved by their values at the times of a
-solution, curves by many points; of others the name is left.  Of laws and other records of a user
-numbers and the name of the class are saved, to be compared with a scene that the user has built.
+Functions of a user are no data.  Functions of time are saved by their values at the times of a
+solution, curves by many points, other functions by their names.  Laws and other records of a user
+are saved by their numbers and the name of the class, to compare them with a scene of the user.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from ufl_beam.model.supports import still
 T = TypeVar("T")
 Data = Any  # data of JSON
 Sampling = Callable[[Any, str, Any], Any]
-"""From record, field and function what stands for it; None if it is lost."""
+"""Function of record, field and function that returns a substitute; None if there is none."""
 
 SAMPLES = 1000  # intervals in which a curve is sampled
 
@@ -41,18 +41,18 @@ SAMPLES = 1000  # intervals in which a curve is sampled
 class SavedFunction:
     """Function of time that is known at some times."""
 
-    name: str  # that of the function
+    name: str  # name of the function
     times: tuple[float, ...]  # ascending; s
     values: tuple[float, ...]  # one for each time
 
     @classmethod
     def of(cls, function: Callable[[float], float], times: Iterable[float]) -> SavedFunction:
-        """Sample a function, at 0 as well; where it fails it is not known."""
+        """Sample a function at times and at 0; times at which it fails are left out."""
         known = _sampled(lambda t: float(function(t)), {0.0, *times})
         return cls(name_of(function), tuple(known), tuple(known.values()))
 
     def __call__(self, t: float) -> float:
-        """The value at one of the times, or :class:`ArgumentError` at others."""
+        """Return the value at a sampled time; :class:`ArgumentError` at other times."""
         n = bisect_left(self.times, t)
         if n == len(self.times) or self.times[n] != t:
             raise ArgumentError(
@@ -67,15 +67,15 @@ class SavedFunction:
 class SavedCurve:
     """Curve through saved points, cubic between them and straight beyond."""
 
-    name: str  # that of the function
+    name: str  # name of the function
     s: tuple[float, ...]  # ascending parameters, at least two
-    points: tuple[Point, ...]  # one for each; m
+    points: tuple[Point, ...]  # a point for each parameter; m
 
     @classmethod
     def of(
         cls, curve: Callable[[float], Any], first: float, last: float, more: Iterable[float] = ()
     ) -> SavedCurve:
-        """Sample a curve between two parameters, and at more of them; gaps where it fails."""
+        """Sample a curve between two parameters and at ``more``, except where it fails."""
         even = (first + (last - first) * k / SAMPLES for k in range(SAMPLES + 1))
 
         def point(s: float) -> Point:
@@ -86,7 +86,7 @@ class SavedCurve:
         return cls(name_of(curve), tuple(known), tuple(known.values()))
 
     def __call__(self, s: float) -> Point:
-        """The point at a parameter; exact where it was sampled."""
+        """Return the point at a parameter; exact at sampled parameters."""
         n = bisect_left(self.s, s)
         if n < len(self.s) and self.s[n] == s:
             return self.points[n]
@@ -101,10 +101,10 @@ class SavedCurve:
 class LostFunction:
     """Placeholder of a function that cannot be saved, such as a controller."""
 
-    name: str  # that of the function
+    name: str  # name of the function
 
     def __call__(self, *arguments: object, **named: object) -> NoReturn:
-        """Raise :class:`ArgumentError`, as the function is not there."""
+        """Raise :class:`ArgumentError`, as the function was not saved."""
         raise ArgumentError(
             f"the function {self.name} is not in the file of the solution, which has results and "
             "numbers; build the scene with the function to simulate it"
@@ -112,7 +112,7 @@ class LostFunction:
 
 
 def _sampled(function: Callable[[float], T], at: Iterable[float]) -> dict[float, T]:
-    """Values of a function in ascending order, without those at which it fails."""
+    """Return values of a function by ascending argument, except where it fails."""
     known = {}
     for x in sorted(at):
         try:
@@ -143,10 +143,10 @@ KNOWN: dict[str, Any] = {"GROUND": GROUND, "HELD": HELD, "steady": steady, "stil
 def to_data(value: Any, sampling: Sampling | None = None) -> Data:
     """Describe a scene or another record as data.
 
-    Functions of a user are replaced by what ``sampling`` returns of them, or by their names.
+    Functions of a user are replaced by results of ``sampling``, or by their names.
     """
     records: list[Data] = []
-    # By identity; the objects are kept, so that none gets the identity of another.
+    # By identity; references to the objects prevent that an identity is used again.
     numbers: dict[int, tuple[int, Any]] = {}
 
     def describe(value: Any, owner: Any, field: str) -> Data:
@@ -194,7 +194,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
 
 
 def require_no_code(data: Data) -> None:
-    """Raise :class:`ArgumentError` if a scene has records of classes that the package has not."""
+    """Raise :class:`ArgumentError` if a scene has records of classes outside the package."""
     for record in data["records"]:
         if "from" in record:
             kind = f"the class {record['is']} of your own (module {record['from']})"
@@ -230,7 +230,7 @@ def from_data(data: Data) -> Any:
 
 
 def made_of(kind: type[T], fields: Mapping[str, Any]) -> T:
-    """Make a dataclass of its fields, also one whose constructor has other arguments."""
+    """Make a dataclass from its fields, even if its constructor has other arguments."""
     known = {field.name for field in dataclasses.fields(kind) if field.init}  # type: ignore[arg-type]
     if fields.keys() != known:
         others = ", ".join(sorted(fields.keys() ^ known))
@@ -245,25 +245,25 @@ def made_of(kind: type[T], fields: Mapping[str, Any]) -> T:
 # -- comparison ------------------------------------------------------------------------------------
 
 CODE = "code"
-"""Last part of the names of what depends on the version of Python."""
+"""Last part of the names of data that depend on the version of Python."""
 
 
 class Description:
-    """Every number and name that can be reached from some values, each under its own name.
+    """All numbers and names that can be reached from some values, by unique names.
 
-    Functions are compared by their code, their defaults, the variables around them and the numbers
-    and functions of their module that they use.  What offers ``state()`` and ``restore(state)``,
-    and random generators of NumPy, are not compared but found.
+    Functions are compared by their code, defaults and enclosing variables, and by the numbers and
+    functions of their module that they use.  Objects with ``state()`` and ``restore(state)``, and
+    random generators of NumPy, are not compared but collected.
 
     Attributes:
         texts: Text by name, such as ``{"scene.beams[0] 'left'.section.EI": "2000.0"}``.
-        stateful: What has a state, by name.
+        stateful: Objects with a state, by name.
     """
 
     def __init__(self, values: Mapping[str, Any]) -> None:
         self.texts: dict[str, str] = {}
         self.stateful: dict[str, Any] = {}
-        # By identity; the objects are kept, so that none gets the identity of another.
+        # By identity; references to the objects prevent that an identity is used again.
         self._seen: dict[int, tuple[str, Any]] = {}
         for name, value in values.items():
             self._put(name, value)
@@ -285,7 +285,7 @@ class Description:
             self._put(f"{name}{part}", what)
 
     def _parts(self, name: str, value: Any) -> Iterator[tuple[str, Any]]:
-        """Note what a thing is; the things it consists of, and how they are called."""
+        """Store the type of an object, and yield its parts with their names."""
         if has_state(value):
             self.stateful[name] = value
             self.texts[name] = type(value).__qualname__
@@ -343,7 +343,7 @@ class Description:
 
 
 def has_state(value: Any) -> bool:
-    """Return whether something says its state and takes it back."""
+    """Return whether an object can save and restore its state."""
     if isinstance(value, type):
         return False
     own = callable(getattr(value, "state", None)) and callable(getattr(value, "restore", None))
@@ -351,7 +351,7 @@ def has_state(value: Any) -> bool:
 
 
 def _text_of(code: CodeType, names: set[str]) -> str:
-    """Return a code as text that can be compared, and add the names that it uses to ``names``."""
+    """Return code as text for comparison, and add the names that it uses to ``names``."""
     names.update(code.co_names)
     constants = [
         _text_of(c, names)
@@ -363,7 +363,7 @@ def _text_of(code: CodeType, names: set[str]) -> str:
 
 
 def difference(now: Mapping[str, str], then: Mapping[str, str]) -> str:
-    """The first thing in which two descriptions differ, in words; empty if there is none."""
+    """Describe the first difference of two descriptions; empty if there is none."""
     for name, text in now.items():
         if name not in then:
             return f"{name} is {text}, in the file there is none"

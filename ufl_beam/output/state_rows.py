@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""A state of a scene as one row of numbers: the table of its columns, and growing arrays of rows.
+"""State of a scene as one row of numbers: the table of its columns, and growing arrays of rows.
 
-C writes rows of running simulations, see :class:`StateWriter`; solutions, the view of a run
-and files read them by the names of the table.
+C writes the rows of running simulations, see :class:`StateWriter`; solutions, the view of a run
+and files read them by the names of the columns.
 """
 
 from __future__ import annotations
@@ -28,25 +28,26 @@ from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger
 
 LEDGER = ("state", "supplied", "lost")
-"""The parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
+"""Parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
 
 FORCES, RECORD, BEFORE = "cell forces", "record", "before"
-"""Columns that not all states have: ``cell_number`` of loops.h of all cells, or what these follow
-from, see :attr:`CellForces.kept`; q at the beginning of the step, if it is not that of the row
-before (of the same row in the first one), and if forces depend on it."""
+"""Columns of some states only: ``cell_number`` of loops.h of all cells; the data from which these
+are computed, see :attr:`CellForces.kept`; q at the beginning of the step, if forces depend on it
+and it differs from q of the row before (in the first row, from q of the same row)."""
 
 
 @in_one_line
 class Connection(NamedTuple):
     """History of a connector.
 
-    Motion, force and rate of a :class:`Bushing` are of all components; (n+1, 2) or (n+1, 3).
+    Motion, force and rate of a :class:`Bushing` have all components; (n+1, 2) or (n+1, 3).
 
     Attributes:
         motion: Relative motion since the undeformed scene; (n+1,); m or rad.
-        force: That resisted its growth during the step that ends there; (n+1,); N or N m.
-        work: That the connector has taken since the beginning: what springs store and dissipate,
-            what dampers and friction dissipate, and minus what motors supply; (n+1,); J.
+        force: Force that resisted the growth of the motion in the step that ends there; (n+1,); N
+            or N m.
+        work: Work on the connector since the beginning: energy that springs store and dissipate
+            and that dampers and friction dissipate, minus energy that motors supply; (n+1,); J.
         rate: Mean rate of the motion in the step that ends there; (n+1,); m/s or rad/s.
         dissipated: Energy that yielding, softening and plastic hinges have dissipated, or that a
             :class:`ConnectorLaw` has lost; (n+1,); J.
@@ -60,7 +61,7 @@ class Connection(NamedTuple):
 
 
 def connection(numbers: Array) -> Connection:
-    """History of the columns of k components, of which works are added; (..., k, columns)."""
+    """Make a history of columns of k components, whose works are added; (..., k, columns)."""
     if numbers.shape[-2] == 1:
         columns = np.moveaxis(numbers[..., 0, :], -1, 0)
         return Connection(*(x if x.ndim else float(x) for x in columns))
@@ -69,7 +70,7 @@ def connection(numbers: Array) -> Connection:
 
 
 FORCE, WORK, DISSIPATED = map(Connection._fields.index, ("force", "work", "dissipated"))
-"""Columns of "connectors" in states, which are these fields."""
+"""Columns of "connectors" in states: the indices of these fields."""
 
 
 PLASTIC, HINGE = 4, 5
@@ -77,13 +78,13 @@ PLASTIC, HINGE = 4, 5
 
 
 class Columns:
-    """Table of the numbers of a state: their names and shapes, in the order of the row.
+    """Table of the columns of a state: their names and shapes, in the order of the row.
 
     Attributes:
-        shapes: Shapes by name; () of a single number.
-        at: Places in a row, by name.
-        width: Numbers of a row.
-        ledger: Places of the entries of each part of the ledger, by name.
+        shapes: Shapes by name; () for a single number.
+        at: Slices of a row, by name.
+        width: Length of a row.
+        ledger: Indices of the entries of each part of the ledger, by name.
     """
 
     def __init__(self, shapes: Mapping[str, Sequence[int]]) -> None:
@@ -100,13 +101,13 @@ class Columns:
 
     @classmethod
     def of(cls, grid: Grid, *, moving: bool, ledger: Iterable[str], record: int | None) -> Columns:
-        """Table of a scene; a number of connectors is a field of :class:`Connection`.
+        """Make the table of a scene; columns of connectors are the fields of :class:`Connection`.
 
         Args:
-            grid: Its numbering.
+            grid: Numbering of the scene.
             moving: Whether there are velocities.
             ledger: Entries, such as "lost: plastic".
-            record: Numbers that forces of cells follow from; None if the forces are in the row.
+            record: Length of the data for the forces of cells; None if the row has the forces.
         """
         size, scene = grid.size, grid.scene
         return cls({
@@ -122,11 +123,11 @@ class Columns:
         })  # fmt: skip
 
     def of_rows(self, name: str, rows: Array) -> Array:
-        """A column of a row, or of some rows: a view, in its shape."""
+        """Return a view of a column of one row or of several rows, in the shape of the column."""
         return rows[..., self.at[name]].reshape(rows.shape[:-1] + self.shapes[name])
 
     def plus(self, name: str, shape: Sequence[int], *, without: str = "") -> Columns:
-        """The same table with a column more at its end, and without another one."""
+        """Return the table with an additional last column, and without the column ``without``."""
         key = name, without
         if key not in self._others:
             shapes = {n: of for n, of in self.shapes.items() if n != without}
@@ -135,17 +136,20 @@ class Columns:
 
 
 def new_rows(number: int, width: int) -> Array:
-    """Rows of zeros.  NumPy asks for large pages from 4 MiB on, whose first touch takes longer."""
+    """Make rows of zeros.
+
+    NumPy requests large pages from 4 MiB on, whose first access takes longer.
+    """
     return np.frombuffer(bytearray(8 * number * width)).reshape(number, width)
 
 
 @dataclass
 class Block:
-    """Rows with the same columns, one below the other, with room for more that is never moved."""
+    """Rows with the same columns, and space for more rows; they are never moved in memory."""
 
     columns: Columns
-    space: Array  # the rows, and behind them the room
-    number: int  # of rows
+    space: Array  # the rows, then the free space
+    number: int  # number of rows
 
     @property
     def rows(self) -> Array:
@@ -154,7 +158,7 @@ class Block:
 
 
 class Column:
-    """A column of states in several blocks, without those that lack it; (n+1, ...)."""
+    """Column of states in several blocks, without states that lack it; (n+1, ...)."""
 
     def __init__(self, blocks: Sequence[Block], name: str) -> None:
         self._name = name
@@ -164,7 +168,7 @@ class Column:
         return sum(block.number for block in self._blocks)
 
     def __getitem__(self, at: tuple[Any, ...]) -> Array:
-        """A new array; the first index is ``:``."""
+        """Return a new array; the first index is ``:``."""
         parts = [block.columns.of_rows(self._name, block.rows)[at] for block in self._blocks]
         return np.concatenate(parts) if parts else np.empty(0)
 
@@ -173,13 +177,14 @@ class Column:
 
 
 class StateWriter:
-    """Writes rows of the state that C has, of the whole scene.
+    """Writer of the state in C, as a row of the whole scene.
 
-    Each process states which of its numbers are added to which places of the row; then the rows of
-    all processes are added.
+    Each process specifies which of its numbers are added to which entries of the row; then the
+    rows of all processes are added.
 
     Attributes:
-        columns: Of a row; with the record of the forces of cells if one process has all of them.
+        columns: Columns of a row, with the record of the forces of cells if one process has all
+            cells.
     """
 
     def __init__(
@@ -212,7 +217,7 @@ class StateWriter:
             if account:
                 first = at[f"{part}: {next(iter(account))}"].start
                 self._copy(self._place(account.numbers), first, len(account))
-        held = [  # of supports, those that this process owns, and their numbers in the row
+        held = [  # degrees of freedom of supports that this process owns, and indices in the row
             (dof, at["reactions"].start + 3 * k + c)
             for k, support in enumerate(grid.scene.supports)
             for c, dof in ((c, share.grid.node(support.place)[c]) for c in support.held)
@@ -237,14 +242,14 @@ class StateWriter:
         for place, number in record:
             self._copy(place, first, number)
             first += number
-        # Large vectors are written once; what is added to begins at zero.
+        # Large vectors are written once; sums begin at zero.
         width = columns.width
         sums, after = (at["reactions"].start, at["material"].stop) if share.alone else (0, width)
         kept = ffi.new("kept_numbers[]", self._kinds)
         fill(march, kinds=len(kept), kept=kept, width=width, sums=sums, after_sums=after)
 
     def _place(self, numbers: Any) -> Any:
-        """A place that has the address of a number of C, of an array, or of a view."""
+        """Return a pointer to the address of a number of C, of an array, or of a view."""
         address = numbers
         if isinstance(numbers, np.ndarray):
             address = ffi.cast("double *", numbers.ctypes.data)
@@ -252,17 +257,17 @@ class StateWriter:
         return place
 
     def _copy(self, place: Any, first: int, number: int) -> None:
-        """Write numbers that stay one after the other."""
+        """Write contiguous numbers to contiguous entries of the row."""
         self._kinds.append((place, number, first, ffi.NULL, ffi.NULL))
 
     def _add(self, place: Any, at: Index, to: Index) -> None:
-        """Add numbers at some places to other places of the row."""
+        """Add numbers at indices ``at`` to the entries ``to`` of the row."""
         both = [np.ascontiguousarray(x.ravel(), dtype=np.int32) for x in (at, to)]
         self._alive.append(both)
         self._kinds.append((place, at.size, 0, *map(integers, both)))
 
     def write(self, row: Array) -> None:
-        """Write the state that C has; all processes call it together."""
+        """Write the state in C; all processes call it together."""
         lib.keep_state(self._march, doubles(row))
         if not self._share.alone:
             self._share.comm.Allreduce(MPI.IN_PLACE, row)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""States at successive times, and what follows from them: motions, forces, material, momenta."""
+"""States at successive times and their results: motions, forces, material, momenta."""
 
 from __future__ import annotations
 
@@ -53,14 +53,14 @@ from ufl_beam.output.state_rows import (
 from ufl_beam.terms.energy_ledger import Energy
 
 LEAST_ROOM, MOST_NUMBERS = 8, 2**17
-"""Least number of rows that are made at once, if they have no more numbers.  Small blocks fit into
-memory that has been used before; to touch new pages takes a good part of a step."""
+"""Least number of rows in a new block, and limit of the numbers in them.  Small blocks fit into
+used memory; the first access of new pages takes a considerable fraction of a step."""
 
 
 class Cells:
-    """Results of the cells of a whole scene, each made when it is asked for first.
+    """Results of the cells of a whole scene, each made at its first access.
 
-    No process communicates with others.
+    Processes do not communicate.
     """
 
     def __init__(self, grid: Grid) -> None:
@@ -83,16 +83,16 @@ class Cells:
 
 
 class States:
-    """States of a scene at n+1 times, read alike in the solution of a run and while it runs.
+    """States of a scene at n+1 times, for the solution of a run and for the present state.
 
     Attributes:
         scene: Model.
         grid: Its vertices, cells and numbering.
-        between: Part of a step at whose configuration its forces are in equilibrium.
+        between: Fraction of a step at whose configuration its forces are in equilibrium.
         begun: Whether forces depend on the configuration at the beginning of the step.
         cells: Section forces, strains and masses of its cells.
-        of_record: Forces of cells that follow from a record, q, and q at the beginning of the step;
-            ``cell_number`` of loops.h; (9, num_cells).
+        of_record: Function that computes the forces of cells from a record, q, and q at the
+            beginning of the step; ``cell_number`` of loops.h; (9, num_cells).
     """
 
     def __init__(self, grid: Grid, like: States | None = None, *blocks: Block) -> None:
@@ -102,7 +102,7 @@ class States:
         self.of_record: Callable[[Array, Array, Array], Array] | None = None
         self._blocks = [*blocks]
         self.cells = Cells(grid)
-        self._computed: tuple[tuple[int, bytes], Array] | None = None  # forces asked for last
+        self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest forces
         if like is not None:
             self.between, self.begun, self.of_record = like.between, like.begun, like.of_record
             self.cells = like.cells
@@ -110,9 +110,9 @@ class States:
     # -- rows ----------------------------------------------------------------------------------
 
     def room(self, columns: Columns, number: int = 1) -> Array:
-        """So many rows behind the last state, or fewer, which count after :meth:`grow`.
+        """Return up to ``number`` free rows after the last state; :meth:`grow` makes them states.
 
-        Memory that was freed may stay with the process, so rows are not copied to make room.
+        The process may keep freed memory, so rows are not copied to make room.
         """
         block = self._blocks[-1] if self._blocks else None
         if (
@@ -127,16 +127,16 @@ class States:
         return block.space[block.number : block.number + number]
 
     def grow(self, number: int = 1) -> None:
-        """Append so many states, which were written in :meth:`room`."""
+        """Append ``number`` states, which were written in :meth:`room`."""
         self._blocks[-1].number += number
 
     def append(self, columns: Columns, *parts: Array) -> None:
-        """Append a state, a row with these columns in one or several parts."""
+        """Append a state: a row with these columns, in one or several parts."""
         np.concatenate(parts, out=self.room(columns)[0])
         self.grow()
 
     def part(self, first: int, last: int) -> States:
-        """Views of the states from the first number to before the last one."""
+        """Return views of the states from ``first`` to ``last``, excluding ``last``."""
         blocks, end = [], 0
         for block in self._blocks:
             begin, end = end, end + block.number
@@ -145,7 +145,7 @@ class States:
         return States(self.grid, self, *blocks)
 
     def thin(self) -> None:
-        """Forget every other state; the first one stays."""
+        """Delete every other state; the first state stays."""
         states, self._blocks, self._computed = self.part(0, len(self)), [], None
         for n in range(0, len(states), 2):
             columns, *parts = states.row(n)
@@ -159,7 +159,7 @@ class States:
         return sum(block.number for block in self._blocks)
 
     def row(self, n: int) -> tuple[Columns, Array]:
-        """The n-th state: its columns, and a view of its row."""
+        """Return the columns of the n-th state, and a view of its row."""
         n = range(len(self))[n]
         for block in self._blocks:
             if n < block.number:
@@ -168,16 +168,16 @@ class States:
         return block.columns, block.rows[n]
 
     def column(self, name: str) -> Column:
-        """Column of this name in all states that have it; (n+1, ...)."""
+        """Return the column of this name in all states that have it; (n+1, ...)."""
         return Column(self._blocks, name)
 
     def _one(self, name: str, n: int) -> Array:
-        """Column of the n-th state; a view."""
+        """Return a view of a column of the n-th state."""
         columns, row = self.row(n)
         return columns.of_rows(name, row)
 
     def before(self, n: int) -> Array:
-        """Configuration at the beginning of the step to the n-th state, where it matters."""
+        """Return q at the beginning of the step to the n-th state, if forces depend on it."""
         n = range(len(self))[n]
         columns, row = self.row(n)
         if BEFORE in columns.at:
@@ -185,7 +185,7 @@ class States:
         return self._one("q", n - 1 if n and self.begun else n)
 
     def numbers(self, n: int) -> Array:
-        """``cell_number`` of loops.h in the n-th state; (9, num_cells); N, N m."""
+        """Return ``cell_number`` of loops.h in the n-th state; (9, num_cells); N, N m."""
         columns, row = self.row(n)
         if FORCES in columns.at:
             return columns.of_rows(FORCES, row)
@@ -195,7 +195,7 @@ class States:
         return self.of_record(record, q, self.before(n))
 
     def history(self) -> State:
-        """Return all states, as arrays by name, with the forces of cells; (n+1, ...)."""
+        """Return all states as arrays by name, with the forces of cells; (n+1, ...)."""
         number = range(len(self))
         names = dict.fromkeys(name for block in self._blocks for name in block.columns.at)
         arrays = {name: self.column(name)[:,] for name in names if ": " not in name}
@@ -204,16 +204,16 @@ class States:
         if arrays.pop(BEFORE, None) is not None:
             before = np.array([self.before(n) for n in number])
             if not np.array_equal(before, arrays["q"][[0, *number[:-1]]]):
-                arrays[BEFORE] = before  # a step does not begin where the one before ends
+                arrays[BEFORE] = before  # a step does not begin at the end of the previous step
         for part, entries in zip(LEDGER, self.ledger(), strict=True):
             arrays |= {f"{part}: {name}": values for name, values in entries.items()}
         return arrays
 
     def resume(self, history: State) -> None:
-        """Go on after :meth:`history`; arrays of a scene that it lacks are zero.
+        """Restore the states of a :meth:`history`; arrays that it lacks are zero.
 
         Raises:
-            ArgumentError: They have other shapes than those that the scene implies.
+            ArgumentError: Shapes of arrays do not agree with the scene.
         """
         require_arrays(history, {"t": (-1,)})
         n, begins = len(history["t"]), BEFORE in history
@@ -233,7 +233,7 @@ class States:
 
     @property
     def times(self) -> Array:
-        """Times that were kept, n after the initial one; (n+1,); s."""
+        """Initial time and n kept times; (n+1,); s."""
         return self.column("t")[:,]
 
     @property
@@ -243,13 +243,13 @@ class States:
 
     @property
     def v(self) -> Array:
-        """Velocities, as :attr:`q`; empty in statics."""
+        """Velocities in the order of :attr:`q`; empty in statics."""
         return self.column("v")[:,]
 
     def displacement(self, place: Anchor) -> Array:
-        """Displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
+        """Return displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
 
-        Interpolated in cells with their degree; of points of bodies exact.
+        In cells they are interpolated with the degree of the mesh; for bodies they are exact.
 
         Raises:
             ArgumentError: The beam of the place is not in the scene.
@@ -260,7 +260,7 @@ class States:
         return motion
 
     def velocity(self, place: Anchor) -> Array:
-        """Velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
+        """Return the velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
 
         Raises:
             ArgumentError: The run was static, or the beam of the place is not in the scene.
@@ -270,24 +270,24 @@ class States:
         return velocity_of(self.grid, place, self.column("q"), v)
 
     def position(self, place: Anchor) -> Array:
-        """Coordinates of a place; (n+1, 2); m."""
+        """Return the coordinates of a place; (n+1, 2); m."""
         if isinstance(place, Spot):
             return np.asarray(place.point + self.displacement(place)[:, :2])
         nodes, weights = self.grid.weights(place)
         return np.asarray(weights @ self.grid.points[nodes] + self.displacement(place)[:, :2])
 
     def shape(self, beam: Member, n: int = -1) -> Array:
-        """Coordinates of the vertices of a beam at the n-th kept time; (num_vertices, 2); m."""
+        """Return coordinates of the vertices of a beam at the n-th time; (num_vertices, 2); m."""
         vertices, grid = self.grid.vertices_of(beam), self.grid
         return np.asarray(grid.points[vertices] + self._one("q", n)[grid.dofs[vertices, :2]])
 
     # -- joints --------------------------------------------------------------------------------
 
     def connector(self, connector: Connector) -> Connection:
-        """Relative motion, force and work of a connector.
+        """Return relative motion, force and work of a connector.
 
         Raises:
-            ArgumentError: It is not in the scene.
+            ArgumentError: The connector is not in the scene.
         """
         return connection(self.column("connectors")[:, links_of(self.scene, connector)])
 
@@ -295,7 +295,7 @@ class States:
         """Return the relative motion and the forces of the first two places of a joint.
 
         Raises:
-            ArgumentError: It is not in the scene.
+            ArgumentError: The joint is not in the scene, or its places share unknowns.
         """
         numbers, (a, b, *_) = links_of(self.scene, joint), joint.places
         if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
@@ -323,7 +323,7 @@ class States:
         return JointHistory(motion, force, in_a, in_b, moment)
 
     def _direction(self, holder: Connector, turn: Array) -> Array:
-        """Unit vectors in the plane along which a motion grows; (n+1, 2)."""
+        """Return unit vectors in the plane along which a motion grows; (n+1, 2)."""
         if holder.stretches:
             between = self.position(holder.b) - self.position(holder.a)
             return np.asarray(between / np.linalg.norm(between, axis=1)[:, None])
@@ -338,13 +338,14 @@ class States:
         return turned(holder.axis, turn if holder.follows_a else np.zeros_like(turn))
 
     def reaction(self, support: Support) -> Array:
-        """Force and moment of a support on the scene; (n+1, 3); N, N, N m.
+        """Return force and moment of a support on the scene; (n+1, 3); N, N, N m.
 
-        It is that of the components of motion that the support holds.
+        Only components of motion that the support holds have reactions.
 
-        In statics the first row is what the initial state bears: nothing in the undeformed scene,
-        for loads act from the first step on; with ``start=`` the reactions of its equilibrium.  In
-        dynamics they act during the step that ends at each time; the first row is NaN.
+        In statics the first row belongs to the initial state: it is zero in the undeformed scene,
+        since loads act from the first step on, and with ``start=`` it has the reactions of that
+        equilibrium.  In dynamics reactions act during the step that ends at each time; the first
+        row is NaN.
 
         Raises:
             ArgumentError: The support is not in the scene.
@@ -359,10 +360,12 @@ class States:
     # -- forces of cells -----------------------------------------------------------------------
 
     def cell_forces(self, n: int, parts: Array = MIDDLE) -> Array:
-        """(N, V, M) of :meth:`diagram` at parts of all cells, from 0 to 1, in the n-th state.
+        """Compute (N, V, M) of :meth:`diagram` at fractions of all cells in the n-th state.
+
+        Fractions ``parts`` are from 0 to 1.
 
         Returns:
-            (num_cells, len(parts), 3); N, N, N m.
+            Section forces; (num_cells, len(parts), 3); N, N, N m.
         """
         asked = range(len(self))[n], parts.tobytes()
         if self._computed is None or self._computed[0] != asked:
@@ -376,13 +379,13 @@ class States:
         return self._computed[1]
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
-        """(N, V, M) of :meth:`diagram` in the middle of the cells; (num_cells, 3); N, N, N m."""
+        """Return (N, V, M) of :meth:`diagram` in the middle of cells; (num_cells, 3); N, N, N m."""
         return np.asarray(self.cell_forces(n)[self.grid.cells_of(beam), 0])
 
     def section_forces_at(self, place: Place) -> Array:
-        """(N, V, M) at a place, as :meth:`diagram` has it; (n+1, 3); N, N, N m.
+        """Return (N, V, M) of :meth:`diagram` at a place; (n+1, 3); N, N, N m.
 
-        At a vertex they are those at the end of the cell before it.
+        At a vertex the values belong to the end of the cell before it.
 
         Raises:
             ArgumentError: The beam of the place is not in the scene.
@@ -398,15 +401,15 @@ class States:
         return np.asarray(forces[:, 0])
 
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
-        """Section forces along a beam, by equilibrium of its cells, at the n-th kept time.
+        """Return section forces along a beam, by equilibrium of cells, at the n-th kept time.
 
-        They belong to the equation of the step that ends at that time, with inertia, damping, loads
-        and works: at a support they are its :meth:`reaction`, in the axes of the section, which
-        turns with the beam.  ``points`` are those of each cell,
-        equally spaced, both ends included; V is linear between them under a uniform load.
+        They belong to the equation of the step that ends at this time, with inertia, damping, loads
+        and works.  At a support they agree with its :meth:`reaction`, in the axes of the section,
+        which turns with the beam.  ``points`` is the number of points of each cell, equally
+        spaced, both ends included; V is linear between them under a uniform load.
 
-        The initial state of a static run bears nothing unless it has a ``start=``.  That of a
-        dynamic one has the forces of the last step of ``start=``, or those of its strains.
+        The initial state of a static run has no forces without ``start=``.  The initial state of a
+        dynamic run has the forces of the last step of ``start=``, or the forces of its strains.
 
         Raises:
             ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
@@ -418,25 +421,25 @@ class States:
         return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
 
     def strains(self, beam: Member, n: int = -1) -> Array:
-        """(Σ, Γ, K) in the cells of a beam at the n-th kept time; (num_cells, 3); 1, 1, 1/m.
+        """Return (Σ, Γ, K) in the cells of a beam at the n-th time; (num_cells, 3); 1, 1, 1/m.
 
         The curvature includes the jump of a hinge over the length of its cell.
         """
         return self.mean_strains(n)[self.grid.cells_of(beam)]
 
     def strains_at(self, place: Place) -> Array:
-        """(Σ, Γ, K) in the cell at a place, as :meth:`section_forces_at`; (n+1, 3); 1, 1, 1/m."""
+        """Return (Σ, Γ, K) in the cell of :meth:`section_forces_at`; (n+1, 3); 1, 1, 1/m."""
         cell = self.grid.cell(place)
         return np.array([self.mean_strains(n)[cell] for n in range(len(self))])
 
     def mean_strains(self, n: int) -> Array:
-        """(Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
+        """Return (Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
         strains = np.empty((len(self.grid.cells), 3))
         strains[self.cells.fields.order] = self.cells.strains.mean(self._one("q", n))
         return strains
 
     def material(self, beam: Member, n: int = -1) -> Material:
-        """Forces, jumps and dissipated energies in the cells of a beam at the n-th kept time.
+        """Return forces, jumps and dissipated energies in the cells of a beam at the n-th time.
 
         Raises:
             ArgumentError: The scene is elastic.
@@ -450,18 +453,18 @@ class States:
         return Material(chosen[:3].T, *chosen[3:])
 
     def cells_of(self, n: int, forces: Array | float = 0.0) -> Array:
-        """Column "material" of all cells; elastic ones have these forces; (num_cells, 6)."""
+        """Return column "material" of all cells; elastic cells get ``forces``; (num_cells, 6)."""
         everything = np.zeros((len(self.grid.cells), self.row(n)[0].shapes["material"][1]))
         everything[:, :3] = forces
         everything[self.grid.inelastic_cells] = self._one("material", n)
         return everything
 
     def material_at(self, place: Place) -> Material:
-        """Material states in the cell at a place at all kept times; arrays begin with (n+1,).
+        """Return material states in the cell at a place at all kept times; (n+1, ...).
 
-        Where a plastic hinge is at the place, ``forces[:, 2]``, ``jump`` and ``hinge`` are its
-        moment during the step that ends at each time, its rotation and the energy that it has
-        dissipated.  The other forces are those in the middle of the cell.
+        If a plastic hinge is at the place, ``forces[:, 2]``, ``jump`` and ``hinge`` are its moment
+        during the step that ends at each time, its rotation and the energy that it has dissipated.
+        The other forces belong to the middle of the cell.
 
         Raises:
             ArgumentError: The scene is elastic, or the beam of the place is not in it.
@@ -475,9 +478,10 @@ class States:
         return Material(forces, jump, plastic, energy)
 
     def damage(self, n: int = -1) -> tuple[Array, Array]:
-        """Jump of rotation (rad) and dissipated energy (J) of each cell; both (num_cells,).
+        """Return jump of rotation (rad) and dissipated energy (J) of each cell; (num_cells,).
 
-        Plastic hinges at its ends are included; of several jumps it is the largest.
+        Plastic hinges at the ends of cells are included.  If a cell has several jumps, the value
+        is the largest jump.
         """
         of_cells = self.cells_of(n)
         jump, dissipated = of_cells[:, 3].copy(), of_cells[:, PLASTIC] + of_cells[:, HINGE]
@@ -510,7 +514,7 @@ class States:
         return Energy(*self.ledger())
 
     def momentum(self) -> Array:
-        """(p_x, p_y, L), L about the origin; (n+1, 3); N s, N s, N m s.
+        """Return (p_x, p_y, L), with L about the origin; (n+1, 3); N s, N s, N m s.
 
         Raises:
             ArgumentError: The run was static.

@@ -294,7 +294,7 @@ class LedgerWatch:
         claimed: Error of entries that the scheme allows; fraction of the energy transferred.
 
     Attributes:
-        judged: Number of the last state that was checked.
+        judged: Number of the last checked state, or of the last state after some were deleted.
     """
 
     def __init__(self, grid: Grid, scheme: Scheme, claimed: float) -> None:

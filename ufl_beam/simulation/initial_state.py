@@ -140,7 +140,7 @@ def _initial_velocity(grid: Grid) -> Array:
 def _require_agreement(grid: Grid, v: Array) -> None:
     """Raise if initial velocities violate joints, which would vibrate for ever, or supports.
 
-    Supports that cancel all velocities of a beam are an error; a warning, if they cancel some.
+    It is an error if supports cancel all velocities of a beam, and a warning if they cancel some.
     """
     size, nodes = grid.scene.size, np.vstack([grid.dofs, grid.dofs_of_bodies])
     fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()

@@ -163,7 +163,7 @@ class Simulation(Stepper):
         self.steps_to(np.array([t1]))
 
     def steps_to(self, ends: Array, *, keep: bool = False) -> int:
-        """Advance to the first of these times, and to more of them within :data:`LONGEST`.
+        """Advance to the first of these times, and to more of them within ``LONGEST`` seconds.
 
         Args:
             ends: Ends of steps; (n,); s.

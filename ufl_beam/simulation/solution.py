@@ -66,7 +66,7 @@ class Solution(States, Rich):
         seconds: Wall time of the run, building the scene included; s.
         building: Wall time of building the scene in :func:`simulate`, which is not saved; s.
         every: Number of steps between kept states.
-        parameter: Axis labels and units of :attr:`times`, which are load factors in a path.
+        parameter: Names and formats of :attr:`times`, which are load factors in a path.
         open_ledger: Message on an open energy ledger; empty if the ledger closes as claimed.
         warnings: Warnings of the run, one in a line; see docs/warnings.md.
         internal: Internal variables of cells and connectors at the end of the run.

@@ -54,7 +54,7 @@ class EqualSteps:
         self.steps += self._simulation.steps_to(ends, keep=keep)
 
     def state(self) -> dict[str, float]:
-        """The number of steps."""
+        """Return the number of steps."""
         return {"steps": float(self.steps)}
 
     def restore(self, state: dict[str, float]) -> None:

@@ -254,7 +254,7 @@ class StepEquation:
     def inner_forces(self, q: Array, t: float | None = None) -> Array:
         """Return the forces of beams at ``q``, in a step too short for viscous flow.
 
-        With a time ``t``, forces of connectors at ``t`` are added; ``q`` has their multipliers.
+        With a time ``t``, forces of connectors at ``t``, which are unknowns in ``q``, are added.
         """
         short, forces = sys.float_info.min, np.zeros(self.share.size)
         self.begin(Step.of(self.scheme, 0.0, short, short, q), self.beams)
@@ -342,7 +342,7 @@ class StepEquation:
         return r, self.A.data.copy()
 
     def tangent_change(self, q: Array, u: Array) -> Array:
-        """Return the derivative along ``u`` of the tangent of :meth:`linearise`; entries."""
+        """Return the derivative of the tangent of :meth:`linearise` along ``u``; entries."""
         self.A.data.fill(0.0)
         for one in (*self.inner, *self.loads):
             one.add_tangent_change(q, u)
