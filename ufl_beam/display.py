@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
-"""Texts for prompts, notebooks and pictures: representations of one line, HTML, names and units.
+"""Texts for prompts, notebooks and pictures: one-line representations, HTML, names and units.
 
-Models and results know no pictures: the modules that draw them register their pages.
+Models and results do not depend on plotting: the modules that draw them register functions here.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from typing import Any, NamedTuple, TypeVar
 
 T = TypeVar("T")
 
-FEW = 4  # numbers of an array that are written
+FEW = 4  # size of the largest array that is written in full
 
 
 class _Short(reprlib.Repr):
-    """Six digits of numbers, names of functions, shapes of arrays; long lists are cut."""
+    """Short texts: six digits, names of functions, shapes of arrays, long lists cut."""
 
     def repr1(self, x: Any, level: int) -> str:
         if isinstance(x, float):
@@ -40,7 +40,7 @@ _SHORT.maxother = _SHORT.maxstring = 120
 
 
 def one_line(record: Any) -> str:
-    """Write a record: ``Mesh(refine=2)``; fields as by default and empty ones are left out."""
+    """Write a record, ``Mesh(refine=2)``, without fields that have their default or are empty."""
     fields = []
     for name, parameter in signature(type(record)).parameters.items():
         value = _SHORT.repr(getattr(record, name))
@@ -50,18 +50,18 @@ def one_line(record: Any) -> str:
 
 
 def in_one_line(kind: type[T]) -> type[T]:
-    """Let instances of a class, such as a named tuple, have the text of :func:`one_line`."""
+    """Give instances of a class, such as a named tuple, the text of :func:`one_line`."""
     kind.__repr__ = one_line  # type: ignore[method-assign]
     return kind
 
 
 def bracketed(named: Any) -> str:
-    """Write what has a text of one line: ``<column.end (0, 3)>``."""
+    """Write the text of an object in angle brackets: ``<column.end (0, 3)>``."""
     return f"<{named}>"
 
 
 def counted(*things: tuple[int, str, str]) -> str:
-    """Write the numbers of things of which there are any: ``1 beam, 8 cells``."""
+    """Write numbers of things, without zeros: ``1 beam, 8 cells``."""
     return ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in things if n)
 
 
@@ -70,7 +70,7 @@ def counted(*things: tuple[int, str, str]) -> str:
 
 @singledispatch
 def html_of(shown: object) -> str:
-    """Write an object as HTML: its text, unless a function is registered for its class."""
+    """Write an object as HTML: its text by default; a class may register another function."""
     return f"<pre>{html.escape(str(shown))}</pre>"
 
 
@@ -85,20 +85,20 @@ class Rich:
 
 
 class Parameter(NamedTuple):
-    """Words for the parameter of a solution, time or load factor, in pictures and messages."""
+    """Labels of the parameter of a solution, time or load factor, in pictures and messages."""
 
     name: str  # title of an axis or a colour bar
     value: str  # format of a value in a sentence
     step: str  # format of a step in a sentence
     column: str  # title of a column
-    progress: str  # title of an axis along which a solution goes one way only
+    progress: str  # title of an axis along which a solution only advances
 
     def at(self, value: float, digits: str = ".4g") -> str:
-        """A value in words."""
+        """Write a value with its name or unit."""
         return self.value.format(format(value, digits))
 
     def over(self, step: float) -> str:
-        """A step in words."""
+        """Write a step with its name or unit."""
         return self.step.format(format(step, ".3g"))
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""DOLFINx 0.9 to 0.11: every difference between the versions, and nothing else."""
+"""DOLFINx 0.9 to 0.11: all code that depends on the version, and no other code."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WAYS = (
     'It comes by conda install -c conda-forge fenics-dolfinx "petsc=*=real*" slepc4py c-compiler, '
     "by apt-get install python3-dolfinx-real (Debian 13), or in the Docker image dolfinx/dolfinx"
 ) + (f"; or run through {SOURCES}/env, see docs/installation.md" * (SOURCES / "env").is_file())
-"""How to get DOLFINx, of an installed package and of a source tree."""
+"""How to install DOLFINx, for an installed package and for a source tree."""
 
 try:
     from mpi4py import MPI
@@ -52,9 +52,8 @@ if all(
     for name in (None, "py.warnings")
     for handler in logging.getLogger(name).handlers
 ):
-    # FFCx 0.9 sends all warnings of Python to the log, where without a handler nobody sees them.
-    # The log gets a handler that shows nothing if a warning comes before this line, as with -W
-    # always.
+    # FFCx 0.9 redirects all Python warnings to the log, where they are lost without a handler.
+    # A warning before this line, as with -W always, adds a handler to the log that shows nothing.
     logging.captureWarnings(False)
 
 if VERSION > (0, 11) and MPI.COMM_WORLD.rank == 0:
@@ -69,11 +68,11 @@ TABULATE = (
     "const uint8_t *permutation" + ("" if VERSION < (0, 10) else ", void *data"),
     "" if VERSION < (0, 10) else ", 0",
 )
-"""Arguments of the kernels of FFCx, and those that a call adds after the first six."""
+"""Parameters of FFCx kernels, and the arguments of a call after the first six."""
 
 
 def jit_directory() -> Path:
-    """Return the directory in which DOLFINx keeps compiled forms."""
+    """Return the directory in which DOLFINx caches compiled forms."""
     return Path(_jit_options()["cache_dir"])
 
 
@@ -89,17 +88,17 @@ def _jit_options() -> dict[str, Any]:
 
 
 def compile_form(form: ufl.Form, directory: Path) -> fem.Form:
-    """Compile a form with FFCx, or load it from a directory in which it was compiled before."""
+    """Compile a form with FFCx, or load it from the cache in ``directory``."""
     logger = logging.getLogger()
     handlers = logger.handlers[:]
     try:
         return fem.form(form, jit_options={"cache_dir": directory})
     finally:
-        logger.handlers = handlers  # FFCx exchanges them, and an interrupt leaves its own
+        logger.handlers = handlers  # FFCx replaces them; an interrupt leaves the replacements
 
 
 def form_key(form: ufl.Form) -> str:
-    """Return a text that differs between forms which FFCx compiles to different code."""
+    """Return a key that differs between forms if FFCx compiles them to different code."""
     options = {k: v for k, v in _jit_options().items() if k not in ("cache_dir", "timeout")}
     system = [sysconfig.get_config_var(name) for name in ("CFLAGS", "EXT_SUFFIX")]
     ours = (form.signature(), ffcx.__version__, dolfinx.__version__, ffcx.get_options(), options)
@@ -117,7 +116,7 @@ def pack(form: fem.Form) -> tuple[Array, Array]:
 
 
 def line_mesh(points: Array, cells: npt.NDArray[np.int64]) -> mesh.Mesh:
-    """Make a mesh of straight cells in the plane, on this process alone; points (n, 2) in m."""
+    """Create a mesh of straight cells in the plane, on this process alone; points (n, 2) in m."""
     line = ufl.Mesh(basix.ufl.element("Lagrange", "interval", 1, shape=(2,)))
     more = {} if VERSION < (0, 10) else {"max_facet_to_cell_links": 2}
     return mesh.create_mesh(MPI.COMM_SELF, cells=cells, x=points, e=line, **more)

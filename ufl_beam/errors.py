@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Errors and warnings of the package, and the checks of arguments that all records share."""
+"""Errors and warnings of the package, and checks of arguments for all records."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ import numpy.typing as npt
 T = TypeVar("T")
 
 LONGEST = 80
-"""Characters that a message shows of a value."""
+"""Largest number of characters of a value in a message."""
 
 BYTES_PER_CELL = 400
-"""Least memory of a cell on each process: its vertices and the numbers of its unknowns."""
+"""Least memory of a cell on each process, for its vertices and the numbering of its unknowns."""
 
 MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 """Memory of this machine; B."""
@@ -34,7 +34,7 @@ PACKAGE = os.path.join(os.path.dirname(__file__), "")
 class ArgumentError(ValueError):
     """Wrong argument of a call; raised before any computation begins.
 
-    The message says which object and argument, what is wrong and what to do.
+    The message names the object and the argument, the error and a remedy.
 
     Example:
         >>> ub.Newton(rtol=-1.0)
@@ -54,7 +54,7 @@ class ArgumentTypeError(ArgumentError, TypeError):
 
 
 class ModelError(ArgumentError):
-    """Error in a model: in one of its parts, or because parts do not fit together.
+    """Error in a model: a record is wrong, or records do not fit together.
 
     Example:
         >>> ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Pinned(beam.start)])
@@ -64,11 +64,11 @@ class ModelError(ArgumentError):
 
 
 class ModelWarning(UserWarning):
-    """Warning about a scene or a call that is likely, but not surely, wrong.
+    """Warning about a scene or a call that is probably wrong.
 
-    The message says which object it is about, what is unusual and what to do.  To silence one
-    that is meant: ``warnings.filterwarnings("ignore", category=ub.ModelWarning)``; to make all of
-    them errors: ``warnings.simplefilter("error", ub.ModelWarning)``.
+    The message names the object, the problem and a remedy.  To silence these warnings:
+    ``warnings.filterwarnings("ignore", category=ub.ModelWarning)``; to make them errors:
+    ``warnings.simplefilter("error", ub.ModelWarning)``.
 
     Example:
         >>> import warnings
@@ -81,7 +81,7 @@ class ModelWarning(UserWarning):
 
 
 class StepFailed(Exception):
-    """No equilibrium was found for a step; attributes are as in :class:`ConvergenceError`."""
+    """A step found no equilibrium; attributes are as in :class:`ConvergenceError`."""
 
     def __init__(self, message: str, residuals: dict[str, float] | None = None) -> None:
         super().__init__(message)
@@ -90,17 +90,17 @@ class StepFailed(Exception):
 
 
 class NoNumber(StepFailed, ModelError):
-    """A function of a user returned no finite number; a shorter step may not ask for it."""
+    """A user's function returned no finite number; a shorter step may avoid the argument."""
 
 
 class ConvergenceError(RuntimeError):
-    """No equilibrium was found for a step, even after cutting it; results so far are kept.
+    """A step found no equilibrium, even after it was cut; ``solution`` has the results so far.
 
     Attributes:
         time: Time of the last accepted state, on a path its load factor; s.
         dt: The smallest step that was tried, on a path the change of the load factor; s.
         solution: The :class:`~ufl_beam.simulation.solution.Solution` up to ``time``;
-            ``start=solution`` goes on from there with another step or scheme.
+            ``start=solution`` continues from there with another step or scheme.
         residuals: Largest residual in each beam, body and connector, in descending order; N,
             moments over the size of the scene.  Empty if equilibria were found but refused.
         forces: Magnitudes of the forces by kind: "beams", "connectors", "loads", "inertia",
@@ -139,7 +139,7 @@ class ConvergenceError(RuntimeError):
 
 
 class CopiesDiffer(RuntimeError):
-    """Copies of one small scene, computed by several processes, have different motions.
+    """Processes that each compute the same small scene found different motions.
 
     Example:
         >>> try:
@@ -150,7 +150,7 @@ class CopiesDiffer(RuntimeError):
 
 
 class TradeoffError(RuntimeError):
-    """No setting can be recommended: the runs do not converge, or it would take too long.
+    """No setting can be recommended: the runs do not converge, or would take too long.
 
     Attributes:
         runs: Runs so far, as in :attr:`Tradeoff.runs`.
@@ -171,9 +171,9 @@ class TradeoffError(RuntimeError):
 
 
 def warn(message: str) -> None:
-    """Issue a :class:`ModelWarning` that points at the line of the user's script."""
+    """Issue a :class:`ModelWarning` that points to the line of the user's script."""
     level, frame = 1, sys._getframe()
-    # <string>: methods that ``dataclass`` writes; and decorators of the library
+    # <string> has the methods that ``dataclass`` generates, contextlib its decorators.
     library = (PACKAGE, "<string>", contextlib.__file__)
     while frame.f_back is not None and frame.f_code.co_filename.startswith(library):
         level, frame = level + 1, frame.f_back
@@ -181,8 +181,8 @@ def warn(message: str) -> None:
 
 
 def raised_at(error: BaseException) -> str:
-    """Place of the user's code that raised an error, " (file, line n)"; empty if there is none."""
-    library = (PACKAGE, functools.__file__)  # that of functions of ub.law_functions
+    """Return the place of the user's code that raised an error, " (file, line n)", or ""."""
+    library = (PACKAGE, functools.__file__)  # functools calls functions of ub.law_functions
     for frame in traceback.extract_tb(error.__traceback__):
         if not frame.filename.startswith(library):
             return f" ({frame.filename}, line {frame.lineno})"
@@ -190,10 +190,10 @@ def raised_at(error: BaseException) -> str:
 
 
 def shorten(value: object) -> str:
-    """Format a value for a message: its ``repr`` in one line, cut to a readable length."""
+    """Format a value for a message: its ``repr`` in one line, of readable length."""
     try:
         text = " ".join(repr(value).split())
-    except Exception:  # of a class of the user, or of an integer with too many digits
+    except Exception:  # by a user's class, or an integer with too many digits
         text = f"<{type(value).__name__}>"
     return clip(text)
 
@@ -204,7 +204,7 @@ def clip(text: str) -> str:
 
 
 def as_float(value: object) -> float:
-    """Convert a real number, also one of NumPy, to ``float``; text and arrays are refused."""
+    """Convert a real number, also of NumPy, to ``float``; refuse text and arrays."""
     if isinstance(value, float | int):
         return float(value)
     scalar: Any = value
@@ -226,7 +226,7 @@ def require_number(
 ) -> float:
     """Return ``value`` as a float in range, or raise :class:`ArgumentError` naming ``what``.
 
-    It must be finite, unless ``infinite`` lets it be positive infinity.
+    It must be finite; with ``infinite`` it may also be positive infinity.
     """
     try:
         number = as_float(value)
@@ -246,7 +246,7 @@ def require_number(
 
 
 def require_returned(value: object, function: str, at: str, *, finite: bool = False) -> float:
-    """Return what a function of a user returned ``at`` some point as a float; NaN may pass."""
+    """Return the value of a user's function as a float; NaN passes unless ``finite``."""
     try:
         number = as_float(value)
     except (TypeError, ValueError, OverflowError):
@@ -259,7 +259,7 @@ def require_returned(value: object, function: str, at: str, *, finite: bool = Fa
 
 
 def require_count(value: Any, what: str) -> int:
-    """Return ``value`` as a whole number from 1 on, or raise :class:`ArgumentError`."""
+    """Return ``value`` as a positive whole number, or raise :class:`ArgumentError`."""
     number = require_number(value, what)
     if number != int(number) or number < 1:
         raise ArgumentError(f"{what} = {shorten(value)} must be a whole number, at least 1")
@@ -293,10 +293,10 @@ def require_all(value: Any, what: str, kind: type | tuple[type, ...]) -> tuple[A
 
 
 def closed(instead: str) -> Callable[[type[T]], type[T]]:
-    """Let a class of the model have no subclasses; ``instead`` tells what a user can do.
+    """Forbid subclasses of a class of the model; ``instead`` is the advice to users.
 
-    Computations know such an object by its class and its fields.  Methods and fields of a subclass
-    would be ignored.
+    Computations depend only on the class and fields of such an object.  They would ignore methods
+    and fields of a subclass.
     """
 
     def close(kind: type[T]) -> type[T]:
@@ -313,7 +313,7 @@ def closed(instead: str) -> Callable[[type[T]], type[T]]:
 
 
 def require_text(value: Any, what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` unless ``value`` is text that files can have."""
+    """Raise :class:`ArgumentError` naming ``what`` unless ``value`` is text fit for files."""
     if not isinstance(value, str):
         raise ArgumentTypeError(f"{what} = {shorten(value)} must be text")
     if any(c == "\0" or "\ud800" <= c <= "\udfff" for c in value):
@@ -336,9 +336,9 @@ def require_function(value: Any, what: str, of: str) -> None:
 
 
 def require_memory(cells: int, what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` if so many cells cannot be held in memory.
+    """Raise :class:`ArgumentError` naming ``what`` if memory or indices are too small for cells.
 
-    Each process has the numbering of the whole scene.
+    Each process stores the numbering of the whole scene.
     """
     needed = cells * BYTES_PER_CELL
     if needed > MEMORY:

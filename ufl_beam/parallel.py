@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Processes of MPI: which compute a scene together, how they fail together, what they print.
+"""MPI processes: computation of a scene together, exceptions on all processes, output.
 
-Without agreement a process that fails alone leaves the others waiting for ever in a collective
-call.
+Without agreement a process that fails alone leaves the other processes waiting forever in a
+collective call.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, CopiesDiffer, StepFailed, shorten, warn
 
 with warnings.catch_warnings():
-    warnings.simplefilter("ignore")  # of a notebook without ipywidgets, where bars are text
+    warnings.simplefilter("ignore")  # in a notebook without ipywidgets, where bars are text
     from tqdm.auto import tqdm
 
 T = TypeVar("T")
 
 GRACE = 3.0
-"""Time for which a process that failed waits for the others; s."""
+"""Time for which a failed process waits for the other processes; s."""
 
 FAILED = 32_749
 """Tag of the messages of processes that end with an exception; MPI has tags up to 32767."""
@@ -52,12 +52,12 @@ _ACTIVE: ContextVar[MPI.Intracomm] = ContextVar("processes of a scene", default=
 
 
 def active_comm() -> MPI.Intracomm:
-    """Return the processes that compute a scene, unless a call names others."""
+    """Return the processes that compute a scene, unless a call has the argument ``comm``."""
     return _ACTIVE.get()
 
 
 def communicator(comm: MPI.Intracomm | None, what: str) -> MPI.Intracomm:
-    """Return the processes of a call: those that it names, or by default :func:`active_comm`."""
+    """Return the processes of a call: its ``comm``, or by default :func:`active_comm`."""
     if comm is None:
         return active_comm()
     if not isinstance(comm, MPI.Intracomm) or comm == MPI.COMM_NULL:
@@ -69,7 +69,7 @@ def communicator(comm: MPI.Intracomm | None, what: str) -> MPI.Intracomm:
 
 @contextmanager
 def alone() -> Iterator[None]:
-    """Within this context a scene is computed by this process alone."""
+    """Compute scenes on this process alone within the context."""
     before = _ACTIVE.set(MPI.COMM_SELF)
     try:
         yield
@@ -81,7 +81,7 @@ _DUPLICATE = MPI.Comm.Create_keyval()
 
 
 def duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
-    """Communicator of the same processes for agreements only; made once and kept with ``comm``."""
+    """Return a communicator of the same processes for agreements, made once for each ``comm``."""
     known: Any = comm.Get_attr(_DUPLICATE)
     if known is None:
         known = comm.Dup()
@@ -96,14 +96,14 @@ def duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
 class Agreement:
     """Calls that raise on all processes if they raise on one.
 
-    On one process they are plain calls.  On several they cost one reduction of an integer.  If the
-    others do not come within :data:`GRACE`, because they wait for the failed process elsewhere, it
-    prints its exception and aborts all of them.
+    On one process they are plain calls.  On several they cost one reduction of an integer.  A
+    failed process prints its exception and aborts all processes if the others do not join the
+    reduction within :data:`GRACE`, because they wait for it elsewhere.
     """
 
     def __init__(self, comm: MPI.Intracomm) -> None:
         self._comm = duplicate(comm) if comm.size > 1 else None
-        self.raised: BaseException | None = None  # the latest that all processes raised together
+        self.raised: BaseException | None = None  # latest exception that all processes raised
 
     def __call__(self, function: Callable[..., T], *arguments: Any) -> T:
         """Call a function on all processes."""
@@ -120,7 +120,7 @@ class Agreement:
     def settle(self, error: BaseException | None) -> None:
         """Raise on all processes if one of them has an exception; all call it together.
 
-        A failed step, after which the run may go on, gives way to any other exception.
+        Any other exception takes precedence over a failed step, after which the run may continue.
         """
         comm = self._comm
         if comm is None:
@@ -144,7 +144,7 @@ class Agreement:
 
 
 def on_first(comm: MPI.Intracomm, action: Callable[[], object]) -> None:
-    """Do something on the first process; what it raises there is raised on all of them."""
+    """Call ``action`` on the first process; all processes raise its exception."""
     error: BaseException | None = None
     if comm.rank == 0:
         try:
@@ -158,7 +158,7 @@ def on_first(comm: MPI.Intracomm, action: Callable[[], object]) -> None:
 
 
 def portable(error: BaseException | None) -> BaseException | None:
-    """Return an exception that other processes can receive: itself, or one with its message."""
+    """Return an exception that can be pickled: ``error``, or a RuntimeError with its message."""
     try:
         pickle.loads(pickle.dumps(error))
     except Exception:
@@ -167,7 +167,7 @@ def portable(error: BaseException | None) -> BaseException | None:
 
 
 def _completed(*requests: MPI.Request) -> bool:
-    """Wait for communication with the others, but not for ever."""
+    """Wait for communication up to :data:`GRACE`; return whether it completed."""
     end = time.monotonic() + GRACE
     while not MPI.Request.Testall(list(requests)):
         if time.monotonic() > end:
@@ -177,7 +177,7 @@ def _completed(*requests: MPI.Request) -> bool:
 
 
 def _abort(comm: MPI.Intracomm) -> None:
-    """End all processes, and say why."""
+    """End all processes, and print the reason."""
     print(  # noqa: T201
         f"ufl_beam: process {comm.rank} of {comm.size} failed; the others have not failed within "
         f"{GRACE:g} s and may wait for it, so all are ended",
@@ -185,24 +185,24 @@ def _abort(comm: MPI.Intracomm) -> None:
     )
     sys.stdout.flush()
     sys.stderr.flush()
-    time.sleep(0.3)  # mpirun forwards what was printed, but not after an abort
+    time.sleep(0.3)  # mpirun forwards output, but not after an abort
     comm.Abort(1)
 
 
-# -- exceptions that nobody catches ----------------------------------------------------------------
+# -- uncaught exceptions ---------------------------------------------------------------------------
 
 
 def _end(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
-    """Print an exception that nobody catches; abort unless all processes end with one.
+    """Print an uncaught exception; abort unless all processes end with an exception.
 
-    The script ends without a word if nobody reads its output any more, as in ``script | head``.
+    Nothing is printed if the output has no reader any more, as in ``script | head``.
     """
     if not (issubclass(kind, BrokenPipeError) and _write_to_nowhere()):
         _print_exception(kind, error, trace)
     if MPI.Is_finalized() or MPI.COMM_WORLD.size == 1:
         return
-    # MPI ends a process only when all of them end.  No collective call, which might meet one of
-    # those that the others are in.
+    # MPI ends a process only when all processes end.  A collective call could match a different
+    # call of the other processes, so messages are sent instead.
     world = MPI.COMM_WORLD
     others = [rank for rank in range(world.size) if rank != world.rank]
     told = [world.Isend(bytearray(), rank, FAILED) for rank in others]
@@ -212,7 +212,7 @@ def _end(kind: type[BaseException], error: BaseException, trace: TracebackType |
 
 
 def _write_to_nowhere() -> bool:
-    """Return whether nobody reads the output; then send what is left of it to nowhere."""
+    """Return whether the output has no reader; then redirect the rest to the null device."""
     try:
         output = sys.stdout.fileno()
         poll = select.poll()
@@ -229,8 +229,8 @@ _print_exception = sys.excepthook
 sys.excepthook = _end
 atexit.register(_write_to_nowhere)
 with suppress(ValueError):  # in a thread
-    # PETSc, which `dolfinx_compat` has imported before, has taken the signal, and ends with a page
-    # about it; back to Python's exception.
+    # `dolfinx_compat` has imported PETSc, whose signal handler ends with a page of text.  Restore
+    # Python's exception.
     signal.signal(signal.SIGPIPE, signal.getsignal(signal.SIGPIPE))
 
 
@@ -238,7 +238,7 @@ with suppress(ValueError):  # in a thread
 
 
 def print_once(*words: object, sep: str = " ") -> None:
-    """Print from the first process only, as scripts do that may run under ``mpirun``.
+    """Print from the first process only, for scripts that may run under ``mpirun``.
 
     Example:
         >>> ub.print_once("steps:", len(solution.times) - 1)  # once, on any number of processes
@@ -249,14 +249,13 @@ def print_once(*words: object, sep: str = " ") -> None:
 
 
 def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
-    """Make a bar of tqdm, which the first process shows if someone can see it.
+    """Create a tqdm bar, which the first process shows in a terminal or notebook.
 
-    Nothing is printed by members of a study, nor if the output is neither a terminal nor a
-    notebook, nor by what takes less than half a second.  A notebook whose kernel has TQDM_DISABLE=1
-    in its environment shows none, as in a documentation.
+    Members of a study show no bar, and work of less than half a second shows none.  A notebook
+    shows none if its kernel has TQDM_DISABLE=1 in its environment, for documentation.
 
     Args:
-        shown: Whether the user wants it.
+        shown: Whether the user wants a bar.
         comm: Processes that share the work.
         options: Arguments of tqdm.
     """
@@ -269,43 +268,43 @@ def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
     return tqdm(delay=DELAY, mininterval=DELAY, **options)
 
 
-# -- copies of a small scene -----------------------------------------------------------------------
+# -- redundant computation of a small scene --------------------------------------------------------
 
 TOLERANCE = 1e-8
-"""Difference of motions that counts, as a part of their size: far above round-off."""
+"""Relative difference of motions above which they differ: far above round-off."""
 
 SMALLEST_SHARE = 6_000
 """Scenes with fewer cells per process are computed by each process.
 
-Measured on two cores with lattices: two processes break even at some 3 000 cells each, and are 1.2
+Measured with lattices on two cores: two processes break even at some 3 000 cells each, and are 1.2
 times as fast at 6 000; see benchmarks/README.md.
 """
 
 INTERVAL = 256
-"""Most steps from one comparison to the next."""
+"""Largest number of steps between comparisons."""
 
 PATIENCE = 20.0
-"""Time for which a process waits for the others before it says so; s."""
+"""Time for which a process waits for the other processes before it warns; s."""
 
 _left: list[tuple[MPI.Request, Array]] = []
-"""Comparisons that nobody waits for; MPI needs their buffers until they are complete."""
+"""Abandoned comparisons; MPI needs their buffers until they are complete."""
 
 
 def sharing(comm: MPI.Intracomm, cells: int) -> MPI.Intracomm:
-    """Return the processes that share a scene with so many cells: all, or this one alone."""
+    """Return the processes that share a scene of ``cells`` cells: all, or this process alone."""
     return comm if cells >= comm.size * SMALLEST_SHARE else MPI.COMM_SELF
 
 
 class Copies:
-    """Copies of a small scene, one on each process.
+    """Redundant computation of a small scene, once on each process.
 
-    A function of the user that draws random numbers, or reads a clock, gives each process another
-    scene and another solution.  So all processes compare a weighted sum of all states so far: in
-    the background after 1, 2, 4, ... and then every :data:`INTERVAL` steps, and before anything is
-    written or given back.
+    If a user's function draws random numbers or reads a clock, each process has another scene and
+    another solution.  So all processes compare a weighted sum of all states so far: in the
+    background after 1, 2, 4, ... and then every :data:`INTERVAL` steps, and before results are
+    written or returned.
 
     Attributes:
-        several: False if there is one copy, and nothing to compare.
+        several: False if the scene is computed once, with nothing to compare.
     """
 
     def __init__(self, comm: MPI.Intracomm, share: Any) -> None:  # a `Share`, above this module
@@ -321,7 +320,7 @@ class Copies:
         _left[:] = [one for one in _left if not one[0].Test()]
 
     def note(self, t: float, q: Array) -> None:
-        """Take the state after a step into the comparison; raise if an earlier one failed."""
+        """Add the state after a step to the comparison; raise if an earlier comparison failed."""
         self._sum += float(self._weights @ q)
         self._size += float(self._weights @ np.abs(q))
         self._times += t
@@ -332,14 +331,14 @@ class Copies:
             self._post()
 
     def settle(self) -> None:
-        """Compare all states so far, together; all processes raise if they are not the same."""
+        """Compare all states so far, on all processes together; all raise if states differ."""
         if self._open and self._compared < self._steps:
             self._complete()
             self._post()
         self._complete()
 
     def leave(self) -> None:
-        """Tell the others, without waiting for them, that this process does not go on."""
+        """Report to the other processes, without waiting, that this process stops."""
         if self._open:
             before, self._open = self._pending, False
             self._post(failed=1.0)
@@ -347,20 +346,20 @@ class Copies:
             self._pending = None
 
     def _post(self, failed: float = 0.0) -> None:
-        """Begin a comparison: the largest and the smallest of what the processes have."""
+        """Begin a comparison: reduce the largest and smallest sums of all processes."""
         mine = np.array([self._sum, self._times, float(self._steps)])
         ends = np.concatenate([mine, -mine, [self._size, failed]])
         self._pending = self._comm.Iallreduce(MPI.IN_PLACE, ends, op=MPI.MAX), ends
         self._compared = self._steps
 
     def _complete(self) -> None:
-        """Wait for a comparison that was begun."""
+        """Wait for a pending comparison, and raise if states differ."""
         if self._pending is None:
             return
         (request, ends), self._pending = self._pending, None
         end = time.monotonic() + PATIENCE
         while not request.Test():
-            time.sleep(0.0)  # the others may need this core
+            time.sleep(0.0)  # another process may need this core
             if time.monotonic() > end:
                 end = math.inf
                 warn(

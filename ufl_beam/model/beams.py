@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Beams: undeformed axis, section along it, cells."""
+"""Beams: undeformed axis, cross-section, cells."""
 
 from __future__ import annotations
 
@@ -41,8 +41,8 @@ class Beam(Record, Member):
         start: First end; m.
         end: Last end; m.
         section: Its cross-section.
-        cells: Number of cells, of equal length in the parameter of the curve.  Places that
-            something is attached to, and corners, become vertices too.
+        cells: Number of cells, of equal length in the parameter of the curve.  Attachment points
+            and corners become vertices too.
         name: Name in messages and pictures.
         curve: Axis from ``s = 0`` at the start to ``s = 1`` at the end.
         corners: Parameters ``s`` that must be vertices.
@@ -50,11 +50,11 @@ class Beam(Record, Member):
             ``{0.0: Softening(limit, fracture_energy)}``.  A hinge is rigid until the moment at
             ``s`` reaches its limit; then it follows its law, :class:`Softening` or
             :class:`ElastoPlastic` (limit in N m, moduli in N m/rad, ``eta`` in N m s).  At an end
-            it comes before the law of the section; ``None`` there is an end without a hinge.
+            it replaces the hinge of the section; ``None`` there removes that hinge.
 
     Raises:
-        ModelError: Zero length, ``cells < 1``, coordinates that are no finite numbers, or hinges in
-            a section of fibres.
+        ModelError: Zero length, ``cells < 1``, coordinates that are not finite, or hinges in a
+            section of fibres.
 
     Example:
         >>> column = ub.Beam((0, 0), (0, 3), section, cells=6, name="column")
@@ -112,7 +112,7 @@ class Beam(Record, Member):
             )
 
     def _require_hinges(self) -> None:
-        """Raise :class:`ModelError` unless the plastic hinges are complete, and apart."""
+        """Raise :class:`ModelError` unless all plastic hinges have a law and are apart."""
         for s, law in self.hinges.items():
             require_number(s, f"{self.name}: hinge at")
             if not 0.0 <= s <= 1.0:
@@ -138,7 +138,7 @@ class Beam(Record, Member):
 
     @property
     def hinge_laws(self) -> dict[Place, HingeLaw]:
-        """Laws of the plastic hinges of zero length that the beam may have, by place."""
+        """Laws of all plastic hinges of zero length that the beam may have, by place."""
         laws: dict[float, HingeLaw | None] = dict.fromkeys((0.0, 1.0), self.section.hinge)
         laws |= {float(s): law for s, law in self.hinges.items()}
         return {self.at(s): law for s, law in laws.items() if law is not None}
@@ -148,7 +148,7 @@ class Beam(Record, Member):
         cls, center: Point, radius: float, angles: tuple[float, float], section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
-        """Circular arc from ``angles[0]`` to ``angles[1]`` (rad, counter-clockwise from x)."""
+        """Create a circular arc between two ``angles`` (rad, counter-clockwise from x)."""
         middle = require_vector(center, f"{name}: center")
         require_number(radius, f"{name}: radius", positive=True)
         first, last = require_vector(angles, f"{name}: angles")
@@ -163,7 +163,7 @@ class Beam(Record, Member):
         cls, points: Sequence[Point], section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
-        """Straight pieces through ``points``, rigidly joined; ``s`` is the part of the length."""
+        """Create straight pieces through ``points``, rigidly joined; ``s`` is length over total."""
         points = require_sequence(points, f"{name}: points")
         xy = [require_vector(p, f"{name}: point {i}") for i, p in enumerate(points)]
         if len(xy) < 2:
@@ -184,7 +184,7 @@ class Beam(Record, Member):
         cls, curve: Curve, section: Section, *,
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
-        """Any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
+        """Create a beam along any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
         a, b = (point_of(curve, s, f"{name}: curve") for s in (0.0, 1.0))
         return cls(a, b, section, cells=cells, name=name, curve=curve, hinges=hinges)
 
@@ -198,14 +198,14 @@ class Mesh:
 
     Args:
         refine: Factor on the number of cells between any two places of a beam; a whole number
-            divides each cell, ``Fraction(1, 2)`` joins two and two.
-        degree: Polynomial degree of displacements and rotations in a cell, 1, 2 or 3, integrated
-            with as many points.  Degrees 2 and 3 are for elastic beams only.
-        lumped: Take the lumped mass matrix of the beams: diagonal, with the row sums of the
-            consistent one.
+            divides each cell, ``Fraction(1, 2)`` merges cells in pairs.
+        degree: Polynomial degree p of displacements and rotations in a cell: 1, 2 or 3.  A cell
+            has p integration points.  Degrees 2 and 3 are for elastic beams only.
+        lumped: Use a lumped mass matrix of the beams: diagonal, with the row sums of the
+            consistent matrix.
 
     Raises:
-        ModelError: A number that makes no mesh.
+        ModelError: A number is out of range.
 
     Example:
         >>> fine = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=4))
@@ -235,42 +235,42 @@ class Mesh:
 
     @cached_property
     def nodes(self) -> Array:
-        """Places of the nodes in a cell, from 0 to 1, ascending: Gauss-Lobatto points."""
+        """Coordinates of the nodes in a cell, from 0 to 1, ascending: Gauss-Lobatto points."""
         inner = np.polynomial.legendre.Legendre.basis(self.degree).deriv().roots()
         return np.array([0.0, *((1 + x) / 2 for x in inner.tolist()), 1.0])
 
     @property
     def point_weights(self) -> Array:
-        """Parts of a cell that its Gauss points stand for."""
+        """Weights of the Gauss points of a cell; their sum is 1."""
         return np.asarray(np.polynomial.legendre.leggauss(self.degree)[1] / 2)
 
     @cached_property
     def parts(self) -> Array:
-        """Part of a uniform load on a cell, or of its mass, that each node bears."""
+        """Fractions of the mass of a cell, or of a uniform load on it, at its nodes."""
         p = self.degree
         at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)
         return np.asarray(1 / (p * (p + 1) * at**2))
 
     def weights(self, part: npt.ArrayLike) -> Array:
-        """Lagrange weights of the nodes of a cell in the values at parts of it; (..., nodes)."""
+        """Evaluate the Lagrange polynomials at ``part`` of a cell, from 0 to 1; (..., nodes)."""
         powers = np.power.outer(part, np.arange(self.degree + 1))
         return np.asarray(powers @ self._polynomials)
 
     def slopes(self, part: npt.ArrayLike) -> Array:
-        """Derivatives of :meth:`weights` by the part; (..., nodes)."""
+        """Evaluate the derivatives of :meth:`weights` by ``part``; (..., nodes)."""
         powers = np.arange(1, self.degree + 1) * np.power.outer(part, np.arange(self.degree))
         return np.asarray(powers @ self._polynomials[1:])
 
     @cached_property
     def _polynomials(self) -> Array:
-        """Coefficients of the polynomials that are one in one node, in columns."""
+        """Coefficients of the Lagrange polynomials, in columns."""
         return np.asarray(np.linalg.inv(np.vander(self.nodes, increasing=True)))
 
     def vertices(self, beam: Member, attached: Sequence[float]) -> list[float]:
-        """Parameters of the vertices of a beam, with its ends, corners and ``attached`` places.
+        """Return the vertices of a beam, with its ends, corners and ``attached`` places.
 
         Raises:
-            ModelError: Between two of those there are too few cells to be joined.
+            ModelError: ``refine`` gives no whole number of cells between two of these places.
         """
         given = beam.vertices(attached)
         if self.refine == 1:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rigid bodies, the ground, places to attach something to, point masses, initial velocities."""
+"""Rigid bodies, the ground, attachment points, point masses, initial velocities."""
 
 from __future__ import annotations
 
@@ -26,11 +26,11 @@ from ufl_beam.model.functions import Curve, Point, tangent_within
 from ufl_beam.model.records import NotNegative, Number, Record, Text, Vector
 
 TOGETHER = 1e-9
-"""Distance below which two places of a beam are one, as a part of a cell."""
+"""Distance below which two places of a beam coincide, as a fraction of a cell."""
 
 
 class Member(ABC):
-    """Base of :class:`Beam`: an axis with places on it; its attributes are those of a beam."""
+    """Base of :class:`Beam`: an axis with places on it, and the attributes of a beam."""
 
     called: ClassVar[str] = "Beam"  # in messages
     a: Point
@@ -43,26 +43,26 @@ class Member(ABC):
     section: Any
 
     def at(self, s: float) -> Place:
-        """Place at the parameter ``s`` of the axis, 0 at the start and 1 at the end.
+        """Return the place at the parameter ``s`` of the axis, 0 at the start and 1 at the end.
 
-        On straight beams, arcs and polylines ``s`` is the part of the length.
+        On straight beams, arcs and polylines ``s`` is the length from the start over the total.
         """
         return Place(self, s)
 
     @property
     def start(self) -> Place:
-        """Place at the first end, ``s = 0``."""
+        """Place at the start, ``s = 0``."""
         return Place(self, 0.0)
 
     @property
     def end(self) -> Place:
-        """Place at the last end, ``s = 1``."""
+        """Place at the end, ``s = 1``."""
         return Place(self, 1.0)
 
     def vertices(self, attached: Sequence[float]) -> list[float]:
-        """Parameters of the vertices: equal cells, the corners and what is ``attached``.
+        """Return the parameters of the vertices: equal cells, corners and ``attached`` places.
 
-        A place nearer to a regular vertex than :data:`TOGETHER` is that vertex.
+        A place within :data:`TOGETHER` of another vertex adds no vertex.
         """
         regular = [i / self.cells for i in range(self.cells + 1)]
         if not {*self.corners, *attached} - {0.0, 1.0}:
@@ -76,7 +76,7 @@ class Member(ABC):
 
 
 Beams = Annotated[Sequence[Member] | None, partial(require_all, kind=Member)]
-"""Field of a record with some beams; all of the scene without."""
+"""Field of a record with some beams; the default is all beams of the scene."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +119,7 @@ class Place:
 
     @property
     def direction(self) -> Point:
-        """Unit tangent of the undeformed axis; at a corner the mean of both sides."""
+        """Unit tangent of the undeformed axis; at a corner the mean direction of both sides."""
         edges = sorted({0.0, *self.beam.corners, 1.0})
         sides = [
             tangent_within(self.beam.curve, self.s, low, high)
@@ -148,7 +148,7 @@ class Body(Record):
         name: Name in messages and pictures.
 
     Raises:
-        ModelError: Coordinates that are no finite numbers, a negative mass or inertia.
+        ModelError: Coordinates that are not finite, or a negative mass or inertia.
 
     Example:
         >>> rotor = ub.Body((2, 0), mass=50.0, inertia=4.0, name="rotor")
@@ -167,7 +167,7 @@ class Body(Record):
         return self.name
 
     def at(self, x: float, y: float) -> Spot:
-        """The point of the body that is at (x, y) in the undeformed scene; m."""
+        """Return the point of the body that is at (x, y) in the undeformed scene; m."""
         return Spot(self, (x, y))
 
     @property
@@ -221,25 +221,25 @@ def ground(x: float, y: float) -> Spot:
 
 
 Anchor = Place | Spot
-"""Where something may be attached."""
+"""Attachment point of a joint, support, load, mass or connector."""
 
 Node = Place | Body
-"""Places of beams and bodies: they have a displacement and a rotation."""
+"""Place of a beam, or a body: it has a displacement and a rotation."""
 
 NodeDof = tuple[Node, int]
-"""A component of motion of a node: 0, 1 displacement, 2 rotation."""
+"""Degree of freedom of a node: components 0 and 1 are the displacement, 2 is the rotation."""
 
 
 class Representatives(dict[NodeDof, NodeDof]):
-    """Of components of motion that are equal, the one that stands for all; others are their own."""
+    """Representatives of equal degrees of freedom; any other represents itself."""
 
     def __missing__(self, dof: NodeDof) -> NodeDof:
         return dof
 
 
 def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
-    """Find the representatives of components of motion from groups of equal ones."""
-    # Numbers in the place of nodes, whose hashes take longer than all the rest.
+    """Find the representatives of degrees of freedom from groups of equal ones."""
+    # Numbers instead of nodes: to hash nodes would take longer than all the rest.
     number: dict[Node, int] = {}
     dofs: dict[int, NodeDof] = {}
     parent: dict[int, int] = {}
@@ -260,14 +260,14 @@ def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
 
 
 def node(anchor: Anchor) -> Node:
-    """Return the cross-section of a beam, or the body, that an anchor moves with."""
+    """Return the cross-section of a beam, or the body, to which an anchor is fixed."""
     return anchor.body if isinstance(anchor, Spot) else anchor
 
 
 def arm(anchor: Anchor, point: Point | None = None) -> Point:
-    """Return the vector from the node of an anchor to a point, by default its own; m.
+    """Return the vector from the node of an anchor to a point, by default the anchor; m.
 
-    All points of the ground are one: they do not move.
+    It is zero for points of the ground, which do not move.
     """
     if node(anchor) is GROUND:
         return 0.0, 0.0
@@ -277,12 +277,12 @@ def arm(anchor: Anchor, point: Point | None = None) -> Point:
 
 
 def carries(anchor: Anchor) -> bool:
-    """Return whether the displacement of an anchor is that of its node."""
+    """Return whether an anchor and its node have the same displacement."""
     return isinstance(anchor, Place) or math.hypot(*arm(anchor)) == 0.0
 
 
 def require_anchors(owner: str, *anchors: object) -> None:
-    """Raise :class:`ModelError` naming ``owner`` unless all are places to attach something to."""
+    """Raise :class:`ModelError` naming ``owner`` unless all are attachment points."""
     for anchor in anchors:
         if not isinstance(anchor, Place | Spot):
             raise ModelError(
@@ -292,7 +292,7 @@ def require_anchors(owner: str, *anchors: object) -> None:
 
 
 def require_node(place: object, owner: str) -> None:
-    """Raise :class:`ModelError` naming ``owner`` unless the motion of a place is that of a node."""
+    """Raise :class:`ModelError` naming ``owner`` unless a place moves like a node."""
     require_anchors(owner, place)
     if isinstance(place, Spot) and place.body is GROUND:
         raise ModelError(f"{owner}: {place} does not move")
@@ -311,7 +311,7 @@ class PointMass(Record):
     """Point mass, with rotary inertia, fixed to a place.
 
     Args:
-        place: Where.
+        place: Place to which it is fixed.
         mass: kg.
         inertia: About the place; kg m².
 
@@ -340,7 +340,7 @@ class Velocity(Record):
     """Initial velocity of beams and bodies that move as one rigid body.
 
     Args:
-        beams: The beams and bodies that move so.
+        beams: The beams and bodies with this velocity.
         linear: Velocity of the point ``about``; m/s.
         angular: Angular velocity; rad/s.
         about: Point of the undeformed scene, by default the origin; m.
@@ -357,7 +357,7 @@ class Velocity(Record):
     about: Annotated[Point | None, require_vector] = None
 
     def at(self, x: float, y: float) -> tuple[float, float, float]:
-        """(du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""
+        """Return (du/dt, dv/dt, dψ/dt) of the point (x, y); m/s, m/s, rad/s."""
         about_x, about_y = self.about or (0.0, 0.0)
         return (
             self.linear[0] - self.angular * (y - about_y),

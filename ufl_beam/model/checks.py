@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Checks of arguments, whose errors are those of a model."""
+"""Checks of arguments that raise :class:`ModelError`."""
 
 from __future__ import annotations
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Laws of connectors that a user states: energy, resistance, variables; functions."""
+"""Connector laws of users: energy, resistance and internal variables, or functions."""
 
 from __future__ import annotations
 
@@ -27,35 +27,35 @@ from ufl_beam.model.material_law import (
 from ufl_beam.model.records import Record, parameters_by_name
 
 LOSSES = ("damping", "friction", "functions", "connectors", "contact")
-"""Entries of the energy ledger of what connectors and dampers lose."""
+"""Entries of the energy ledger for losses in connectors and dampers."""
 
 ENTRIES = (
     *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
     *("numerical", "plastic", "hinges", *LOSSES),
 )
-"""Names that entries of the energy ledger have already."""
+"""Names of all entries of the energy ledger that the package uses."""
 
 IMAGINARY = 1e-30
-"""Part of a complex step, which leaves all digits to a derivative."""
+"""Size of a complex step; a derivative by it has no cancellation."""
 
 
 class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but one of two
-    """Base of the laws of connectors; a law of one's own is a frozen dataclass of it.
+    """Base of connector laws; a user's law is a frozen dataclass derived from it.
 
-    The fields of the dataclass are the numbers of the law.  Its methods are written with the
-    functions of ``ub.law_functions``.  A law states an energy, a resistance, or both: the force
-    that resists the growth of the motion is the derivative of the energy by the motion, plus the
-    resistance.  Work that is not stored is lost.  A law of what rubs states a limit, and perhaps a
-    sliding force, instead: the motion is held, without a stiffness, until the force is beyond the
-    limit, and again when it comes to rest.  See docs/extending_laws.md.
+    The fields of the dataclass are the parameters of the law.  Its methods use the functions of
+    ``ub.law_functions``.  A law states an energy, a resistance, or both: the force that resists
+    the growth of the motion is the derivative of the energy by the motion, plus the resistance.
+    Work that is not stored is lost.  A friction law states a limit instead, and perhaps a sliding
+    force: a constraint holds the motion until its force exceeds the limit, and again when the
+    motion comes to rest.  See docs/extending_laws.md.
 
     Attributes:
-        variables: Internal variables, and their values before anything has happened.
-        components: Motions that the law acts on; 2 or 3 of a law for :class:`Bushing`, whose
-            methods get tuples of motions and rates, and whose resistance is a tuple.
-        entry: Entry of the ledger, in ``lost``, of what is not stored.
-        active: True of a law that may give energy, such as a drive.  Else runs warn if the energy
-            that it has lost falls.
+        variables: Internal variables, and their initial values.
+        components: Number of motions on which the law acts.  A law for :class:`Bushing` has 2 or 3;
+            its methods get tuples of motions and rates, and its resistance is a tuple.
+        entry: Entry of the ledger, in ``lost``, for work that is not stored.
+        active: True if the law may supply energy, such as a drive.  Otherwise runs warn if the
+            energy that it has lost falls.
 
     Example:
         >>> from dataclasses import dataclass
@@ -83,19 +83,21 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
     active: ClassVar[bool] = False
 
     def energy(self, motion: Any, state: State) -> Values:
-        """Energy that can be had back, zero by default; J.
+        """Return the recoverable energy, zero by default; J.
 
         Args:
-            motion: m or rad; a tuple where there are several components.
+            motion: m or rad; a tuple for several components.
             state: Internal variables, as attributes.
         """
         return 0.0
 
     def resistance(self, motion: Any, rate: Any, state: State, dt: Values) -> Any:
-        """Force beside that of the energy, zero by default; N or N m; a tuple of several.
+        """Return the force in addition to the derivative of the energy; N or N m.
+
+        It is zero by default, and a tuple for several components.
 
         Args:
-            motion: At the time of the step at which the law holds; m or rad.
+            motion: Motion at the time of the step at which the law holds; m or rad.
             rate: Mean rate of the step; m/s or rad/s.
             state: Internal variables at the time of the motion.
             dt: Length of the step; s.
@@ -103,7 +105,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return 0.0 if self.components == 1 else self.components * (0.0,)
 
     def limit(self, state: State) -> Values:
-        """Force up to which the motion is held, none by default; N or N m.
+        """Return the force up to which a constraint holds the motion, zero by default; N or N m.
 
         Args:
             state: Internal variables at the beginning of the step.
@@ -111,31 +113,31 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return 0.0
 
     def sliding(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
-        """Size of the force against sliding, the limit by default; N or N m.
+        """Return the size of the force against sliding, the limit by default; N or N m.
 
         It has the arguments of :meth:`resistance`.
         """
         return self.limit(state)
 
     def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
-        """Changes of the variables over a backward-Euler step of length dt, in closed form.
+        """Return increments of the variables over a backward-Euler step dt, in closed form.
 
         Args:
-            motion: At the end of the step; m or rad.
+            motion: Motion at the end of the step; m or rad.
             rate: Mean rate; m/s or rad/s.
-            state: Variables at its beginning.
+            state: Variables at the beginning of the step.
             dt: s; infinite on a path.
         """
         return {}
 
     @property
     def holds(self) -> bool:
-        """True if the motion is held below a limit."""
+        """True if a constraint holds the motion below a limit."""
         return type(self).limit is not ConnectorLaw.limit
 
     @property
     def elastic(self) -> bool:
-        """True if the law loses nothing."""
+        """True if the law loses no energy."""
         lossless = type(self).resistance is ConnectorLaw.resistance and not self.holds
         return lossless and not self.variables
 
@@ -145,25 +147,25 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         return type(self).energy is not ConnectorLaw.energy
 
     def numbers(self) -> dict[str, Any]:
-        """Numbers of the law by name, its fields."""
+        """Return the parameters of the law by name, its fields."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def of(self, numbers: Mapping[str, Values]) -> ConnectorLaw:
-        """Return the law with arrays or symbols in the place of its numbers."""
+        """Return the law with arrays or symbols as parameters."""
         law = copy.copy(self)
         vars(law).update(numbers)
         return law
 
     def given(self, motions: Sequence[Values]) -> Any:
-        """Motions as the methods of the law get them: a number, or a tuple of several."""
+        """Return motions as arguments of the methods: a number, or a tuple of several."""
         return motions[0] if self.components == 1 else tuple(motions)
 
     def each(self, forces: Any) -> tuple[Values, ...]:
-        """Forces of the law as a tuple, also where there is one."""
+        """Return the forces of the law as a tuple, also for one component."""
         return (forces,) if self.components == 1 else tuple(forces)
 
     def elastic_forces(self, motions: Sequence[Values], state: State) -> list[Values]:
-        """Derivatives of the energy by the motions, arrays of real numbers; N or N m."""
+        """Return the derivatives of the energy by the motions, real arrays; N or N m."""
         forces = []
         for i, motion in enumerate(motions):
             moved = [*motions[:i], motion + IMAGINARY * 1j, *motions[i + 1 :]]
@@ -177,7 +179,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
 
 
 def require_connector_law(law: ConnectorLaw, what: str) -> None:
-    """Raise :class:`ModelError` unless a law of a connector is complete; it is called at no motion.
+    """Raise :class:`ModelError` unless a connector law is complete; it is called at zero motion.
 
     Its methods are compiled when a run begins.
     """
@@ -245,7 +247,7 @@ CALLED = ("energy", "limit", "resistance", "sliding", "increments")
 
 
 def require_limit(law: ConnectorLaw, what: str) -> None:
-    """Raise :class:`ModelError` unless increments of a law have a limit for ever longer steps."""
+    """Raise :class:`ModelError` unless increments of a law are finite for an infinite step."""
     motion, rest = (law.given([np.full(1, x)] * law.components) for x in (0.5, 0.0))
     with np.errstate(all="ignore"):
         changes = law.increments(motion, rest, initial_state(law), np.inf) if law.variables else {}
@@ -268,9 +270,9 @@ def stated_at(law: object) -> str:
 
 
 def judges_loss(law: ConnectorLaw) -> bool:
-    """Return whether what a law of a connector loses is its own dissipation, whatever the step.
+    """Return whether the loss of a connector law is its own dissipation, for steps of any length.
 
-    With variables it is, up to an error of the step, unless the energy is quadratic.
+    A law with variables has an error of the step in its loss, unless its energy is quadratic.
     """
 
     def energy(factor: float) -> list[float]:
@@ -296,18 +298,18 @@ class ForceLaw(Record):
     """Force of a connector as a function of its motion and rate, of time and its own history.
 
     Args:
-        force: ``force(motion, rate)``; N or N m; a positive one resists growth.  It is evaluated
-            where loads are, in dynamics in the middle of the step.  By name it may ask for ``t``,
-            the time of that (s), ``dt``, the length of the step (s), and ``state``, the internal
-            variables before it; then it returns the force and those after the step.
+        force: ``force(motion, rate)``; N or N m; a positive force resists growth.  It is evaluated
+            at the time of loads, in dynamics in the middle of the step.  It may have the parameters
+            ``t``, this time (s), ``dt``, the length of the step (s), and ``state``, the internal
+            variables before the step.  With ``state`` it returns the force and the new variables.
         state: Internal variables before the run.
-        stored: ``stored(motion)``, or ``stored(motion, state)``, the energy that can be had back;
-            J.  It is in the entry "stored" of the ledger, and the work that the law takes beyond it
-            in the entry "functions"; without it all of the work.
+        stored: ``stored(motion)``, or ``stored(motion, state)``, the recoverable energy; J.  The
+            ledger has it in the entry "stored", and the rest of the work on the law in the entry
+            "functions".  By default all work is in "functions".
 
     Raises:
-        ModelError: A parameter that is not known; a state that the function does not ask for, or
-            that it does and is not there.
+        ModelError: A function has an unknown parameter, or only one of ``state`` and the parameter
+            ``state`` of ``force`` is given.
 
     Example:
         >>> law = ub.ForceLaw(lambda motion, rate: 1e6 * motion + 1e9 * motion**3)
@@ -344,16 +346,16 @@ class ForceLaw(Record):
                 "ForceLaw: the function does not ask for the state; let it have a parameter state, "
                 "and return the force and the state after the step"
             )
-        _ = self.asked, self.asked_by_stored  # which refuse names that nobody knows
+        _ = self.asked, self.asked_by_stored  # raises for unknown names
 
     @property
     def asked(self) -> tuple[str, ...]:
-        """Names by which the function asks for more than motion and rate."""
+        """Names of the parameters of the function after motion and rate."""
         return self._names(self.force, "force", "t", "dt", after=2)
 
     @property
     def asked_by_stored(self) -> tuple[str, ...]:
-        """Names by which the energy asks for more than the motion."""
+        """Names of the parameters of the energy after the motion."""
         return self._names(self.stored, "stored", after=1) if self.stored else ()
 
     def _names(

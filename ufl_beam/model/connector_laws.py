@@ -27,7 +27,7 @@ from ufl_beam.model.softening_laws import (
 )
 
 OWN_LAW = "state a ConnectorLaw of your own"
-"""Message of classes that are closed."""
+"""Message of classes without subclasses."""
 
 
 @closed(OWN_LAW)
@@ -36,7 +36,7 @@ class PrescribedMotion(Record):
     """Prescribed relative motion of a connector; its force is unknown.
 
     Args:
-        motion: In time; m or rad.  Zero, which joints use, holds it.
+        motion: Motion over time; m or rad.  Joints use zero, which holds it.
 
     Example:
         >>> motor = ub.Turn(
@@ -54,10 +54,10 @@ class PrescribedMotion(Record):
 @closed(OWN_LAW)
 @dataclass(frozen=True, repr=False)
 class PrescribedForce(Record):
-    """Prescribed force or moment of a connector; a positive one makes the motion grow.
+    """Prescribed force or moment of a connector; a positive force makes the motion grow.
 
     Args:
-        force: In time; N or N m.
+        force: Force over time; N or N m.
 
     Example:
         >>> jack = ub.Slide(
@@ -73,32 +73,32 @@ class PrescribedForce(Record):
 
 
 class Bearing:
-    """Base of joints and supports: their force may press on places that rub."""
+    """Base of joints and supports: their force may be the normal force of friction."""
 
 
 class Running(Protocol):
-    """Simulation between two steps, as laws of connectors see it."""
+    """Simulation between two steps, as connector laws see it."""
 
     t: float
     """Time; s."""
 
     def press(self, joint: Any) -> float:
-        """Return the force that a joint or support bears across its motion; N."""
+        """Return the magnitude of the force of a joint or support; N."""
 
 
 @closed(OWN_LAW)
 @dataclass(frozen=True, repr=False)
 class Controller(Record):
-    """Force by a function of the running simulation, constant until it is evaluated again.
+    """Force by a function of the running simulation, constant until the next evaluation.
 
-    The force acts a step, or a sample time, after the state that it is computed from.  A force of
+    The force acts a step, or a sample time, after the state from which it is computed.  A force of
     ``kd`` times a rate grows without bound, or changes its sign each time, unless
     ``kd sample < 2 J``; J is the inertia that the force accelerates within that time.  At the end
-    of a beam without a body this is nearly nothing.  :class:`ForceLaw` has no such delay.
+    of a beam without a body J is nearly zero.  :class:`ForceLaw` has no such delay.
 
     Args:
-        force: ``force(simulation)``; N or N m; a positive one makes the motion grow.  It may ask
-            the simulation for its time, motions, velocities and the forces of joints.
+        force: ``force(simulation)``; N or N m; a positive force makes the motion grow.  It may read
+            the time, motions, velocities and forces of joints of the simulation.
         sample: Sample time, from the beginning of the run; s.  Steps end at samples.  By default
             the force is computed at every step.
 
@@ -117,7 +117,7 @@ class Controller(Record):
     sample: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def ask(self, simulation: Running, link: object) -> float:
-        """Evaluate the force of ``link`` from now on; all processes call it together."""
+        """Evaluate the force of ``link`` for the next steps; all processes call it together."""
         at = f"t = {simulation.t:.9g} s"
         return require_returned(self.force(simulation), f"{link}: the controller", at, finite=True)
 
@@ -129,11 +129,11 @@ class Spring(Record):
 
     Args:
         stiffness: N/m or N m/rad.
-        law: How it yields; limit in N or N m, moduli as the stiffness.
-        softening: How it breaks; energy in J.
+        law: Law of yielding; limit in N or N m, moduli in the unit of the stiffness.
+        softening: Law of fracture; energy in J.
 
     Raises:
-        ModelError: A stiffness that is not positive.
+        ModelError: The stiffness is not positive.
 
     Example:
         >>> spring = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))  # N/m
@@ -172,20 +172,20 @@ class Damper(Record):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Stop(Record, ConnectorLaw):
-    """Stop: a contact force where the motion leaves an interval, elastic or damped.
+    """Stop: a contact force if the motion leaves an interval, elastic or damped.
 
     At a depth δ the force is stiffness δ (1 + damping dδ/dt), and never pulls (Hunt and Crossley
     1975).  It begins and ends at zero.  The lost energy is the entry "contact" of the ledger.
 
     Args:
         low, high: Ends of the interval; m or rad.
-        stiffness: Of the contact; N/m or N m/rad.
-        damping: s/m or s/rad.  A mass that arrives with the small velocity v leaves with the part
-            1 - 2/3 damping v of it.
+        stiffness: Contact stiffness; N/m or N m/rad.
+        damping: s/m or s/rad.  A mass that arrives with a small velocity v leaves with the
+            velocity (1 - 2/3 damping v) v.
 
     Raises:
-        ModelError: An interval that does not contain the undeformed scene, no stiffness, or a
-            negative damping.
+        ModelError: The interval does not contain 0, the stiffness is not positive, or the damping
+            is negative.
 
     Example:
         >>> buffer = ub.Slide(ub.ground(2, 0), beam.end, ub.Stop(1e9, low=-0.01), axis=(0, 1))
@@ -204,15 +204,15 @@ class Stop(Record, ConnectorLaw):
     damping: NotNegative = 0.0
 
     entry = "contact"
-    resists: ClassVar[bool] = False  # nothing is borne within the interval
+    resists: ClassVar[bool] = False  # no force within the interval
 
     def energy(self, motion: Values, state: State) -> Values:
-        """Energy of the depth; J."""
+        """Return the contact energy; J."""
         below, above = positive(self.low - motion), positive(motion - self.high)
         return self.stiffness * (below**2 + above**2) / 2
 
     def resistance(self, motion: Values, rate: Values, state: State, dt: Values) -> Values:
-        """Force of the damping, which takes at most all of the elastic one."""
+        """Return the damping force, at most as large as the elastic force if it pulls."""
         below, above = positive(self.low - motion), positive(motion - self.high)
         above = above * larger(self.damping * rate, -1.0)
         below = below * larger(-self.damping * rate, -1.0)
@@ -238,22 +238,23 @@ class Stop(Record, ConnectorLaw):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Clearance(Record, ConnectorLaw):
-    """Pin in a round hole that is larger: free within a gap, contact at its edge; of a Bushing.
+    """Pin in a larger round hole, of a Bushing: free within a gap, contact at its edge.
 
     At a depth δ beyond the gap the hole presses on the pin with stiffness δ (1 + damping dδ/dt), as
     a :class:`Stop`.  Friction acts along the edge, against the motion of the surface of the pin,
-    and turns it.  It sticks by an elastic deflection, as stiff as the contact, up to
-    ``friction`` times the pressing force.  The lost energy is the entry "contact" of the ledger.
+    and turns the pin.  A sticking contact deflects elastically, with the contact stiffness, up to
+    ``friction`` times the normal force.  The lost energy is the entry "contact" of the ledger.
 
     Args:
-        stiffness: Of the contact; N/m.
+        stiffness: Contact stiffness; N/m.
         gap: Difference of the radii of hole and pin; m.
-        damping: Of the contact; s/m.
-        friction: Coefficient of friction.  With one the law has the rotation as third component.
-        radius: Of the pin; m.
+        damping: Contact damping; s/m.
+        friction: Coefficient of friction.  If it is positive, the rotation is a third component.
+        radius: Radius of the pin; m.
 
     Raises:
-        ModelError: No stiffness, no gap, a negative number, or friction without a radius.
+        ModelError: Stiffness or gap is not positive, a parameter is negative, or only one of
+            friction and radius is given.
 
     Example:
         >>> hole = ub.Clearance(stiffness=1e8, gap=1e-3, friction=0.2, radius=0.02)
@@ -273,7 +274,7 @@ class Clearance(Record, ConnectorLaw):
     radius: NotNegative = 0.0
 
     entry = "contact"
-    resists: ClassVar[bool] = False  # nothing is borne within the gap
+    resists: ClassVar[bool] = False  # no force within the gap
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -287,39 +288,39 @@ class Clearance(Record, ConnectorLaw):
 
     @property
     def components(self) -> int:  # type: ignore[override]
-        """Displacements along and across the axis; with friction the rotation, too."""
+        """Number of components: displacements along and across the axis, rotation with friction."""
         return 3 if self.rubs else 2
 
     @property
     def variables(self) -> dict[str, float]:  # type: ignore[override]
-        """Elastic deflection of what sticks along the edge; m."""
+        """Elastic deflection of the sticking contact along the edge; m."""
         return {"deflection": 0.0} if self.rubs else {}
 
     def numbers(self) -> dict[str, Any]:
-        """Numbers that the law has, by name."""
+        """Return the parameters of the law by name."""
         unused = () if self.rubs else ("friction", "radius")
         return {name: x for name, x in super().numbers().items() if name not in unused}
 
     @property
     def elastic(self) -> bool:
-        """True if nothing is lost."""
+        """True if the law dissipates no energy."""
         return self.damping == 0.0 and not self.rubs
 
     def _contact(self, motion: Any, rate: Any = (0.0, 0.0)) -> tuple[Values, ...]:
-        """Elastic and damping force, N, and their direction, from the middle of hole to pin."""
+        """Return elastic and damping force, N, and their direction, from hole to pin centre."""
         x, y = motion[:2]
-        r = sqrt(larger(x**2 + y**2, (self.gap / 2) ** 2))  # not zero, where there is no direction
+        r = sqrt(larger(x**2 + y**2, (self.gap / 2) ** 2))  # a zero radius has no direction
         x, y, elastic = x / r, y / r, self.stiffness * positive(r - self.gap)
         return elastic, elastic * larger(self.damping * (x * rate[0] + y * rate[1]), -1.0), x, y
 
     def energy(self, motion: Any, state: State) -> Values:
-        """Energy of the depth, and of the deflection of what sticks; J."""
+        """Return the energy of contact and of the deflection by friction; J."""
         pressure, *_ = self._contact(motion)
         stored = pressure**2 / (2 * self.stiffness)
         return stored + self.stiffness * state.deflection**2 / 2 if self.rubs else stored
 
     def resistance(self, motion: Any, rate: Any, state: State, dt: Values) -> Any:
-        """Forces of damping and friction; N, N and N m."""
+        """Return the forces of damping and friction; N, N and N m."""
         _, damped, x, y = self._contact(motion, rate)
         if not self.rubs:
             return damped * x, damped * y
@@ -327,7 +328,7 @@ class Clearance(Record, ConnectorLaw):
         return damped * x - rubbing * y, damped * y + rubbing * x, rubbing * self.radius
 
     def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
-        """The surface of the pin takes the deflection along, up to the limit."""
+        """Move the deflection with the surface of the pin, up to the limit of friction."""
         if not self.rubs:
             return {}
         elastic, damped, x, y = self._contact(motion, rate)
@@ -343,16 +344,16 @@ class Coulomb(Record):
     """Coulomb friction: sticks below a limit of the force, slides at the limit.
 
     The limit is ``force``, plus ``coefficient`` times the force of a joint at the end of the
-    previous step.  Sticking has no stiffness: the motion is held exactly.
+    previous step.  Sticking has no stiffness: a constraint holds the motion.
 
     Args:
-        force: Constant part of the limit; N or N m.
+        force: Constant term of the limit; N or N m.
         coefficient: Coefficient of friction; for rotations times the radius of the pin; 1 or m.
-        joint: Joint or support that provides the normal force.  Joints must be ``measured``, or
-            hold their places with forces anyway, as :class:`Prismatic` and :class:`Link` do.
+        joint: Joint or support that provides the normal force.  A joint needs ``multipliers``,
+            unless it always has constraint forces, as :class:`Prismatic` and :class:`Link` do.
 
     Raises:
-        ModelError: No limit, or a coefficient without a joint.
+        ModelError: Force and coefficient are zero, or only one of coefficient and joint is given.
 
     Example:
         >>> brake = ub.Turn(ub.ground(0, 0), beam.start, ub.Coulomb(1e3))  # N m
@@ -389,7 +390,7 @@ OWN_HINGE = (
 )
 
 HingeLaw = SofteningLaw | ElastoPlastic
-"""Laws of a plastic hinge of zero length, which has no elasticity of its own."""
+"""Laws of a plastic hinge of zero length, which is not elastic itself."""
 
 
 def require_hinge_law(law: object, what: str) -> None:
@@ -423,16 +424,16 @@ def require_hinge_law(law: object, what: str) -> None:
 class RigidPlastic(Record):
     """Rigid-plastic law: no motion below a limit of the force, flow or softening at it.
 
-    There is no elastic stiffness: below the limit the motion is held exactly, and nothing else may
-    hold it, see docs/warnings.md.  Plastic hinges of beams, ``Beam(hinges={s: law})``, are
-    rotations with this law.
+    There is no elastic stiffness: below the limit a constraint holds the motion.  No other
+    constraint may hold it, see docs/warnings.md.  Plastic hinges of beams,
+    ``Beam(hinges={s: law})``, are rotations with this law.
 
     Args:
         law: A :class:`SofteningLaw` or :class:`ElastoPlastic`; limit in N m or N, moduli in N m/rad
             or N/m, fracture energy in J.
 
     Raises:
-        ModelError: A law of another kind, or one that relaxes an elastic stress.
+        ModelError: A law of another kind, or with :class:`DuvautLions` viscosity.
 
     Example:
         >>> fuse = ub.RigidPlastic(ub.ElastoPlastic(yield_limit=5e4))  # N m
@@ -446,7 +447,7 @@ class RigidPlastic(Record):
 @closed(OWN_LAW)
 @dataclass(frozen=True)
 class Guide(Record):
-    """The point stays on a curve of the plane, free along it; see :class:`Guided`."""
+    """Constraint of a point to a curve of the plane, free along it; see :class:`Guided`."""
 
     # ``s -> (x, y)``, smooth, for all s that the motion may reach; m
     curve: Annotated[Curve, partial(require_function, of="s that returns (x, y)")]
@@ -465,7 +466,7 @@ RESISTING = (*HOLDING, Spring, ForceLaw, RigidPlastic)
 
 
 def resists(law: Law) -> bool:
-    """Return whether a law resists every motion; others bear nothing, or what they are told."""
+    """Return whether a law resists every motion; other laws may bear no force, or a given one."""
     return law.resists if isinstance(law, ConnectorLaw) else isinstance(law, RESISTING)
 
 
@@ -475,4 +476,4 @@ def rubs(law: object) -> bool:
 
 
 HELD = PrescribedMotion(Constant(0.0))
-"""The law of what a joint holds."""
+"""Law of the connectors of a joint."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Connectors: a relative motion of two places, and the law that it follows; plastic hinges."""
+"""Connectors: a relative motion of two places, and the law of its force; plastic hinges."""
 
 from __future__ import annotations
 
@@ -24,19 +24,19 @@ Factors = tuple[float, float, float]
 
 
 class Connector(ABC):
-    """Relative motion of two anchors with a force law; base of :class:`Turn` and its siblings.
+    """Relative motion of two anchors with a force law; base of :class:`Turn` and others.
 
     The motion is zero in the undeformed scene.  The force of a connector resists its growth: it is
     positive in a spring that is stretched, and negative in a motor that drives.
 
     Attributes:
-        motion: Which relative motion; a name in ``relative_motions.MOTIONS``.
+        motion: Name of the relative motion in ``relative_motions.MOTIONS``.
         a, b: The anchors.
         law: Law of its force.
-        axis: Unit vector, for motions along one.
-        corner: The point of frame a that is meant, if it is not that of the anchor.
-        component: Which motion of its law it is, in a :class:`Bushing`.
-        components: Connectors of its components, of a :class:`Bushing`.
+        axis: Unit vector, for motions along an axis.
+        corner: Point of frame a, if it is not the point of the anchor.
+        component: Index of the motion in the law of a :class:`Bushing`.
+        components: Connectors of the components of a :class:`Bushing`.
 
     Example:
         >>> spring = ub.Slide(ub.ground(2, 0), beam.end, ub.Spring(1e6), axis=(0, 1))
@@ -93,12 +93,12 @@ class Connector(ABC):
 
     @property
     def turns(self) -> bool:
-        """True if the motion is a rotation: rad and N m in the place of m and N."""
+        """True if the motion is a rotation: rad and N m instead of m and N."""
         return self.motion == "turning"
 
     @property
     def stretches(self) -> bool:
-        """True if the motion is that of the distance of the points."""
+        """True if the motion is a change of the distance of the points."""
         return self.motion == "stretching"
 
     @property
@@ -107,7 +107,7 @@ class Connector(ABC):
         return self.motion == "sliding"
 
     def rigidly(self) -> tuple[Factors, Factors]:
-        """Return the derivatives of the motion by those of both nodes, in the undeformed scene."""
+        """Return the derivatives of the motion by (u, v, ψ) of nodes a and b, undeformed."""
         if self.turns:
             return (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
         (dx, dy), length = self.apart, math.hypot(*self.apart)
@@ -140,7 +140,7 @@ class Stretch(Connector):
     """Connector of the distance between ``a`` and ``b``: springs, dampers, actuators; m, N.
 
     Raises:
-        ModelError: Both are at the same point, so that there is no direction.
+        ModelError: Both are at the same point, so that no direction exists.
 
     Example:
         >>> rod = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e6))
@@ -162,7 +162,7 @@ class Slide(Connector):
     """Connector of the displacement of ``b`` along an axis that turns with ``a``; m, N.
 
     Args:
-        a: Whose axis it is; it may be on the ground.
+        a: Place with which the axis turns; it may be on the ground.
         b: Place that moves along the axis.
         law: Law of the force along the axis.
         axis: Direction in the undeformed scene; from ``a`` to ``b`` by default.
@@ -191,12 +191,12 @@ class Slide(Connector):
 class Bushing(Connector):
     """Connector of two or three components of the motion of ``b`` relative to ``a``; N, N m.
 
-    The components are the displacement along an axis that turns with ``a``, that across it, 90
-    degrees further, and of laws with three components the rotation.  All are zero in the undeformed
-    scene.  Solutions have the histories of all components, in this order.
+    The first is the displacement along an axis that turns with ``a``, the second the displacement
+    along the normal, 90 degrees counter-clockwise.  The third, if the law has it, is the rotation.
+    All are zero in the undeformed scene.  Solutions have their histories in this order.
 
     Args:
-        a: Whose axis it is; it may be on the ground.
+        a: Place with which the axis turns; it may be on the ground.
         b: Place that moves; it may be at the same point.
         law: A :class:`ConnectorLaw` with two or three components, such as :class:`Clearance`.
         axis: Direction of the first component in the undeformed scene.
@@ -244,7 +244,7 @@ class Bushing(Connector):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Component(Connector):
-    """One relative motion that a joint, a plastic hinge or a bushing consists of."""
+    """One relative motion of a joint, a plastic hinge or a bushing."""
 
     owner: str
     motion: str
@@ -257,7 +257,7 @@ class Component(Connector):
 
     @property
     def kind(self) -> str:
-        """Name for messages: that of its owner."""
+        """Name of its owner, for messages."""
         return self.owner
 
 
@@ -266,7 +266,7 @@ UNIT = 4 * sys.float_info.epsilon
 
 
 def unit_axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
-    """Unit vector along an axis, by default from ``a`` to ``b``."""
+    """Return the unit vector along an axis, by default from ``a`` to ``b``."""
     require_anchors(kind, a, b)
     (ax, ay), (bx, by) = a.point, b.point
     x, y = (bx - ax, by - ay) if axis is None else require_vector(axis, f"{kind}: axis")
@@ -276,7 +276,7 @@ def unit_axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
             f"{kind}({a}, {b}): the axis has zero length; give axis = (x, y), a direction in the "
             "undeformed scene"
         )
-    if abs(length - 1.0) <= UNIT:  # of a file: it must not change
+    if abs(length - 1.0) <= UNIT:  # read from a file: it must not change
         return x, y
     return x / length, y / length
 
@@ -299,13 +299,13 @@ def plastic_hinges(
     bearing: Iterable[Anchor],  # where supports, connectors or masses bear a moment
     loaded: Iterable[Anchor],  # where loads are moments
 ) -> tuple[Connector, ...]:
-    """Plastic hinges of zero length, as connectors of both sides; motions are jumps of rotation.
+    """Return plastic hinges of zero length as connectors; their motions are jumps of rotation.
 
-    A beam has its ``hinges``, and a hinge at each end if its section has one.  There is
-    none at an end that bears no moment, nor at one where nothing but a load is: the load acts on
-    the member, as nothing beyond a hinge could bear it.  Where two members meet and nothing else
-    bears a moment, both have the same moment; then only the weaker one has a hinge, as the other
-    one never opens.
+    A beam has its ``hinges``, and a hinge at each end if its section has one.  An end has no hinge
+    if it bears no moment, or if only a load acts there: the load acts on the member, because
+    nothing beyond the hinge could bear it.  Where two members meet and nothing else bears a
+    moment, both have the same moment.  Then only the weaker member has a hinge, because the hinge
+    of the stronger would never open.
     """
     laws = {place: law for place, law in may_have.items() if law.opens}
     if not laws:
@@ -342,7 +342,7 @@ def law_of(link: Connector) -> HingeLaw:
 
 
 def place_of(hinge: Connector) -> Place:
-    """Return the place of a plastic hinge, on the side that joints and loads are attached to."""
+    """Return the place of a plastic hinge, on the side of joints and loads."""
     if not isinstance(hinge.a, Place):
         raise ModelError(f"{hinge}: it is not a plastic hinge of a beam")
     return hinge.a.beam.at(hinge.a.s)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Rank analysis: what may move without strain, and what is held twice."""
+"""Rank analysis: motions without strain, and redundant constraints."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 
 INSTEAD = "Add supports or joints, or run dynamics (EnergyMomentum)"
-"""What to do where statics has no unique answer."""
+"""Advice if statics has no unique answer."""
 
 LAST_DIGITS = 1e-12
-"""Strain, or motion over the size of the scene, whose stress is round-off."""
+"""Strain, or motion over the size of the scene, that causes a stress of round-off."""
 
 DENSE = 90
-"""Up to this number of unknowns the null space comes from a dense decomposition."""
+"""Largest number of unknowns for a null space by a dense decomposition."""
 
 
 def require_masses(scene: Scene) -> None:
-    """Raise :class:`ModelError` if a body that may move has no mass, unless a beam carries it."""
+    """Raise :class:`ModelError` if a free body has no mass, unless it is joined to a beam."""
     if not scene.bodies:
         return
     same, moved = scene.representatives, _fixed(scene)
@@ -62,10 +62,10 @@ def require_masses(scene: Scene) -> None:
 
 
 def require_inertia(scene: Scene) -> None:
-    """Raise :class:`ModelError` if a part of the scene has no mass and nothing determines it.
+    """Raise :class:`ModelError` if a beam or body can move without inertia and resistance.
 
-    Its rigid motions must be held, by stiffness, damping or constraints, or have inertia: else the
-    equations of motion are singular.
+    Rigid motions without inertia need stiffness, damping or constraints.  Otherwise the equations
+    of motion are singular.
     """
     inertias = [(s.rhoA, s.rhoA, s.rhoA or s.rhoI) for s in (beam.section for beam in scene.beams)]
     inertias += [(one.mass, one.mass, one.inertia) for one in scene.bodies]
@@ -99,21 +99,21 @@ def require_inertia(scene: Scene) -> None:
 
 
 def _fixed(scene: Scene) -> set[NodeDof]:
-    """Return the components of motion that the ground and supports give."""
+    """Return the degrees of freedom that the ground and supports prescribe."""
     same = scene.representatives
     by_supports = {same[node(s.place), c] for s in scene.supports if not s.angle for c in s.held}
     return {same[GROUND, component] for component in range(3)} | by_supports
 
 
 Row = list[tuple[Node, Array]]
-"""A linear constraint of nodes, with the factors of (u, v, size ψ) of each."""
+"""Linear constraint: nodes, and the factors of (u, v, size ψ) of each."""
 
 
 def require_independent(scene: Scene) -> None:
     """Raise :class:`ModelError` if constraints repeat or contradict each other.
 
-    They do if their gradients in the undeformed scene, by what moves freely, are dependent.  What
-    is rigid-plastic is a constraint below its limit.
+    They do if their gradients by the free degrees of freedom are linearly dependent in the
+    undeformed scene.  A rigid-plastic connector is a constraint below its limit.
     """
     rows, within = _dependences(scene)
     if within.shape[1] == 0:
@@ -140,7 +140,7 @@ def require_independent(scene: Scene) -> None:
 
 
 def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
-    """Supports that hold motions of some constraints, and joints that make their ends equal."""
+    """Iterate over supports that hold ends of constraints, and joints that make ends equal."""
     same = scene.representatives
     supports = {same[node(s.place), c]: s for s in scene.supports for c in s.held if not s.angle}
     for row in rows:
@@ -153,16 +153,17 @@ def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
 
 
 def friction_repeats(scene: Scene) -> bool:
-    """Return whether places that stick hold what is held already, by joints or by each other."""
+    """Return whether constraints of sticking friction are redundant."""
     rubbing = any(rubs(link.law) for link in scene.links)
     return rubbing and _dependences(scene, rubbing=True)[1].shape[1] > 0
 
 
 def _dependences(scene: Scene, rubbing: bool = False) -> tuple[list[tuple[object, Row]], Array]:
-    """Find dependent constraints: laws that hold, places that stick, supports in turned axes.
+    """Find dependent constraints of laws, of supports in rotated axes and of sticking friction.
 
-    Returns the constraints with their owners, those left out that are alone in moving something,
-    and, in columns, the combinations of constraints that vanish for all that can move.
+    Returns candidate constraints with their owners, and in columns the combinations of them that
+    vanish for all free degrees of freedom.  A constraint that alone acts on a degree of freedom is
+    independent; such constraints are removed from the candidates, one after the other.
     """
 
     def holds(link: Connector) -> bool:
@@ -180,7 +181,7 @@ def _dependences(scene: Scene, rubbing: bool = False) -> tuple[list[tuple[object
         for of, factors in row:
             for component, factor in enumerate(factors):
                 sums[same[of, component]] += factor
-        # Ends that are one node leave nothing but round-off.
+        # If both ends are one node, only round-off is left.
         moved.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
         for dof in moved[-1]:
             users[dof].add(number)
@@ -207,12 +208,13 @@ def _dependences(scene: Scene, rubbing: bool = False) -> tuple[list[tuple[object
 
 
 def require_no_mechanism(scene: Scene) -> str:
-    """Raise :class:`ModelError` if a part of the scene is free to move in statics.
+    """Raise :class:`ModelError` if the scene is a mechanism in statics.
 
-    An elastic beam resists every motion but the three rigid ones, so a motion without strain moves
-    each beam as a rigid body; it exists if joints and supports leave those motions a null space.
-    Loads may hold it, as its weight holds a pendulum.  Then the motion is described, for whoever
-    knows the tangent in equilibrium; the description is empty if nothing is free.
+    An elastic beam resists every motion except the three rigid ones, so a motion without strain
+    moves each beam as a rigid body.  It exists if the constraints on these motions have a null
+    space.  Loads may stabilize a mechanism, as weight stabilizes a pendulum.  So for a scene with
+    loads the result describes the motion, until the tangent in equilibrium is known.  The result is
+    empty if the scene is no mechanism.
     """
     free = _null_space(_constraints(scene))
     if free.shape[1] == 0:
@@ -230,7 +232,7 @@ def require_no_mechanism(scene: Scene) -> str:
 
 
 def _center(part: Member | Body) -> Point:
-    """Point about which the rigid motion of a beam or body is described."""
+    """Return the reference point for the rigid motion of a beam or body."""
     if isinstance(part, Body):
         return part.center
     (xa, ya), (xb, yb) = part.start.point, part.end.point
@@ -240,7 +242,7 @@ def _center(part: Member | Body) -> Point:
 def _rows(
     scene: Scene, acts: Callable[[Connector], bool], supports: Iterable[Support]
 ) -> Iterator[tuple[object, Row]]:
-    """Connectors that ``acts`` selects, and supports, with the rows of each."""
+    """Iterate over the constraints of supports and of connectors that ``acts`` selects."""
     for link in filter(acts, scene.links):
         unit = np.array([1.0, 1.0, 1.0 if link.turns else 1 / scene.size])
         ends = zip((link.a, link.b), link.rigidly(), strict=True)
@@ -256,10 +258,11 @@ def _constraints(
     acts: Callable[[Connector], bool] = lambda link: resists(link.law),
     also: Iterable[tuple[Anchor, int]] = (),
 ) -> csr_array:
-    """Matrix of constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
+    """Assemble constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
 
-    Joints, supports, connectors that ``acts`` selects and components of motion in ``also`` have
-    rows.  So have beams on which works of the user act, because a work may hold them.
+    Parts are beams and bodies.  Rows are of joints, of supports, of connectors that ``acts``
+    selects and of degrees of freedom in ``also``.  Beams with works of the user have rows too,
+    because a work may hold them.
     """
     unit = np.eye(3)
     rows: list[Row] = [
@@ -285,13 +288,13 @@ def _constraints(
 
 
 def _sparse(entries: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
-    """Matrix of entries (row, column, value); those at one place are added."""
+    """Build a sparse matrix of entries (row, column, value); duplicates are added."""
     rows, columns, values = np.array(entries).reshape(-1, 3).T
     return csr_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
 
 
 def _null_space(constraints: csr_array) -> Array:
-    """Orthonormal basis, in columns, of what ``constraints @ x = 0`` leaves free."""
+    """Return an orthonormal basis of the null space of ``constraints``, in columns."""
     unknowns = constraints.shape[1]
     if unknowns <= DENSE:
         _, sizes, rows = np.linalg.svd(constraints.toarray(), full_matrices=True)
@@ -303,7 +306,7 @@ def _null_space(constraints: csr_array) -> Array:
 
 
 def _moving(scene: Scene, mode: Array) -> list[str]:
-    """Describe the motions of the parts that move in a mode."""
+    """Describe the motions of beams and bodies in a mode."""
     parts: list[tuple[str, Member | Body]] = [(f"beam {i}", b) for i, b in enumerate(scene.beams)]
     parts += [(f"body {i}", body) for i, body in enumerate(scene.bodies)]
     found = []
@@ -320,9 +323,9 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
 
 
 def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
-    """Raise :class:`ModelError` if a law bears a stress at no strain, as with an eigenstrain.
+    """Raise :class:`ModelError` if a law has a stress at zero strain, as with an eigenstrain.
 
-    The undeformed scene is no state of equilibrium then; ``what`` begins with it.
+    Then the undeformed scene, from which ``what`` starts, is not in equilibrium.
     """
     size = scene.size
     laws: list[tuple[object, MaterialLaw, Array, Array]] = [
@@ -362,14 +365,14 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
 
 
 class Rated(Protocol):
-    """Time scheme, by the properties that a scene may need."""
+    """Properties of a time scheme that a scene may need."""
 
     has_mean_velocity: bool
     rings: bool
 
 
 def require_rates(scene: Scene, scheme: Rated) -> None:
-    """Raise :class:`ModelError` if a time scheme has not the rates that a scene needs."""
+    """Raise :class:`ModelError` if a time scheme lacks the rates that a scene needs."""
     name = type(scheme).__name__
     for owner, what in [*((c, c.law) for c in scene.links), *((x, x) for x in scene.loads)]:
         if (isinstance(what, RotatingFrame) or rubs(what)) and not scheme.has_mean_velocity:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Material points of a cross-section: resultants, or fibres; distributions of yield stresses."""
+"""Material points of a cross-section: resultants or fibres; distributions of yield stresses."""
 
 from __future__ import annotations
 
@@ -24,11 +24,11 @@ from ufl_beam.model.records import Positive, Record
 from ufl_beam.model.softening_laws import SofteningLaw, require_softening
 
 Below = Callable[[Array], Array]
-"""Area of a shape below y, from any line, and its first moment about y = 0; (2, n); m², m³."""
+"""Function of y: area of a shape up to y, less a constant, and its first moment; (2, n); m², m³."""
 
 
 class Kind(NamedTuple):
-    """A law whose numbers do not matter, and their names."""
+    """A law with all parameters equal to 1, and the names of the parameters."""
 
     law: MaterialLaw
     numbers: tuple[str, ...]
@@ -41,13 +41,13 @@ class Layout:
     The resultants of the section are the sums of weight times stress times ``strains``.
     """
 
-    strains: Values  # of each point per strain (Σ, Γ, K) of the section; (n, 3)
+    strains: Values  # derivatives of the strain of each point by (Σ, Γ, K) of the section; (n, 3)
     weights: Values  # area of fibres, 1 for resultants; (n,)
-    stiffness: Values  # elastic; (n,); of interacting resultants, strains and stiffness have rows
-    laws: tuple[tuple[MaterialLaw, int], ...]  # with the number of points in a row that follow them
-    rest: Values  # stiffness (axial, shear, bending) of what has no points; (3,)
+    stiffness: Values  # elastic; (n,); interacting resultants have a row each, but one weight
+    laws: tuple[tuple[MaterialLaw, int], ...]  # each with its number of consecutive points
+    rest: Values  # stiffness (axial, shear, bending) of resultants without points; (3,)
     softening: SofteningLaw | None  # law of the discontinuities, if points can break
-    breaking: slice  # the points that can
+    breaking: slice  # points that can break
     hinges: bool = False  # True if the discontinuity is one hinge, a jump of rotation
 
     def __post_init__(self) -> None:
@@ -55,7 +55,7 @@ class Layout:
 
     @property
     def elastic(self) -> bool:
-        """True if nothing can happen at the points."""
+        """True if the points neither yield nor break."""
         return self.softening is None and not self.yields
 
     @property
@@ -65,7 +65,7 @@ class Layout:
 
     @cached_property
     def kind(self) -> Kind:
-        """The law of one kind that points of the bulk follow, with numbers of their own."""
+        """The kind of law that all points of the bulk follow, each with its own parameters."""
         laws = [law for law, _ in self.laws if not law.elastic] or [self.laws[0][0]]
         kinds: dict[Kind, MaterialLaw] = {}
         for law in laws:
@@ -85,9 +85,9 @@ class Layout:
         return kind
 
     def numbers(self, keys: list[tuple[int, int]]) -> dict[str, Values]:
-        """Numbers of the laws at the points of many cells, each (cells, n).
+        """Return the parameters of the laws at the points of many cells, each (cells, n).
 
-        Random numbers depend on the keys of the cells and a seed.
+        Random values depend on the keys of the cells and a seed.
         """
         shape, first = (len(keys), len(self.weights)), 0
         columns = {name: np.zeros(shape) for name in self.kind.numbers}
@@ -107,13 +107,14 @@ class Fibres(Record):
     """Number and material law of the fibres of a section, P(93).
 
     Args:
-        law: Of each fibre; stresses in Pa.  A random limit is drawn for each fibre of each cell.
-        number: Of layers of equal thickness, where the shape of the section tells their areas.
-        softening: Law of the crack that opens in a fibre where the stress reaches its limit; Pa,
+        law: Law of each fibre; stresses in Pa.  A random limit is drawn for each fibre of each
+            cell.
+        number: Number of layers of equal thickness, if the shape of the section gives their areas.
+        softening: Law of the crack that opens in a fibre if the stress reaches its limit; Pa,
             J/m².
 
     Raises:
-        ModelError: A law is none, or ``number`` is no whole number from 1.
+        ModelError: A law has the wrong type, or ``number`` is not a whole number from 1.
 
     Example:
         >>> steel = ub.Fibres(ub.ElastoPlastic(355e6, isotropic=2e9), number=16)
@@ -130,7 +131,7 @@ class Fibres(Record):
 
 @dataclass(frozen=True, eq=False)
 class PlacedFibres:
-    """Fibres at their places in a section."""
+    """Fibres with their positions and areas in a section."""
 
     fibres: Fibres
     E: float  # Young's modulus; Pa
@@ -143,7 +144,7 @@ class PlacedFibres:
     def layers(
         cls, fibres: Fibres | None, E: float, h: float, below: Below, edges: Sequence[float] = ()
     ) -> PlacedFibres | None:
-        """Layers of equal thickness, if any, over the depth ``h``, cut at ``edges`` too; m."""
+        """Create layers of equal thickness over the depth ``h``, also cut at ``edges``; m."""
         if fibres is None:
             return None
         require_kind(fibres, Fibres, "Section: fibres")
@@ -165,7 +166,7 @@ class PlacedFibres:
         return float(self.E * self.A @ self.y**2)
 
     def layout(self, GA: float) -> Layout:
-        """Layout with one material point for each fibre; shear stays elastic."""
+        """Return the layout with one material point for each fibre; shear stays elastic."""
         n, softening = len(self.y), self.fibres.softening
         return Layout(
             strains=np.column_stack([np.ones(n), np.zeros(n), -self.y]),
@@ -190,8 +191,8 @@ def _require_seed(value: Any, what: str) -> None:
 class Distribution(Record, ABC):
     """Base of the distributions: a random positive quantity, the same on every process.
 
-    Each cell of each beam draws from a stream of its own, known by where the beam begins and ends,
-    so that neither the order of beams nor the number of processes changes what it gets.
+    Each cell of each beam draws from its own random stream, whose key follows from the ends of the
+    beam.  So values depend on neither the order of beams nor the number of processes.
     """
 
     _: KW_ONLY
@@ -199,17 +200,17 @@ class Distribution(Record, ABC):
 
     @abstractmethod
     def _law(self) -> Any:
-        """The distribution of SciPy."""
+        """Return the distribution of SciPy."""
 
     def draw(self, n: int, key: tuple[int, int]) -> npt.NDArray[np.float64]:
-        """``n`` independent values of the stream ``key``; none is negative; shape (n,)."""
+        """Draw ``n`` independent values of the stream ``key``, at least zero; shape (n,)."""
         stream = np.random.default_rng(np.random.SeedSequence(int(self.seed), spawn_key=key))
         return np.asarray(np.maximum(self._law().rvs(n, random_state=stream), 0.0))
 
 
 @dataclass(frozen=True)
 class _ByMoments(Distribution):
-    """Base of the distributions that are given by mean and standard deviation."""
+    """Base of the distributions with a mean and a standard deviation."""
 
     mean: Positive
     deviation: Positive
@@ -224,7 +225,7 @@ class Normal(_ByMoments):
         seed: The same seed gives the same scene again.
 
     Raises:
-        ModelError: Mean or deviation are not positive, or the seed is no whole number.
+        ModelError: Mean or deviation is not positive, or the seed is not a whole number from 0.
 
     Example:
         >>> limit = ub.Normal(mean=355e6, deviation=25e6, seed=1)
@@ -236,7 +237,7 @@ class Normal(_ByMoments):
 
 
 class TruncatedNormal(_ByMoments):
-    """Normal distribution of these parameters, truncated to positive values.
+    """Normal distribution with these parameters, truncated to positive values.
 
     Example:
         >>> limit = ub.TruncatedNormal(mean=30e6, deviation=20e6, seed=1)
@@ -266,13 +267,13 @@ class Weibull(Distribution):
     """Weibull distribution of positive values, for strengths.
 
     Args:
-        scale: Value that a part exp(-1) of all values exceeds; Pa for fibres, N or N m for
+        scale: Value that is exceeded with probability exp(-1); Pa for fibres, N or N m for
             resultants.
-        shape: Weibull's modulus; the larger, the less scatter.
+        shape: Weibull modulus; a larger modulus means less scatter.
         seed: The same seed gives the same scene again.
 
     Raises:
-        ModelError: Scale or shape are not positive, or the seed is no whole number.
+        ModelError: Scale or shape is not positive, or the seed is not a whole number from 0.
 
     Example:
         >>> limit = ub.Weibull(scale=355e6, shape=20.0, seed=1)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Functions of users: curves of the plane, and functions of time."""
+"""Users' functions: curves of the plane, and functions of time."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ Point = tuple[float, float]
 Curve = Callable[[float], Sequence[float]]
 
 REACH = 1e-3
-"""Step of the differences that give tangents, as a part of a length.  Their error is some 1e-12 for
-a curve with a radius of that length; round-off costs three digits of the coordinates."""
+"""Step of finite differences for tangents, as a fraction of a length.  Their error is some 1e-12
+for a curve with a radius of this length; round-off costs three digits of the coordinates."""
 
 PROJECTIONS = 50
 """Largest number of iterations in the search for the nearest point of a curve."""
@@ -38,10 +38,10 @@ WEIGHTS = np.array(
     [[-25, 48, -36, 16, -3], [-3, -10, 18, -6, 1], [1, -8, 0, 8, -1],
      [-1, 6, -18, 10, 3], [3, -16, 36, -48, 25]]
 ) / 12  # fmt: skip
-"""Weights of five equidistant values in the derivative at each of them."""
+"""Weights of five equidistant values in the derivative at each of these points."""
 
 
-# -- of beam axes: records, so that scenes are compared and saved by their numbers ---------------
+# -- beam axes: records, so that scenes are compared and saved by their numbers ------------------
 
 
 @closed("any function of s will do")
@@ -53,7 +53,7 @@ class Straight:
     b: Point
 
     def __call__(self, s: float) -> Point:
-        """The point at part ``s`` of the length; exact at both ends."""
+        """Return the point at the fraction ``s`` of the length; exact at both ends."""
         return between(self.a, self.b, s)
 
 
@@ -67,7 +67,7 @@ class Arc:
     last: float
 
     def __call__(self, s: float) -> Point:
-        """The point at part ``s`` of the length."""
+        """Return the point at the fraction ``s`` of the length."""
         angle = self.first + s * (self.last - self.first)
         x, y = self.center
         return x + self.radius * math.cos(angle), y + self.radius * math.sin(angle)
@@ -78,22 +78,22 @@ class Polyline:
     """Straight pieces through points; m."""
 
     points: tuple[Point, ...]
-    at: tuple[float, ...]  # part of the length at each point, from 0 to 1
+    at: tuple[float, ...]  # fraction of the length at each point, from 0 to 1
 
     def __call__(self, s: float) -> Point:
-        """The point at part ``s`` of the length."""
+        """Return the point at the fraction ``s`` of the length."""
         i = bisect_left(self.at, s, 1, len(self.at) - 1) - 1
         part = (s - self.at[i]) / (self.at[i + 1] - self.at[i])
         return between(self.points[i], self.points[i + 1], part)
 
 
 def between(p: Point, q: Point, s: float) -> Point:
-    """The point at part ``s`` of the way from ``p`` to ``q``; exact at both ends."""
+    """Return the point at the fraction ``s`` of the line from ``p`` to ``q``; exact at its ends."""
     return p[0] * (1 - s) + q[0] * s, p[1] * (1 - s) + q[1] * s
 
 
 def point_of(curve: Curve, s: float, what: str) -> Point:
-    """Evaluate a curve of a user, or raise :class:`ModelError` naming ``what``."""
+    """Evaluate a user's curve, or raise :class:`ModelError` naming ``what``."""
     require_function(curve, what, "s that returns (x, y)")
     try:
         point = curve(s)
@@ -103,7 +103,7 @@ def point_of(curve: Curve, s: float, what: str) -> Point:
 
 
 def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] | Array]) -> Array:
-    """Points of several curves at the parameters of each, one after the other; (n, 2); m."""
+    """Return points of several curves at the parameters of each, curve by curve; (n, 2); m."""
     ends = [(*c.a, *c.b) if isinstance(c, Straight) else (0.0,) * 4 for c in curves]
     counts = [len(s) for s in parameters]
     s = np.concatenate([np.empty(0), *parameters])
@@ -120,14 +120,14 @@ def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] |
 
 
 def tangent(curve: Curve, s: float, step: float) -> Array:
-    """Derivative of a curve by its parameter, from points at most two steps away; (2,); m."""
+    """Return the derivative of a curve, from points at most two steps away; (2,); m."""
     inner = np.subtract(curve(s + step), curve(s - step))
     outer = np.subtract(curve(s + 2 * step), curve(s - 2 * step))
     return np.asarray((8 * inner - outer) / (12 * step))
 
 
 def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
-    """Return the tangent of a curve that is smooth between two parameters only; (2,); m."""
+    """Return the tangent of a curve from points between ``low`` and ``high`` only; (2,); m."""
     step = min(REACH, (high - low) / 8)
     left, right = int((s - low) / step), int((high - s) / step)
     before = left if left < 2 else max(2, 4 - right)
@@ -136,7 +136,7 @@ def tangent_within(curve: Curve, s: float, low: float, high: float) -> Array:
 
 
 def parameter_step(curve: Curve, s: float, length: float) -> float:
-    """Change of the parameter that moves a point along a curve by :data:`REACH` of a length.
+    """Find the parameter step that moves a point along a curve by :data:`REACH` of a length.
 
     The parameter may have any unit, so the search begins at an arbitrary step.
     """
@@ -153,9 +153,10 @@ def parameter_step(curve: Curve, s: float, length: float) -> float:
 
 
 def nearest(curve: Curve, point: Array, s: float, step: float, length: float) -> float:
-    """Parameter of the point of a curve nearest to another, from ``s`` on; NaN if none is found.
+    """Find the parameter of the point of a curve nearest to ``point``; NaN without convergence.
 
-    ``step`` is that of :func:`tangent`, ``length`` the size of what the curve guides; m.
+    The search begins at ``s``.  ``step`` is the step of :func:`tangent`, ``length`` the size of the
+    guided object; m.
     """
     last_digits = 4 * np.spacing(length + math.hypot(*point))
     for _ in range(PROJECTIONS):
@@ -168,10 +169,10 @@ def nearest(curve: Curve, point: Array, s: float, step: float, length: float) ->
 
 
 def enclosing_diameter(points: Array) -> float:
-    """Diameter of the smallest circle around points; (n, 2) or more rows; m.
+    """Return the diameter of the smallest circle around points, (n, 2); m.
 
-    It is the same in all axes.  The circle goes through two or three points; those that are
-    farthest outside are taken in, one after the other.
+    It does not depend on the axes.  The circle goes through two or three points; the point farthest
+    outside is included, until none is outside.
     """
     points = points - points.mean(axis=0)
     distances = np.hypot(*points.T)
@@ -183,18 +184,18 @@ def enclosing_diameter(points: Array) -> float:
         if distances[outside] <= radius + slack:
             return 2 * radius
         held, center, larger = _circle_around(points, [*held, outside])
-        if larger <= radius:  # by the last digits
+        if larger <= radius:  # by round-off
             return 2 * radius
         radius = larger
 
 
 def _circle_around(points: Array, few: list[int]) -> tuple[list[int], Array, float]:
-    """Smallest circle around at most four points: those that it goes through, centre, radius."""
+    """Find the smallest circle around at most four points: points on it, centre, radius."""
     circles = []
     for held in (*combinations(few, 2), *combinations(few, 3)):
         first, *others = points[list(held)]
         ways = np.array(others) - first
-        # as far from the first point as from the others; some circle around all, if in a row
+        # at equal distance from all; if they are collinear, a least-squares centre
         center = first + np.linalg.lstsq(2 * ways, (ways**2).sum(axis=1), rcond=None)[0]
         circles.append((float(np.hypot(*(points[few] - center).T).max()), list(held), center))
     radius, through, center = min(circles, key=lambda circle: circle[0])
@@ -208,18 +209,18 @@ TimeFunction = Callable[[float], float]
 
 
 def steady(t: float) -> float:
-    """The time function of a load that is always there: 1."""
+    """Return 1: the time function of a steady load."""
     return 1.0
 
 
 @dataclass(frozen=True)
 class Constant:
-    """The time function that has always the same value."""
+    """Time function with a constant value."""
 
     value: float
 
     def __call__(self, t: float) -> float:
-        """The value, at any time."""
+        """Return the value, at any time."""
         return self.value
 
 
@@ -238,14 +239,14 @@ def ramp(duration: float) -> TimeFunction:
 @closed("any function of t will do")
 @dataclass(frozen=True)
 class Table:
-    """Time function by points, linear between them and constant outside.
+    """Time function through points, linear between them and constant outside.
 
     Args:
         times: Increasing times; s.
         values: Value at each time.
 
     Raises:
-        ModelError: Different lengths, or times that do not increase.
+        ModelError: The lengths differ, or times do not increase.
 
     Example:
         >>> pulse = ub.Table([0, 0.1, 0.2], [0, 5, 0])
@@ -282,7 +283,7 @@ class Table:
         return self.times
 
     def __call__(self, t: float) -> float:
-        """Value at time ``t``."""
+        """Return the value at time ``t``."""
         return float(np.interp(t, self.times, self.values))
 
 
@@ -304,11 +305,11 @@ Timed = Annotated[TimeFunction, require_time_function]
 
 
 def value_at(function: TimeFunction, t: float, owner: object) -> float:
-    """Evaluate a time function of a user.
+    """Evaluate a user's time function.
 
     Raises:
         NoNumber: The value is not finite.
-        ModelError: It is no number.
+        ModelError: The value is not a number.
     """
     value = function(t)
     if type(value) is not float:

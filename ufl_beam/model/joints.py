@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Joints: components of motion that places share, or that connectors hold."""
+"""Joints: places share degrees of freedom, or connectors hold their relative motion."""
 
 from __future__ import annotations
 
@@ -27,15 +27,15 @@ from ufl_beam.model.functions import Curve, Point, point_of
 
 
 class Joint(Bearing, ABC):
-    """Joint by shared unknowns or by constraint forces; base of :class:`Rigid` and its siblings.
+    """Joint by shared unknowns or constraint forces; base of :class:`Rigid` and other joints.
 
     Attributes:
         places: The anchors.
-        shared: Components that are equal: 0, 1 displacement, 2 rotation.  Those of rotation are one
-            unknown; so are displacements of anchors that their nodes carry.
+        shared: Components that are equal: 0, 1 displacement, 2 rotation.  They are one unknown;
+            for displacements this holds for anchors that move like their nodes.
         holders: Connectors that hold the other components.
-        meets: Whether the anchors are at one point of the undeformed scene.
-        advice: For anchors that should meet and do not.
+        meets: Whether the anchors must coincide in the undeformed scene.
+        advice: Text appended to the error if they do not coincide.
 
     Example:
         >>> mast = ub.Beam((2, 0), (2, 3), section, name="mast")
@@ -60,18 +60,21 @@ class Joint(Bearing, ABC):
         return f"{type(self).__name__}({', '.join(map(str, self.places))})"
 
     def equal(self, component: int) -> list[NodeDof]:
-        """Components of motion that are equal; of displacements those that the nodes carry."""
+        """Return equal degrees of freedom; displacements only of anchors that move like nodes."""
         alike = [place for place in self.places if component == 2 or carries(place)]
         return [(node(place), component) for place in alike]
 
     def _hold(self, motion: str, axis: Point, corner: Point | None = None) -> Connector:
-        """Hold a relative motion of the first two places."""
+        """Return a connector that holds a relative motion of the first two places."""
         a, b = self.places[:2]
         return Component(type(self).__name__, motion, a, b, HELD, axis, corner)
 
 
 class _AtPoint(Joint):
-    """Joint at one point: by multipliers, and of what nodes do not carry, connectors hold it."""
+    """Joint at one point by shared unknowns or, with multipliers, by connectors.
+
+    Connectors also hold anchors that do not move like their nodes.
+    """
 
     meets = True
     joined: tuple[int, ...] = (0, 1)
@@ -100,7 +103,7 @@ class _AtPoint(Joint):
 def _held_at_point(
     joint: Joint, multipliers: bool, joined: tuple[int, ...]
 ) -> tuple[Connector, ...]:
-    """Connectors that hold what nodes do not carry, or all that is joined."""
+    """Return connectors for anchors that do not move like nodes, or for all with multipliers."""
     carriers = [place for place in joint.places if carries(place) and not multipliers]
     base = (carriers or joint.places)[0]
     others = [place for place in joint.places if place not in (*carriers, base)]
@@ -117,12 +120,12 @@ def _held_at_point(
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Rigid(_AtPoint):
-    """Rigid joint at one point: displacement and rotation are shared by all ``places``.
+    """Rigid joint at one point: all ``places`` share displacement and rotation.
 
     Args:
         places: Places to be joined, at one point.
-        multipliers: Keep separate unknowns and hold them with forces, which solutions and
-            controllers can ask for, in the place of sharing the unknowns, which costs nothing.
+        multipliers: Keep separate unknowns, and hold them by constraint forces that solutions and
+            controllers can read.  By default the places share unknowns, at no cost.
 
     Example:
         >>> column = ub.Beam((2, 0), (2, -3), section, name="column")
@@ -138,9 +141,9 @@ class Rigid(_AtPoint):
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
 class Revolute(_AtPoint):
-    """Revolute joint: displacement is shared by all ``places``, each turns freely.
+    """Revolute joint: all ``places`` share the displacement, each turns freely.
 
-    Args are those of :class:`Rigid`; friction needs ``multipliers``.
+    It has the arguments of :class:`Rigid`; friction needs ``multipliers``.
 
     Example:
         >>> rod = ub.Beam((2, 0), (4, 0), section, name="rod")
@@ -158,7 +161,7 @@ class Prismatic(Joint):
     """Prismatic joint: ``slider`` moves along an axis that turns with ``rail``.
 
     Args:
-        rail: Where the axis is; it may be on the ground.
+        rail: Place with the axis; it may be on the ground.
         slider: Place that slides.
         axis: Direction in the undeformed scene; from rail to slider by default.
         turning: Whether the slider may turn on the rail, like a pin in a slot.
@@ -196,7 +199,7 @@ class Prismatic(Joint):
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """It holds the motion across the axis."""
+        """Connector that holds the motion across the axis."""
         assert self.axis is not None
         x, y = self.axis
         return (self._hold("sliding", (-y, x)),)
@@ -232,7 +235,7 @@ class RigidLink(Joint):
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """They hold the displacement of ``b`` relative to the frame of ``a``."""
+        """Connectors that hold the displacement of ``b`` relative to the frame of ``a``."""
         corner = self.b.point
         return tuple(
             self._hold("parting", axis, corner=corner) for axis in ((1.0, 0.0), (0.0, 1.0))
@@ -270,7 +273,7 @@ class Link(Joint):
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """It holds the distance."""
+        """Connector that holds the distance."""
         return (self._hold("stretching", (1.0, 0.0)),)
 
 
@@ -279,12 +282,13 @@ class Guided(Joint):
     """Joint that keeps a point on a guide curve of the ground, free along it and free to turn.
 
     Args:
-        place: Guided place; of bodies the centre, other points by a :class:`Revolute` to a beam.
+        place: Guided place.  On a body it is the centre; join another point to a guided beam by a
+            :class:`Revolute`.
         curve: ``s -> (x, y)`` for all s that the motion may reach; ``curve(0)`` is at the place; m.
 
     Raises:
-        ModelError: The curve stands still at s = 0.  A scene raises it where ``curve(0)`` is not at
-            the place.
+        ModelError: The curve has no direction at s = 0.  A scene raises it if ``curve(0)`` is not
+            at the place.
 
     Example:
         >>> rail = ub.Guided(beam.end, lambda s: (2 + s, 0.5 * s**2))
@@ -302,7 +306,7 @@ class Guided(Joint):
         require_anchors("Guided", self.place)
         if not carries(self.place):
             raise ModelError(f"Guided({self.place}): it must be the centre of the body")
-        _ = self.holders  # which look at the curve
+        _ = self.holders  # checks the curve
 
     @cached_property
     def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
@@ -315,7 +319,7 @@ class Guided(Joint):
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """It holds the distance from the curve."""
+        """Connector that holds the distance from the curve."""
         law, name = Guide(self.curve), f"Guided({self.place}): curve"
         start = self._start
         (x0, y0), (x1, y1) = (point_of(self.curve, s, name) for s in NEAR_START)
@@ -327,7 +331,7 @@ class Guided(Joint):
 
 
 NEAR_START = (-1e-6, 1e-6)
-"""Parameters between which a guide curve has its first direction."""
+"""Parameters of two points that give the direction of a guide curve at s = 0."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -341,7 +345,7 @@ class Release(Joint):
         multipliers: As in :class:`Rigid`.
 
     Raises:
-        ModelError: Other letters, or none.
+        ModelError: ``free`` is empty or has other letters.
 
     Example:
         >>> girder = ub.Beam((2, 0), (4, 0), section, name="girder")
@@ -367,7 +371,7 @@ class Release(Joint):
 
     @property
     def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
-        """Both places of it."""
+        """Both places."""
         return self.a, self.b
 
     @property
@@ -382,7 +386,7 @@ class Release(Joint):
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        """They hold what is not released along the axes of the beam."""
+        """Connectors that hold the components that are not released, along the axes of the beam."""
         if 0 in self._joined:
             return _held_at_point(self, self.multipliers, self._joined)
         x, y = self.a.direction

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Functions that laws of materials are written with, for arrays and for UFL expressions.
+"""Functions for material laws, of arrays and of UFL expressions.
 
-Arrays may be complex: the reference solver differentiates by complex steps, so that ``abs`` is
-wrong there and :func:`absolute` is right.  The operators + - * / and ** are those of Python.
+Arrays may be complex, because the reference solver differentiates by complex steps: use
+:func:`absolute` instead of ``abs``.  The operators + - * / and ** are the Python operators.
 
 Example:
     >>> f = ub.law_functions
@@ -23,7 +23,7 @@ Values = Any
 
 @singledispatch
 def where(condition: Values, yes: Values, no: Values) -> Values:
-    """``yes`` where the condition holds, else ``no``; both are evaluated everywhere."""
+    """Return ``yes`` where the condition holds, else ``no``; both are evaluated everywhere."""
     return np.where(condition, yes, no)
 
 
@@ -35,48 +35,48 @@ def below(x: Values, limit: float) -> Values:
 
 @singledispatch
 def exp(x: Values) -> Values:
-    """Exponential function of numbers or arrays."""
+    """Return the exponential of numbers or arrays."""
     return np.exp(x)
 
 
 def sign(x: Values) -> Values:
-    """1 or -1; 1 at zero."""
+    """Return the sign, 1 or -1; it is 1 at zero."""
     return where(below(x, 0.0), -1.0, 1.0)
 
 
 def positive(x: Values) -> Values:
-    """Macaulay's bracket <x>: x where it is positive, else zero."""
+    """Return the Macaulay bracket <x>: x where it is positive, else zero."""
     return where(below(-x, 0.0), x, 0.0)
 
 
 def absolute(x: Values) -> Values:
-    """Size of x; its slope at zero is 1."""
+    """Return the absolute value of x; its slope at zero is 1."""
     return where(below(x, 0.0), -x, x)
 
 
 def larger(x: Values, y: Values) -> Values:
-    """The larger of x and y; x where they are equal."""
+    """Return the larger of x and y; x where they are equal."""
     return where(below(x - y, 0.0), y, x)
 
 
 def smaller(x: Values, y: Values) -> Values:
-    """The smaller of x and y; x where they are equal."""
+    """Return the smaller of x and y; x where they are equal."""
     return where(below(y - x, 0.0), y, x)
 
 
 @singledispatch
 def sqrt(x: Values) -> Values:
-    """Square root of numbers that are not negative."""
+    """Return the square root of numbers that are not negative."""
     return np.sqrt(x)
 
 
 @singledispatch
 def log(x: Values) -> Values:
-    """Natural logarithm of positive numbers."""
+    """Return the natural logarithm of positive numbers."""
     return np.log(x)
 
 
 @singledispatch
 def tanh(x: Values) -> Values:
-    """Hyperbolic tangent of numbers or arrays."""
+    """Return the hyperbolic tangent of numbers or arrays."""
     return np.tanh(x)

@@ -33,16 +33,16 @@ class LoadAtPlace(Record, ABC):
 
 
 OWN_LOAD = "state other loads as a VirtualWork, a Potential or a connector with a ForceLaw"
-"""Message of classes that are closed."""
+"""Message of classes without subclasses."""
 
 
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
 class PointLoad(LoadAtPlace):
-    """Dead force and moment at a place: they keep their direction in the plane.
+    """Dead force and moment at a place: the force keeps its direction.
 
     Args:
-        place: Where.
+        place: Loaded place.
         force: (F_x, F_y); N.
         moment: Counter-clockwise; N m.
         amplitude: Factor at time t.
@@ -63,7 +63,7 @@ class PointLoad(LoadAtPlace):
 class FollowerLoad(LoadAtPlace):
     """Follower force at a place: it turns with the cross-section and is not conservative.
 
-    Args are those of :class:`PointLoad`; the force is that before any rotation.
+    It has the arguments of :class:`PointLoad`; ``force`` is the force before any rotation.
 
     Example:
         >>> thrust = ub.FollowerLoad(beam.end, force=(0, -1e5), amplitude=lambda t: t)
@@ -88,7 +88,7 @@ class LineLoad(Record):
     """Distributed dead force and moment along a beam, per undeformed length.
 
     Args:
-        beam: Where.
+        beam: Loaded beam.
         force: (f_x, f_y); N/m.
         moment: Counter-clockwise; N m/m.
         amplitude: Factor at time t.
@@ -149,7 +149,7 @@ class RotatingFrame(Record):
 
     Args:
         rate: Angular velocity of the frame, counter-clockwise; rad/s.
-        about: The point that stays in place; m.
+        about: Centre of rotation; m.
 
     Example:
         >>> blade = ub.Scene([beam], supports=scene.supports, loads=[ub.RotatingFrame(rate=50.0)])
@@ -163,7 +163,7 @@ class RotatingFrame(Record):
 
     @property
     def amplitude(self) -> TimeFunction:
-        """The rate does not change: that would make other forces."""
+        """Constant 1: a rate that changes would cause other forces."""
         return steady
 
 
@@ -179,8 +179,8 @@ class Rayleigh(Record):
     """Rayleigh damping (a0 M + a1 K) v with the stiffness K of the undeformed scene, P(92).
 
     The damping ratio of a mode of circular frequency ω is a0/(2ω) + a1 ω/2.  It is a property of
-    the structure, not of the material, and it is not objective: rigid rotation is damped too, and
-    a hinge that has opened keeps being resisted.  For large motion see :class:`KelvinVoigt`.
+    the structure, not of the material, and it is not objective: it damps rigid rotation too, and
+    resists a hinge that has opened.  For large motion see :class:`KelvinVoigt`.
 
     Args:
         mass: a0; 1/s.
@@ -210,18 +210,18 @@ class Rayleigh(Record):
 @closed("state other damping as a VirtualWork of v")
 @dataclass(frozen=True, eq=False)
 class KelvinVoigt(Record):
-    """Kelvin-Voigt damping: C times the strain rates, beside the elastic resultants; objective.
+    """Kelvin-Voigt damping: viscous resultants, C times the strain rates; objective.
 
     Rigid motion is not damped.  The damping ratio of a mode of circular frequency ω in small
-    vibration is retardation_time ω/2, that of ``Rayleigh(stiffness=retardation_time)``.  Cells with
-    a hinge are left out, so that an open hinge turns freely.
+    vibration is retardation_time ω/2, as with ``Rayleigh(stiffness=retardation_time)``.  Cells with
+    a hinge are not damped, so that an open hinge turns freely.
 
     Args:
         retardation_time: Viscosity over stiffness; s.
-        beams: The beams that are damped; all by default.
+        beams: The damped beams; all by default.
 
     Raises:
-        ModelError: A time that is not positive.
+        ModelError: ``retardation_time`` is not positive.
 
     Example:
         >>> damped = ub.Scene([beam], supports=scene.supports, damping=[ub.KelvinVoigt(1e-4)])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Base of the laws of a material point: stress, evolution of internal variables, energies."""
+"""Base of the laws of material points: stress, evolution of internal variables, energies."""
 
 from __future__ import annotations
 
@@ -33,22 +33,22 @@ class State:
 
 
 class MaterialLaw(ABC):
-    """Base of the laws of material points; a law of one's own is a frozen dataclass of it.
+    """Base of the laws of material points; a user's law is a frozen dataclass derived from it.
 
-    The fields of the dataclass are the numbers of the law.  Its methods are written with the
-    functions of ``ub.law_functions``, for they are called with arrays and with UFL
-    expressions.  In them ``self.C`` is the elastic stiffness at the point: that of the resultant in
-    a :class:`Section` (EA, GA or EI), Young's modulus of a fibre, the stiffness of a
-    :class:`Spring`.  A law evolves by :meth:`increments` or by :meth:`residuals`, one of both.
+    The fields of the dataclass are the parameters of the law.  Its methods use the functions of
+    ``ub.law_functions``, because they are called with arrays and with UFL expressions.  In them
+    ``self.C`` is the elastic stiffness at the point: EA, GA or EI of a resultant in a
+    :class:`Section`, Young's modulus of a fibre, or the stiffness of a :class:`Spring`.  Internal
+    variables evolve by either :meth:`increments` or :meth:`residuals`.
     See docs/extending_laws.md.
 
     Attributes:
-        variables: Internal variables, and their values before anything has happened.
-        resultants: ``"NM"`` or ``"NVM"`` of a law in which these interact; strain, stress and ``C``
-            are tuples then.  By default a law is of one strain and one stress.
+        variables: Internal variables, and their initial values.
+        resultants: ``"NM"`` or ``"NVM"`` if these interact; strain, stress and ``C`` are tuples
+            then.  By default a law has one strain and one stress.
         C: Elastic stiffness.
-        active: True of a law that may give energy, such as one that swells.  Else steps are refused
-            in which :meth:`residuals` were solved by variables with a negative dissipation.
+        active: True if the law may supply energy, for example by swelling.  Otherwise a step is
+            refused if :meth:`residuals` have a solution with negative dissipation.
 
     Example:
         >>> from dataclasses import dataclass
@@ -72,33 +72,33 @@ class MaterialLaw(ABC):
 
     @abstractmethod
     def stress(self, strain: Values, state: State) -> Values:
-        """Stress; at fixed variables its derivative by the strain is ``C``."""
+        """Return the stress; its derivative by the strain at fixed variables is ``C``."""
 
     @abstractmethod
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Stored energy per volume, that of hardening left out."""
+        """Return the stored energy per volume, without the energy of hardening."""
 
     def hardening_energy(self, state: State) -> Values:
-        """Energy per volume that hardening stores, a function of the variables; zero by default."""
+        """Return the energy per volume that hardening stores in the variables, zero by default."""
         return 0.0
 
     def increments(self, strain: Values, state: State, dt: Values) -> Mapping[str, Values]:
-        """Changes of the variables over a backward-Euler step of length dt, in closed form.
+        """Return increments of the variables over a backward-Euler step dt, in closed form.
 
         Args:
-            strain: At the end of the step.
-            state: Variables at its beginning.
+            strain: Strain at the end of the step.
+            state: Variables at the beginning of the step.
             dt: s.
         """
         return {}
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Equations of a backward-Euler step, one of each variable, that vanish at its end.
+        """Return the residuals of a backward-Euler step, one for each variable.
 
         Args:
-            strain: At the end of the step.
-            old: Variables at its beginning.
-            new: Variables at its end.
+            strain: Strain at the end of the step.
+            old: Variables at the beginning of the step.
+            new: Variables at the end of the step.
             dt: s.
         """
         return {}
@@ -106,12 +106,12 @@ class MaterialLaw(ABC):
     def dissipation(
         self, strain: Values, state: State, changes: State, dt: Values
     ) -> Values | None:
-        """Energy per volume dissipated over a step; None: all work that is not stored.
+        """Return the energy per volume dissipated over a step; None means all work not stored.
 
         Args:
-            strain: At the time of the step at which the law holds.
-            state: Variables at that time.
-            changes: Of the variables over the step.
+            strain: Strain at the time of the step at which the law holds.
+            state: Variables at this time.
+            changes: Increments of the variables over the step.
             dt: s.
         """
         return None
@@ -122,30 +122,30 @@ class MaterialLaw(ABC):
         return False
 
     def numbers(self, C: Values) -> dict[str, Any]:
-        """Numbers of the law by name at points of stiffness ``C``, by default its fields."""
+        """Return the parameters by name at points of stiffness ``C``, by default the fields."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
     def of(self, C: Values, numbers: Mapping[str, Values]) -> MaterialLaw:
-        """Return the law with a stiffness, and arrays or symbols in the place of its numbers."""
+        """Return the law with a stiffness, and with arrays or symbols as parameters."""
         law = copy.copy(self)
         vars(law).update(numbers, C=C)
         return law
 
     @property
     def solves(self) -> bool:
-        """True if the variables are found by Newton's method from :meth:`residuals`."""
+        """True if Newton's method finds the variables from :meth:`residuals`."""
         return type(self).residuals is not MaterialLaw.residuals
 
     @property
     def prestressed(self) -> bool:
-        """True if laws of this class may bear a stress at no strain; numbers do not matter."""
-        law = copy.copy(self)  # with numbers that have nothing in common
+        """True if laws of this class may bear stress at zero strain, for some parameters."""
+        law = copy.copy(self)  # with irrational parameters, whose terms do not cancel
         vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(vars(self))})
         one = uniform(self, 1.0)
         return any(np.any(σ != 0) for σ in _at_no_strain(law.of(one, {})))
 
     def stressed(self, C: tuple[Values, ...], least: tuple[Values, ...]) -> bool:
-        """Return whether the law bears more stress at no strain than ``C`` times ``least``."""
+        """Return whether the stress at zero strain exceeds ``C`` times ``least``."""
         stresses = _at_no_strain(_with_numbers(self, C))
         return any(np.any(abs(σ) > c * e) for σ, c, e in zip(stresses, C, least, strict=True))
 
@@ -155,35 +155,35 @@ class MaterialLaw(ABC):
         return self.solves and not self.active
 
     def as_tuple(self, values: Values) -> tuple[Values, ...]:
-        """Strains or stresses of a point as a tuple, of one if nothing interacts."""
+        """Return strains or stresses of a point as a tuple, also for a single resultant."""
         return tuple(values) if self.resultants else (values,)
 
     def as_argument(self, values: tuple[Values, ...]) -> Values:
-        """Strains or stiffnesses of a point as the methods take them."""
+        """Return strains or stiffnesses of a point as arguments of the methods."""
         return values if self.resultants else values[0]
 
 
 def uniform(law: MaterialLaw, value: Values) -> Values:
-    """Strains or stiffnesses of one value, as the methods of a law take them."""
+    """Return equal strains or stiffnesses as an argument of the methods of a law."""
     return law.as_argument(tuple(value for _ in law.resultants or "x"))
 
 
 def _with_numbers(law: MaterialLaw, C: tuple[Values, ...] = ()) -> MaterialLaw:
-    """A law at points of stiffness ``C``, 1 by default, with 1 in the place of random numbers."""
+    """Return a law at points of stiffness ``C``, 1 by default, with 1 instead of random values."""
     at = law.as_argument(C) if C else uniform(law, np.ones(1))
     numbers = law.numbers(at).items()
     return law.of(at, {n: np.ones(1) if hasattr(x, "draw") else x for n, x in numbers})
 
 
 def _at_no_strain(law: MaterialLaw) -> tuple[Values, ...]:
-    """Stresses at no strain."""
+    """Return the stresses at zero strain."""
     none = uniform(law, np.zeros(1))
     with np.errstate(all="ignore"):
         return law.as_tuple(law.stress(none, initial_state(law)))
 
 
 def initial_state(law: Any) -> State:
-    """Return the internal variables before anything has happened, each (1,)."""
+    """Return the initial internal variables, each (1,)."""
     return State({name: np.full(1, float(x)) for name, x in law.variables.items()})
 
 
@@ -191,7 +191,7 @@ def initial_state(law: Any) -> State:
 
 
 def require_bulk_law(law: object, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless a bulk can follow a law."""
+    """Raise :class:`ModelError` naming ``what`` unless a law is valid for one stress and strain."""
     require_law(law, what)
     if resultants := law.resultants:  # type: ignore[attr-defined]
         raise ModelError(
@@ -201,7 +201,7 @@ def require_bulk_law(law: object, what: str) -> None:
 
 
 def require_interaction(law: object, what: str) -> None:
-    """Raise :class:`ModelError` naming ``what`` unless resultants of a section can follow a law."""
+    """Raise :class:`ModelError` naming ``what`` unless a law couples resultants of a section."""
     require_law(law, what)
     if law.resultants not in ("NM", "NVM"):  # type: ignore[attr-defined]
         raise ModelError(
@@ -211,7 +211,7 @@ def require_interaction(law: object, what: str) -> None:
 
 
 def require_law(law: object, what: str) -> None:
-    """Raise :class:`ModelError` unless a law is complete; it is called with numbers."""
+    """Raise :class:`ModelError` unless a law is complete; its methods are called at zero strain."""
     if not isinstance(law, MaterialLaw):
         raise ModelError(f"{what} = {shorten(law)} is not a ElastoPlastic or another MaterialLaw")
     kind = f"{what}: {type(law).__name__}"
@@ -255,7 +255,7 @@ def require_law(law: object, what: str) -> None:
 def require_fields(law: Any, base: type, what: str, but: Collection[str] = ()) -> None:
     """Raise :class:`ModelError` unless a law is a frozen dataclass whose fields have free names.
 
-    A field cannot have the name of a member of the base, except those in ``but``.
+    A field cannot have the name of a member of the base, unless ``but`` has the name.
     """
     parameters = getattr(type(law), "__dataclass_params__", None)
     if parameters is None or not parameters.frozen or not parameters.eq:
@@ -313,10 +313,10 @@ def require_names(found: object, law: Any, what: str) -> None:
 
 
 def judges_dissipation(law: MaterialLaw) -> bool:
-    """Return whether the entry "plastic" of a law is its own dissipation, whatever the step.
+    """Return whether the entry "plastic" of a law is its own dissipation, for steps of any length.
 
-    So it is if the law states it, and if energies are quadratic.  Else the entry has an error of
-    the rule by which works are integrated, of either sign.  An active law may give energy.
+    It is if the law states its dissipation, or if energies are quadratic.  Otherwise the entry has
+    an integration error, of either sign.  An active law may supply energy.
     """
     stated = type(law).dissipation is not MaterialLaw.dissipation
     return not law.active and (stated or has_quadratic_energies(law))
@@ -338,6 +338,6 @@ def has_quadratic_energies(law: MaterialLaw) -> bool:
 
 
 def quadratic(energies: Callable[[float], list[float]]) -> bool:
-    """Return whether energies of some numbers times a factor go with its square."""
-    # Twice the numbers have the same digits.
+    """Return whether energies grow with the square of a factor on their arguments."""
+    # Factors of two keep all digits.
     return bool(np.allclose(energies(2.0), 4.0 * np.array(energies(1.0)), rtol=1e-12, atol=0.0))

@@ -2,8 +2,8 @@
 """Laws of a material point in one dimension: yielding, hardening, viscous flow.
 
 A point is a resultant of a cross-section (strain 1 or curvature 1/m against N or N m) or a fibre
-(strain against Pa).  The laws are plain functions of arrays, and of UFL expressions as well: UFL
-derives their tangents and FFCx compiles them for the time loop, see
+(strain against Pa).  The laws are functions of arrays, and of UFL expressions too: UFL derives
+their tangents and FFCx compiles them for the time loop, see
 :mod:`ufl_beam.terms.material_points`.
 """
 
@@ -34,7 +34,7 @@ from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.records import FromZero, NotNegative, Positive, Record
 
 OWN_LAW = "state a MaterialLaw of your own"
-"""Message of classes that are closed."""
+"""Message of classes without subclasses."""
 
 
 @closed(OWN_LAW)
@@ -43,8 +43,8 @@ class Perzyna(Record):
     """Perzyna viscoplasticity: overstress in proportion to the plastic strain rate, P(39).
 
     Args:
-        eta: Overstress per rate; Pa s for fibres, N s and N m² s for resultants.  Zero is
-            rate-independent, infinity elastic.
+        eta: Overstress per plastic strain rate; Pa s for fibres, N s and N m² s for resultants.
+            Zero is rate-independent, infinity elastic.
 
     Example:
         >>> law = ub.ElastoPlastic(250e6, isotropic=2e9, viscosity=ub.Perzyna(eta=1e6))  # Pa, Pa s
@@ -54,7 +54,7 @@ class Perzyna(Record):
     eta: FromZero
 
     def coefficient(self, stiffness: Values) -> Values:
-        """Overstress per rate of plastic strain, the same for any stiffness."""
+        """Return the overstress per rate of plastic strain, the same for any stiffness."""
         return np.full_like(stiffness, self.eta)
 
 
@@ -63,7 +63,7 @@ class Perzyna(Record):
 class DuvautLions(Record):
     """Duvaut-Lions viscoplasticity: relaxation towards the rate-independent stress, P(45).
 
-    The same law as :class:`Perzyna` with ``eta = tau (C + H)``, given by its relaxation time.
+    It is the law of :class:`Perzyna` with ``eta = tau (C + H)``, given by its relaxation time.
 
     Args:
         tau: Relaxation time; s.  Zero is rate-independent, infinity elastic.
@@ -78,12 +78,12 @@ class DuvautLions(Record):
     tau: FromZero
 
     def coefficient(self, stiffness: Values) -> Values:
-        """Overstress per rate of plastic strain: tau times the stiffness of plastic flow."""
+        """Return the overstress per rate of plastic strain: tau times the stiffness C + H."""
         return np.asarray(self.tau * stiffness)  # P(46)
 
 
 def _require_limit(value: Any, what: str, **limits: Any) -> None:
-    """Raise :class:`ModelError` unless a limit is a number in range, or a distribution."""
+    """Raise :class:`ModelError` unless a limit is a number in range or a distribution."""
     if not hasattr(value, "draw"):
         require_number(value, what, **limits)
 
@@ -102,14 +102,14 @@ AtLeastOne = Annotated[float, partial(require_number, at_least=1.0)]
 
 
 class _Plastic(Record, MaterialLaw):
-    """Base of laws whose stress is that of the strain less a plastic strain."""
+    """Base of laws whose stress is C times (strain less plastic strain)."""
 
     def stress(self, strain: Values, state: State) -> Values:
-        """Stress of the elastic part of the strain."""
+        """Return the stress of the elastic strain."""
         return self.C * (strain - state.plastic)
 
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Energy per volume of the elastic part of the strain."""
+        """Return the energy per volume of the elastic strain."""
         return self.C * (strain - state.plastic) ** 2 / 2
 
 
@@ -125,7 +125,7 @@ class ElastoPlastic(_Plastic):
         viscosity: :class:`Perzyna` or :class:`DuvautLions`; rate-independent by default.
 
     Raises:
-        ModelError: A number is negative or none; infinity is allowed for the limit.
+        ModelError: A parameter is negative or not a number; only the limit may be infinite.
 
     Example:
         >>> law = ub.ElastoPlastic(3e5, isotropic=1e6)  # N m, N m²
@@ -137,16 +137,16 @@ class ElastoPlastic(_Plastic):
     kinematic: Modulus = 0.0
     viscosity: Annotated[Any, partial(require_kind, kind=(Perzyna, DuvautLions))] = Perzyna(0.0)
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "accumulated": 0.0}
-    fracture_energy: ClassVar[float] = math.inf  # of fracture: it never breaks
-    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # fall of the stress, and where
+    fracture_energy: ClassVar[float] = math.inf  # it never breaks
+    steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # fall per opening, and its opening
 
     def numbers(self, C: Values) -> dict[str, Any]:
-        """Limit and moduli; in the place of the viscosity, the overstress per plastic rate."""
+        """Return limit, moduli and viscosity, as overstress per plastic strain rate."""
         eta = self.viscosity.coefficient(C + self.isotropic + self.kinematic)
         return super().numbers(C) | {"viscosity": eta}
 
     def increments(self, strain: Values, state: State, dt: Values) -> dict[str, Values]:
-        """Plastic strain of a step, and the size of it, in closed form, P(38)-P(44)."""
+        """Return the plastic strain increment and its size, in closed form, P(38)-P(44)."""
         trial = self.stress(strain, state) - self.kinematic * state.plastic
         direction = sign(trial)
         overstress = direction * trial - (
@@ -157,32 +157,32 @@ class ElastoPlastic(_Plastic):
         return {"plastic": direction * γ, "accumulated": γ}
 
     def hardening_energy(self, state: State) -> Values:
-        """Energy per volume that hardening stores."""
+        """Return the energy per volume that hardening stores."""
         return (
             self.kinematic * state.plastic**2 + self.isotropic * state.accumulated**2
         ) / 2  # P(35)
 
     def dissipation(self, strain: Values, state: State, changes: State, dt: Values) -> Values:
-        """Energy per volume that a plastic increment dissipates, by yield stress and viscosity."""
+        """Return the energy per volume that yield stress and viscosity dissipate in a step."""
         γ = changes.accumulated
-        flows = below(-γ, 0.0)  # a limit that is infinite must not meet an increment of zero
+        flows = below(-γ, 0.0)  # avoids infinity times zero
         return (
             where(flows, self.yield_limit, 0.0) + where(flows, self.viscosity, 0.0) * γ / dt
         ) * γ  # P(37)
 
     @property
     def limit(self) -> Any:
-        """The yield limit, by the name that it has in all laws of hinges."""
+        """The yield limit, under the name that all laws of hinges use."""
         return self.yield_limit
 
     @property
     def elastic(self) -> bool:
-        """True if it never flows."""
+        """True if the yield limit is infinite."""
         return bool(self.yield_limit == np.inf)
 
     @property
     def opens(self) -> bool:
-        """True if it ever flows."""
+        """True if the yield limit is finite."""
         return not self.elastic
 
     @property
@@ -199,9 +199,9 @@ class ElastoPlastic(_Plastic):
 class RambergOsgood(_Plastic):
     """Power law of Ramberg and Osgood: strain = stress/C + offset (stress/yield_limit)^exponent.
 
-    It holds while the stress grows beyond all stresses so far; below them the point is elastic, in
-    both directions (isotropic hardening).  There is no yield limit.  After Ramberg and Osgood,
-    NACA TN 902 (1943).
+    The power law holds while the stress exceeds all previous stresses; below them the point is
+    elastic, in both directions (isotropic hardening).  There is no yield limit.  After Ramberg and
+    Osgood, NACA TN 902 (1943).
 
     Args:
         yield_limit: Stress at which the plastic strain is ``offset``, or a distribution such as
@@ -223,7 +223,7 @@ class RambergOsgood(_Plastic):
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "largest": 0.0}
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Accumulated plastic strain of the largest stress; plastic strain along the stress."""
+        """Return residuals of accumulated strain at the largest stress, and of plastic strain."""
         stress = self.stress(strain, new)
         largest = larger(
             old.largest, self.offset * (absolute(stress) / self.yield_limit) ** self.exponent
@@ -243,7 +243,7 @@ class ArmstrongFrederick(_Plastic):
     Args:
         yield_limit: Yield stress, or a distribution such as :class:`Normal`; Pa, N or N m.
         kinematic: Initial hardening; stress per plastic strain.
-        recovery: Rate at which hardening fades; per plastic strain.  Without it use
+        recovery: Rate of dynamic recovery; per plastic strain.  Without recovery use
             :class:`ElastoPlastic` with ``kinematic``.
 
     Raises:
@@ -262,21 +262,21 @@ class ArmstrongFrederick(_Plastic):
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "back": 0.0}
 
     def increments(self, strain: Values, state: State, dt: Values) -> Mapping[str, Values]:
-        """Plastic strain and back stress of a step: the positive root of a quadratic equation."""
+        """Solve a quadratic equation for the increments of plastic strain and back stress."""
         C, B, r = self.C, self.kinematic, self.recovery
         trial = self.stress(strain, state)
         direction = sign(trial - state.back)
         over = positive(direction * (trial - state.back) - self.yield_limit)
         b = C + B - r * (direction * trial - self.yield_limit)  # C r γ² + b γ = over
         root = sqrt(b**2 + 4 * C * r * over)
-        above = where(below(b, 0.0), 1.0, b + root)  # no difference of numbers that are close
+        above = where(below(b, 0.0), 1.0, b + root)  # avoids cancellation
         γ = where(below(b, 0.0), (root - b) / (2 * C * r), 2 * over / above)
         γ = where(below(-over, 0.0), γ, 0.0)
         change = (direction * B - r * state.back) * γ / (1 + r * γ)
         return {"plastic": direction * γ, "back": change}
 
     def hardening_energy(self, state: State) -> Values:
-        """Energy per volume that the back stress stores."""
+        """Return the energy per volume that the back stress stores."""
         return state.back**2 / (2 * self.kinematic)
 
 
@@ -286,20 +286,20 @@ class BoucWen(Record, MaterialLaw):
 
     The stress is C (hardening strain + (1 - hardening) z), where the hysteretic strain z follows
     dz = dx (1 - ν abs(z/z0)^n (1 - β + β sign(z dx))) with z0 = yield_limit/C.  Strength degrades
-    by ν = 1 + strength e with the dissipated energy e, in parts of yield_limit²/C.  After Wen, J.
-    Eng.  Mech.  Div. ASCE 102 (1976), and Baber and Wen, ibid. 107 (1981).  Their degradation of
-    stiffness is left out: in unloading it would give back energy that was dissipated.
+    by ν = 1 + strength e with the dissipated energy e over yield_limit²/C.  After Wen, J. Eng.
+    Mech. Div. ASCE 102 (1976), and Baber and Wen, ibid. 107 (1981).  Their degradation of
+    stiffness is left out: in unloading it would return dissipated energy.
 
     Args:
-        yield_limit: Stress at which the tangents of both branches meet, hardening left out, or a
+        yield_limit: Stress at which the tangents of both branches meet without hardening, or a
             distribution such as :class:`Normal`; Pa, N, N m.
-        hardening: Slope of the plastic branch as a part of C, below 1.
+        hardening: Slope of the plastic branch over C, below 1.
         exponent: Sharpness n of the transition, at least 1.
-        shape: β from 1/2, unloading along C, to 1.
+        shape: β from 1/2 (unloading along C) to 1.
         strength: Degradation per dissipated energy; zero by default.
 
     Raises:
-        ModelError: A number is out of its range.
+        ModelError: A parameter is out of range.
 
     Example:
         >>> law = ub.BoucWen(yield_limit=5e4, hardening=0.05, exponent=2, strength=0.01)  # N m
@@ -314,13 +314,13 @@ class BoucWen(Record, MaterialLaw):
     variables: ClassVar[Mapping[str, float]] = {"slip": 0.0, "strain": 0.0, "energy": 0.0}
 
     def stress(self, strain: Values, state: State) -> Values:
-        """Stress of both springs; that of the slip, strain less z, is missing."""
+        """Return the stress of both springs in parallel; the slip is the strain less z."""
         return self.C * (strain - (1 - self.hardening) * state.slip)
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Evolution of the hysteretic strain; strain and dissipated energy are remembered.
+        """Return the residuals of the slip, the stored strain and the dissipated energy.
 
-        Far beyond all solutions the flow grows no more with z, and so has one zero there, too.
+        Far beyond all solutions the flow no longer grows with z, so that no second root exists.
         """
         z, z0, dx = strain - new.slip, self.yield_limit / self.C, strain - old.strain
         before = old.strain - old.slip
@@ -337,7 +337,7 @@ class BoucWen(Record, MaterialLaw):
         }
 
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Energy per volume of both springs."""
+        """Return the energy per volume of both springs."""
         a = self.hardening
         return self.C * (a * strain**2 + (1 - a) * (strain - state.slip) ** 2) / 2
 
@@ -349,8 +349,9 @@ class BoucWen(Record, MaterialLaw):
 class AxialBending(Record, MaterialLaw):
     """Yield surface of axial force and moment, (N/Np)² + abs(M)/Mp = 1, with associated flow.
 
-    It is that of a rectangle of an ideally plastic material.  Its ridge at M = 0 is rounded:
-    abs(m) is (sqrt(m² + w²) - w)/(sqrt(1 + w²) - w) of m = M/Mp and w = ``rounding``.
+    The surface is exact for a rectangle of ideally plastic material.  Its ridge at M = 0 is
+    rounded: with m = M/Mp and w = ``rounding``, (sqrt(m² + w²) - w)/(sqrt(1 + w²) - w) replaces
+    abs(m).
 
     Args:
         axial: Np, the yield force; N.
@@ -372,25 +373,25 @@ class AxialBending(Record, MaterialLaw):
     variables: ClassVar[Mapping[str, float]] = {"stretch": 0.0, "curvature": 0.0, "flow": 0.0}
 
     def stress(self, strain: Values, state: State) -> Values:
-        """(N, M) of the elastic parts of the strains."""
+        """Return (N, M) of the elastic strains."""
         (Σ, K), (EA, EI) = strain, self.C
         return EA * (Σ - state.stretch), EI * (K - state.curvature)
 
     def elastic_energy(self, strain: Values, state: State) -> Values:
-        """Energy per length of the elastic parts of the strains."""
+        """Return the energy per length of the elastic strains."""
         (Σ, K), (EA, EI) = strain, self.C
         return (EA * (Σ - state.stretch) ** 2 + EI * (K - state.curvature) ** 2) / 2
 
     def excess(self, N: Values, M: Values) -> Values:
-        """Yield function; positive outside of the surface."""
+        """Return the yield function; it is positive outside the surface."""
         w, m = self.rounding, M / self.bending
         return (N / self.axial) ** 2 + (sqrt(m**2 + w**2) - w) / (sqrt(1 + w**2) - w) - 1
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
-        """Flow along the normal of the surface up to which the resultants return.
+        """Return the residuals of flow along the normal of the surface, with return to the surface.
 
-        Flow against the normal would lead to the far side of the surface.  So a negative flow moves
-        nothing, and the excess grows with it: the equations have one solution.
+        Flow against the normal would lead to the far side of the surface.  So a negative flow
+        changes no strain, but increases the residual: the equations have one solution.
         """
         (N, M), (EA, EI) = self.stress(strain, new), self.C
         w, m, flow = self.rounding, M / self.bending, new.flow - old.flow

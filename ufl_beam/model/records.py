@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Records that check their fields; signatures of functions and objects of users."""
+"""Records that check their fields; signatures of users' functions and objects."""
 
 from __future__ import annotations
 
@@ -48,16 +48,16 @@ Instance = Annotated[T, require_kind]
 class Record:
     """Base of frozen dataclasses that check their fields by annotations ``Annotated[T, check]``.
 
-    A check is called as ``check(value, what=name)`` with a value that is not the default; what it
-    returns takes the place of the value, unless it is None.  The name is that of the field, or the
-    text that follows the check in the annotation.
+    A value other than the default is checked by ``check(value, what=name)``.  The result replaces
+    the value, unless it is None.  ``name`` is the name of the field, or the text that follows the
+    check in the annotation.
     """
 
     _refused: ClassVar[type[ArgumentError]] = ModelError
-    """Error of wrong fields; ArgumentError of records that are no parts of models."""
+    """Error of wrong fields; it is ArgumentError for records that do not belong to a model."""
 
     def __repr__(self) -> str:
-        return one_line(self)  # of dataclasses with ``repr=False``
+        return one_line(self)  # for dataclasses with ``repr=False``
 
     def __post_init__(self) -> None:
         for name, word, default, check in _checks(type(self)):  # type: ignore[arg-type]
@@ -73,13 +73,13 @@ class Record:
                 object.__setattr__(self, name, value if kept is None else kept)
 
     def _label(self) -> str:
-        """Name of the record in messages."""
+        """Return the name of the record in messages."""
         return type(self).__name__
 
 
 @cache
 def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., object]]]:
-    """Name, name in messages, default and check of each field that has a check."""
+    """Return name, name in messages, default and check of each field with a check."""
     found = []
     hints = get_type_hints(record, include_extras=True)
     for field in fields(record):
@@ -92,24 +92,25 @@ def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., obj
     return found
 
 
-# -- signatures of functions and objects of users -----------------------------------------------
+# -- signatures of users' functions and objects -------------------------------------------------
 
 
 NO_MEMBERS = {object, ABC, Protocol, Generic}
 
 _alike: WeakKeyDictionary[type, set[type]] = WeakKeyDictionary()
-"""Protocols that objects of a class were found to satisfy; signatures take a millisecond."""
+"""Protocols that a class satisfies; a check of signatures takes a millisecond."""
 
 
 def parameters_by_name(
     function: Callable[..., Any], known: Sequence[str], what: str, after: int = 0, more: str = ""
 ) -> tuple[str, ...] | None:
-    """Return the names by which a function asks, after so many parameters by position.
+    """Return the ``known`` names among the parameters of a function, without the first ``after``.
 
-    A function with ``**more`` asks for all that is known; None if the function does not tell.
+    A function with ``**more`` takes all known names.  The result is None if a function has no
+    signature.
 
     Raises:
-        ModelError: ``what`` has a parameter that is not known, without which it cannot be called.
+        ModelError: ``what`` has an unknown parameter without a default.
     """
     try:
         parameters = [*inspect.signature(function).parameters.values()]
@@ -129,7 +130,7 @@ def parameters_by_name(
 
 @lru_cache(maxsize=32)
 def members(of: type) -> dict[str, Callable[..., Any] | None]:
-    """Public methods, by name, of a protocol or an abstract class; attributes are None."""
+    """Return public methods by name of a protocol or an abstract class; attributes are None."""
     found: dict[str, Callable[..., Any] | None] = {}
     for base in reversed([base for base in of.__mro__ if base not in NO_MEMBERS]):
         for name, thing in (dict.fromkeys(inspect.get_annotations(base)) | vars(base)).items():
@@ -139,9 +140,9 @@ def members(of: type) -> dict[str, Callable[..., Any] | None]:
 
 
 def unlike(value: object, of: type) -> str:
-    """Return why an object has not the members of a protocol; empty if it has them.
+    """Return why an object does not satisfy a protocol; empty if it does.
 
-    Methods must take the arguments that the protocol calls them with.
+    Methods must accept the arguments of the methods of the protocol.
     """
     if missing := [name for name in members(of) if not hasattr(value, name)]:
         return f"it lacks {', '.join(missing)}"
@@ -155,8 +156,8 @@ def unlike(value: object, of: type) -> str:
         try:
             inspect.signature(getattr(value, name)).bind(*positions, **dict.fromkeys(by_name))
         except ValueError:
-            pass  # of a builtin, which has no signature
-        except TypeError:  # also of what cannot be called
+            pass  # a builtin has no signature
+        except TypeError:  # also if the member is not callable
             call = ", ".join(p.name for p in parameters)
             return f"its method {name} cannot be called as {name}({call})"
     known.add(of)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scenes: all records of a model, and their validity as a whole before any mesh exists."""
+"""Scenes: all records of a model, and checks of the whole model before any mesh exists."""
 
 from __future__ import annotations
 
@@ -68,15 +68,15 @@ class Scene(Record, Rich):
         loads: :class:`PointLoad`, :class:`FollowerLoad`, :class:`LineLoad`, :class:`Gravity`,
             :class:`RotatingFrame`.
         masses: :class:`PointMass`.
-        initial: :class:`Velocity`; at rest without.
-        damping: :class:`Rayleigh`, :class:`KelvinVoigt`; besides what materials dissipate.
+        initial: :class:`Velocity`; all is at rest by default.
+        damping: :class:`Rayleigh`, :class:`KelvinVoigt`, in addition to dissipation of materials.
         bodies: :class:`Body`.
         connectors: :class:`Turn`, :class:`Stretch`, :class:`Slide`: springs, dampers, stops,
             friction, motors.
         works: :class:`VirtualWork`, :class:`Potential`: effects along beams that you state in UFL.
 
     Raises:
-        ModelError: The parts do not fit together; the message names them.
+        ModelError: Records do not fit together; the message names them.
 
     Example:
         >>> frame = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
@@ -129,10 +129,10 @@ class Scene(Record, Rich):
         self._require_single_supports()
 
     def __getitem__(self, name: str) -> Beam | Body:
-        """The beam or body of a name, as in ``scene["left"].end``.
+        """Return the beam or body called ``name``, as in ``scene["left"].end``.
 
         Raises:
-            ModelError: There is none, or more than one.
+            ModelError: No beam or body has this name, or more than one has it.
         """
         everything: tuple[Beam | Body, ...] = (*self.beams, *self.bodies)
         found = [one for one in everything if one.name == name]
@@ -160,9 +160,10 @@ class Scene(Record, Rich):
     def size(self) -> float:
         """Diameter of the smallest circle around the undeformed scene; m.
 
-        It is the same in all axes.  A single point is as large as its radius of gyration.
+        It does not depend on the axes.  If all points coincide, it is the largest radius of
+        gyration, or 1.
         """
-        of_kind = {(b.cells, b.corners): b for b in self.beams}  # beams alike have one array
+        of_kind = {(b.cells, b.corners): b for b in self.beams}  # equal beams share an array
         vertices = {kind: np.array(b.vertices(())) for kind, b in of_kind.items()}
         curves = [beam.curve for beam in self.beams]
         on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams])
@@ -187,7 +188,7 @@ class Scene(Record, Rich):
 
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
-        """Plastic hinges of zero length: those of beams, and at ends whose section has a hinge."""
+        """Plastic hinges of zero length: ``hinges`` of beams, and hinges of sections at ends."""
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
         bearing = [support.place for support in self.supports if 2 in support.held]
         bearing += [mass.place for mass in self.masses if mass.inertia]
@@ -200,7 +201,7 @@ class Scene(Record, Rich):
 
     @property
     def moments(self) -> list[LoadAtPlace]:
-        """Loads at places that are moments, or have one."""
+        """Loads at places with a moment."""
         return [load for load in self.loads if isinstance(load, LoadAtPlace) and load.moment]
 
     @cached_property
@@ -225,7 +226,7 @@ class Scene(Record, Rich):
             yield from ((work, number) for number in work.numbers.values() if callable(number))
 
     def attachments(self) -> Iterator[tuple[object, Anchor]]:
-        """Iterate over all that has a place, and its place."""
+        """Iterate over pairs of a record (or a word for it) and a place that it refers to."""
         yield from ((joint, place) for joint in self.joints for place in joint.places)
         yield from ((link, place) for link in self.connectors for place in (link.a, link.b))
         yield from ((support, support.place) for support in self.supports)
@@ -247,7 +248,7 @@ class Scene(Record, Rich):
 
     @cached_property
     def attached(self) -> dict[Member, list[float]]:
-        """Parameters of the places of each beam that must be vertices."""
+        """Parameters of the places on each beam that must be vertices."""
         found: dict[Member, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
         for _, place in self.attachments():
             if isinstance(place, Place):
@@ -255,7 +256,7 @@ class Scene(Record, Rich):
         return found
 
     def _require_once(self) -> None:
-        """Raise if a record is in a list twice, or if two joints are the same."""
+        """Raise if a record repeats another, works share a name, or two frames rotate."""
         for one, twice in (*_again("beams", self.beams), *_again("bodies", self.bodies)):
             raise ModelError(f"Scene: {one.name} is in the scene {twice}")
         for part in ("joints", "connectors", "loads", "masses", "initial", "damping", "works"):
@@ -292,7 +293,7 @@ class Scene(Record, Rich):
             )
 
     def _require_pressing(self, connector: Connector, pressing: Bearing) -> None:
-        """Raise unless the force of what presses on friction can be known."""
+        """Raise unless the normal force on friction is known, from a support or joint."""
         if pressing not in (*self.joints, *self.supports):
             why = "is not in the scene; add it to joints or supports"
         elif isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
@@ -305,17 +306,17 @@ class Scene(Record, Rich):
 
     @property
     def shared_by_joints(self) -> list[list[NodeDof]]:
-        """Groups of components of motion that joints make equal."""
+        """Groups of degrees of freedom that joints make equal."""
         return [joint.equal(component) for joint in self.joints for component in joint.shared]
 
     def release(self) -> None:
-        """Give back the memory of what only numbering asks for, until it is asked for again."""
+        """Free the memory of properties that only numbering uses; they are computed again."""
         for name in ("attached", "representatives"):
             vars(self).pop(name, None)
 
     @cached_property
     def representatives(self) -> Representatives:
-        """Which component of a node stands for it, for all components that joints share."""
+        """Representative of each degree of freedom that joints and hinges share."""
         hinges = ([(node(link.a), c), (node(link.b), c)] for link in self.hinges for c in (0, 1))
         return merged([*self.shared_by_joints, *hinges])
 
@@ -323,7 +324,7 @@ class Scene(Record, Rich):
         same = self.representatives
         holders = {same[GROUND, component]: "the ground" for component in range(3)}
         for support in self.supports:
-            # A support in turned axes takes both displacements of its place.
+            # A support in rotated axes involves both displacements of its place.
             components = {*support.held, *((0, 1) if support.angle else ())}
             for component in sorted(components):
                 dof = same[node(support.place), component]
@@ -336,7 +337,7 @@ class Scene(Record, Rich):
 
 
 def spots_of(scene: Scene) -> dict[Body, list[Spot]]:
-    """Find the points of bodies and of the ground that something is attached to, each once."""
+    """Find the attachment points of bodies and of the ground, each once."""
     anchors = [place for joint in scene.joints for place in joint.places]
     anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
     anchors += [x.place for x in scene.loads if isinstance(x, PointLoad | FollowerLoad)]
@@ -348,7 +349,7 @@ def spots_of(scene: Scene) -> dict[Body, list[Spot]]:
 
 
 def _off_center(load: PointLoad) -> tuple[Connector, ...]:
-    """Connectors that push like a load at a point of a body that is not its centre."""
+    """Return connectors with the force of a load at a point of a body that is not its centre."""
     if carries(load.place):
         return ()
 
@@ -367,7 +368,7 @@ def _off_center(load: PointLoad) -> tuple[Connector, ...]:
 def _again(
     part: str, records: Sequence[Any], key: Callable[[Any], object] = id
 ) -> Iterator[tuple[Any, str]]:
-    """Records that were in a list before, and the words for it."""
+    """Iterate over records that a list repeats, with words for a message."""
     first: dict[object, int] = {}
     for i, record in enumerate(records):
         if (j := first.setdefault(key(record), i)) != i:

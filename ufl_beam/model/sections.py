@@ -33,24 +33,24 @@ class Section(Record):
         EA: Axial stiffness; N.
         GA: Shear stiffness, shear factor included; N.
         EI: Bending stiffness; N m².
-        rhoA: Mass per length; kg/m.  Zero, the default, is a beam without mass; state it where
-            other beams of a scene in motion have mass.
+        rhoA: Mass per length; kg/m.  Zero, the default, is a beam without mass; give zero
+            explicitly if other beams of a scene in motion have mass.
         rhoI: Rotary inertia per length; kg m.  Zero leaves rotary inertia out.
-        depth: Depth in the plane of motion, for pictures; m.  By default that of the rectangle
-            with the same EI/EA.  Beams that are much shorter are warned of.
+        depth: Depth in the plane of motion, for pictures; m.  The default is the depth of the
+            rectangle with the same EI/EA.  A much shorter beam causes a warning.
         axial: Law of the axial force N, if it can yield; N.
         shear: Law of the shear force V, if it can yield; N.
         bending: Law of the bending moment M, if it can yield; N m.
         hinge: Law of the hinge that opens in each cell where the moment reaches its limit; N m, J.
             For hinges in chosen cells see :class:`Beam`.
-        fibres: Fibres in the place of the laws of N, M and the hinge; the shapes below and
+        fibres: Fibres instead of the laws of N, M and the hinge; the shapes below and
             :meth:`of_fibres` place them.
-        interaction: Law of N and M together, such as :class:`AxialBending`, in the place of those
-            of single resultants and the hinge.
+        interaction: Law of N and M together, such as :class:`AxialBending`, instead of laws of
+            single resultants and the hinge.
 
     Raises:
-        ModelError: A stiffness is not positive, a number is not finite, a law is none, or laws of
-            resultants stand beside fibres.
+        ModelError: A stiffness is not positive, a number is not finite, a law has the wrong type,
+            or a section has both fibres and laws of resultants.
 
     Example:
         >>> plate = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
@@ -95,7 +95,7 @@ class Section(Record):
         self.layout(self.hinge)  # refuses laws that do not go together
 
     def layout(self, hinge: SofteningLaw | None) -> Layout | None:
-        """Material points of a cell with a hinge of this law; none if the cell is elastic."""
+        """Return the material points of a cell with this hinge law; None if it is elastic."""
         if self.fibres is not None:
             return self.fibres.layout(self.GA)
         stiffness = np.array([self.EA, self.GA, self.EI])
@@ -136,7 +136,7 @@ class Section(Record):
         cls, *, A: float, I: float, E: float, nu: float, rho: float | None, shear_factor: float,
         depth: float, fibres: PlacedFibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Homogeneous isotropic section of a given shape.
+        """Create a homogeneous isotropic section of a given shape.
 
         Args:
             A: Area; m².
@@ -144,9 +144,9 @@ class Section(Record):
             E: Young's modulus; Pa.
             nu: Poisson's ratio.
             rho: Density; kg/m³.
-            shear_factor: Part of A that carries shear.
+            shear_factor: Shear area over A.
             depth: Depth in the plane of motion; m.
-            fibres: Fibres; their sums are then EA and EI.
+            fibres: Fibres; EA and EI are then sums over them.
             laws: ``axial``, ``shear``, ``bending`` and ``hinge`` of :class:`Section`.
         """
         _require_positive("Section", A=A, I=I, E=E, shear_factor=shear_factor)
@@ -168,12 +168,12 @@ class Section(Record):
         cls, y: Sequence[float], A: Sequence[float], *, E: float, nu: float, fibres: Fibres,
         rho: float | None = None, shear_factor: float = 5 / 6,
     ) -> Section:  # fmt: skip
-        """Fibres of areas ``A`` (m²) at distances ``y`` (m) from any line along the beam.
+        """Create a section of fibres with areas ``A`` (m²) at ``y`` (m) from any parallel line.
 
         The axis of the beam runs through their centroid.
 
         Raises:
-            ModelError: The lists do not fit, or all fibres lie at one y.
+            ModelError: The lengths of the lists differ, or all fibres lie at one y.
         """
         require_kind(fibres, Fibres, "Section.of_fibres: fibres")
         require_number(E, "Section: E", positive=True)
@@ -203,7 +203,7 @@ class Section(Record):
         cls, b: float, h: float, *, E: float, nu: float, rho: float | None = None,
         shear_factor: float = 5 / 6, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Rectangle of width ``b`` and depth ``h`` (in the plane of motion); m."""
+        """Create a rectangle of width ``b`` and depth ``h`` (in the plane of motion); m."""
         _require_positive("Section.rectangle", b=b, h=h)
         placed = PlacedFibres.layers(fibres, E, h, lambda y: _below_in_rectangle(y, b, h))
         return cls.of_shape(
@@ -216,7 +216,7 @@ class Section(Record):
         cls, d: float, *, E: float, nu: float, rho: float | None = None,
         shear_factor: float = 9 / 10, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Solid circle of diameter ``d``; m."""
+        """Create a solid circle of diameter ``d``; m."""
         _require_positive("Section.circle", d=d)
         placed = PlacedFibres.layers(fibres, E, d, lambda y: _below_in_circle(y, d))
         return cls.of_shape(
@@ -229,7 +229,7 @@ class Section(Record):
         cls, d: float, t: float, *, E: float, nu: float, rho: float | None = None,
         shear_factor: float = 1 / 2, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Circular tube of outer diameter ``d`` and wall thickness ``t``; m."""
+        """Create a circular tube of outer diameter ``d`` and wall thickness ``t``; m."""
         _require_positive("Section.tube", d=d, t=t)
         if 2 * t > d:
             raise ModelError(
@@ -250,9 +250,9 @@ class Section(Record):
         cls, h: float, b: float, tw: float, tf: float, *, E: float, nu: float,
         rho: float | None = None, fibres: Fibres | None = None, **laws: Any,
     ) -> Section:  # fmt: skip
-        """Doubly symmetric I of depth ``h``, width ``b``, web ``tw`` and flanges ``tf``; m.
+        """Create a symmetric I of depth ``h``, width ``b``, web ``tw`` and flanges ``tf``; m.
 
-        Bends about its strong axis; the web between the mid-planes of the flanges carries shear.
+        It bends about its strong axis; the web between the mid-planes of the flanges carries shear.
         """
         _require_positive("Section.i_shape", h=h, b=b, tw=tw, tf=tf)
         if 2 * tf >= h or tw > b:
@@ -274,16 +274,16 @@ class Section(Record):
 
 
 def _below_in_rectangle(y: Array, b: float, h: float) -> Array:
-    """Area below y, and its first moment; (2, n)."""
+    """Return the area up to y, less a constant, and its first moment; (2, n)."""
     y = np.clip(y, -h / 2, h / 2)
     return np.array([b * y, b * y**2 / 2])
 
 
 def _below_in_circle(y: Array, d: float) -> Array:
-    """Area below y, and its first moment; (2, n)."""
+    """Return the area up to y, less a constant, and its first moment; (2, n)."""
     r = d / 2
     y = np.clip(y, -r, r)
-    half_chord = np.sqrt((r - y) * (r + y))  # never the root of a negative last digit
+    half_chord = np.sqrt((r - y) * (r + y))  # round-off makes no negative radicand
     area = y * half_chord + (r**2 * np.arcsin(y / r) if r else 0.0)
     return np.array([area, -2 / 3 * half_chord**3])
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Base of the laws of hinges and cracks that soften: traction over the opening."""
+"""Softening laws of hinges and cracks: traction as a function of the opening."""
 
 from __future__ import annotations
 
@@ -20,41 +20,41 @@ from ufl_beam.model.material_law import require_field, require_fields
 from ufl_beam.model.records import FromZero, Positive, Record
 
 OWN_LAW = "state a SofteningLaw of your own"
-"""Message of classes that are closed."""
+"""Message of classes without subclasses."""
 
 GAUSS = 6
 """Points of Gauss-Legendre quadrature of a traction over a step.
 
 The error of an exponential traction is 1e-12 of its mean in a step that opens by twice
-energy/limit, after which 86 % of the energy is dissipated, and 1e-17 in one that opens by half.
+energy/limit, after which 86 % of the energy is dissipated, and 5e-20 in one that opens by half.
 """
 
 SMALL = 1e-4
-"""Growth, as a part of energy/limit, from which on the mean traction is a difference of energies.
+"""Growth over energy/limit above which the mean traction is a difference of energies.
 
-The difference loses four digits there.  Quadrature over a smaller step is exact to round-off, or to
-1e-10 of the energy where a kink is inside.
+At this growth the difference loses four digits.  Quadrature over a smaller step is exact to
+round-off, or to 1e-10 of the energy if the step contains a kink.
 """
 
 MOST = 10_000
-"""Intervals of the quadrature of an energy that are halved at once; of a noisy law all would be."""
+"""Number of intervals above which adaptive quadrature stops: a noisy law never converges."""
 
 DECADES = 20
-"""Openings are looked at from ten to minus this power up to ten to this power; m or rad."""
+"""A law is sampled at openings from ten to minus this power to ten to this power; m or rad."""
 
 
 class SofteningLaw(ABC):
     """Base of the laws of hinges and cracks that lose their resistance.
 
-    A law of one's own is a frozen dataclass, whose fields are its numbers.  Its methods are written
-    with the functions of ``ub.law_functions``, for they are called with arrays and with UFL
-    expressions.  The traction is positive at zero opening, where the hinge opens; it may rise
-    before it falls, and vanishes in the end.  See docs/extending_laws.md.
+    A user's law is a frozen dataclass, whose fields are its parameters.  Its methods use the
+    functions of ``ub.law_functions``, because they are called with arrays and with UFL expressions.
+    The traction must be positive at zero opening and vanish at large openings; it may rise before
+    it falls.  See docs/extending_laws.md.
 
     Attributes:
-        limit: Traction at zero opening; a field of the law, or found from :meth:`traction`.
-        fracture_energy: Integral of the traction over all openings; a field of the law, or found
-            by quadrature.
+        limit: Traction at zero opening; a field of the law, or computed from :meth:`traction`.
+        fracture_energy: Integral of the traction over all openings; a field of the law, or
+            computed by quadrature.
 
     Example:
         >>> from dataclasses import dataclass
@@ -76,17 +76,17 @@ class SofteningLaw(ABC):
 
     @abstractmethod
     def traction(self, opening: Values) -> Values:
-        """Resistance after an accumulated opening; N m, N or Pa."""
+        """Return the resistance after an accumulated opening; N m, N or Pa."""
 
     def energy_to(self, opening: Values) -> Values | None:
-        """Energy dissipated up to an opening, the integral of the traction; None: by quadrature."""
+        """Return the integral of the traction up to an opening; None leaves it to quadrature."""
         return None
 
     def mean_traction(self, opening: Values, growth: Values) -> Values:
-        """Mean resistance while the opening grows; its product with the growth is dissipated.
+        """Return the mean resistance over a growth; dissipation is its product with the growth.
 
-        It is the difference of :meth:`energy_to` over the growth; where a law states none, and in
-        steps so small that digits would be lost, that of Gauss-Legendre quadrature.
+        It is the difference of :meth:`energy_to` over the growth.  Gauss-Legendre quadrature
+        replaces it if a law has no ``energy_to``, or if a small step would lose digits.
         """
         points, weights = np.polynomial.legendre.leggauss(GAUSS)
         terms = zip(points.tolist(), weights.tolist(), strict=True)
@@ -104,7 +104,7 @@ class SofteningLaw(ABC):
 
     @property
     def opens(self) -> bool:
-        """True if it ever opens."""
+        """True if the limit is finite."""
         return bool(self.limit < np.inf)
 
     @property
@@ -114,37 +114,40 @@ class SofteningLaw(ABC):
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """Largest fall of the traction per opening, and an opening at which it falls so."""
+        """Largest fall of the traction per opening, and an opening with this fall."""
         return course(self).steepest
 
     def numbers(self) -> dict[str, Any]:
-        """Numbers of the law by name: its fields, and limit and energy."""
+        """Return the parameters of the law by name: its fields, limit and energy."""
         own = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
         return {"limit": self.limit, "fracture_energy": self.fracture_energy} | own
 
     def of(self, numbers: Mapping[str, Values]) -> SofteningLaw:
-        """Return the law with other numbers, arrays or symbols."""
+        """Return the law with other parameters: numbers, arrays or symbols."""
         law = copy.copy(self)
         vars(law).update(numbers)
         return law
 
     def kind(self) -> SofteningLaw:
-        """Return the law with numbers that do not matter."""
+        """Return the law with all parameters equal to 1."""
         return self.of(dict.fromkeys(self.numbers(), 1.0))
 
 
 # -- laws of the package -------------------------------------------------------------------------
 
 BROKEN = 70.0
-"""Exponent of the decay of a traction from which on it is zero, some 1e-30 of the limit.
+"""Exponent of the decay from which on a traction, some 1e-30 of the limit, is set to zero.
 
-Far below round-off; but numbers that underflow would be forces and stiffnesses made of noise.
+This is far below round-off.  Numbers that underflow would make forces and stiffnesses of noise.
 """
 
 
 @dataclass(frozen=True)
 class _OfLimitAndEnergy(Record, SofteningLaw):
-    """Base of laws of two numbers that fall by limit²/energy or less; others state `steepest`."""
+    """Base of laws with a limit and an energy; their tractions never exceed the limit.
+
+    They fall by at most limit²/energy per opening; a steeper law must define ``steepest``.
+    """
 
     limit: FromZero
     fracture_energy: Positive
@@ -152,7 +155,7 @@ class _OfLimitAndEnergy(Record, SofteningLaw):
 
     @property
     def steepest(self) -> tuple[float, float]:
-        """Fall of the traction per opening when it opens; linear softening has half of it."""
+        """Bound on the fall per opening, at zero opening; linear softening falls by half of it."""
         return self.limit * (self.limit / self.fracture_energy), 0.0
 
 
@@ -161,12 +164,12 @@ class Softening(_OfLimitAndEnergy):
     """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
 
     Args:
-        limit: Traction at which it opens: moment of a hinge, N m; stress of a fibre, Pa.  Zero is a
-            perfect joint, infinity never opens.
+        limit: Traction at which opening begins: moment of a hinge, N m; stress of a fibre, Pa.
+            Zero is a perfect joint; with infinity it never opens.
         fracture_energy: Energy dissipated by a complete opening: J; for fibres J/m².
 
     Raises:
-        ModelError: A negative limit, or an energy that is not positive.
+        ModelError: The limit is negative, or the energy is not positive.
 
     Example:
         >>> law = ub.Softening(limit=5e4, fracture_energy=1e3)  # N m, J
@@ -175,12 +178,12 @@ class Softening(_OfLimitAndEnergy):
     """
 
     def traction(self, ξ: Values) -> Values:
-        """Resistance after the accumulated opening ξ."""
+        """Return the resistance after the accumulated opening ξ."""
         decay = self.limit / self.fracture_energy * ξ
         return where(below(decay, BROKEN), self.limit * exp(-decay), 0.0)  # P(52)!
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
-        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
+        """Return the mean resistance from ξ to ξ + a; its product with a is dissipated."""
         return self.traction(ξ) * _mean_of_decay(self.limit / self.fracture_energy * a)
 
 
@@ -188,7 +191,7 @@ class Softening(_OfLimitAndEnergy):
 class LinearSoftening(_OfLimitAndEnergy):
     """Linear softening of a hinge or crack, to zero at the opening 2 fracture_energy / limit.
 
-    Args and errors are those of :class:`Softening`.
+    It has the arguments and errors of :class:`Softening`.
 
     Example:
         >>> law = ub.LinearSoftening(limit=5e4, fracture_energy=1e3)  # N m, J
@@ -197,11 +200,11 @@ class LinearSoftening(_OfLimitAndEnergy):
     """
 
     def traction(self, ξ: Values) -> Values:
-        """Resistance after the accumulated opening ξ."""
+        """Return the resistance after the accumulated opening ξ."""
         return positive(self.limit - self.limit**2 / (2 * self.fracture_energy) * ξ)
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
-        """Mean resistance while the opening grows from ξ by a; its product with a is dissipated."""
+        """Return the mean resistance from ξ to ξ + a; its product with a is dissipated."""
         now, slope = self.traction(ξ), self.limit**2 / (2 * self.fracture_energy)
         ends = below(now - slope * a, 0.0)
         safe = where(ends, slope * a, 1.0)
@@ -209,7 +212,7 @@ class LinearSoftening(_OfLimitAndEnergy):
 
 
 def _mean_of_decay(x: Values) -> Values:
-    """Mean of exp(-x) from 0 to x, smooth at zero: (1 - exp(-x))/x, its series below 0.1."""
+    """Return the mean of exp(-x) from 0 to x, (1 - exp(-x))/x; below 0.1 by its series."""
     small = below(x, 0.1)
     series = 1.0
     for k in range(12, 1, -1):
@@ -239,21 +242,21 @@ def require_softening(law: object, what: str) -> None:
         raise ModelError(f"{what}: {error}") from error.__cause__
 
 
-# -- numbers that follow from the traction -------------------------------------------------------
+# -- parameters that follow from the traction ----------------------------------------------------
 
 
 class Course(NamedTuple):
-    """Course of a traction over all openings."""
+    """Properties of a traction over all openings."""
 
     limit: float
     fracture_energy: float
     largest: float  # traction
-    steepest: tuple[float, float]  # fall per opening, and an opening at which it falls so
+    steepest: tuple[float, float]  # largest fall per opening, and an opening with this fall
 
 
 @lru_cache(maxsize=256)
 def course(law: SofteningLaw) -> Course:
-    """Follow a law from zero to full opening; raise :class:`ModelError` if it cannot soften so."""
+    """Sample a law from zero to full opening; raise :class:`ModelError` if it is invalid."""
     kind = type(law).__name__
     edges = np.append(0.0, np.logspace(-DECADES, DECADES, 16 * DECADES + 1))
     t = _called(law, "traction", edges)
@@ -265,7 +268,7 @@ def course(law: SofteningLaw) -> Course:
         )
     _require_no_drive(kind, edges, t)
     energy = _integral(law, edges)
-    if t[-1] > 0:  # beyond, by the power with which it falls
+    if t[-1] > 0:  # extrapolated by the power law of its fall
         power = np.log(t[-17] / t[-1]) / np.log(edges[-1] / edges[-17])
         if power <= 1.01:
             raise ModelError(
@@ -328,9 +331,9 @@ def _called(law: SofteningLaw, method: str, openings: Array) -> Array:
 
 
 def _integral(law: SofteningLaw, edges: Array) -> float:
-    """Integral of a traction; intervals are halved until quadrature is exact to round-off.
+    """Integrate a traction; intervals are halved until quadrature is exact to round-off.
 
-    Lobatto's rule has points at both ends, where a kink is seen that is close to them.
+    Lobatto's rule has points at both ends, so that it detects a kink near them.
     """
     polynomial = np.polynomial.Legendre.basis(GAUSS)
     x = np.array([-1.0, *polynomial.deriv().roots(), 1.0])
@@ -354,7 +357,7 @@ def _integral(law: SofteningLaw, edges: Array) -> float:
 
 
 def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:
-    """Raise :class:`ModelError` unless ``energy_to`` and stated numbers are of the traction."""
+    """Raise :class:`ModelError` unless ``energy_to``, limit and energy agree with the traction."""
     kind = type(law).__name__
     if law.energy_to(np.zeros(1)) is not None:
         for opening in (0.0, *(unit * np.array([0.1, 0.5, 1.0, 2.0, 5.0]))):
@@ -378,7 +381,7 @@ def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:
 
 
 def _slope(law: SofteningLaw, a: float, b: float, limit: float, unit: float) -> tuple[float, float]:
-    """Steepest fall in an interval, found by halving it, and where it begins."""
+    """Find the steepest fall in an interval by bisection, and the opening where it begins."""
 
     def traction(opening: float) -> float:
         return float(_called(law, "traction", np.array([opening]))[0])

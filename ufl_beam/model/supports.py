@@ -22,15 +22,15 @@ Motion = float | TimeFunction
 
 
 def still(t: float) -> float:
-    """The time function of a component that is held fast: 0."""
+    """Return 0: the time function of a fixed component."""
     return 0.0
 
 
 class Support(Bearing, ABC):
-    """Held or prescribed motion of a place; base of :class:`Clamped` and its siblings.
+    """Held or prescribed motion of a place; base of :class:`Clamped` and other supports.
 
     Attributes:
-        place: Where.
+        place: Supported place.
         held: Component -> its value in time (m, m, rad), in axes turned by ``angle``.
         angle: Direction of the first axis; rad.
 
@@ -124,12 +124,12 @@ class Roller(Support):
 
     @property
     def held(self) -> dict[int, TimeFunction]:
-        """The displacement across it."""
+        """The displacement across ``along``."""
         return {0 if self.along[0] == 0.0 else 1: still}
 
     @property
     def angle(self) -> float:  # type: ignore[override]
-        """Direction in which it rolls, if that is not along an axis."""
+        """Direction in which it rolls, or 0 if that is along an axis; rad."""
         return math.atan2(self.along[1], self.along[0]) if all(self.along) else 0.0
 
 
@@ -137,8 +137,8 @@ class Roller(Support):
 class PrescribedDisplacement(Support):
     """Prescribed motion of a place by numbers or functions of time; m, m, rad.
 
-    A number is reached at once in dynamics, and in proportion to the time in statics only if it is
-    given as a function such as ``lambda t: 0.1 * t``.
+    A number is reached at once, also in statics.  For a motion in proportion to the time give a
+    function such as ``lambda t: 0.1 * t``.
 
     Example:
         >>> turned = ub.PrescribedDisplacement(

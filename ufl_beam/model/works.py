@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Virtual works and potentials along beams that a user states in UFL."""
+"""Virtual works and potentials along beams, stated by users in UFL."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ def _require_name(name: Any, what: str) -> None:
 
 @dataclass(frozen=True, eq=False)
 class Work(Record):
-    """Base of what acts along beams by a function of a user; the function is a density of energy.
+    """Base of effects along beams that a user states as a function, a density of energy.
 
     Attributes:
-        arguments: Names that its parameters may have, besides those of ``numbers``.
+        arguments: Names that the parameters of the function may have, besides ``numbers``.
     """
 
     arguments: ClassVar[tuple[str, ...]]
@@ -72,7 +72,7 @@ class Work(Record):
 
     @property
     def asked(self) -> tuple[str, ...]:
-        """Names of the parameters of the function, each with a known meaning."""
+        """Names of the parameters of the function, all of them known."""
         known = (*self.arguments, *self.numbers)
         asked = parameters_by_name(
             self.density, known, f"{self}: the function", more=", and what `numbers` names"
@@ -86,16 +86,16 @@ class Work(Record):
 
     @property
     def takes_rates(self) -> bool:
-        """True if the function takes ``v`` or ``dt``: only a step in time gives it a value."""
+        """True if the function takes ``v`` or ``dt``, which only a time step defines."""
         return not {"v", "dt"}.isdisjoint(self.asked)
 
     @property
     def in_time(self) -> str:
-        """Name of the entry of what a potential gains by a change in time."""
+        """Name of the entry with the energy that a potential gains by a change in time."""
         return f"{self.name} in time"
 
     def on(self, beams: Sequence[Member]) -> Sequence[Member]:
-        """Those of the beams of a scene on which it acts."""
+        """Return the beams of a scene on which it acts."""
         return beams if self.beams is None else self.beams
 
 
@@ -104,12 +104,13 @@ class Work(Record):
 class VirtualWork(Work):
     """Virtual work of a distributed effect, which a user states in UFL.
 
-    The function returns the work per undeformed length that the effect does on a virtual motion, as
-    loads do: a force f along y is ``f * w[1]``.  Its derivative follows by UFL.  It takes, by name,
-    whichever of these it needs:
+    The function returns the work of the effect on a virtual motion, per undeformed length and with
+    the sign of loads: a force f along y is ``f * w[1]``.  UFL derives its tangent.  Parameters of
+    the function may be, by name:
 
     * ``q0``, ``q1``: configurations (u_x, u_y, ψ) at both ends of the step; m, m, rad,
-    * ``q``: that at which the time scheme states forces, their mean in :class:`EnergyMomentum`,
+    * ``q``: configuration at which the time scheme evaluates forces, in :class:`EnergyMomentum` the
+      mean of ``q0`` and ``q1``,
     * ``v``: mean velocity of the step, (q1 - q0)/dt, also in static runs; m/s, m/s, rad/s,
     * ``w``: virtual motion (w_x, w_y, w_ψ), in which the work is linear; m, m, rad,
     * ``axis``: undeformed axis, with ``axis.x``, its point (2,), tangent ``axis.t0`` and normal
@@ -117,21 +118,21 @@ class VirtualWork(Work):
     * ``t``, ``dt``: time at which it acts, and length of the step; s,
     * the names in ``numbers``.
 
-    Its work since the beginning is the entry ``name`` among those supplied in the energy ledger.
-    Effects that store energy are a :class:`Potential`.  A static run has real time: works with
-    ``v`` act in it as dampers do, with a warning.
+    Its work since the beginning is an entry ``name`` of the supplied energy in the ledger.  State
+    effects that store energy as a :class:`Potential`.  A static run has real time: there works with
+    ``v`` act like dampers, with a warning.
 
     Args:
         name: Entry in the ledger.
         density: The function; J/m.
-        beams: The beams it acts on; all by default.
-        numbers: Numbers, or functions of time, that the function names; others can be taken
-            without compiling anew.
-        degree: Degree of polynomials that are integrated exactly in cells of degree 1; each degree
-            that cells have more adds two.
+        beams: Beams on which it acts; all by default.
+        numbers: Parameters of the function: numbers or functions of time.  Other values need no
+            new compilation.
+        degree: Degree of polynomials that are integrated exactly in cells of degree 1.  Each
+            further degree of the cells adds two.
 
     Raises:
-        ModelError: The function is not linear in w, or no scalar of UFL; the name is taken.
+        ModelError: The function is not linear in w, or not a scalar of UFL; the name is taken.
 
     Example:
         >>> def drag(v, w, c):
@@ -154,17 +155,17 @@ class VirtualWork(Work):
 class Potential(Work):
     """Potential energy of a distributed effect, which a user states in UFL.
 
-    The function returns the energy per undeformed length.  It takes, by name, whichever it needs of
-    ``q``, ``axis``, ``t`` and the names in ``numbers``, see :class:`VirtualWork`.  Forces are its
-    derivative by UFL, in :class:`EnergyMomentum` and its relatives the mean of the derivative over
-    the step: their work is the increment of the energy, to round-off for polynomials of degree 8
-    and otherwise but for the ninth power of a step.  The energy is the entry ``name`` of the state
-    of the ledger; what a change in time brings is the entry supplied "name in time".
+    The function returns the energy per undeformed length.  Its parameters may be ``q``, ``axis``,
+    ``t`` and the names in ``numbers``, see :class:`VirtualWork`.  UFL derives the forces.
+    :class:`EnergyMomentum` and related schemes use the mean of this derivative over the step.  Then
+    the work of the forces is the increment of the energy: to round-off for polynomials of degree 8,
+    otherwise with an error of the ninth power of a step.  The energy is the entry ``name`` of the
+    state of the ledger; energy gained by a change in time is the supplied entry "name in time".
 
-    Args are those of :class:`VirtualWork`.
+    It has the arguments of :class:`VirtualWork`.
 
     Raises:
-        ModelError: The function does not depend on q, or is no scalar of UFL; the name is taken.
+        ModelError: The function does not depend on q, or is not a scalar of UFL; the name is taken.
 
     Example:
         >>> soil = ub.Potential("soil", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": 1e6})  # N/m²
