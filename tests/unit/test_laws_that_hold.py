@@ -256,6 +256,11 @@ def law_of(**members):
         ({"limit": lambda s, z: 1.0, "components": 2}, "has a limit, which is for"),
         ({"energy": lambda s, e, z: e, "sliding": lambda s, e, r, z, dt: 1.0}, "and no limit"),
         ({"limit": lambda s, z: None}, "Mine.limit returns None"),
+        ({"limit": lambda s, z: -1.0}, "Mine.limit returns -1.0 at no motion; it must return the"),
+        (
+            {"limit": lambda s, z: 1.0, "sliding": lambda s, e, r, z, dt: e - 1.0},
+            "Mine.sliding returns array([-1.]) at no motion; it must return the size",
+        ),
         ({"limit": lambda s, z: 1.0, "sliding": lambda s, e, r, z, dt: e / 0}, "Mine.sliding"),
     ],
 )

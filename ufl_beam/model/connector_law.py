@@ -240,6 +240,11 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
                     f"{what}.{name} returns {f'{of} = ' * bool(of)}{shorten(value)} at no motion; "
                     f"it must return a number there{stated_at(law)}"
                 )
+            if name in ("limit", "sliding") and np.any(np.asarray(value) < 0):
+                raise ModelError(
+                    f"{what}.{name} returns {shorten(value)} at no motion; it must return the size "
+                    f"of a force, whose sign comes by itself{stated_at(law)}"
+                )
 
 
 CALLED = ("energy", "limit", "resistance", "sliding", "increments")
