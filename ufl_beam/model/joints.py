@@ -371,7 +371,7 @@ class Release(Joint):
 
     @property
     def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
-        """Both places."""
+        """Both places of the joint."""
         return self.a, self.b
 
     @property
