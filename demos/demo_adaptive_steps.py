@@ -2,15 +2,15 @@
 # # Adaptive steps
 #
 # The four-beam swing moves slowly for 0.64 s, then it snaps taut within microseconds.  Equal steps
-# that resolve the snap are far too short for the rest.  `dt=ub.Adaptive(tolerance)` chooses the
-# steps by the error of each step, estimated from the change of the acceleration.
+# that resolve the snap are far too short for the rest of the motion.  `dt=ub.Adaptive(tolerance)`
+# chooses the steps by the error of each step, estimated from the change of the acceleration.
 #
 # This demo shows
 #
-# * adaptive steps against equal ones: steps needed for the same error,
-# * that steps end where the table of the load has its kinks,
-# * the list of events, here of a stop that the beam hits,
-# * what the tolerance means.
+# * adaptive and equal steps: the numbers of steps for the same error,
+# * steps that end at the kinks of the load table,
+# * the list of events, here impacts of the beam on a stop,
+# * the meaning of the tolerance.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -29,7 +29,7 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# That of `demo_four_beam_swing.py`, up to the moment when the links are taut.
+# The scene is the swing of `demo_four_beam_swing.py`, up to the moment when the links are taut.
 
 # %%
 E, nu, rho = 73e9, 0.3, 2700.0  # Pa, -, kg/m^3
@@ -46,7 +46,7 @@ push = ub.Table([0, 0.128, 0.256], [0, 2, 0])  # s, N
 
 
 def swing(connectors=()):
-    """The swing, and what else acts on it."""
+    """Return the swing, with further connectors."""
     return ub.Scene(
         beams=[beam, left, right],
         joints=[ub.Revolute(left.end, beam.start), ub.Revolute(right.end, beam.end)],
@@ -60,7 +60,7 @@ def swing(connectors=()):
 # %% [markdown]
 # ## Errors and steps
 #
-# The error is that of the places of the beam at 0.64 s, against a run with a smaller tolerance.
+# The error is the distance of the places of the beam at 0.64 s from a run with a smaller tolerance.
 
 # %%
 END = 0.64  # s
@@ -104,7 +104,7 @@ for kink in push.times[1:]:
     assert kink in chosen.times
 
 # %% [markdown]
-# For the same error, there are fewer adaptive than equal steps, by an order of magnitude.  The sum
+# For the same error, adaptive steps are fewer than equal steps by an order of magnitude.  The sum
 # of the estimated errors is larger than the error at the end, since errors decay in this motion.
 #
 # ## Impact on a stop
@@ -157,7 +157,6 @@ if MPI.COMM_WORLD.rank == 0:
 # %% [markdown]
 # ## Try this
 #
-# * `EnergyMomentum(0.05, 0.05)`: dissipation of the scheme counts as an error, so steps are
-#   shorter.
+# * `EnergyMomentum(0.05, 0.05)`: numerical dissipation counts as an error, so steps are shorter.
 # * A pulse without a table, `amplitude=lambda t: 2.0 * (0.1 < t < 0.2)`: the steps find the jumps
-#   at some cost; `ub.Adaptive(1e-6, stops=[0.1, 0.2])` avoids it.
+#   at some cost; `ub.Adaptive(1e-6, stops=[0.1, 0.2])` avoids this cost.

@@ -9,11 +9,11 @@
 # This demo shows
 #
 # * a hinge that softens, P(49)-P(53), at a chosen place of a moving beam,
-# * the transition from a rigid joint to a revolute one without a change of the model,
-# * the ledger: what the drive supplied and where it went.
+# * the transition from a rigid joint to a revolute joint without a change of the model,
+# * the ledger: the energy that the drive supplied, and its distribution.
 #
-# The machine is assumed, with numbers that one could buy: an aluminium tube 50 x 2 mm of 1.5 m
-# and a payload of 2 kg, in the horizontal plane, so that gravity does no work.
+# The data of the machine are realistic assumptions: an aluminium tube 50 x 2 mm of 1.5 m and a
+# payload of 2 kg, in the horizontal plane, so that gravity does no work.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -30,9 +30,9 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# The hub turns as prescribed: up to speed within 0.3 s, on until 0.5 s, then the brake.  The
-# breaking joint is at the hub.  It opens at M_u = 300 N m, twice the moment of the drive, and its
-# fracture energy G_f = 20 J is half of the kinetic energy.
+# The rotation of the hub is prescribed: it reaches its speed within 0.3 s and keeps it until the
+# brake closes at 0.5 s.  The breaking joint is at the hub.  It opens at M_u = 300 N m, twice the
+# moment of the drive, and its fracture energy G_f = 20 J is half of the kinetic energy.
 
 # %%
 L, payload = 1.5, 2.0  # m, kg
@@ -54,7 +54,7 @@ def hub(t):
 
 
 def run(hinges, record=()):
-    """The arm, its drive, and its motion for 1.3 s."""
+    """Return the arm and its motion for 1.3 s."""
     arm = ub.Beam((0, 0), (L, 0), tube, cells=20, hinges=hinges, name="arm")
     drive = ub.PrescribedDisplacement(arm.start, u=0, v=0, psi=hub)
     scene = ub.Scene([arm], supports=[drive], masses=[ub.PointMass(arm.end, payload)])
@@ -65,8 +65,9 @@ def run(hinges, record=()):
 # %% [markdown]
 # ## Two runs
 #
-# The arm with the breaking joint, and without it.  `alpha` damps vibrations at frequencies far
-# above those of the arm, which the brake excites; the ledger has this loss as "numerical".
+# The arm moves with the breaking joint, and without it.  `alpha` damps vibrations that the brake
+# excites, at frequencies far above the natural frequencies of the arm; the ledger lists this loss
+# as "numerical".
 
 # %%
 breaking = {0.0: ub.Softening(M_u, G_f)}
@@ -97,7 +98,8 @@ ub.print_once(
 # %% [markdown]
 # ## Pictures
 #
-# The arm every 50 ms, the moments at the hub, the jump of the joint, and where the energy is.
+# The pictures show the arm every 50 ms, the moments at the hub, the jump of the joint, and the
+# distribution of the energy.
 
 # %%
 from matplotlib import colormaps
@@ -109,7 +111,7 @@ of_time = Normalize(0.0, t[-1])
 
 
 def strobe(axes, solution, beam):
-    """Shapes every 50 ms, coloured by time, and the path of the payload."""
+    """Draw shapes every 50 ms, coloured by time, and the path of the payload."""
     for n in range(0, len(t), 50):
         x, y = solution.shape(beam, n).T
         axes.plot(x, y, color=colors(of_time(t[n])), lw=2.0, zorder=3)
@@ -123,7 +125,7 @@ def strobe(axes, solution, beam):
 
 
 def balance(axes, energy):
-    """Energies upon each other; their sum is what the drive supplied."""
+    """Draw stacked energies; their sum is the energy that the drive supplied."""
     shares = {
         "kinetic": (blue, "kinetic"), "stored": (sky, "stored"), "hinges": (orange, "lost: joint"),
         "numerical": (grey, "lost: scheme"),
@@ -172,9 +174,9 @@ ub.print_once(
 # %% [markdown]
 # ## Verification
 #
-# The hinge dissipates exactly its fracture energy, and the ledger closes.  After that it is a
-# revolute joint: no moment, no dissipation, and the arm swings freely with constant angular
-# momentum about the hub.
+# The hinge dissipates exactly its fracture energy, and the ledger closes.  Afterwards it is a
+# revolute joint: it has no moment and no dissipation, and the arm swings freely with constant
+# angular momentum about the hub.
 
 # %%
 for solution in (saved, bent):
@@ -197,7 +199,7 @@ assert np.ptp(momentum) < 1e-2 * momentum.mean()
 # %% [markdown]
 # ## Try this
 #
-# * `LinearSoftening(M_u, G_f)`: the joint is open after 2 G_f/M_u = 0.13 rad, and then entirely,
+# * `LinearSoftening(M_u, G_f)`: the joint is completely open after 2 G_f/M_u = 0.13 rad,
 # * `G_f = 60.0`: more than the energy of the arm; where does it stop?
 # * `tube` with `bending=ub.ElastoPlastic(M_yield, isotropic=...)`: how far does the arm bend
-#   without?
+#   without the joint?

@@ -1,9 +1,9 @@
 # %% [markdown]
 # # End rotation: the moment of a beam that yields, flows and breaks
 #
-# The free end of a straight cantilever is turned by π, at different rates.  The moment is the same
-# all along the beam, so the result of each material law is one number with
-# a closed form.  This is section 4.1 of the paper: its Table 1 and its Figures 4 and 5.
+# The free end of a straight cantilever is turned by π, at different rates.  The moment is constant
+# along the beam, so the result of each material law is one number with a closed form.  This is
+# section 4.1 of the paper: its Table 1 and its Figures 4 and 5.
 #
 # This demo shows
 #
@@ -11,8 +11,8 @@
 # * an energy ledger that closes to round-off although energy is dissipated,
 # * a plastic hinge that opens and softens, independently of the mesh.
 #
-# What the paper does not print follows from its numbers: L = 1 m, and the rates π, 10π and 100π
-# per second are those of the curvature, so that the end turns by π in 1, 0.1 and 0.01 s.
+# The paper does not print L and the durations, but they follow from its numbers: L = 1 m, and π,
+# 10π and 100π per second are rates of the curvature, so the end turns by π in 1, 0.1 and 0.01 s.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -61,7 +61,7 @@ def turn(beam, angle, rate, steps, record=()):
 
 
 def check(solution):
-    """What must hold in every run, whatever the law."""
+    """Check conditions that must hold in every run with any law."""
     assert solution.energy.worst < 1e-9
     assert solution.iterations <= 5 * solution.parts
     for values in solution.energy.lost.values():
@@ -71,15 +71,15 @@ def check(solution):
 # %% [markdown]
 # ## Table 1
 #
-# `EnergyMomentumStatic` finds equilibrium over each step, in the middle of its rotation.  What is
-# left of that at the end of a step is a moment that varies along the beam with the square of the
-# rotation in a step; its mean is exact, since the mean curvature is.  (`Static` has no such trace,
-# but its ledger closes to second order only.)
+# `EnergyMomentumStatic` finds equilibrium over each step, in the middle of its rotation.  Therefore
+# the moment at the end of a step varies along the beam, with the square of the rotation in a step;
+# its mean is exact, since the mean curvature is exact.  (`Static` has no such variation, but its
+# ledger closes only to second order.)
 #
-# The overstress of Perzyna's law, P(39), is η I times the rate of the plastic curvature: in steady
-# flow E/(E + K) times the rate of the curvature, and E/(E + K) of that reaches the moment, because
-# the overstress also slows down hardening.  The law of Duvaut and Lions, P(45), with τ = η/(E + K),
-# P(46), is the same law; we use it for the larger η as the paper does.
+# The overstress of Perzyna's law, P(39), is η I times the rate of the plastic curvature.  In steady
+# flow this rate is E/(E + K) times the rate of the curvature.  Only the fraction E/(E + K) of the
+# overstress adds to the moment, because it also slows down hardening.  The law of Duvaut and Lions,
+# P(45), with τ = η/(E + K), P(46), is the same law; we use it for the larger η as the paper does.
 
 # %%
 M_e = np.pi * EI / L
@@ -92,7 +92,7 @@ def steady(eta):
 
 
 def moment(solution, beam, n=-1):
-    """Mean moment of the law at the n-th kept time, not that of the step that ends there; N m."""
+    """Return the mean moment of the law at the n-th kept time, not over the step before it; N m."""
     if beam.section.bending is None:
         return EI * solution.strains(beam, n)[:, 2].mean()
     return solution.material(beam, n).forces[:, 2].mean()
@@ -123,11 +123,12 @@ closed = np.array([M_e, M_ep, *steady(1e6), *steady(2e7)]) / kNcm
 # %% [markdown]
 # ## What the paper prints for η = 2e7 Pa s
 #
-# Its computed values are another update.  It takes the trial stress of a step from the
-# *rate-independent* stress before it, where P(47) continues the viscous one, it uses τ = η/E in the
-# place of P(46), and a step of 1 ms at all rates.  A step then forgets the overstress of the steps
-# before, so that the result depends on the step.  Its "exact" values are one step of the same rule
-# from yield to the end.  Neither belongs in a package; here they are.
+# The paper's computed values result from another update.  It starts the trial stress of a step from
+# the preceding *rate-independent* stress, whereas P(47) starts from the viscous stress.  It uses
+# τ = η/E instead of P(46), and a step of 1 ms at all rates.  Each step then loses the overstress of
+# the preceding steps, so the result depends on the step.  The "exact" values are one step of the
+# same rule from yield to the end.  The package has neither of these rules; they are implemented
+# here.
 
 
 # %%
@@ -183,9 +184,9 @@ ub.print_once(
 )
 
 # %% [markdown]
-# All computed moments are the closed forms, and up to η = 1e6 Pa s the printed values to their last
-# digit (5.9357 of two cells is 5.93576, cut off rather than rounded).  The paper's "exact" values
-# for η = 1e6 Pa s are those of the full overstress η I times the rate of the curvature.
+# All computed moments equal the closed forms, and up to η = 1e6 Pa s they equal the printed values
+# to the last digit (5.9357 with two cells is 5.93576, truncated instead of rounded).  The paper's
+# "exact" values for η = 1e6 Pa s contain the full overstress, η I times the rate of the curvature.
 
 # %%
 assert np.allclose(table, closed, rtol=1e-9)
@@ -206,14 +207,14 @@ assert 3.8 < spread[100] / spread[200] < 4.2
 # %% [markdown]
 # ## Softening
 #
-# The middle is weaker: at M_u = 8 kN cm a hinge opens there, with the traction
-# M_u exp(-M_u a/G_f) at the jump a, P(52).  While it opens the beam around it unloads, and as the
-# rotation of the end is imposed, that is stable if the hinge softens more slowly than the beam
-# springs back: M_u²/G_f < EI/L.  The fracture energy is printed as 10·10³ kJ, which would lift
-# a lorry of 40 t by 25 m; we read it as 10·10³ N cm = 100 J, so that 64 < 122 N m/rad.
+# The middle is weaker: at M_u = 8 kN cm a hinge opens there, with the traction M_u exp(-M_u a/G_f)
+# at the jump a, P(52).  While the hinge opens, the beam around it unloads.  As the rotation of the
+# end is prescribed, this is stable if the hinge softens more slowly than the beam unloads:
+# M_u²/G_f < EI/L.  The paper prints the fracture energy as 10·10³ kJ, which would lift a lorry of
+# 40 t by 25 m; we read it as 10·10³ N cm = 100 J, so that 64 < 122 N m/rad.
 #
-# M_u is reached at 9.7 rad only, so we go on to 4π.  The jump adds to the curvature of the bulk
-# wherever it sits: ψ = M L/EI + κ_p L + a, with the plastic curvature κ_p = (M_u - M_y)/(K I).
+# M_u is reached only at 9.7 rad, so we continue to 4π.  At any place the jump adds to the curvature
+# of the bulk: ψ = M L/EI + κ_p L + a, with the plastic curvature κ_p = (M_u - M_y)/(K I).
 
 # %%
 M_u, G_f = 80.0, 100.0  # N m, J
@@ -256,9 +257,10 @@ for name, (psi, at_hinge, solution) in named.items():
     )
 
 # %% [markdown]
-# The work that the bulk dissipates until M_u is M_y κ_p L, the hinge dissipates the closed form for
-# its jump to round-off.  The moment of the hinge in a step is the mean traction over it, which is
-# compared with the closed form in the middle of the step: 2 % of M_u, of the first step.
+# The bulk dissipates M_y κ_p L until M_u is reached.  The dissipation of the hinge equals the
+# closed form for its jump to round-off.  The moment of the hinge is the mean traction over a step.
+# It is compared with the closed form in the middle of the step: the first step has the largest
+# error, 2 % of M_u.
 
 # %%
 for psi, at_hinge, solution in slow.values():
@@ -278,8 +280,8 @@ assert opening_at[0] > opening_at[1] > opening_at[2]  # the faster, the earlier
 # %% [markdown]
 # ## Pictures
 #
-# Figure 4 of the paper: moment against curvature.  Meshes of 2, 4 and 8 cells lie on one line; so
-# do the three rates, unless the viscosity is large.
+# Figure 4 of the paper: moment against curvature.  Meshes of 2, 4 and 8 cells give one curve, and
+# so do the three rates, unless the viscosity is large.
 
 # %%
 ink, grey = "#222222", "0.75"
@@ -328,8 +330,9 @@ with ub.picture((11, 7.5)) as laws:
 laws.savefig(output / "end_rotation_laws.png")
 
 # %% [markdown]
-# Figure 5: the same with a hinge, and where the energy is that the support supplied.  The bulk
-# hardens until the hinge opens, springs back while it does, and is left with its plastic curvature.
+# Figure 5 shows the moments with a hinge, and the distribution of the energy that the support
+# supplied.  The bulk hardens until the hinge opens, unloads while it opens, and keeps its plastic
+# curvature.
 
 # %%
 with ub.picture((13, 8)) as softening:
@@ -388,10 +391,10 @@ ub.print_once(
 #
 # The laws agree with the paper's numbers, and with closed forms to round-off.  The laws of Perzyna
 # and of Duvaut and Lions are identical.  The ledger is exact with all of them, and the moment of a
-# hinge depends on its jump alone, whatever the mesh and the rate.
+# hinge depends on its jump alone, not on the mesh or the rate.
 #
 # ## Try this
 #
 # * `G_f = 50.0`: the hinge snaps back, and no rotation of the end can hold it,
-# * `kinematic` in the place of `isotropic`, and turn the end back: which one shifts, which grows?
+# * `kinematic` instead of `isotropic`, and turn the end back: which law shifts, which law grows?
 # * `DuvautLions(2e7 / E)`, the relaxation time that the paper uses: 5.8963, 5.9881, 6.9056.

@@ -2,14 +2,14 @@
 # # A tank on a frame in a storm: which weld cracks first
 #
 # A tank stands on a steel frame of two storeys.  Turbulence shakes it at its natural frequency, so
-# that stresses alternate some thousand times in an hour.  Nothing yields, but welds fatigue.
+# that stresses alternate some thousand times in an hour.  No section yields, but welds fatigue.
 #
 # This demo shows
 #
 # * `Fatigue`: rainflow cycles of the stress at named places, counted while the run goes on,
-# * `SNCurve.eurocode`, Miner's sum, the life that is left; other curves afterwards,
+# * `SNCurve.eurocode`, Miner's sum, the fatigue life; other curves after the run,
 # * `Extremes`: the envelope of the moments, each step included,
-# * `max_states=`, `max_rows=`: solution and files that do not grow, however long the storm lasts.
+# * `max_states=`, `max_rows=`: solution and files of limited size for a storm of any duration.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -26,9 +26,9 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## The wind
 #
-# Its mean speed is 30 m/s, its turbulence that of EN 1991-1-4: the spectrum
+# The mean speed is 30 m/s.  Turbulence follows EN 1991-1-4, with the spectrum
 # $n S / \sigma^2 = 6.8 f / (1 + 10.2 f)^{5/3}$ with $f = n L / V$, as a sum of 300 waves of random
-# phase.  The tank is small enough to feel the whole gust.
+# phase.  The tank is so small that each gust acts on its whole area.
 
 # %%
 V, intensity, L = 30.0, 0.17, 120.0  # m/s, -, m
@@ -55,8 +55,8 @@ def pressure(t):
 # %% [markdown]
 # ## The frame
 #
-# Welded tubes; the tank is a mass on the upper girder.  It starts from the static equilibrium with
-# the mean wind, since a sudden storm would do damage of its own.
+# The frame consists of welded tubes; the tank is a mass on the upper girder.  The run starts from
+# the static equilibrium at the initial wind, since a sudden load would cause additional damage.
 
 # %%
 steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m^3
@@ -93,8 +93,8 @@ calm = ub.simulate(frame(lambda t: pressure(0.0)), ub.Static(), t=(0, 1), dt=1, 
 # %% [markdown]
 # ## The places
 #
-# At each of them one fibre of the tube, on the side where the mean wind pulls: 71 MPa for the
-# welds of girders, of the feet and of the columns at the lower girder.
+# Each hot spot is a fibre of the tube, on the side in tension under the mean wind.  All welds have
+# the category 71 MPa.
 
 # %%
 weld = ub.SNCurve.eurocode(71e6)  # Pa
@@ -111,8 +111,8 @@ table = output / "fatigue.csv"
 # %% [markdown]
 # ## Ten minutes of storm
 #
-# Of 15 000 steps the solution keeps 1000 to 2000, and so does the table; the counts and the
-# extremes know all of them.
+# The solution and the table keep 1000 to 2000 of 15 000 steps; the cycle counts and the extremes
+# include all steps.
 
 # %%
 duration = 600.0  # s
@@ -139,8 +139,8 @@ first = min(spots, key=lambda name: fatigue.life(spots[name]))
 ub.print_once(f"the {first} cracks first")
 
 # %% [markdown]
-# Other curves need no other run.  A better weld; and a parent material whose strength the mean
-# stress reduces.
+# Other curves need no further run: here a better weld, and a parent material whose strength is
+# reduced by the mean stress.
 
 # %%
 cycles = fatigue.cycles(spots[first])
@@ -182,11 +182,11 @@ figure.savefig(output / "fatigue_storm.png")
 # %% [markdown]
 # ## Verification
 #
-# A lightly damped frame in a random wind answers in a narrow band: the amplitudes of its stress
-# follow Rayleigh's law.  With one slope $m$ the damage per cycle is then
+# A lightly damped frame in a random wind responds in a narrow band: the amplitudes of its stress
+# have a Rayleigh distribution.  With one slope $m$ the damage per cycle is then
 # $(2 \sqrt 2 \sigma / \Delta\sigma)^m \Gamma(1 + m/2) / N$ with the standard deviation $\sigma$ of
-# the stress.  The gusts below the natural frequency widen the band, which this formula takes for
-# more damage than there is: it is an upper bound, and a close one.
+# the stress.  Gusts below the natural frequency widen the band, for which this formula
+# overestimates the damage: it is a close upper bound.
 
 # %%
 slope_3 = ub.SNCurve(range=71e6, cycles=2e6, slope=3.0)
@@ -211,7 +211,7 @@ rows = len(table.read_text().splitlines()) - 1
 ub.print_once(f"kept of 15 000 steps: {len(storm)} states, {rows} rows")
 
 assert 0.6 < ratio < 1.0
-# A peak of so many scatters by about a third of a standard deviation; the wind enters squared
+# The largest peak scatters by about a third of a standard deviation; the wind enters squared
 assert expected - 1.0 < max(peak, least) < expected + 1.5
 assert first == "lower girder"
 assert storm.energy.worst < 1e-9
@@ -222,6 +222,7 @@ ub.print_once("pictures:", *sorted(str(p) for p in output.glob("fatigue*.png")),
 # %% [markdown]
 # ## Try this
 #
-# * `Rayleigh(mass=0.6)`, a damper in the frame: which life does it buy?
+# * `Rayleigh(mass=0.6)`, a damper in the frame: how much does it extend the life?
 # * `factor=1.3` for the lower girder: the stress concentration of a bad weld.
-# * `Section.tube(d=0.33, ...)` for the lower girder: how do its damage and that of a foot change?
+# * `Section.tube(d=0.33, ...)` for the lower girder: how do its damage and the damage of a foot
+#   change?

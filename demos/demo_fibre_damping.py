@@ -2,17 +2,16 @@
 # # Yielding fibres: exponential damping without viscosity
 #
 # Engineers damp structures by a viscous force, after Rayleigh, because measured vibrations decay
-# exponentially.  Materials are not viscous, though: what they dissipate, they dissipate by sliding
-# and yielding in small places, at any rate.  A single place of this kind acts like friction, under
-# which amplitudes decay **linearly**.  Many of them, with scattered yield stresses, are activated
-# one after the other as the amplitude grows, and the decay is **exponential**, without viscosity.
+# exponentially.  Materials are not viscous, though: they dissipate energy by sliding and yielding
+# in small places, at any rate.  A single place of this kind acts like friction, which makes
+# amplitudes decay **linearly**.  Many places with scattered yield stresses are activated one after
+# another as the amplitude grows, and the decay is **exponential**, without viscosity.
 #
 # This demo shows
 #
-# * a section of fibres, each with a yield stress of its own,
-#   `ElastoPlastic(yield_limit=Normal(...))`,
+# * a section of fibres, each with its own yield stress, `ElastoPlastic(yield_limit=Normal(...))`,
 # * free vibration from an initial velocity under the scheme that conserves energy exactly,
-# * which law the decay obeys, decided by `fit_decay`,
+# * the law of the decay, determined by `fit_decay`,
 # * Rayleigh damping with the fitted ratio, for comparison.
 #
 # It follows section 4.5 of the paper, P(93) to P(95), and its Fig. 16.
@@ -31,23 +30,24 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# A bar with a heavy mass at its end, which is guided along the axis.  So all fibres have the same
-# strain, and what differs between them is their strength alone.  The bar is one cell of 400 fibres.
+# A bar has a heavy mass at its end, which is guided along the axis.  So all fibres have the same
+# strain and differ only in their strength.  The bar is one cell of 400 fibres.
 #
 # The paper says that the yield stress is Gaussian, with a deviation τ = 0.01 for a small,
-# homogeneous structure and τ = 1.06 for a large, heterogeneous one; it tells neither unit nor mean
-# nor amplitude.  These are **assumptions**:
+# homogeneous structure and τ = 1.06 for a large, heterogeneous structure; it states neither unit
+# nor mean nor amplitude.  These are **assumptions**:
 #
-# * τ is in MPa, and the mean is 0.2 MPa; draws below zero become zero, such fibres slide at once,
-# * a fibre that yields keeps 4/5 of its stiffness, by kinematic hardening: it is the elastic
-#   neighbourhood that brings the bar back to where it was, and makes the loops slender,
+# * τ is in MPa, and the mean is 0.2 MPa; negative samples become zero, and such fibres slide at
+#   once,
+# * a yielding fibre keeps 4/5 of its stiffness, by kinematic hardening: this represents the elastic
+#   neighbourhood, which returns the bar to its initial position and makes the loops slender,
 # * the initial velocity strains the bar until elastic fibres would bear 4 MPa: twenty times the
 #   mean, and four times the larger deviation.
 #
-# The last ratio matters most.  Fibres of strength s that slide through a cycle of stress amplitude
-# S dissipate 4 s (S − s) each, in proportion to S where all of them slide: friction.  Where
-# strengths are spread over all stresses up to S, more fibres slide the larger S is, and the sum
-# goes with a higher power; with S² it is that of a viscous damper.
+# The last ratio matters most.  A fibre of strength s that slides in a cycle of stress amplitude S
+# dissipates 4 s (S − s).  If all fibres slide, the sum grows in proportion to S, as in friction.
+# If strengths are spread over all stresses up to S, more fibres slide at a larger S, and the sum
+# grows with a higher power; a sum proportional to S² is equivalent to a viscous damper.
 
 # %%
 E, mean = 30e9, 0.2e6  # Pa
@@ -73,7 +73,7 @@ def bar(section, damping=()):
 
 
 def vibrate(scene, record=()):
-    """A little more than ``PERIODS`` periods, 100 steps in each."""
+    """Simulate a little more than ``PERIODS`` periods, with 100 steps in each."""
     five = ub.Newton(max_iterations=5)
     end = 1.2 * (PERIODS + 1) * period
     return ub.simulate(
@@ -95,8 +95,8 @@ ub.print_once(f"τ = {deviations[-1]} MPa\n{runs[deviations[-1]]}\n")
 # %% [markdown]
 # ## Which law
 #
-# The amplitude of a swing is half the way from a maximum to the minimum after it.  Both laws have
-# two parameters; the evidence ratio says how many times likelier the better one is.
+# The amplitude of a swing is half the difference between a maximum and the next minimum.  Both laws
+# have two parameters; the evidence ratio states how many times likelier the better law is.
 
 
 # %%
@@ -126,8 +126,8 @@ ub.print_once(f"\nτ = 0.01 MPa\n{smooth}\n\nτ = 1.06 MPa\n{scattered}")
 # %% [markdown]
 # ## Rayleigh's damper in its place
 #
-# An elastic bar of the same period, with Rayleigh damping of the fitted ratio ζ, P(92): the damper
-# is tuned to this bar, and would have to be tuned again for another; the fibres would not.
+# An elastic bar of the same period has Rayleigh damping of the fitted ratio ζ, P(92).  The damper
+# is tuned to this bar and would have to be tuned again for another bar; the fibres would not.
 
 # %%
 ζ, ω_d = scattered.fitted_ratio, 2 * np.pi / scattered.period
@@ -141,11 +141,12 @@ ub.print_once(f"\nRayleigh damping, ζ = {ζ:.4f}: computed {of_damper.fitted_ra
 # %% [markdown]
 # ## Pictures
 #
-# Histories with the better law through their peaks; amplitudes over the number of periods; and
-# loops of stress and strain.  The loops are slender: what they enclose shows when the stress of the
-# elastic neighbourhood is taken off, a parallelogram where all fibres slide at once, a lens where
-# they do so one after the other.  They are drawn at the middles of the steps, where this scheme
-# states the law of the material; at the ends, stresses stray from it a little to either side.
+# The pictures show histories with the better law through their peaks, amplitudes over the number of
+# periods, and loops of stress and strain.  The loops are slender: their area is visible only if the
+# stress of the elastic neighbourhood is subtracted.  It is a parallelogram if all fibres slide at
+# once, and a lens if they slide one after another.  The loops are drawn at the middle of the steps,
+# where this scheme evaluates the material law; at the ends of the steps stresses deviate slightly
+# from the law to either side.
 
 # %%
 BLUE, RED, GREY = "#0072B2", "#D55E00", "#909090"
@@ -153,7 +154,7 @@ colors = dict(zip(deviations, (BLUE, "#8FA9BC", "#D9A98A", RED), strict=True))
 
 
 def draw_history(ax, solution, decay, law, color, label):
-    """Displacement in periods, and the law between its peaks."""
+    """Draw the displacement over periods, and the law through its peaks."""
     n, u = solution.times / decay.period, solution.displacement(solution.scene.beams[0].end)
     ax.plot(n, 1e6 * u[:, 0], color=color, lw=1.2)
     t = decay.times - decay.times[0]
@@ -225,15 +226,16 @@ ub.print_once("\npictures and data:", *names, sep="\n  ")
 # %% [markdown]
 # ## Verification
 #
-# The paper's transition: linear decay of the homogeneous bar, exponential decay of the
-# heterogeneous one, each far closer than the other law and within a hundredth of the first
-# amplitude, with any of three seeds.  What the vibration lost is what the fibres dissipated, and no
-# step needed more than five iterations: one that did would have been cut, and counted.
+# The result is the paper's transition: linear decay of the homogeneous bar, exponential decay of
+# the heterogeneous bar.  Each fit is far closer than the other law and within a hundredth of the
+# first amplitude, with any of three seeds.  The vibration lost exactly the energy that the fibres
+# dissipated.  No step needed more than five iterations: such a step would have been subdivided, and
+# its parts counted.
 #
-# The fibres are no viscous damper, though.  The exponential holds as long as the amplitude lies
-# among the strengths, here from 4.3 down to 1.2 MPa; below, few fibres slide, and the decrement
-# falls, as the last periods show.  The evidence ratio takes residuals for independent, which these
-# are not: it tells which law is closer, not how probable it is.
+# The fibres are not a viscous damper, though.  The decay is exponential as long as the amplitude
+# lies within the range of strengths, here from 4.3 down to 1.2 MPa; below it few fibres slide, and
+# the decrement falls, as the last periods show.  The evidence ratio assumes independent residuals,
+# but these are dependent: it shows which law is closer, not how probable the law is.
 
 # %%
 assert smooth.better == "linear"
@@ -252,7 +254,7 @@ ub.print_once("linear and exponential decay told apart")
 # %% [markdown]
 # ## Try this
 #
-# * `mean = 1e6`: the homogeneous bar slides a few times, then keeps vibrating elastically,
-# * a tenth of the speed: only the weakest fibres slide, and damp much less,
-# * `ub.TruncatedNormal` in the place of `ub.Normal`: no fibre slides at once,
+# * `mean = 1e6`: the homogeneous bar slides a few times, then vibrates elastically,
+# * a tenth of the speed: only the weakest fibres slide, and the damping is much smaller,
+# * `ub.TruncatedNormal` instead of `ub.Normal`: no fibre slides at once,
 # * `v=0.0, psi=0.0` left out and `linear=(0, speed)`: the bar is a cantilever that bends.

@@ -7,8 +7,8 @@
 #
 # This demo shows
 #
-# * exact conservation of all three by `EnergyMomentum()`, at small and at absurdly large steps,
-# * second order in the step, measured,
+# * exact conservation of all three by `EnergyMomentum()`, at small and at extremely large steps,
+# * second order of accuracy in the step, measured,
 # * the effect of `alpha` and `beta` on them.
 #
 # The planar "flying spaghetti" of J. C. Simo and L. Vu-Quoc (1986).
@@ -28,7 +28,7 @@ section = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=10.0, depth=0.35) 
 
 
 def jump(t):
-    """The push of the benchmark: there at once, gone at once at t = 2.5 s."""
+    """Return the push of the benchmark, which starts at t = 0 and ends at t = 2.5 s suddenly."""
     return float(t < 2.5)
 
 
@@ -47,7 +47,7 @@ def fly(dt, scheme, push=jump, end=10.0, record=()):
 # %% [markdown]
 # ## Conservation
 #
-# Drift after the release, as a part of the value itself.
+# The table shows relative drifts after the release.
 
 # %%
 steps = (0.01, 0.1, 0.2)
@@ -92,14 +92,15 @@ assert drifts(with_alpha)[1] < 1e-10 < drifts(with_beta)[1]
 # %% [markdown]
 # ## Accuracy
 #
-# Conservation is not accuracy. The free end at t = 5 s, against a run with a step of 1/640 s on the
-# same mesh, converges with the square of the step. This holds for a push that comes and goes
-# smoothly; a jump excites all frequencies of the mesh, and no step resolves the highest ones.
+# Conservation is not accuracy.  The position of the free end at t = 5 s, compared with a run with a
+# step of 1/640 s on the same mesh, converges with the square of the step.  This holds for a push
+# that starts and ends smoothly; a jump excites all frequencies of the mesh, and no step resolves
+# the highest frequencies.
 
 
 # %%
 def pulse(t):
-    """A push of the same impulse that comes and goes smoothly."""
+    """Return a push of the same impulse that starts and ends smoothly."""
     return 2 * np.sin(np.pi * t / 2.5) ** 2 if t < 2.5 else 0.0
 
 
@@ -137,5 +138,5 @@ ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("flyin
 # %% [markdown]
 # ## Try this
 #
-# * `dt=0.5`: the step is cut where a node would turn too far, and energy is still conserved,
+# * `dt=0.5`: a step is subdivided if a node would turn too far, and energy is still conserved,
 # * `rhoI=0.0` in the section: rotary inertia disappears, and so does its cost.

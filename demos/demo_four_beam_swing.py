@@ -3,20 +3,20 @@
 #
 # A flexible beam hangs from two rigid links and carries a heavy mass at mid-span.  A short push
 # makes it swing out; at t = 0.64 s the left link and the left half of the beam come into line and
-# snap taut.  The impact excites axial vibrations a thousand times faster than the swing.  A
-# scheme that conserves energy keeps them for ever; a dissipative scheme removes them without
+# snap taut.  The impact excites axial vibrations a thousand times faster than the swing.  A scheme
+# that conserves energy keeps these vibrations for ever; a dissipative scheme removes them without
 # changing the swing.
 #
 # This demo shows
 #
 # * revolute joints, which cost nothing: they only remove unknowns,
 # * a point mass, a load in a time table, massless links as stiff beams and as constraints,
-# * plastic hinges in the place of the joints, as in the paper,
+# * plastic hinges instead of the joints, as in the paper,
 # * `EnergyMomentum()` against `EnergyMomentum(alpha, beta)`, and the ledger that accounts for the
 #   difference,
-# * the files: XDMF for ParaView, a history table, pictures.
+# * output files: XDMF for ParaView, a history table, pictures.
 #
-# The problem is that of N. J. Theron (1994) and section 4.3 of the paper; the numbers at the end
+# The problem is from N. J. Theron (1994) and section 4.3 of the paper; the numbers at the end
 # were computed with an independent program.
 
 # %%
@@ -33,9 +33,9 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# The beam lies at rest, horizontally, 0.36 m below the pivots; the left link is vertical, the
-# right one inclined by 45°.  The links stand for rigid bars: ten thousand times as stiff as the
-# beam, without mass.
+# The beam lies at rest, horizontally, 0.36 m below the pivots; the left link is vertical, the right
+# one inclined by 45°.  The links represent rigid bars: they are ten thousand times as stiff as the
+# beam and have no mass.
 
 # %%
 E, nu, rho = 73e9, 0.3, 2700.0  # Pa, -, kg/m^3
@@ -62,8 +62,8 @@ swing = ub.Scene(
 # %% [markdown]
 # ## Two runs
 #
-# The same scene with both schemes; a step is 1 ms, some two hundred times the period of the axial
-# vibration that the snap excites.
+# Both schemes simulate the same scene; a step is 1 ms, some two hundred times the period of the
+# axial vibration that the snap excites.
 
 # %%
 conserving = ub.simulate(swing, ub.EnergyMomentum(), t=(0.0, 2.5), dt=1e-3)
@@ -84,14 +84,14 @@ ub.print_once("\nfour-beam swing, alpha = beta = 0.01\n" + str(decaying))
 # %% [markdown]
 # ## The links as constraints
 #
-# A massless rigid rod with a joint at both ends is a `Link`: a distance that stays, with one force.
-# What the stiff beams cost and what they change is in the table below.  With 16 cells and steps of
-# 0.2 ms the motion up to the snap is that of the converged reference.
+# A massless rigid rod with a joint at both ends is a `Link`: a constant distance with one force.
+# The table below shows the cost and the error of the stiff beams.  With 16 cells and steps of
+# 0.2 ms the motion up to the snap agrees with the converged reference.
 
 
 # %%
 def rods(cells):
-    """The swing on two links, and the places whose motion is known: mid-span, A and B."""
+    """Return the swing on two links, and the places of the reference: mid-span, A and B."""
     beam = ub.Beam((0, -0.36), (0.72, -0.36), flexible, cells=cells, name="beam")
     middle = beam.at(0.5)
     links = [ub.Link(ub.ground(0, 0), beam.start), ub.Link(ub.ground(1.08, 0), beam.end)]
@@ -108,9 +108,9 @@ fine = ub.simulate(fine_rods, ub.EnergyMomentum(), t=(0.0, 0.65), dt=2e-4, progr
 # %% [markdown]
 # ## Plastic hinges that have become joints
 #
-# In the paper the joints between links and beam are hinges that have gone through their plastic
-# process.  The units of its hinge data are inconsistent, so these numbers are assumptions: a limit
-# of 0.5 mN m, which the push exceeds soon, and a fracture energy of 10 µJ each, together a
+# In the paper the joints between links and beam are plastic hinges that have softened completely.
+# The units of its hinge data are inconsistent, so these numbers are assumptions: a limit of
+# 0.5 mN m, which the push soon exceeds, and a fracture energy of 10 µJ for each hinge, together a
 # three-thousandth of the energy of the push.
 
 # %%
@@ -136,7 +136,7 @@ hinged_conserving, hinged_decaying = hinged.values()
 ub.print_once("\nfour-beam swing, plastic hinges, alpha = beta = 0.01\n" + str(hinged_decaying))
 
 # %% [markdown]
-# The reference: converged in space and time, and with the mesh and step of the paper.
+# One reference is converged in space and time, the other has the mesh and step of the paper.
 
 # %%
 converged = {  # s: displacements of mid-span, A and B; m
@@ -155,13 +155,13 @@ of_the_paper = {
 
 
 def at(solution, place, t):
-    """Displacement of a place at a time; m."""
+    """Return the displacement of a place at a time; m."""
     n = int(np.argmin(np.abs(solution.times - t)))
     return solution.displacement(place)[n, :2]
 
 
 def table(name, solution, where, reference):
-    """Displacements beside those of the reference; returns the largest difference in m."""
+    """Print displacements beside the reference; return the largest difference in m."""
     ub.print_once(f"\n{name}\n    t     place      u (m)      v (m)   reference u, v")
     apart = []
     for t, rows in reference.items():
@@ -175,7 +175,7 @@ def table(name, solution, where, reference):
 
 
 def peak(solution, place):
-    """First peak of the axial force at mid-span and its time; N, s."""
+    """Return the first peak of the axial force at mid-span and its time; N, s."""
     N = place.beam.section.EA * solution.strains_at(place)[:, 0]  # at the ends of the steps
     n = int(np.argmax(np.where(solution.times < 0.65, N, 0.0)))
     return N[n], solution.times[n]
@@ -267,9 +267,9 @@ ub.print_once(
 # %% [markdown]
 # ## Verification
 #
-# The reference values come from an independent program with the same four cells and the same
-# step, so they check the scene, the element and the scheme to the digits given.  The ledger
-# checks itself.
+# The reference values come from an independent program with the same four cells and the same step,
+# so they verify the scene, the element and the scheme to the printed digits.  The ledger verifies
+# the energy balance.
 
 # %%
 i = {t: int(np.argmin(np.abs(conserving.times - t))) for t in (0.256, 0.5, 0.7, 1.0, 1.5, 2.5)}
@@ -286,11 +286,11 @@ for solution in (conserving, decaying, exact, fine, hinged_conserving, hinged_de
     assert solution.iterations <= 5 * solution.parts
 
 # %% [markdown]
-# Links and stiff beams move the same way: 10⁴ times the stiffness of the beam yields nothing that
-# forces of less than a newton, before the snap, would show.  The mesh of the paper is met to the
-# digits given, and the converged motion up to what 16 cells and 0.2 ms leave.  The hinges take
-# their fracture energy, once, which changes the swing by a
-# thousandth of the motion, until the snap makes it sensitive to everything.
+# Links and stiff beams have the same motion: before the snap the forces are less than a newton, and
+# their deformation of the stiff beams is negligible.  The results with the mesh of the paper agree
+# to the printed digits, and the converged motion agrees up to the error of 16 cells and 0.2 ms.
+# The hinges dissipate their fracture energy once.  This changes the swing by a thousandth of the
+# motion, until the snap makes the motion sensitive to any perturbation.
 
 # %%
 assert apart_paper < 5.1e-6
@@ -321,4 +321,4 @@ ub.print_once("reference values reproduced")
 # * `alpha=beta=0.5`: how much of the swing itself is lost now?
 # * `dt=2e-4` with `EnergyMomentum()`: does a smaller step calm the axial force?
 # * twice the push: the mass loops over the pivots,
-# * `G_f = 1e-3`: hinges that take part of the swing; are they joints in the end?
+# * `G_f = 1e-3`: the hinges dissipate a part of the energy; are they joints in the end?

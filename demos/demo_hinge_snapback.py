@@ -2,16 +2,16 @@
 # # A brittle hinge: softening that snaps back
 #
 # A cantilever breaks at its clamp.  The more brittle the hinge and the more slender the beam, the
-# more energy the beam has stored when the hinge opens: if M_u²/G_f exceeds 3EI/L, more than the
-# hinge can dissipate.  Then load *and* displacement must go back together, and neither of them can
-# be prescribed.  What always grows is the dissipated energy.
+# larger is the ratio of the energy stored in the beam to the fracture energy when the hinge opens.
+# If M_u²/G_f exceeds 3EI/L, load *and* displacement must decrease together, and neither of them can
+# be prescribed.  Only the dissipated energy always grows.
 #
 # This demo shows
 #
 # * dissipation control, which also tells softening from elastic unloading,
-# * the arc length, which takes over where nothing dissipates,
-# * a closed form for the whole path, met to all digits,
-# * energy: what a test under displacement control would set free is the area it jumps over.
+# * the arc length, which controls the path while nothing dissipates,
+# * a closed form for the whole path,
+# * energy: a test under displacement control would release the area that it jumps over.
 #
 # Data: EI = 1 MN m², L = 2 m, M_u = 10 kN m; fracture energies from ductile to brittle.
 
@@ -28,13 +28,13 @@ output = Path("output")
 output.mkdir(exist_ok=True)
 
 EI, L, M_u = 1e6, 2.0, 10e3  # N m², m, N m
-stiff = 1e5 * EI / L**2  # N: shear and extension make next to nothing
+stiff = 1e5 * EI / L**2  # N: shear and extension are negligible
 section = ub.Section(EA=stiff, GA=stiff, EI=EI)
 steepness = {0.3: "#009e73", 1.0: "#0072b2", 2.0: "#d55e00", 6.0: "#333333"}  # M_u²/G_f over 3EI/L
 
 
 def broken(ratio, cells=16):
-    """The path of the cantilever, its tip load in parts of M_u/L."""
+    """Return the path of the cantilever, with the tip load as a multiple of M_u/L."""
     energy = M_u**2 / (ratio * 3 * EI / L)  # J
     beam = ub.Beam(
         (0, 0), (L, 0), section, cells=cells,
@@ -54,8 +54,8 @@ def broken(ratio, cells=16):
 # %% [markdown]
 # ## The closed form
 #
-# M = M_u exp(-M_u α/G_f) with the jump α, F = M/L, δ = F L³/3EI + α L, and what is dissipated is
-# G_f (1 - M/M_u): the steps of dissipation are steps of the moment.
+# M = M_u exp(-M_u α/G_f) with the jump α, F = M/L, δ = F L³/3EI + α L.  The dissipated energy is
+# G_f (1 - M/M_u), so equal steps of dissipation are equal steps of the moment.
 
 # %%
 paths = {ratio: broken(ratio) for ratio in steepness}
@@ -85,8 +85,9 @@ for ratio, (beam, energy, path) in paths.items():
 # %% [markdown]
 # ## What displacement control would jump over
 #
-# It follows the curve to the largest displacement, then the load drops at that displacement; the
-# area between the drop and the path is energy that becomes motion and noise.
+# Displacement control follows the curve to the peak of the displacement, then the load drops at
+# constant displacement; the area between the drop and the path is energy that becomes motion and
+# noise.
 
 # %%
 beam, energy, path = paths[2.0]
@@ -135,9 +136,9 @@ ub.print_once("\npicture:", output / "hinge_snapback.png")
 # %% [markdown]
 # ## Verification
 #
-# What is left of the deflection is the mesh, 1/(4·16²) of its elastic part, and of the load that
-# rotations are not quite small: 1e-4.  The peak is a state of each path,
-# and a limit point.
+# The remaining error of the deflection is due to the mesh, 1/(4·16²) of its elastic part.  The
+# error of the load, 1e-4, is due to rotations that are not quite small.  The peak is a state of
+# each path, and a limit point.
 
 # %%
 assert np.max(worst) < 2e-3
@@ -147,5 +148,5 @@ assert np.isclose(np.max(F), M_u / L, rtol=1e-3)
 # %% [markdown]
 # ## Try this
 #
-# * `ub.ArcLength(0.001)` alone: where does it end, and what does it say?
+# * `ub.ArcLength(0.001)` alone: where does it end, and with which message?
 # * a hinge in the middle of a beam that is clamped at both ends: three hinges, one after the other.

@@ -2,18 +2,18 @@
 # # Lattice: 200 000 cells, alone or under `mpirun`
 #
 # A wall of square bays, a hundred by a hundred, stands on clamped feet and is struck at its upper
-# left corner.  The blow runs through it as waves: fast ones that stretch members, and slow ones
-# that bend them.
+# left corner.  The blow runs through the wall as waves: fast waves stretch the members, and slow
+# waves bend them.
 #
 # This demo shows
 #
 # * size: 20 000 beams, 10 000 joints, 600 000 unknowns, with exact rotations everywhere,
 # * processes that share a scene: `mpirun -n 2 python3 demos/demo_lattice.py`, the same script,
-# * a loop of your own over `Simulation.step_to`, with files written on the way,
-# * the ledger: at this size, too, every joule is accounted for.
+# * a loop of your own over `Simulation.step_to`, with files written during the run,
+# * the ledger: it accounts for every joule at this size, too.
 #
 # Each process condenses the interior nodes of its members without communication.  The remaining
-# unknowns of the joints, a twentieth of all, are solved for together.
+# unknowns at the joints, a twentieth of all, are solved together.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -37,8 +37,8 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# `--cells` says how many cells, about; where another script runs this one, as in the tests, they
-# are few.
+# `--cells` is the approximate number of cells; it is small if another script runs this script, as
+# in the tests.
 
 # %%
 parser = argparse.ArgumentParser()
@@ -55,7 +55,7 @@ beams, ends = [], defaultdict(list)
 
 
 def member(a, b):
-    """A beam between two nodes (column, row) of the lattice."""
+    """Add a beam between two nodes (column, row) of the lattice."""
     start, end = ((bay * i, bay * j) for i, j in (a, b))
     beam = ub.Beam(start, end, tube, cells=in_member, name=f"{a}-{b}")
     beams.append(beam)
@@ -70,7 +70,7 @@ for j in range(bays):
         member((i, j + 1), (i + 1, j + 1))
 
 # %% [markdown]
-# Members are joined rigidly, but for every seventh joint, where each turns freely.
+# Members are joined rigidly, except at every seventh joint, where each member turns freely.
 
 # %%
 joints = [
@@ -103,7 +103,7 @@ ub.print_once(
 # ## Run
 #
 # The step resolves the blow, not the vibrations of single cells, which an implicit scheme need not
-# follow.  The run ends when sound in steel has gone three quarters of the height of the wall.
+# follow.  The run ends when sound in steel has travelled three quarters of the height of the wall.
 
 # %%
 sound = np.sqrt(steel["E"] / steel["rho"])  # 5172 m/s
@@ -135,8 +135,8 @@ ub.print_once(solution.energy)
 # %% [markdown]
 # ## Pictures
 #
-# Each cell is coloured by its speed at four times.  Ahead of the waves nothing moves; what runs
-# along the members is at the front, and behind it they sway.
+# Each cell is coloured by its speed at four times.  Nothing moves ahead of the waves.  The axial
+# waves along the members form the front; behind it the members sway.
 
 # %%
 speeds = [
@@ -183,5 +183,5 @@ ub.print_once("the ledger closes, and nothing overtakes sound")
 #
 # * `mpirun -n 2 python3 demos/demo_lattice.py`: the same numbers, in less time,
 # * `--cells 1000`: a wall of seven bays, in a second,
-# * `output/lattice.xdmf` in ParaView: *Warp By Vector* with the displacement, coloured by `M`;
-#   then *Rescale to data range over all timesteps*, for at t = 0 nothing moves.
+# * `output/lattice.xdmf` in ParaView: *Warp By Vector* with the displacement, coloured by `M`; then
+#   *Rescale to data range over all timesteps*, since nothing moves at t = 0.

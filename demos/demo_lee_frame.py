@@ -2,14 +2,16 @@
 # # Lee's frame: through limit points of the load and of the displacement
 #
 # Two members of 120 cm, pinned at both far ends, carry a load near their corner.  The load grows to
-# a limit, falls to nothing, pulls, and grows again; on the way the loaded point turns back twice.
-# Neither steps of the load nor steps of the displacement get through.  The arc length does.
+# a limit, falls to zero, becomes negative, and grows again; along this path the loaded point turns
+# back twice.  Neither load control nor displacement control can follow the whole path.  The arc
+# length can.
 #
 # This demo shows
 #
-# * `ub.follow`, which finds the load factor together with the displacements,
+# * `ub.follow`, which solves for the load factor together with the displacements,
 # * critical points, reported with their modes,
-# * motions as load: where the loaded point turns back, the path of its *motion* has limit points.
+# * prescribed motion as load: where the loaded point turns back, the path of its *motion* has limit
+#   points.
 #
 # Data: S. L. Lee, F. S. Manuel, E. C. Rossow, "Large deflections and stability of elastic frames",
 # 1968; A = 6 cm², I = 2 cm⁴, E = 7.2e6 N/cm², ν = 0.3, shear as stiff as G A.
@@ -31,7 +33,7 @@ L = 1.2  # m
 
 
 def frame(cells, moved=False):
-    """The frame under a load of 1 kN, or with the loaded point moved down, times the factor."""
+    """Return the frame under a load of 1 kN or a motion of 1 m downwards, times the factor."""
     column = ub.Beam((0, 0), (0, L), section, cells=cells, name="column")
     girder = ub.Beam((0, L), (L, L), section, cells=cells, name="girder")
     place = girder.at(0.2)
@@ -50,8 +52,9 @@ def frame(cells, moved=False):
 # %% [markdown]
 # ## The path
 #
-# A step is the root mean square of all displacements over the size of the frame, of all rotations,
-# and of the change of the load factor over `factor`, here 10 kN.
+# The length of a step combines the root mean squares of all displacements, divided by the size of
+# the frame, and of all rotations with the change of the load factor, divided by `factor`, here
+# 10 kN.
 
 # %%
 place, _, scene = frame(60)
@@ -128,8 +131,8 @@ ub.print_once("\npicture:", output / "lee_frame.png")
 # %% [markdown]
 # ## Verification
 #
-# The limit loads of a converged solution are 18.5466 and -9.3961 kN, v turns at 61.013 and
-# 50.737 cm.  Sixty cells a member are off by the mesh, an error of second order.
+# The limit loads of a converged solution are 18.5466 and -9.3961 kN, and v turns at 61.013 and
+# 50.737 cm.  Results with sixty cells a member differ by the mesh error, which is of second order.
 
 # %%
 assert np.allclose(P[limits], (18.5466, -9.3961), rtol=2e-3)
@@ -139,5 +142,5 @@ assert [point.kind for point in path.critical] == ["limit", "limit"]
 # %% [markdown]
 # ## Try this
 #
-# * `ub.DisplacementControl(place, "v", -0.01)` in the place of the arc length: how far does it get?
+# * `ub.DisplacementControl(place, "v", -0.01)` instead of the arc length: how far does it get?
 # * 30 and 120 cells: the limit load with Richardson's extrapolation has six digits.

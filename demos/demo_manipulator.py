@@ -1,21 +1,21 @@
 # %% [markdown]
 # # Manipulator: a plastic hinge that has become a joint
 #
-# A rigid arm carries a flexible one.  They are joined by a plastic hinge, which bears moments up
-# to M_u, then softens, and is a perfect revolute joint when its fracture energy is dissipated.  In
-# the first second the flexible arm is turned until the hinge has softened completely.  In the next
-# two seconds the rigid arm turns at 10 rad/s, and the flexible arm swings about the opened hinge
-# as it would about a revolute joint.
+# A rigid arm carries a flexible one.  They are joined by a plastic hinge, which bears moments up to
+# M_u, then softens, and becomes a perfect revolute joint when its fracture energy is dissipated.
+# In the first second the flexible arm is turned until the hinge has softened completely.  In the
+# next two seconds the rigid arm turns at 10 rad/s, and the flexible arm swings about the opened
+# hinge as it would about a revolute joint.
 #
 # This demo shows
 #
-# * two runs in a row: the second starts with the state of the first, its material included,
+# * two consecutive runs: the second starts with the state of the first, including the material,
 # * an opened hinge compared with `Revolute`,
-# * a rigid part both ways: a beam 10³ to 10⁸ times as stiff, and a `Body`.
+# * two models of a rigid part: a beam 10³ to 10⁸ times as stiff, and a `Body`.
 #
-# It is section 4.2 of the paper: EA = GA = 10⁶, EI = 10⁵, 10 rad/s, steps of 1 ms.  Its geometry
-# and hinge are in a figure that the text does not repeat: those below are assumptions, and so
-# is the mass.
+# The problem is section 4.2 of the paper: EA = GA = 10⁶, EI = 10⁵, 10 rad/s, steps of 1 ms.  The
+# paper states geometry and hinge only in a figure: the data below are assumptions, and so is the
+# mass.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -33,14 +33,14 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# Both arms are 5 m long.  The flexible one has 0.1 kg/m, so little that it bends by millimetres,
-# and the rigid one none.  The hinge is at the start of the flexible arm, whose first cell is 10 mm
-# long.  It opens at 100 N m with a fracture energy of 4 J; when the tip has turned by two radians,
-# exp(-50) of M_u is left.  Then the tip turns back.  This run is quasi-static, so no vibration
-# remains.
+# Both arms are 5 m long.  The flexible arm has 0.1 kg/m, so little that it bends by millimetres;
+# the rigid arm has no mass.  The hinge is at the start of the flexible arm, whose first cell is
+# 10 mm long.  It opens at 100 N m with a fracture energy of 4 J; when the tip has turned by two
+# radians, exp(-50) of M_u is left.  Then the tip turns back.  This run is quasi-static, so no
+# vibration remains.
 #
-# The drive gets up to speed within 0.2 s.  A velocity that jumps would excite what no step of 1 ms
-# resolves.
+# The drive reaches its speed within 0.2 s.  A jump of the velocity would excite vibrations that
+# steps of 1 ms cannot resolve.
 
 # %%
 length, rhoA = 5.0, 0.1  # m, kg/m
@@ -66,8 +66,8 @@ class Manipulator:
 
     Args:
         hinge: Length of the cell beside the hinge; m.  Zero is a revolute joint.
-        cells: Of the flexible arm, besides the one at the hinge.
-        stiffer: How much stiffer the rigid arm is; infinity is a rigid body.
+        cells: Number of cells of the flexible arm, without the cell beside the hinge.
+        stiffer: Ratio of the stiffness of the rigid arm to the flexible arm; infinity is a body.
     """
 
     def __init__(self, hinge=0.01, cells=4, stiffer=1e3, record=()):
@@ -79,7 +79,7 @@ class Manipulator:
         self.flexible = ub.Beam(elbow, tip, section, cells=cells, name="flexible arm", **options)
         self.tip, self.root = self.flexible.end, self.flexible.start
         if math.isinf(stiffer):
-            # All of its motion is given, so its mass is without effect on that of the others.
+            # All of its motion is prescribed, so its mass does not affect the other parts.
             rigid = ub.Body(shoulder, mass=1.0, inertia=1.0, name="rigid arm")
             parts = {"beams": [self.flexible], "bodies": [rigid]}
             self.shoulder, self.elbow = rigid.middle, rigid.at(*elbow)
@@ -104,15 +104,15 @@ class Manipulator:
         self.path = self.motion.position(self.tip)
 
     def away(self, other):
-        """Largest distance of the tips of two manipulators at the same time; m."""
+        """Return the largest distance of the tips of two manipulators at the same time; m."""
         return float(np.linalg.norm(self.path - other.path, axis=1).max())
 
 
 # %% [markdown]
 # ## Runs
 #
-# The hinge beside cells of three lengths, and the joint; the flexible arm with 1, 2, 4 and 8 cells;
-# and the rigid arm both ways.
+# The runs vary the length of the cell beside the hinge (three lengths, and the joint), the cells of
+# the flexible arm (1, 2, 4 and 8), and the model of the rigid arm.
 
 # %%
 revolute = Manipulator(hinge=0.0)
@@ -122,7 +122,7 @@ hinged = by_length[0.01]
 by_cells = {1: Manipulator(cells=1), 2: Manipulator(cells=2), 4: hinged}
 by_cells[8] = Manipulator(cells=8, record=record)
 with warnings.catch_warnings():
-    # The stiffest arm magnifies round-off, as the run says; how much is checked below.
+    # The stiffest arm magnifies round-off, so the run warns; the error is checked below.
     warnings.simplefilter("ignore", ub.ModelWarning)
     by_stiffness = {r: Manipulator(stiffer=r) if r != 1e3 else hinged for r in (1e3, 1e4, 1e8)}
 body = Manipulator(stiffer=math.inf)
@@ -142,7 +142,7 @@ for cells, distance in coarse.items():
 
 
 def line(name, one):
-    """A row of the table: the rigid arm one way."""
+    """Print a row of the table: one model of the rigid arm."""
     run = one.motion
     ub.print_once(
         f"  {name:15s} {1e3 * one.away(body):11.1e} mm  {run.iterations / run.parts:10.2f}"
@@ -158,8 +158,8 @@ line("body", body)
 # %% [markdown]
 # ## Pictures
 #
-# Shapes during the first 2π/10 s of the drive, ten of them; the path of the tip; and what the
-# hinge dissipates.
+# The pictures show ten shapes during the first 2π/10 s of the drive, the path of the tip, and the
+# energy that the hinge dissipates.
 
 # %%
 from matplotlib import colormaps
@@ -176,7 +176,7 @@ of_time = Normalize(t_joint, t_joint + one_turn[-1])
 
 
 def strobe(axes):
-    """Both arms every 2π/100 s."""
+    """Draw both arms every 2π/100 s."""
     for t in t_joint + one_turn:
         n = int(np.argmin(np.abs(times - t)))
         color = colors(of_time(t))
@@ -188,7 +188,7 @@ def strobe(axes):
 
 
 def paths(axes):
-    """Paths of both tips."""
+    """Draw the paths of both tips."""
     axes.plot(*revolute.path.T, color=orange, lw=5, alpha=0.6, label="revolute joint")
     axes.plot(*hinged.path.T, color=blue, lw=1.4, label="softened hinge")
     circle = np.linspace(0, 2 * math.pi, 200)
@@ -260,14 +260,14 @@ ub.print_once(
 # ## Verification
 #
 # The hinge dissipates its fracture energy while it softens and nothing afterwards, except for the
-# part exp(-50) that remains.  The hinged arm has one cell more than the arm with `Revolute`.  This
+# remaining fraction exp(-50).  The hinged arm has one cell more than the arm with `Revolute`.  This
 # is the only difference: the distance of the tips is of first order in the length of that cell.
 #
-# The arm hardly bends, so one cell gives the motion of eight up to the bending.  The deformation
-# of the stiff beam is in inverse proportion to its stiffness, and so is its distance from the
-# rigid body.  But its strains have round-off errors, and its forces have these errors times its
-# stiffness: at 10⁸ EA they are 0.02 N, and act along the path of the elbow of 94 m.  A `Body` has
-# no such forces, and takes two thirds of the iterations.
+# The arm hardly bends, so the motions with one cell and with eight differ only by the bending.  The
+# deformation of the stiff beam is in inverse proportion to its stiffness, and so is its distance
+# from the rigid body.  But its strains have round-off errors, and its forces have these errors
+# times its stiffness: at 10⁸ EA the errors are 0.02 N, and act along the path of the elbow of 94 m.
+# A `Body` has no such forces, and needs two thirds of the iterations.
 
 # %%
 eps, turned = np.finfo(float).eps, drive(t_end)  # 1, rad

@@ -3,9 +3,9 @@
 #
 # A portal frame is hit so that its columns yield, and it keeps a residual drift.  The drift depends
 # on the yield stresses, which vary along the columns.  The usual answer is one simulation with the
-# mean yield stress.  Here are 48 more, each with random yield stresses.  They show what one run
-# cannot: the scatter of the drift, and that frames with scatter **dissipate more**, in the mean
-# and in nearly every sample.
+# mean yield stress.  This demo adds 48 simulations with random yield stresses.  They show results
+# that one run cannot give: the scatter of the drift, and that frames with scatter **dissipate
+# more**, in the mean and in nearly every sample.
 #
 # This demo shows
 #
@@ -30,12 +30,12 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# Columns of 4 m and a girder of 6 m, clamped at the feet, with 2 t on each corner; it sways in
-# 0.23 s.  The columns have ten layers of fibres.  Each fibre of each cell draws its own yield
-# stress, with a mean of 300 MPa and a deviation of 60 MPa: much for steel, usual for timber or
-# masonry.  The girder stays elastic.  A triangular blow of 40 ms strikes a corner.
+# The frame has columns of 4 m, clamped at the feet, a girder of 6 m, and 2 t on each corner; its
+# period is 0.23 s.  The columns have ten layers of fibres.  Each fibre of each cell draws its own
+# yield stress, with a mean of 300 MPa and a deviation of 60 MPa: much for steel, usual for timber
+# or masonry.  The girder stays elastic.  A triangular blow of 40 ms strikes a corner.
 #
-# The scheme conserves energy exactly, so that all that is lost is lost in fibres.
+# The scheme conserves energy exactly, so energy is lost only in fibres.
 
 # %%
 steel = {"E": 210e9, "nu": 0.3, "rho": 7850.0}  # Pa, -, kg/m^3
@@ -45,7 +45,7 @@ end, dt = 1.2, 4e-3  # s
 
 
 def portal(strength):
-    """The frame, and the corner that is struck."""
+    """Return the frame, and the corner that is struck."""
     law = ub.ElastoPlastic(strength, kinematic=steel["E"] / 100)
     fibres = ub.Fibres(law, number=10)
     column = ub.Section.rectangle(b=0.10, h=0.20, **steel, fibres=fibres)  # m
@@ -66,13 +66,13 @@ def portal(strength):
 # %% [markdown]
 # ## A member
 #
-# A function of the seed, which returns numbers and arrays by name.  The frame keeps swaying
+# A member is a function of the seed that returns named numbers and arrays.  The frame keeps swaying
 # elastically; its drift is the mean displacement over whole periods after the last yielding.
 
 
 # %%
 def struck(seed, record=()):
-    """One frame; without a seed all fibres have the mean strength."""
+    """Simulate one frame; without a seed all fibres have the mean strength."""
     random = ub.TruncatedNormal(mean, deviation, seed=seed or 0)
     scene, corner = portal(mean if seed is None else random)
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, end), dt=dt, record=record)
@@ -97,13 +97,13 @@ ub.print_once(f"{len(study)} members, {len(study.failed)} failed\n")
 # %% [markdown]
 # ## Statistics
 #
-# The interval of a mean is Student's: mean ± t s/√n.  It holds for independent members, whatever
-# the distribution if n is large.
+# The interval of a mean is Student's: mean ± t s/√n.  It holds for independent members, and for any
+# distribution if n is large.
 
 
 # %%
 def mean_95(x):
-    """Mean, and half its 95 % interval, of the first 2, 3, ... values."""
+    """Return mean and half of its 95 % interval for the first 2, 3, ... values."""
     n = np.arange(2, len(x) + 1)
     means = np.array([x[:k].mean() for k in n])
     errors = np.array([x[:k].std(ddof=1) for k in n]) / np.sqrt(n)
@@ -138,19 +138,20 @@ ub.print_once(f"the first five drift by {', '.join(f'{x:.1f}' for x in drift[:5]
 # %% [markdown]
 # ## What the numbers mean
 #
-# The **drift** is what the columns yielded to one side less what they yielded back, a small
+# The **drift** is the yielding of the columns to one side minus the yielding back, a small
 # difference of large numbers.  Scatter makes it uncertain by a quarter downwards and a third
 # upwards.  The frame of mean strength is within the 95 % interval of the mean.  The first five
-# members would have told otherwise, for all of them drift further than that frame.
+# members alone would suggest the contrary, since all of them drift further than this frame.
 #
 # The **dissipated energy** is a sum in which nothing cancels.  Weak fibres slide to and fro in all
-# swings, even in the late ones that leave the frame of mean strength elastic; strong fibres cannot
-# do less than not to slide.  So the scatter adds a tenth, in the mean of the members and in nearly
-# each of them.
+# swings, even in late swings, in which the frame of mean strength is elastic; the dissipation of
+# strong fibres cannot fall below zero.  So the scatter adds a tenth in the mean of the members, and
+# nearly each member dissipates more.
 #
 # ## One member, for ParaView
 #
-# The one that drifts most is simulated again and written.  It is the same to the last bit.
+# The member with the largest drift is simulated again and written to a file.  Its result is the
+# same to the last bit.
 
 # %%
 worst = int(np.nanargmax(study["residual drift"]))
@@ -212,10 +213,11 @@ ub.print_once("\npictures and data:", *names, sep="\n  ")
 # %% [markdown]
 # ## Verification
 #
-# The ledger of every member closes and no step was cut, so that none of the scatter is numerical.
-# From ten members on, the interval of the mean energy excludes the frame of mean strength; that of
-# the mean drift does not in the end.  Intervals shrink with √n: half the width costs four times the
-# members.  The one that was simulated again, by all processes together, is that of the study.
+# The ledger of every member closes and no step was subdivided, so the scatter is not numerical.
+# From ten members on, the interval of the mean energy excludes the frame of mean strength; the
+# final interval of the mean drift includes it.  Intervals shrink with √n: half the width needs four
+# times the members.  The member simulated again, by all processes together, equals the member of
+# the study.
 
 # %%
 assert not study.failed
@@ -237,8 +239,8 @@ ub.print_once("drift uncertain, dissipated energy larger than that of the frame 
 # ## Try this
 #
 # * `mpirun -n 3 python3 demo_monte_carlo.py`: three members at a time,
-# * `anew=True` left out: interrupt it and start it again, or raise 49 to 97; only what is missing
-#   is computed,
+# * no `anew=True`: interrupt the study and restart it, or raise 49 to 97; only missing members are
+#   computed,
 # * `ub.Fibres(law, number=40)`: do frames of more fibres differ less from each other?
-# * `ub.Lognormal` in the place of `ub.TruncatedNormal`,
+# * `ub.Lognormal` instead of `ub.TruncatedNormal`,
 # * a blow of 400 kN, under which the frame of mean strength stays elastic.

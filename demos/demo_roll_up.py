@@ -1,15 +1,15 @@
 # %% [markdown]
 # # Roll-up: a cantilever bent to a circle and beyond
 #
-# A moment at the free end bends a straight cantilever to an arc of constant curvature κ = M/EI,
-# and M = 2π EI/L closes the circle.  Its large rotations have a closed-form solution, so this is
-# the first test of every geometrically exact beam.
+# A moment at the free end bends a straight cantilever to an arc of constant curvature κ = M/EI, and
+# M = 2π EI/L closes the circle.  These large rotations have a closed-form solution, so this is the
+# first test of every geometrically exact beam.
 #
 # This demo shows
 #
-# * statics with the time as load parameter,
-# * rotations of any size, twice around here,
-# * a mesh error that is known in closed form, and measured.
+# * statics with time as the load parameter,
+# * rotations of any size, here two full turns,
+# * the mesh error, measured and compared with its closed form.
 #
 # Data: cantilever of the peers' benchmark, L = 1 m, aluminium, 2 cm².
 
@@ -30,7 +30,7 @@ turns = 2.0
 
 
 def roll_up(cells, steps=16):
-    """The cantilever under a moment that grows to two full circles."""
+    """Simulate the cantilever under a moment that grows to two full circles."""
     beam = ub.Beam((0, 0), (L, 0), section, cells=cells, name="cantilever")
     moment = ub.PointLoad(
         beam.end, moment=turns * 2 * np.pi * section.EI / L, amplitude=ub.ramp(1.0)
@@ -55,9 +55,9 @@ assert np.allclose(ψ, solution.times * turns * 2 * np.pi, atol=1e-9)
 # ## The error of the mesh
 #
 # A cell of length h that turns by κh between its ends is a chord of length h, whereas the arc it
-# stands for has the chord h sin(κh/2)/(κh/2).  The radius of the polygon is therefore too large
-# by the factor (κh/2)/sin(κh/2), an error of second order, and this is all the error there is:
-# moment and curvature are exact.  We look at half a circle, where the tip is at (0, 2/κ).
+# stands for has the chord h sin(κh/2)/(κh/2).  The radius of the polygon is therefore too large by
+# the factor (κh/2)/sin(κh/2), an error of second order.  There is no other error: moment and
+# curvature are exact.  We look at half a circle, where the tip is at (0, 2/κ).
 
 # %%
 meshes = np.array([4, 8, 16, 32, 64, 128])
@@ -95,8 +95,8 @@ ub.print_once("\npictures:", *sorted(str(p) for p in output.glob("roll_up*")), s
 # %% [markdown]
 # ## Verification
 #
-# The computed error is the closed form of the polygon to solver tolerance: the element has no
-# error but that of its geometry, in particular no locking in shear or extension.
+# The computed error equals the closed form of the polygon to solver tolerance: the element has only
+# this geometric error, in particular no locking in shear or extension.
 
 # %%
 assert np.allclose(errors, exact_errors, rtol=1e-5)
@@ -106,4 +106,4 @@ assert np.all(np.abs(orders[1:] - 2) < 0.02)
 # ## Try this
 #
 # * a transverse force instead of the moment; compare with the elastica,
-# * `steps=2`: how far can a static step go before it is cut?
+# * `steps=2`: how far can a static step go before it is subdivided?

@@ -1,10 +1,10 @@
 # %% [markdown]
 # # Rotating beam: a Campbell diagram
 #
-# The centrifugal force stretches a blade on a turning shaft, which makes it stiffer in bending.  In
-# the plane of rotation this force also grows outward, which makes it softer again.  So the natural
-# frequencies depend on the speed.  A Campbell diagram shows them over the speed, and the speeds at
-# which an excitation once, twice, ... per revolution is in resonance.
+# The centrifugal force stretches a blade on a turning shaft, which makes the blade stiffer in
+# bending.  In the plane of rotation this force also grows outward, which makes the blade softer
+# again.  So the natural frequencies depend on the speed.  A Campbell diagram shows them over the
+# speed, and the speeds at which an excitation once, twice, ... per revolution is in resonance.
 #
 # This demo shows
 #
@@ -35,12 +35,12 @@ inner = ub.KelvinVoigt(retardation_time=2e-5)  # s
 
 
 def spinning(rate):
-    """The blade seen from the frame that turns with it; rad/s."""
+    """Return the blade in the frame that turns with it; rad/s."""
     return ub.Scene([blade], supports=[root], loads=[ub.RotatingFrame(rate)], damping=[inner])
 
 
 def modes_at(rate, n=3):
-    """Modes about the steady rotation, and the state itself."""
+    """Return modes about the steady rotation, and the steady state."""
     scene = spinning(rate)
     steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
     return ub.modes(scene, n, at=steady), steady
@@ -65,8 +65,8 @@ ub.print_once(f"the root bears {pull / 1e3:.1f} kN, the tip moves out by "
 # ## Southwell's bound
 #
 # With the shape w(x) of the blade at rest, Rayleigh's quotient gives ω² ≤ ω₀² + (k - 1) Ω²: k is
-# the work of the centrifugal force, ∫ (L² - x²)/2 w'² dx / ∫ w² dx, and -1 is what the growth of
-# that force takes away in the plane of rotation.  The shape at rest is known in closed form.
+# the work of the centrifugal force, ∫ (L² - x²)/2 w'² dx / ∫ w² dx, and -1 is the reduction by the
+# growth of this force in the plane of rotation.  The shape at rest is known in closed form.
 
 # %%
 x = np.linspace(0.0, 1.0, 4001)
@@ -129,10 +129,10 @@ ub.print_once("\npictures:", *sorted(str(p) for p in output.glob("rotating_beam*
 # %% [markdown]
 # ## Verification
 #
-# The computed frequencies stay below the bound, and near it: only where the speed is large, and
-# most in the first mode, does the shape change.  The damping ratios of the second and third mode
-# fall with the speed: the centrifugal force stores more and more of their energy, and only what
-# strains store is damped here.
+# The computed frequencies are below the bound and close to it: the shape changes only at large
+# speeds, most in the first mode.  The damping ratios of the second and third mode fall with the
+# speed: the centrifugal force stores more and more of their energy, and only the energy stored by
+# strains is damped here.
 
 # %%
 assert np.all(frequencies <= bounds * (1 + 1e-6))
@@ -142,12 +142,12 @@ assert np.allclose(ratios[0], in_theory, rtol=1e-5)
 assert np.all(np.diff(ratios[:, 1:], axis=0) < 0)
 assert np.isclose(
     pull, section.rhoA * rates[-1] ** 2 * L**2 / 2, rtol=1e-2
-)  # less what it stretches
+)  # apart from the stretch of the blade
 
 # %% [markdown]
 # ## Try this
 #
-# * the axis of rotation beside the clamp: `ub.RotatingFrame(rate, about=(-0.5, 0))`,
-# * `ub.Pinned` in the place of `ub.Clamped`: a hinged blade, which at no offset swings freely,
+# * an axis of rotation beside the clamp: `ub.RotatingFrame(rate, about=(-0.5, 0))`,
+# * `ub.Pinned` instead of `ub.Clamped`: a hinged blade, which swings freely without an offset,
 # * a mass at the tip, `masses=[ub.PointMass(blade.end, 5.0)]`,
 # * `ub.animate(fast.motion(1), "mode.gif")`.

@@ -1,16 +1,17 @@
 # %% [markdown]
 # # Slider-crank: the mechanism of every engine, and a press made of it
 #
-# First a problem with known numbers: a stiff crank, a flexible rod and a slider without mass; a
-# constant moment turns the crank for one second.  Then a press of machine elements: a motor with a
-# controller, a flywheel on the crank, a heavy slider with dry friction on its guide, a spring that
-# pushes it back and a workpiece that it hits before the end of its travel.
+# The first problem has known results: a stiff crank, a flexible rod and a slider without mass; a
+# constant moment turns the crank for one second.  The second is a press of machine elements: a
+# motor with a controller, a flywheel on the crank, a heavy slider with dry friction on its guide, a
+# spring that pushes the slider back, and a workpiece that the slider hits before the end of its
+# travel.
 #
 # This demo shows
 #
 # * `Prismatic`, `Revolute(..., multipliers=True)` and the forces that they bear,
-# * `Body` for what is rigid, `Turn`, `Slide` and `Stretch` for what acts between two places,
-# * `PrescribedMotion` against `Controller`: a motion that is given, and one that is to be held,
+# * `Body` for rigid parts, `Turn`, `Slide` and `Stretch` for forces between two places,
+# * `PrescribedMotion` and `Controller`: a prescribed motion, and a controlled motion,
 # * the ledger, with an entry for each source and sink.
 
 # %%
@@ -28,8 +29,9 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## The known mechanism
 #
-# The data are those of Stander and Stein, in moofeKIT: round rods, the crank a hundred times as
-# stiff as the rod.  All is straight at first: a dead centre, but only for a slider that drives.
+# The data come from Stander and Stein, in moofeKIT: round rods, and a crank a hundred times as
+# stiff as the rod.  The initial configuration is straight.  This is a dead centre, but only for a
+# slider that drives.
 
 # %%
 r, l, d = 0.1524, 0.3048, 6.35e-3  # m
@@ -49,8 +51,8 @@ known = ub.simulate(mechanism, ub.EnergyMomentum(), t=(0.0, 3.0), dt=2.5e-3, pro
 ub.print_once("slider-crank with a flexible rod\n" + str(known))
 
 # %% [markdown]
-# The reference values were computed with an independent program.  Their last digits are those of a
-# step of 2.5 ms, as here: with 1 ms the angle after 3 s is 18.2574.
+# The reference values were computed with an independent program.  Their last digits hold for a step
+# of 2.5 ms, as here: with 1 ms the angle after 3 s is 18.2574.
 
 # %%
 reference = {
@@ -73,13 +75,13 @@ ub.print_once(f"kinetic energy after 1 s: {kinetic[free].mean():.6f} J; referenc
 # %% [markdown]
 # ## The press
 #
-# A rigid crank with the inertia of its flywheel, a rod 12 x 5 mm of steel, a slider of 2 kg.  The
-# slide has dry friction: 5 N of its seal, and 0.2 times what presses on the guide.  A spring
-# pushes the slider back.  The workpiece stands 1.2 mm before the dead centre, so that rod and
-# workpiece must yield once in each turn.
+# The press has a rigid crank with the inertia of its flywheel, a steel rod 12 x 5 mm, and a slider
+# of 2 kg.  The slider has dry friction: 5 N from its seal, and 0.2 times the force on the guide.  A
+# spring pushes the slider back.  The workpiece stands 1.2 mm before the dead centre, so rod and
+# workpiece must deform once in each turn.
 #
-# It runs twice, with 30 rad/s reached within 0.1 s: once with a motor that nothing can slow down,
-# once with a controller, which sees angle and speed at the beginning of each step and gives up to
+# It runs twice and reaches 30 rad/s within 0.1 s: first with a motor of prescribed motion, then
+# with a controller, which reads angle and speed at the beginning of each step and applies up to
 # 15 N m.
 
 # %%
@@ -91,7 +93,7 @@ steel = ub.Section.rectangle(b=0.012, h=0.005, E=210e9, nu=0.3, rho=7850.0)  # m
 
 
 def wanted(t):
-    """Rotation of the crank and its rate as they should be; rad, rad/s."""
+    """Return the desired rotation of the crank and its rate; rad, rad/s."""
     x = min(t / starting, 1.0)
     turned = starting * (x**3 - x**4 / 2) + max(t - starting, 0.0)
     return speed * turned, speed * (3 * x**2 - 2 * x**3)
@@ -101,7 +103,7 @@ class Press:
     """The press, and its motion for 0.75 s.
 
     Args:
-        controlled: Whether a controller drives it, or a motor whose motion is given.
+        controlled: True for a controller, False for a motor whose motion is prescribed.
     """
 
     def __init__(self, controlled, record=()):
@@ -149,7 +151,7 @@ class Press:
         self.speed = self.run.velocity(self.crank.middle)[:, 2]
 
     def control(self, simulation):
-        """Torque in proportion to what angle and speed of the crank lack; N m."""
+        """Return a torque in proportion to the missing angle and speed of the crank; N m."""
         angle, rate = wanted(simulation.t)
         lacks = angle - simulation.displacement(self.crank.middle)[2]  # rad
         lacks_rate = rate - simulation.velocity(self.crank.middle)[2]  # rad/s
@@ -162,8 +164,8 @@ ub.print_once("\npress, motion given\n" + str(driven.run))
 ub.print_once("\npress, controlled\n" + str(controlled.run))
 
 # %% [markdown]
-# What each element did.  The force of a connector resists its growth, so that of a motor which
-# drives is negative.
+# The output lists the results of each element.  The force of a connector resists its motion, so the
+# force of a driving motor is negative.
 
 # %%
 t = driven.run.times
@@ -274,15 +276,15 @@ ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("slide
 # %% [markdown]
 # ## Verification
 #
-# Angles, positions and the energy are those of another program, to the digits of its step.  Joints
-# do no work: the energy stays after the moment has ended.  Their forces are those that move the
-# parts: pivot and guide together change the momentum of the mechanism, and in the press the motor
-# balances what the elbow exerts on a crank of constant speed.  Friction takes the limit times
-# the way, the spring nothing, and the ledger closes.
+# Angles, positions and the energy agree with another program, to the digits of its step.  Joints do
+# no work: the energy is constant after the moment has ended.  Their forces move the parts: the
+# forces of pivot and guide together change the momentum of the mechanism, and in the press the
+# motor balances the torque of the elbow force on a crank of constant speed.  Friction dissipates
+# its force times the path, the spring dissipates nothing, and the ledger closes.
 
 # %%
 for t_known, (angle_there, x_there) in reference.items():
-    # Half of the last digit given, and 2e-5 for the steps of another program.
+    # Half of the last printed digit, and 2e-5 for the steps of another program.
     digits = 5e-4 if t_known == 3.0 else 5e-5
     assert abs(angle[row[t_known]] - angle_there) < digits + 2e-5 * angle_there, t_known
     assert abs(x_slider[row[t_known]] - x_there) < 5e-5, t_known
@@ -326,7 +328,7 @@ ub.print_once("reference values reproduced")
 # %% [markdown]
 # ## Try this
 #
-# * `gap` for 3 mm before the dead centre: can the controller still turn the press?
+# * a `gap` of 3 mm before the dead centre: can the controller still turn the press?
 # * `coefficient=0.8`: how much more power does it take?
-# * `EnergyMomentum()` in the place of `alpha = beta = 0.05`: how long does the rod ring after a
+# * `EnergyMomentum()` instead of `alpha = beta = 0.05`: how long does the rod vibrate after a
 #   stroke?

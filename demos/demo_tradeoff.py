@@ -4,13 +4,13 @@
 # The arm of a pick-and-place machine swings its payload through 90 degrees within 0.6 s.  How far
 # does it bend on the way, and where is the payload in the end?  `ub.tradeoff` runs this scene with
 # several settings.  It finds the cheapest setting for a required accuracy, and the most accurate
-# one for a given wall time.
+# setting for a given wall time.
 #
 # This demo shows
 #
 # * errors of chosen quantities,
 # * competing settings: schemes, and cells with two and three nodes,
-# * the cost of the search, and cases that it refuses.
+# * the cost of the search, and quantities that it refuses.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -27,8 +27,8 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# An aluminium tube with a payload at its end, in the horizontal plane.  The hub turns as a cam
-# law has it whose acceleration begins and ends at zero.  Two cells are the coarsest mesh.
+# The arm is an aluminium tube with a payload at its end, in the horizontal plane.  The hub follows
+# a cam law whose acceleration begins and ends at zero.  Two cells are the coarsest mesh.
 
 # %%
 L, payload = 1.5, 2.0  # m, kg
@@ -52,21 +52,21 @@ scene = ub.Scene(
 # %% [markdown]
 # ## Quantities
 #
-# The place of the payload at the end, and how much the arm lags behind the hub at sixteen instants
-# on the way.  Arrays must have one shape whatever the steps are, so a history is asked for at
-# instants of its own.
+# The quantities are the place of the payload at the end, and the lag of the arm behind the hub at
+# sixteen instants.  The shape of an array must not depend on the steps, so a history is
+# interpolated at fixed instants.
 
 # %%
 instants = np.linspace(0.05, end, 16)  # s
 
 
 def place(solution):
-    """Of the payload at the end; m."""
+    """Return the place of the payload at the end; m."""
     return solution.position(arm.end)[-1]
 
 
 def lag(solution):
-    """Rotation of the payload behind that of the hub; rad."""
+    """Return the rotation of the payload relative to the hub; rad."""
     behind = solution.displacement(arm.end)[:, 2] - solution.displacement(arm.start)[:, 2]
     return np.interp(instants, solution.times, behind)
 
@@ -76,9 +76,9 @@ quantities = {"place": place, "lag": lag}
 # %% [markdown]
 # ## A tolerance
 #
-# A millimetre, and two thousandths of a radian.  Two schemes compete, and, unless something else
-# is asked for, cells with two and with three nodes.  A coarser tolerance of Newton's method is
-# tried in the end.
+# The tolerances are a millimetre and two thousandths of a radian.  Two schemes compete, and, by
+# default, cells with two and with three nodes.  A coarser tolerance of Newton's method is tried in
+# the end.
 
 # %%
 accurate = ub.tradeoff(
@@ -95,7 +95,7 @@ ub.print_once(accurate)
 # %% [markdown]
 # ## A budget
 #
-# What else could be done in twice that time, with the scheme and the cells that have just won?
+# Which accuracy is possible in twice that time, with the recommended scheme and cells?
 
 # %%
 winner = accurate.recommended
@@ -120,9 +120,9 @@ ub.plot(fast).savefig(output / "tradeoff_budget.png")
 # %% [markdown]
 # ## Verification
 #
-# The recommended arguments go into `simulate` as they are.  Against a reference with steps and
-# cells that are much finer than all that was run, the errors are below what was asked for; the
-# extrapolated limit is as near as it says.
+# The recommended arguments are passed to `simulate` unchanged.  Compared with a reference whose
+# steps and cells are much finer than in all runs, the errors are below the tolerances; the error of
+# the extrapolated limit is within its estimate.
 
 # %%
 best = ub.simulate(scene, **winner, progress=False)
@@ -148,7 +148,7 @@ ub.print_once(
 )
 
 # %% [markdown]
-# A quantity that has no limit is refused, with the numbers seen: here one that counts steps.
+# `tradeoff` refuses a quantity without a limit and reports its values: here the number of steps.
 
 # %%
 try:
@@ -164,5 +164,5 @@ else:
 # ## Try this
 #
 # * `scheme=ub.Newmark()`, or `dt=[0.04, ub.Adaptive(1e-3)]`: do they pay here?
-# * A hub that stops within 20 ms: which of the two quantities becomes the expensive one?
+# * A hub that stops within 20 ms: which of the two quantities becomes expensive?
 # * `mpirun -n 3`: two runs at a time.

@@ -9,11 +9,11 @@
 #
 # * a softening plastic hinge, `Beam(..., hinges={1.0: Softening(limit, fracture_energy)})`,
 # * logarithmic decrement and damping ratio from a history, `peaks` and `fit_decay`,
-# * the ledger: what the vibration loses is what the hinge dissipates, to round-off,
-# * what "damping ratio" can mean, and what it cannot, where plasticity damps.
+# * the ledger: the energy loss of the vibration equals the dissipation of the hinge to round-off,
+# * the limited meaning of a "damping ratio" if plasticity damps.
 #
-# It follows section 4.4 of the paper and its Table 2.  There fracture energies G_f of the hinge
-# are compared, from one to ten times a first value: the tougher the hinge, the less it damps.
+# It follows section 4.4 of the paper and its Table 2, which compares fracture energies G_f of the
+# hinge, from one to ten times a first value: the tougher the hinge, the less it damps.
 
 # %%
 # SPDX-License-Identifier: MIT
@@ -29,14 +29,14 @@ output.mkdir(exist_ok=True)
 # %% [markdown]
 # ## Scene
 #
-# The paper gives the section, A = 10 cm², I = 1 cm⁴, E = 1 GPa, the step of 1 ms and the 15 s.
-# Frame, mass and impulse are in a drawing without numbers, and moments of 3 kN m cannot belong to
-# EI = 10 N m²: they would bend it to a radius of 3 mm.  So these are **assumptions**:
+# The paper states the section, A = 10 cm², I = 1 cm⁴, E = 1 GPa, the step of 1 ms and the duration
+# of 15 s.  Frame, mass and impulse are in a drawing without numbers, and moments of 3 kN m cannot
+# belong to EI = 10 N m²: they would bend a beam to a radius of 3 mm.  So these are **assumptions**:
 #
 # * a square frame of 1 m with clamped feet, of a material as light as water,
 # * the limit M_u = 315 N cm, where the paper prints 315 kN cm,
-# * G_f = 150 N cm, and a triangular impulse of 0.3 s whose elastic answer just exceeds M_u: both
-#   chosen such that the first decrement of Table 2 is about that of the paper,
+# * G_f = 150 N cm, and a triangular impulse of 0.3 s whose elastic response just exceeds M_u: both
+#   chosen to match approximately the first decrement of Table 2,
 # * a hinge at the corner, rigid before it opens: "linear elasticity with softening response".
 
 # %%
@@ -50,7 +50,7 @@ peak = 13.8  # N
 
 
 def frame(factor):
-    """The frame with a hinge of ``factor`` times the fracture energy, and its corner."""
+    """Return the frame with a hinge of ``factor`` times the fracture energy, and its corner."""
     hinges = {1.0: ub.Softening(limit, factor * fracture)} if factor else {}
     left = ub.Beam((0, 0), (0, 1), section, cells=8, name="left")  # m
     girder = ub.Beam(
@@ -67,18 +67,18 @@ def frame(factor):
 
 
 def swing(factor, end, record=()):
-    """Let it swing; every fifth step is kept, 120 in a period."""
+    """Simulate the free swing; every fifth step is kept, 120 in a period."""
     scene, corner = frame(factor)
-    scheme = ub.EnergyMomentum()  # conserves energy exactly: what is lost, the hinge has
+    scheme = ub.EnergyMomentum()  # conserves energy exactly: only the hinge dissipates
     return ub.simulate(scene, scheme, t=(0.0, end), dt=1e-3, every=5, record=record), corner
 
 
 # %% [markdown]
 # ## Runs
 #
-# First without a hinge: the moment that the impulse would cause.  Then the fracture energies of
-# Table 2.  Decrements are taken from the first eight periods, for which 6.5 s are enough; two runs
-# go on to the paper's 15 s.
+# The first run has no hinge and finds the moment that the impulse would cause.  The other runs have
+# the fracture energies of Table 2.  Decrements are taken from the first eight periods, for which
+# 6.5 s are enough; two runs continue to the paper's 15 s.
 
 # %%
 elastic, corner = swing(0, 2.0)
@@ -97,18 +97,19 @@ for factor in (1, 10):
 # %% [markdown]
 # ## Decrement and damping ratio
 #
-# The amplitude of a swing is half the way from a maximum of u to the minimum before it: so it does
-# not matter that the open hinge shifts the middle.  The corner sinks whenever the frame sways, to
-# either side, v ≈ −0.6 u²/H: its minima come twice in a period and are as the squares of the swing.
-# Half the time, twice the logarithm: **both displacements have the same decrement**, as they have
-# in the paper's table.  Two successive minima, left and right, are averaged.
+# The amplitude of a swing is half the difference between a maximum of u and the minimum beside it,
+# so the shift of the middle by the open hinge does not matter.  The corner sinks whenever the frame
+# sways, to either side, v ≈ −0.6 u²/H: its minima occur twice in a period and are proportional to
+# the square of the swing.  Half the time and twice the logarithm compensate: **both displacements
+# have the same decrement**, as in the paper's table.  Two successive minima, left and right, are
+# averaged.
 
 # %%
 PERIODS = 8
 
 
 def decays(run):
-    """Decay of the horizontal and of the vertical displacement of the corner, after the impulse."""
+    """Return the decay of the corner's horizontal and vertical displacement after the impulse."""
     solution, corner = run
     free = solution.times > impulse.times[-1]
     t, (u, v, _) = solution.times[free], solution.displacement(corner)[free].T
@@ -140,7 +141,7 @@ printed = {  # Table 2 of the paper
 
 
 def row(name, values, digits):
-    """A line of the table."""
+    """Print a line of the table."""
     ub.print_once(f"{name:38s}" + "".join(f"{value:>8.{digits}f}" for value in values))
 
 
@@ -160,21 +161,21 @@ for f in (1, 1.4, 10):
 # %% [markdown]
 # ## What the numbers mean
 #
-# The trend is the paper's: the damping ratio falls with every step of G_f and nearly vanishes at
-# ten times the energy.  The reason is a race.  Each opening takes energy and so lowers the moment
-# of the next swing, and it lowers the limit.  In a tough hinge the limit stays where it is, the
-# swings fall below it, and from then on the frame is elastic.  In a brittle one the limit falls as
-# fast as the swings, and the hinge opens again and again.
+# The trend agrees with the paper: the damping ratio falls with every step of G_f and nearly
+# vanishes at ten times the energy.  The reason is a competition.  Each opening dissipates energy,
+# which lowers the moment of the next swing, and it lowers the limit.  In a tough hinge the limit
+# hardly changes, the swings fall below it, and from then on the frame is elastic.  In a brittle
+# hinge the limit falls as fast as the swings, and the hinge opens again and again.
 #
-# So this damping **ends**.  A decrement is a mean over the periods that one counts, not a property
-# of the frame: the printout shows how it rises and falls from one period to the next.  It also
-# depends on how far the impulse exceeds the limit: weaker by a tenth, and nothing is damped at all.
-# A per cent in the peak moment, high frequencies included, decides how long the hinge keeps
-# opening, so even the mesh has an influence: with 16 or 32 cells in each beam, the
-# first decrement is 0.061 or 0.059 instead of 0.078.  The numbers are those of one frame and
-# one mesh; **the trend is robust**: from 1 to 1.4 to 10 times G_f the damping falls on all three.
-# It turns where G_f is so small that the hinge opens completely in a swing or two: then it has
-# taken all it can, G_f, and what remains is a joint without damping.
+# So this damping **ends**.  A decrement is a mean over the counted periods, not a property of the
+# frame: the printout shows how it rises and falls from one period to the next.  It also depends on
+# how far the impulse exceeds the limit: after an impulse weaker by a tenth the vibration is not
+# damped at all.  A difference of one per cent in the peak moment, high frequencies included,
+# determines how long the hinge continues to open, so even the mesh has an influence: with 16 or 32
+# cells in each beam, the first decrement is 0.061 or 0.059 instead of 0.078.  The numbers hold for
+# one frame and one mesh, but **the trend is robust**: from 1 to 1.4 to 10 times G_f the damping
+# falls on all three meshes.  The trend reverses if G_f is so small that the hinge opens completely
+# in a swing or two: then it has dissipated all of G_f, and a joint without damping remains.
 #
 # ## Pictures
 
@@ -250,8 +251,9 @@ ub.print_once("\npictures and data:", *names, sep="\n  ")
 # %% [markdown]
 # ## Verification
 #
-# The trend of Table 2: each tougher hinge damps less, and the toughest next to nothing.  The
-# equal decrements of both directions.  And the ledger: the hinge is the only damper.
+# The results confirm the trend of Table 2: each tougher hinge damps less, and the toughest hinge
+# hardly damps.  Both directions have equal decrements.  The ledger shows that the hinge is the only
+# damper.
 
 # %%
 horizontal, vertical = (np.array([decay[f][d].ratio for f in factors]) for d in (0, 1))
@@ -269,4 +271,4 @@ ub.print_once("trend of Table 2 reproduced")
 #
 # * `fracture = 0.3`: the hinge opens completely in the first swing; how much can it damp then?
 # * `peak = 12.5`: the hinge never opens, and all decrements are zero,
-# * `ub.LinearSoftening` in the place of `ub.Softening`: the last of the resistance goes, too.
+# * `ub.LinearSoftening` instead of `ub.Softening`: the resistance vanishes completely.
