@@ -132,11 +132,11 @@ ub.print_once("\nhinge, in motion\n" + str(hinged.motion))
 ub.print_once("\nrevolute joint, in motion\n" + str(revolute.motion))
 
 apart = {cell: other.away(revolute) for cell, other in by_length.items()}
-ub.print_once("\ntip of the hinged arm from that of the jointed one, at most")
+ub.print_once("\nlargest distance between the tips of the hinged and the jointed arm:")
 for cell, distance in apart.items():
     ub.print_once(f"  hinge beside a cell of {1e3 * cell:3.0f} mm: {1e6 * distance:6.1f} µm")
 coarse = {n: other.away(by_cells[8]) for n, other in by_cells.items() if n < 8}
-ub.print_once("tip from that with 8 cells, at most")
+ub.print_once("largest distance from the tip with 8 cells:")
 for cells, distance in coarse.items():
     ub.print_once(f"  {cells} cell{'s'[: cells > 1]:1s}: {1e3 * distance:6.2f} mm")
 

@@ -233,7 +233,7 @@ assert abs(means[-1] - 1) < halves[-1]
 low, high = np.percentile(drift, (5, 95))
 assert high - low > 0.4 * drift.mean()
 assert all((np.asarray(again[name]) == study[name][worst]).all() for name in again)
-ub.print_once("drift uncertain, dissipated energy larger than that of the frame of mean strength")
+ub.print_once("drift uncertain, dissipated energy larger than in the frame of mean strength")
 
 # %% [markdown]
 # ## Try this

@@ -144,7 +144,7 @@ for name, tolerance in (("place", 1e-3), ("lag", 2e-3)):
     assert error < tolerance
     assert apart < accurate.uncertainty[name] + 0.1 * tolerance
 ub.print_once(
-    f"the steps of all runs took {accurate.effort:.0f} times those of the recommended one"
+    f"the steps of all runs took {accurate.effort:.0f} times as long as the recommended run"
 )
 
 # %% [markdown]

@@ -167,7 +167,7 @@ def test_a_curve_that_stands_still():
     [
         (lambda: ub.Table([0, 2, 1], [0, 0, 0]), ("Table", "increase", "times[1] = 2", "by 1")),
         (lambda: ub.Table([0, 1, 1], [0, 0, 1]), ("Table", "increase", "times[1] = 1", "by 1")),
-        (lambda: ub.Table([0, 1], [0]), ("Table: 2 times and 1 values", "as many of each")),
+        (lambda: ub.Table([0, 1], [0]), ("Table: 2 times and 1 values", "the same number of each")),
         (lambda: ub.Table([], []), ("Table: 0 times and 0 values",)),
         (lambda: ub.Table([0, math.nan], [0, 1]), ("Table: times[1] = nan is not finite",)),
         (lambda: ub.Table([0, 1], [0, math.inf]), ("Table: values[1] = inf is not finite",)),

@@ -312,7 +312,7 @@ def test_it_can_be_read():
 @pytest.mark.parametrize(
     ("t", "x", "says"),
     [
-        ([0, 1, 2], [0, 1], ("peaks: 3 t and 2 x; give as many of each",)),
+        ([0, 1, 2], [0, 1], ("peaks: 3 t and 2 x; give the same number of each",)),
         ([0, 2, 1], [0, 1, 0], ("t must increase", "t[1] = 2 is followed by 1")),
         ([0, 1, 1], [0, 1, 0], ("t must increase", "t[1] = 1 is followed by 1")),
         ([0, 1, 2], [0, np.nan, 0], ("x[1] = nan is not finite",)),

@@ -289,7 +289,7 @@ def _series(call: str, t: npt.ArrayLike, x: npt.ArrayLike, what: str) -> tuple[A
     times, values = require_row(t, f"{call}: t"), require_row(x, f"{call}: {what}")
     if len(times) != len(values):
         raise ArgumentError(
-            f"{call}: {len(times)} t and {len(values)} {what}; give as many of each"
+            f"{call}: {len(times)} t and {len(values)} {what}; give the same number of each"
         )
     for i in np.flatnonzero(np.diff(times) <= 0):
         raise ArgumentError(

@@ -125,7 +125,7 @@ def tradeoff(
     """
     require_kind(quantities, Mapping, "tradeoff: quantities")
     if not quantities:
-        raise ArgumentError("tradeoff: quantities is empty; name what is to be accurate")
+        raise ArgumentError("tradeoff: quantities is empty; name at least one quantity")
     for name, quantity in quantities.items():
         require_text(name, "tradeoff: the name of a quantity")
         if not callable(quantity):

@@ -268,7 +268,7 @@ class Table:
         if len(self.times) != len(self.values) or len(self.times) < 1:
             raise ModelError(
                 f"Table: {len(self.times)} times and {len(self.values)} values; "
-                "give as many of each"
+                "give the same number of each"
             )
         for i, (before, after) in enumerate(pairwise(self.times)):
             if after <= before:
