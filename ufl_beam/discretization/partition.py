@@ -158,14 +158,14 @@ class Share:
         found = self._local[dofs]
         return np.asarray((found >= 0) & (found < self.num_owned))
 
-    def gather(self, values: Array) -> Array:
+    def gather(self, values: Array, out: Array | None = None) -> Array:
         """Gather values of all degrees of freedom, in the order of the grid, on every process.
 
         A single process returns ``values`` itself: states are new arrays in each step.
         """
         if self.alone:
             return values
-        result, parts = np.empty(self.grid.size), self._parts
+        result, parts = np.empty(self.grid.size) if out is None else out, self._parts
         owned = np.ascontiguousarray(values[: self.num_owned])
         self.comm.Allgatherv(owned, [parts, self._num_owned_by])
         result[self._all_owned] = parts

@@ -112,12 +112,12 @@ class Columns:
         size, scene = grid.size, grid.scene
         return cls({
             "t": (),  # time, s; or the load factor of a path
-            "q": (size,),  # configuration, all degrees of freedom in the order of the grid
-            **({"v": (size,)} if moving else {}),  # velocities
             "reactions": (len(scene.supports), 3),  # forces of supports, in their axes
             "connectors": (len(scene.links), len(Connection._fields)),
             "material": (len(grid.inelastic_cells), int(lib.POINT_KEPT)),  # `Points.kept`
             **dict.fromkeys(ledger, ()),  # J
+            "q": (size,),  # configuration, all degrees of freedom in the order of the grid
+            **({"v": (size,)} if moving else {}),  # velocities
             **({FORCES: (lib.CELL_NUMBERS, len(grid.cells))} if record is None
                else {RECORD: (record,)}),
         })  # fmt: skip
@@ -180,11 +180,13 @@ class StateWriter:
     """Writer of the state in C, as a row of the whole scene.
 
     Each process specifies which of its numbers are added to which entries of the row; then the
-    rows of all processes are added.
+    entries of all processes are added.  Vectors of degrees of freedom, which are last in the row
+    and most of it, are gathered from the processes that own them.
 
     Attributes:
-        columns: Columns of a row, with the record of the forces of cells if one process has all
-            cells.
+        records: True if the row has the record of the forces of cells.  Processes with entries of
+            forms, which differ in number and order, do not share a record.
+        columns: Columns of a row.
     """
 
     def __init__(
@@ -195,24 +197,30 @@ class StateWriter:
         self._alive, self._kinds = list[Any](), list[Any]()
         grid, moving = share.grid, march.rates != ffi.NULL
         accounts = ledger.state, ledger.supplied, ledger.lost
-        record = cell_forces.kept if share.alone else []
+        self.records = share.alone or not share.largest(float(len(cell_forces.entries)))
+        vectors, others = list[Any](), list[tuple[Any, int]]()
+        if self.records:
+            vectors, others = cell_forces.vectors, [*cell_forces.entries, *cell_forces.factors]
         self.columns = columns = Columns.of(
-            grid, moving=moving, record=sum(n for _, n in record),
+            grid, moving=moving, record=grid.size * len(vectors) + sum(n for _, n in others),
             ledger=[f"{p}: {name}" for p, of in zip(LEDGER, accounts, strict=True) for name in of],
         )  # fmt: skip
         at = columns.at
         if share.comm.rank == 0:
             self._copy(self._place(ffi.addressof(march, "t")), at["t"].start, 1)
         now = ffi.addressof(march, "q")
-        vectors = {"q": now}
-        if moving:
-            vectors["v"] = ffi.addressof(march.rates, "rate", V)
-        for name, place in vectors.items():
+        velocity = [ffi.addressof(march.rates, "rate", V)] if moving else []
+        self._gathered = list[tuple[Any, slice]]()
+        first = at["q"].start
+        for place in (now, *velocity, *vectors):
             if share.alone:
-                self._copy(place, at[name].start, share.size)
+                self._copy(place, first, grid.size)
             else:
-                own = np.arange(share.num_owned)
-                self._add(place, own, at[name].start + share.dofs[own])
+                self._gathered.append((place, slice(first, first + grid.size)))
+            first += grid.size
+        for place, number in others:
+            self._copy(place, first, number)
+            first += number
         for part, account in zip(LEDGER, accounts, strict=True):
             if account:
                 first = at[f"{part}: {next(iter(account))}"].start
@@ -238,15 +246,8 @@ class StateWriter:
             for field, numbers in link.kept:
                 apart = numbers.strides[0] // numbers.itemsize * np.arange(len(rows))
                 self._add(self._place(numbers), apart, rows + Connection._fields.index(field))
-        first = at[RECORD].start
-        for place, number in record:
-            self._copy(place, first, number)
-            first += number
-        # Large vectors are written once; sums begin at zero.
-        width = columns.width
-        sums, after = (at["reactions"].start, at["material"].stop) if share.alone else (0, width)
         kept = ffi.new("kept_numbers[]", self._kinds)
-        fill(march, kinds=len(kept), kept=kept, width=width, sums=sums, after_sums=after)
+        fill(march, kinds=len(kept), kept=kept, width=columns.width, sums=at["q"].start)
 
     def _place(self, numbers: Any) -> Any:
         """Return a pointer to the address of a number of C, of an array, or of a view."""
@@ -268,6 +269,9 @@ class StateWriter:
 
     def write(self, row: Array) -> None:
         """Write the state in C; all processes call it together."""
+        share = self._share
         lib.keep_state(self._march, doubles(row))
-        if not self._share.alone:
-            self._share.comm.Allreduce(MPI.IN_PLACE, row)
+        if not share.alone:
+            share.comm.Allreduce(MPI.IN_PLACE, row[: self._march.sums])
+        for place, at in self._gathered:
+            share.gather(np.frombuffer(ffi.buffer(place[0], 8 * share.size)), row[at])

@@ -31,7 +31,7 @@ from ufl_beam.parallel import Agreement, communicator, sharing
 from ufl_beam.simulation.diagnosis import no_equilibrium
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.solution import Solution
-from ufl_beam.simulation.step_equation import StaticPath, StepEquation
+from ufl_beam.simulation.step_equation import StaticPath, StepEquation, forces_of_scene
 from ufl_beam.simulation.stepper import Stepper
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
@@ -141,7 +141,8 @@ class Simulation(Stepper):
         super().__init__(comm, equation, newton, t0, q_here, path, solution, together, loose)
         self._begun_at = before
         solution.begun = solution.between < 1 or self.cell_forces.asks_for_before
-        solution.of_record = self.cell_forces.of_record if share.alone else None
+        of_scene = forces_of_scene(grid, scheme, t0)
+        solution.of_record = self.cell_forces.of_record if share.alone else of_scene
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())
         # If forces act before the end of a step, loads that act from the start are applied first.
@@ -270,7 +271,7 @@ class Simulation(Stepper):
                 row[size:] = self.share.gather(self.q_before)
                 columns = columns.plus(BEFORE, (self.grid.size,))
             self._now = States(self.grid, self.solution, Block(columns, row[None], 1))
-            if self._gathers:
+            if not self.share.alone or self._lacks_record:
                 self._now.of_record = partial(self._gathered_forces, self.parts)
         return self._now
 
@@ -282,43 +283,33 @@ class Simulation(Stepper):
         )  # fmt: skip
 
     @property
-    def _gathers(self) -> bool:
-        """True if rows lack the record from which forces of cells are computed."""
-        return not self.share.alone or bool(self.cell_forces.c.given)
+    def _lacks_record(self) -> bool:
+        """True if the row has no record from which the forces of cells are computed."""
+        return not self._writer.records or bool(self.cell_forces.c.given)
 
     def _gathered_forces(self, parts: int, *_: Array) -> Array:
         """Return ``cell_number`` of loops.h of all cells; ``parts`` must be the present number."""
         if parts != self.parts:
             raise ArgumentError("section forces of an earlier state: ask for simulation.now again")
-        forces = self._put_forces(np.empty((lib.CELL_NUMBERS, len(self.grid.cells))))
+        forces: Array = np.zeros((lib.CELL_NUMBERS, len(self.grid.cells)))
+        forces[:, self.share.cells] = self.cell_forces(self.q, self.q_before)
         if not self.share.alone:
             self.share.comm.Allreduce(MPI.IN_PLACE, forces)
         return forces
 
-    def _put_forces(self, out: Array) -> Array:
-        """Put the forces of the cells of this process among zeros, to be added over processes."""
-        out.fill(0.0)
-        out[:, self.share.cells] = self.cell_forces(self.q, self.q_before)
-        return out
-
     def keep(self, solution: Solution | None = None) -> None:
         """Append the state to a solution, by default its own; all processes call it together."""
         solution = self.solution if solution is None else solution
-        columns, alone = self._writer.columns, self.share.alone
+        columns = self._writer.columns
         follows = not solution.begun or solution.parts_of_last == self.parts - 1
-        if self.parts and follows and not (alone and self._gathers):
-            if not alone:
-                shape = int(lib.CELL_NUMBERS), len(self.grid.cells)
-                columns = columns.plus(FORCES, shape, without=RECORD)
+        if self.parts and follows and not self._lacks_record:
             (row,) = solution.room(columns)
-            if not alone:
-                self._put_forces(columns.of_rows(FORCES, row))
             self._writer.write(row)
             solution.grow()
         else:
             _, row = self.now.row(0)
             parts, before = [row[: columns.width]], row[columns.width :]
-            if self._gathers:
+            if self._lacks_record:
                 forces = self.now.numbers(0)
                 parts = [row[: columns.at[RECORD].start], forces.ravel()]
                 columns = columns.plus(FORCES, forces.shape, without=RECORD)

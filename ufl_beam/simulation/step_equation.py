@@ -5,14 +5,18 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import cache
 from typing import Any
+
+from mpi4py import MPI
 
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
+from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import NOWHERE, Memory, State
@@ -378,6 +382,20 @@ class StepEquation:
             work += np.triu([times(np.ascontiguousarray(x)) @ Y for x in X.T])
             work += np.triu(work, 1).T
         return works[0], works[1]
+
+
+def forces_of_scene(grid: Grid, scheme: Scheme, t0: float) -> Callable[..., Array]:
+    """Return :meth:`CellForces.of_record` of all cells, for a record of several processes.
+
+    The equation of the whole scene is made at the first call, without communication.
+    """
+
+    @cache
+    def equation() -> StepEquation:
+        share = Share(grid, MPI.COMM_SELF)
+        return StepEquation(share, scheme, t0, np.zeros(grid.size), Agreement(share.comm))
+
+    return lambda *state: equation().cell_forces.of_record(*state)
 
 
 # -- checks of static steps ------------------------------------------------------------------------

@@ -28,8 +28,9 @@ class CellForces:
         c: ``cell_forces`` of loops.h.
         asks_for_before: True if the forces depend on the configuration at the beginning of the
             step.
-        kept: Pointers to arrays, with their sizes, that determine the forces besides
-            configurations.
+        vectors, entries, factors: Pointers to arrays, the last two with their sizes, that determine
+            the forces besides configurations: vectors of degrees of freedom, entries of forms, and
+            load factors, which are equal on all processes.
     """
 
     def __init__(self, share: Share, parts: Sequence[InCells], loads: Any = ffi.NULL) -> None:
@@ -37,7 +38,8 @@ class CellForces:
         self._alive: list[Any] = [parts]
         self._unmade = list[tuple[InCells, Any]]()
         self._of_ends: list[tuple[Kernel, fem.Function, Any, Array]] = []
-        self.kept: list[tuple[Any, int]] = []
+        self.vectors, self.entries = list[Any](), list[tuple[Any, int]]()
+        self.factors = list[tuple[Any, int]]()
         self._forces = ffi.new("force_in_cells[]", len(parts))
         vectors: dict[Any, Any] = {}  # latest vectors: accepted vectors, as pointers
         for c, one in zip(self._forces, parts, strict=True):
@@ -50,7 +52,7 @@ class CellForces:
             if one.vector is not None:
                 if one.vector not in vectors:
                     c.latest, vectors[one.vector] = one.vector, accepted
-                    self.kept.append((accepted, share.size))
+                    self.vectors.append(accepted)
                 c.vector = vectors[one.vector]
                 self._unmade.append((one, c))
             else:
@@ -60,14 +62,14 @@ class CellForces:
                 self._alive.append(each)
                 if one.q0 is None:
                     c.latest = each
-                    self.kept.append((accepted, other.size))
+                    self.entries.append((accepted, other.size))
                 else:
                     each[0] = ffi.NULL
                     self._of_ends.append((form, one.q0, each, other))
             c.accepted = doubles(other)
             self._alive.append(other)
         if loads != ffi.NULL:
-            self.kept.append((ffi.addressof(loads, "accepted"), loads.vectors))
+            self.factors.append((ffi.addressof(loads, "accepted"), loads.vectors))
         self.asks_for_before = any(form.uses(q0) for form, q0, *_ in self._of_ends)
         first, *between, last = share.grid.mesh.nodes - 0.5
         from_middle = np.array([first, last, *between])
@@ -130,18 +132,19 @@ class CellForces:
     # -- data of solutions ----------------------------------------------------------------------
 
     def of_record(self, record: Array, q: Array, before: Array) -> Array:
-        """Return the numbers of a call from the saved arrays of :attr:`kept`."""
-        given, now, at = self.c.given, [place[0] for place, _ in self.kept], 0
+        """Return the numbers of a call from saved vectors, entries and factors, in this order."""
+        kept = [*((one, self._share.size) for one in self.vectors), *self.entries, *self.factors]
+        given, now, at = self.c.given, [place[0] for place, _ in kept], 0
         record = np.array(record)
         try:
             self.c.given = ffi.NULL
-            for place, n in self.kept:
+            for place, n in kept:
                 place[0] = doubles(record[at : at + n])
                 at += n
             return self(q, before)
         finally:
             self.c.given = given
-            for (place, _), old in zip(self.kept, now, strict=True):
+            for (place, _), old in zip(kept, now, strict=True):
                 place[0] = old
 
     def remember(self, memory: Memory, q: Array, before: Array) -> None:

@@ -944,8 +944,8 @@ typedef struct {
   int states;
   double *state;      /* entries of the ledger that are functions of the state, contiguous */
   time_step step;
-  int kinds, width;     /* kinds of numbers of a state; length of a row */
-  int sums, after_sums; /* range of a row in which numbers are added */
+  int kinds, width, sums; /* kinds of numbers of a state; length of a row, and of its first part, in
+                           * which numbers are added */
   const kept_numbers *kept;
   cell_forces *cell_forces;
   int watches;

@@ -1020,7 +1020,7 @@ static double seconds_now(void)
 /* Write the state, or the share of this process, into a row; see state_rows.py. */
 void keep_state(const march *m, double *row)
 {
-  memset(row + m->sums, 0, (m->after_sums - m->sums) * sizeof *row);
+  memset(row, 0, m->sums * sizeof *row);
   for (int k = 0; k < m->kinds; ++k) {
     const kept_numbers *n = m->kept + k;
     const double *from = *n->from;
