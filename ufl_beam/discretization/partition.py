@@ -78,7 +78,7 @@ class Share:
         np.minimum.at(owner, of_link, rank_of_link[:, None])
         owner[owner == comm.size] = 0  # bodies without attachments
         self.links = np.flatnonzero(rank_of_link == comm.rank)
-        order = np.argsort(owner, kind="stable").astype(np.int32)
+        order = np.argsort(owner, kind="stable")
         number = np.empty(grid.size, dtype=np.int32)  # of PETSc
         number[order] = np.arange(grid.size, dtype=np.int32)
 
