@@ -31,8 +31,8 @@ LEDGER = ("state", "supplied", "lost")
 """Parts of the ledger, see :class:`~ufl_beam.terms.energy_ledger.Energy`."""
 
 FORCES, RECORD, BEFORE = "cell forces", "record", "before"
-"""Columns of some states only: ``cell_number`` of loops.h of all cells; the data from which these
-are computed, see :attr:`CellForces.kept`; q at the beginning of the step, if forces depend on it
+"""Columns of some states only: ``cell_number`` of loops.h of all cells; the record from which
+:meth:`CellForces.of_record` computes these; q at the beginning of the step, if forces depend on it
 and it differs from q of the row before (in the first row, from q of the same row)."""
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import ufl
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, struct
+from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, names, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.partition import Share
@@ -65,10 +65,13 @@ class Links(Term):
         self._callbacks: Callbacks  # set when the phases are made
         self.response = response = respond(self.links[0].law, self.links, setting)
         self.must_dissipate = response.must_dissipate
-        # Motions and forces of the accepted state, and works since the beginning (J)
-        self._e, self._before, self._work, self.rate = np.zeros((4, len(self.links)))
+        # Motions and forces of the accepted state, and `connector_number` of loops.h
+        self._e, self._before = np.zeros((2, len(self.links)))
+        self._numbers_kept: Array = np.zeros((lib.CONNECTOR_NUMBERS, len(self.links)))
+        self.rate: Array = self._numbers_kept[lib.CONNECTOR_RATE]
         motion = self._e if response.motion is None else response.motion
-        self.kept = [("motion", motion), ("work", self._work), ("rate", self.rate)]
+        fields = names("connector_number", "connector_")
+        self.kept = [("motion", motion), *zip(fields, self._numbers_kept, strict=True)]
         self.kept += [("dissipated", energy) for energy in response.dissipated]
 
     @abstractmethod
@@ -168,8 +171,8 @@ class Couplings(Links):
             work=work.cells, tangent=tangent.cells, motion=value.cells,
             row=work.position(forms.row), row_of_tangent=tangent.position(forms.row),
             by_cell=np.zeros(n), e0=self._e, e1=self._now, before=self._before,
-            taken=self._work, rate=self.rate, weight_of_before=scheme.weight_of_before,
-            **self.response.in_c,
+            kept=[doubles(numbers) for numbers in self._numbers_kept],
+            weight_of_before=scheme.weight_of_before, **self.response.in_c,
         )  # fmt: skip
         self.loops = loop("add_couplings_force", self._in_c), loop("add_cells", tangent.cells)
         self.demand = loop("missed_by_couplings", self._in_c)
@@ -206,9 +209,9 @@ class Couplings(Links):
 
             accept.insert(0, callbacks.phase(ask))
         if response.opens:
-            names, of = ("points", "slips", "rubs", "way_before"), response.in_c
+            parts, of = ("points", "slips", "rubs", "way_before"), response.in_c
             found = {**of, "slips": of.get("rigid_plastic"), "rubs": of.get("friction"), **of_law}
-            opens = {name: found[name] for name in names if found.get(name) is not None}
+            opens = {name: found[name] for name in parts if found.get(name) is not None}
             if "way_before" in opens:
                 opens["way_before"] = integers(opens["way_before"])
         if response.in_c.keys() & {"rigid_plastic", "friction", "asked"}:
@@ -274,10 +277,12 @@ class Couplings(Links):
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore motions, forces, works, and internal variables of laws."""
         response = self.response
-        rows = np.column_stack([self._work, self.rate, self._before, self._e, response.state()])
+        mine = *self._numbers_kept, self._before, self._e
+        rows = np.column_stack([*mine, response.state()])
         rows = memory.rows(response.name, self.numbers, rows)
-        self._work[:], self.rate[:], self._before[:], self._e[:] = rows[:, :4].T
-        response.restore(rows[:, 4:])
+        for numbers, column in zip(mine, rows.T, strict=False):
+            numbers[:] = column
+        response.restore(rows[:, len(mine) :])
 
 
 class Guides(Links):

@@ -237,8 +237,8 @@ static double commit_couplings(const couplings *c, const double *q, double dt)
     double of_all = 0;
     for (int j = n * i; j < n * (i + 1); ++j) {
       const double work = taken_by(c, j, q);
-      c->taken[j] += work;
-      c->rate[j] = (c->e1[j] - c->e0[j]) / dt;
+      c->kept[CONNECTOR_WORK][j] += work;
+      c->kept[CONNECTOR_RATE][j] = (c->e1[j] - c->e0[j]) / dt;
       c->before[j] = q[c->force[j]];
       c->e0[j] = c->e1[j];
       of_all += work;

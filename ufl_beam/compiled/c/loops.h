@@ -305,6 +305,10 @@ typedef struct {
   double *sum;                /* energy lost in the last step: by the laws, by the scheme */
 } connector_laws;
 
+/* Numbers of an accepted step that are kept, with the names of fields of `Connection`: work taken since
+ * the beginning, rate. */
+enum connector_number { CONNECTOR_WORK, CONNECTOR_RATE, CONNECTOR_NUMBERS };
+
 /* Connectors with the same components of motion, in cells whose unknowns include the forces. The
  * law of a component is a row a·e + b f = c in all motions e of the connector and the force f of
  * the component. Material points supply the rows of springs. Arrays have one number for each
@@ -320,7 +324,7 @@ typedef struct {
   const int32_t *link, *force;     /* connector of each cell; indices of the forces among the unknowns */
   int row, row_of_tangent;         /* positions of the rows in the coefficients of work and tangent */
   double *by_cell, *e1;            /* space; motions at the latest unknowns */
-  double *e0, *before, *taken, *rate; /* accepted state: motion, force, work taken so far, rate */
+  double *e0, *before, *kept[CONNECTOR_NUMBERS]; /* accepted state: motion, force, numbers kept */
   double weight_of_before;         /* weight of the force before the step in the work of the step */
   const int32_t *dofs;             /* of each connector: six of its nodes, then the forces */
   const double *length;            /* 1 for a rotation, else the size of the scene */
