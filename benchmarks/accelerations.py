@@ -33,8 +33,9 @@ class Acceleration(NamedTuple):
 
 ACCELERATIONS = {
     "Newton's method in C": Acceleration(
-        "Newton's method with full steps as a SNES of the type \"shell\". Without it, PETSc's "
-        "`newtonls` calls the same residual and tangent in C, and the factorization by Python.",
+        "Newton's method with full steps, in C, as a SNES of the type \"shell\". Without it, "
+        "PETSc's `newtonls` calls the same residual and tangent in C, and Python calls the "
+        "factorization.",
         by.SHIPPED, by.PETSC,
         (
             "compiled/c/newton.c:factor_tangent", "compiled/c/newton.c:solve_tangent",
@@ -44,9 +45,8 @@ ACCELERATIONS = {
         ),
     ),
     "SIMD kernels": Acceleration(
-        "Kernels of FFCx compiled a second time with vectors instead of numbers, for the "
-        "processor of the machine: four or eight cells at once. Without it, cells are computed one "
-        "by one by FFCx's own kernels.",
+        "FFCx's kernels are compiled a second time, for vectors of the processor: they compute "
+        "four or eight cells at once. Without it, FFCx's own kernels compute one cell at a time.",
         by.SHIPPED, by.SCALAR,
         (
             "compiled/simd_kernels.py", "compiled/c/lanes.c", "compiled/c/lanes.h",
@@ -55,10 +55,10 @@ ACCELERATIONS = {
         ),
     ),
     "elimination along beams": Acceleration(
-        "Eliminates the vertices between the ends of beams in blocks of three; dense fronts factor "
-        "the remaining matrix. Without it, such fronts with the ordering \"amd\" factor the whole "
-        "tangent, called from the same Newton's method in C. Several processes share all of this "
-        "but what is at their borders.",
+        "The unknowns of the vertices between the ends of beams are eliminated in blocks of three; "
+        "dense fronts factor the remaining matrix. Without it, dense fronts with the ordering "
+        "\"amd\" factor the whole tangent. On several processes only the unknowns at the borders "
+        "of subdomains are not divided among the processes.",
         by.SHIPPED, by.WHOLE,
         (
             "compiled/c/elimination.c", "solvers/static_condensation.py:_chains",
@@ -68,15 +68,16 @@ ACCELERATIONS = {
         ),
     ),
     "dense fronts": Acceleration(
-        "Eliminate what the elimination along beams leaves, in dense matrices whose products stay "
-        "in registers. Without it, KLU does so, called by PETSc. The more joints a scene has, the "
-        "more of them are worth: see docs/ranks.md.",
+        "The unknowns that remain after the elimination along beams, mostly of joints, are "
+        "eliminated in dense matrices whose products stay in registers. Without it, KLU, called by "
+        "PETSc, factors this matrix. The gain grows with the number of joints: see docs/ranks.md.",
         by.SHIPPED, by.LEFT,
         ("compiled/c/fronts.c", "solvers/multifrontal.py"),
     ),
     "guess with the acceleration": Acceleration(
-        "Adds to the guess of a step that part of the last second difference of the configuration "
-        "which repeats itself. Without it, a step begins at the velocity of the last one.",
+        "The initial guess of a step contains the part of the last second difference of the "
+        "configuration that is expected to repeat. Without it, the guess extrapolates with the "
+        "velocity of the last step.",
         by.SHIPPED, by.VELOCITY,
         (
             "compiled/c/march.c:enter_step", "compiled/c/march.c:compare_differences",
@@ -85,9 +86,9 @@ ACCELERATIONS = {
         (ELASTIC, LARGE, SWING, HINGED, JOINTED),
     ),
     "tangent kept in the last iteration": Acceleration(
-        "Keeps the tangent of the previous iterate if the residual then decreases far below the "
-        "tolerance, at most once in a row. Without it, every iteration assembles and factors a "
-        "tangent.",
+        "The tangent of the previous iterate is kept if the residual is expected to fall far below "
+        "the tolerance with it, at most once in a row. Without it, every iteration assembles and "
+        "factors a tangent.",
         by.SHIPPED, by.TANGENTS,
         ("compiled/c/newton.c~e->near|\\bkept\\b|\\bclose\\b|CLOSE",),
         (ELASTIC, LARGE, HINGED, JOINTED),

@@ -268,7 +268,7 @@ def paragraphs(found):
         said = f" {count(one.code)} lines in {where}." if where else ""
         yield (
             f"**{name[0].upper()}{name[1:]}**. {one.text} Gain {least} to {most}: "
-            f'"{one.without}" beside "{one.with_}".{said}'
+            f'"{one.with_}" compared with "{one.without}".{said}'
         )
 
 

@@ -186,7 +186,7 @@ def table(records, rounds):
     of = machine()
     lines = [
         f"Commit {of['commit']}, {of['processor']}; medians of {rounds} rounds.", "",
-        "| with | a step (µs) | iterations | without (µs) | iterations | per iteration | µs more |",
+        "| object | µs a step | iterations | µs a step without it | iterations | ratio | µs more |",
         "|---|--:|--:|--:|--:|--:|--:|",
     ]  # fmt: skip
     for r in records:

@@ -25,7 +25,7 @@ plan = static_condensation._plan
 
 
 def nothing(*_):
-    """No loop over several cells at once, in the place of `in_lanes`."""
+    """Replace `in_lanes`: there is no loop over several cells at once."""
 
 
 def without_chains(cell_dofs, indptr, indices, alone, *more):
@@ -34,7 +34,7 @@ def without_chains(cell_dofs, indptr, indices, alone, *more):
 
 
 def klu(inner, _):
-    """KLU, called by PETSc, in the place of fronts."""
+    """Factor with KLU, called by PETSc, instead of fronts."""
     return Klu(inner)
 
 
@@ -102,7 +102,7 @@ AT_VELOCITY = (stepper, "Prediction", AtVelocity)
 
 SHIPPED, PETSC = "as shipped", "PETSc's `newtonls`"
 SCALAR, WHOLE = "cell by cell", "fronts of the whole tangent"
-LEFT = "KLU in the place of fronts"
+LEFT = "KLU instead of fronts"
 TANGENTS, VELOCITY = "a tangent in each iteration", "guess at the last velocity"
 
 VARIANTS = {

@@ -45,8 +45,8 @@ VISCOSITIES = (0.0, 1e-300, 1e-12, 1e-6, 1e-3, 1e-1, 1.0, 1e2, 1e6, 1e12, 1e300,
 
 @row(
     "Perzyna's viscosity",
-    "η over C times the duration",
-    "force of a bar that is pulled at a constant rate, in closed form",
+    "η / (C × duration)",
+    "force of a bar at a constant strain rate, closed form",
     VISCOSITIES,
 )
 def perzyna(η):
@@ -64,8 +64,8 @@ def perzyna(η):
 
 @row(
     "Duvaut and Lions' relaxation",
-    "τ over the duration",
-    "force of a bar that is pulled at a constant rate, in closed form, η = τ (C + H)",
+    "τ / duration",
+    "force of a bar at a constant strain rate, closed form with η = τ (C + H)",
     VISCOSITIES,
 )
 def duvaut_lions(τ):
@@ -99,9 +99,9 @@ def softened(limit, energy, ψ):
 
 
 @row(
-    "fracture energy, in statics",
-    "energy over that below which softening snaps back, limit² L/EI",
-    "moment of a beam whose end is turned, in closed form",
+    "fracture energy, statics",
+    "energy / (limit² L/EI), below which softening snaps back",
+    "moment of a beam with a prescribed rotation of its end, closed form",
     tuple(10.0**k for k in range(-6, 7)),
     stops=("softening snaps back",),
 )
@@ -116,9 +116,9 @@ def fracture(ratio):
 
 
 @row(
-    "fracture energy, in motion",
-    "energy over that below which softening snaps back, limit² L/EI",
-    "the ledger, and that no more is dissipated than the energy of the hinge",
+    "fracture energy, dynamics",
+    "energy / (limit² L/EI), below which softening snaps back",
+    "ledger; dissipation of at most the energy of the hinge",
     (1e-300, 1e-100, *(10.0**k for k in range(-6, 7)), 1e300),
     stops=("a node turns by", "no equilibrium after t"),
 )
@@ -153,9 +153,9 @@ def ledger_of_hinges(solution, energy, hinges, note=""):
 
 
 @row(
-    "limit of a hinge, in statics",
-    "M_u over the moment that the elastic beam would bear",
-    "moment of a beam whose end is turned, in closed form",
+    "limit of a hinge, statics",
+    "M_u / moment of the elastic beam",
+    "moment of a beam with a prescribed rotation of its end, closed form",
     (0.0, 1e-300, 1e-100, 1e-12, 1e-6, 1e-3, 0.1, 0.5, 1.0, 1e3, 1e12, 1e300, math.inf),
     stops=("or is too long to tell",),
 )
@@ -167,9 +167,9 @@ def limit(size):
 
 
 @row(
-    "limit of a hinge, in motion",
-    "M_u over EI/L",
-    "the ledger, and that no more is dissipated than the energy of the hinges",
+    "limit of a hinge, dynamics",
+    "M_u / (EI/L)",
+    "ledger; dissipation of at most the energy of the hinges",
     (0.0, 1e-300, 1e-100, 1e-12, 1e-6, 1e-3, 0.1, 1.0, 1e3, 1e300, math.inf),
     stops=("a node turns by", "no equilibrium after t"),
 )
@@ -179,9 +179,9 @@ def limit_in_motion(size):
 
 
 @row(
-    "a perfect joint",
-    "cells of a beam whose clamped end has a hinge of M_u = 0",
-    "the same beam on a pin",
+    "hinge without resistance",
+    "cells of a clamped beam with M_u = 0 at the clamp",
+    "the same beam on a pinned support",
     (8, 32, 128, 512),
 )
 def perfect_joint(cells):
@@ -201,9 +201,9 @@ def perfect_joint(cells):
 
 
 @row(
-    "hinges in every cell at once",
+    "a hinge in each cell",
     "cells",
-    "the ledger; all have opened; none dissipates more than its energy",
+    "ledger; dissipation of at most the energy of the hinges",
     (1, 8, 64, 512, 4096),
     stops=("a node turns by", "no equilibrium after t"),
     seconds=300,
@@ -220,13 +220,13 @@ def every_cell(cells):
     solution = ub.simulate(scene, ub.EnergyMomentum(0.1, 0.1), t=(0, 0.02), dt=0.002)
     jumps = [solution.material_at(beam.at((i + 0.5) / cells)).jump[-1] for i in (0, cells // 2)]
     opened = int(np.count_nonzero(jumps))
-    return ledger_of_hinges(solution, 1.0, cells, note=f"{opened} of 2 cells looked at opened")
+    return ledger_of_hinges(solution, 1.0, cells, note=f"{opened} of 2 sampled cells opened")
 
 
 @row(
-    "limits side by side",
-    "yield moment of a part over that of its neighbour",
-    "the ledger",
+    "neighbouring yield moments",
+    "ratio of the yield moments of two beams",
+    "ledger",
     (0.0, 1e-12, 1e-6, 1e-3, 1.0, 1e3, 1e12, math.inf),
     stops=("a node turns by", "no equilibrium after t"),
 )

@@ -81,21 +81,24 @@ def _section(**numbers):
 
 
 CASES = {
-    "a load is not a number from some time on": (
+    "a load that becomes NaN": (
         lambda: run(cantilever(_late(math.nan))),
         "PointLoad",
     ),
-    "a load is infinite from some time on": (lambda: run(cantilever(_late(math.inf))), "PointLoad"),
-    "a motion is not a number from some time on": (
+    "a load that becomes infinite": (lambda: run(cantilever(_late(math.inf))), "PointLoad"),
+    "a prescribed motion that becomes NaN": (
         lambda: _motion(math.nan),
         "PrescribedDisplacement",
     ),
-    "a time function raises": (lambda: run(cantilever(_raises)), "a user's own error"),
-    "the force of a Function is not a number": (_function_fails, "Slide"),
+    "a time function that raises an exception": (
+        lambda: run(cantilever(_raises)),
+        "a user's own error",
+    ),
+    "a ForceLaw that returns NaN": (_function_fails, "Slide"),
     "a beam of zero length": (lambda: ub.Beam((1, 1), (1, 1), ub.Section(**STEEL)), "zero length"),
     "a stiffness of zero": (_section(EA=0.0), "must be positive"),
-    "a stiffness that is infinite": (_section(EI=math.inf), "not finite"),
-    "a stiffness that is not a number": (_section(GA=math.nan), "not finite"),
+    "an infinite stiffness": (_section(EI=math.inf), "not finite"),
+    "a stiffness of NaN": (_section(GA=math.nan), "not finite"),
     "a negative mass": (_section(rhoA=-1.0), "must be at least 0"),
     "statics of a mechanism": (_free_in_statics, "free to move"),
     "dynamics of a body without mass": (_massless, "mass = 0"),
@@ -106,14 +109,14 @@ CASES = {
         "dt",
     ),
     "an end before the beginning": (lambda: run(cantilever(), t=(1.0, 0.0)), "must come after"),
-    "a step of nothing": (lambda: run(cantilever(), dt=0.0), "must be positive"),
+    "a step of length zero": (lambda: run(cantilever(), dt=0.0), "must be positive"),
 }
 
 
 @row(
-    "what is wrong, and what is said",
-    "the mistake",
-    "a message that names it",
+    "wrong input",
+    "error",
+    "a message that names the error",
     tuple(CASES),
     stops=tuple({says for _, says in CASES.values()}),
 )
@@ -141,9 +144,9 @@ def _require_kept(error):
 
 
 @row(
-    "no mass, or no rotary inertia",
-    "rhoA and rhoI of half of a beam",
-    "the ledger",
+    "beams without mass or rotary inertia",
+    "rhoA and rhoI of one half",
+    "ledger",
     ((1.0, 1e-3), (1.0, 0.0), (0.0, 1e-3), (0.0, 0.0), (1e-300, 1e-300), (1e12, 1e12)),
 )
 def without_mass(inertia):

@@ -30,28 +30,29 @@ def save(results: Results) -> None:
     lines = [
         "# Results at extreme parameters",
         "",
-        "Written by `make extremes`; do not edit. Each value is a simulation of its own; its",
-        "error is the difference from an independent result; the allowed error is derived in",
-        "[benchmarks/extremes](../benchmarks/extremes): the tolerance of Newton's method, the",
-        "order of the scheme, and round-off times its amplification.",
+        "Written by `make extremes`; do not edit. Each value is one simulation. Its error is the",
+        "difference from an independent result. The allowed error follows from the tolerance of",
+        "Newton's method, the order of the scheme and amplified round-off; its derivation is in",
+        "[benchmarks/extremes](../benchmarks/extremes).",
         "",
         f"Of {sum(counts.values())} runs {counts['works']} work, {counts['stops']} stop with a "
-        f"message that names what is wrong, {counts['WRONG']} are wrong "
-        f"in silence, {counts['HANG']} hang.",
+        f"message that names the cause, {counts['WRONG']} return a wrong result or a message "
+        f"without the cause, {counts['HANG']} do not end.",
         "",
-        "![Errors as parts of what is allowed](pictures/extremes.png)",
+        "![Errors relative to the allowed error](pictures/extremes.png)",
         "",
-        "*Dots: error as a part of what is allowed, crosses: stopped with a message.*",
+        "*Dots: error relative to the allowed error; crosses: runs that stop with a message.*",
         "",
-        "| what | varied | works: error, of allowed; iterations per step | stops |",
+        "| case | parameter | works: largest error, allowed error; iterations a step | stops |",
         "|---|---|---|---|",
     ]
     lines += [_line(row, one) for row, one in results]
     lines += ["", "## Each value", ""]
     for row, one in results:
-        lines += [f"### {row.name}", "", f"Varied: {row.varied}. Compared with: {row.against}.", ""]
+        lines += [f"### {row.name}", ""]
+        lines += [f"Parameter: {row.varied}. Compared with: {row.against}.", ""]
         lines += [
-            "| value | error | allowed | iterations per step | verdict |",
+            "| value | error | allowed error | iterations a step | verdict |",
             "|---|---|---|---|---|",
         ]
         lines += [_detail(r) for r in one] + [""]

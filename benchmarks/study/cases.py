@@ -139,11 +139,11 @@ def bent_cantilever():
 
 
 CASES = (
-    Case("flying beam", "smooth", "A free beam, thrown by a force and a moment that come and go "
-         "as a sine.", flying_beam, 2.0, 20),
+    Case("flying beam", "smooth", "A free beam, thrown by a force and a moment in the form of a "
+         "sine pulse.", flying_beam, 2.0, 20),
     Case("double pendulum", "smooth", "Two slender beams that fall.", pendulum, 0.8, 20),
-    Case("swing", "stiff", "A beam and a mass on links ten thousand times as stiff as the beam, "
-         "until they are taut.", swing, 0.6, 30),
+    Case("swing", "stiff", "A beam with a mass, on links that are ten thousand times as stiff, "
+         "until these are taut.", swing, 0.6, 30),
     Case("hit cantilever", "impulsive", "A steel bar and a blow of 2 ms at its end.",
          hit_cantilever, 0.04, 40),
     Case("yielding cantilever", "plastic", "A viscoplastic steel bar, pulled beyond its limit "

@@ -13,7 +13,7 @@ import ufl_beam as ub
 
 SCHEMES: dict[str, ub.mechanics.time_schemes.Scheme] = {
     "EnergyMomentum": ub.EnergyMomentum(),
-    "EnergyMomentum, decaying": ub.EnergyMomentum(alpha=0.05, beta=0.05),
+    "EnergyMomentum(0.05, 0.05)": ub.EnergyMomentum(alpha=0.05, beta=0.05),
     "EnergyMomentumDecaying": ub.EnergyMomentumDecaying(),
     "EnergyMomentumPrinted": ub.EnergyMomentumPrinted(),
     "Newmark": ub.Newmark(),
@@ -36,7 +36,7 @@ class Setting:
         degree: Of the cells.
         lumped: Whether masses are those of nodes.
         rtol: Of Newton's method.
-        adaptive: Tolerance of adaptive steps, in the place of equal ones; 0: none.
+        adaptive: Tolerance of adaptive steps, instead of equal steps; 0: none.
         every: Steps from one that is kept to the next.
         history: Whether a table of the place is written, a row each step.
     """
@@ -103,7 +103,7 @@ def one_by_one(case: Case, quick: bool) -> Iterator[tuple[str, Setting]]:
         for degree in (2, 3):
             yield f"cells: degree {degree}", replace(here, degree=degree)
             coarse = replace(here, degree=degree, refine=max(1, here.refine // degree))
-            yield f"cells: degree {degree}, as many nodes", coarse
+            yield f"cells: degree {degree}, same number of nodes", coarse
     for more in (-1, 1):
         turned = replace(here, halvings=here.halvings + more)
         yield f"step: {'twice' if more < 0 else 'half'}", turned
@@ -117,5 +117,5 @@ def one_by_one(case: Case, quick: bool) -> Iterator[tuple[str, Setting]]:
     for rtol in (1e-8, 1e-6, 1e-4):
         yield f"Newton: rtol {rtol:g}", replace(here, rtol=rtol)
     steps = case.steps * 2**here.halvings // len(case.instants)
-    yield "output: kept at ten instants", replace(here, every=steps)
-    yield "output: a history beside", replace(here, history=True)
+    yield "output: ten states kept", replace(here, every=steps)
+    yield "output: with a History file", replace(here, history=True)

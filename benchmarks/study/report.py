@@ -14,13 +14,13 @@ Case = dict[str, Any]
 INTRODUCTION = """\
 # Speed and accuracy: the study
 
-Written by `make study`; do not edit. Time and error of each setting, over scenes that are smooth,
-stiff, impulsive, plastic, softening and static. Times are the wall time of a run, including the
-building of the scene, without compilation. The error is the largest distance of a place, at ten
-instants, from a reference run that is finer than all others, relative to the size of the scene;
-errors below twice that of the reference itself are not counted. The scenes are small, and the times
-are those of one machine: use the ratios, and find the settings for your own scene by
-[`ub.tradeoff`](tradeoff.md).
+Written by `make study`; do not edit. The study measures time and error of each setting in scenes
+that are smooth, stiff, impulsive, plastic, softening and static. The time is the wall time of a run
+with the building of its scene, without compilation. The error is the largest distance of a place
+from its position in a reference run, at ten instants, relative to the size of the scene. The
+reference run is finer than all others; targets below twice its estimated error are omitted. The
+scenes are small, and times depend on the machine, so use the ratios of times.
+[`ub.tradeoff`](tradeoff.md) finds the settings for a scene of your own.
 """
 
 
@@ -37,20 +37,23 @@ def save(study: dict[str, Any], docs: Path) -> None:
         f"{study['processor']}, one thread; {study['seconds'] / 60:.0f} minutes.",
         "",
         *(f"Without {name}: {_cut(why)}\n" for name, why in study["failed"].items()),
-        "## What to choose when",
+        "## Recommended settings",
+        "",
+        "Each line has the fastest setting for an error, and the times of other schemes for the "
+        'same error, relative to it; "as long" is within 15 %.',
         "",
         *advice(cases),
         "",
-        "Time of each scheme relative to the fastest one: the geometric mean over the scenes in "
-        "which it reaches the error, and their number:",
+        "Time of each scheme for an error, relative to the fastest scheme: the geometric mean over "
+        "the scenes in which it reaches the error, and the number of these scenes:",
         "",
         *overall(cases),
         "",
         "## Each setting by itself",
         "",
-        "One setting is varied at a time, from the base that the tables of the scenes name. Time "
-        "and error are ratios to the base; the change is that of the result by this setting "
-        "alone.",
+        "Each setting is changed alone, from a base that is stated for each scene below. Time and "
+        "error are relative to the base. The change is the distance from the result of the base, "
+        "relative to the size of the scene.",
         "",
         "![Time and error as each setting is varied](pictures/study_dials.png)",
         "",
@@ -69,7 +72,7 @@ def _section(case: Case, picture: Path) -> list[str]:
     lines = [
         f"## {case['name'].capitalize()}: {case['kind']}",
         "",
-        f"{case['says']} The reference errs by about {case['reference']:.0e}.",
+        f"{case['says']} Estimated error of the reference: {case['reference']:.0e}.",
         "",
         f"![Error over wall time](pictures/{picture.name})",
         "",
@@ -99,7 +102,9 @@ def _section(case: Case, picture: Path) -> list[str]:
             f"| {run['iterations']:.2f} | {run['imbalance']:.1e} |"
         )
     failed = {run["scheme"]: run["failed"] for run in case["runs"] if "failed" in run}
-    lines += [""] + [f"{scheme} failed in some: {_cut(why)}  " for scheme, why in failed.items()]
+    lines += [""] + [
+        f"{scheme} fails in some settings: {_cut(why)}  " for scheme, why in failed.items()
+    ]
     return [*lines, ""]
 
 

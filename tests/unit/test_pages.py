@@ -9,7 +9,7 @@ from pages import DOCS, blocks_of
 PAGES = [
     *sorted(DOCS.glob("extending*.md")),
     *sorted(DOCS.glob("howto_*.md")),
-    *(DOCS / name for name in ("coming_from.md", "hinges.md", "start.md")),
+    *(DOCS / name for name in ("coming_from.md", "hinges.md", "results.md", "start.md")),
 ]
 
 

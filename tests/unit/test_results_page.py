@@ -1,0 +1,30 @@
+# SPDX-License-Identifier: MIT
+"""The entries of the energy ledger on docs/results.md are those of the code."""
+
+import re
+from pathlib import Path
+
+from pages import DOCS
+
+from ufl_beam.model.connector_law import ENTRIES
+
+PACKAGE = Path(__file__).parents[2] / "ufl_beam"
+WRITTEN = re.compile(
+    r'\b(?:state|supplied|lost)"?(?:\[|\.pointer\(|, )"(\w+)"'  # ledger.lost["..."], (lost, "...")
+    r'|\b_?entry\b[^=\n]* = "(\w+)"'  # of a class
+)
+WRITERS = "terms/*.py", "reference/*.py", "model/connector_law*.py", "simulation/step_equation.py"
+
+
+def test_the_page_of_results_lists_all_entries_of_the_ledger():
+    page = (DOCS / "results.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `(\w+)` \| (?:state|supplied|lost) \|", page, re.MULTILINE)
+    text = "\n".join(
+        file.read_text("utf-8") for name in WRITERS for file in sorted(PACKAGE.glob(name))
+    )
+    written = {name for pair in WRITTEN.findall(text) for name in pair if name}
+    assert len(rows) == len(set(rows))
+    assert set(rows) == set(ENTRIES)
+    assert set(rows) <= written
+    other_uses = {"beams", "lost", "new", "supplied", "v"}  # of the words in the pattern
+    assert written - set(rows) <= other_uses
