@@ -31,7 +31,7 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
-from ufl_beam.output.postprocessing import velocity_of
+from ufl_beam.output.postprocessing import velocity_at
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
@@ -88,7 +88,7 @@ class Shapes(Rich, ABC):
         """
         self._require(k)
         shape: Any = self.shapes[:, k]
-        return np.asarray(velocity_of(self.grid, place, self.q[None], shape[None])[0])
+        return np.asarray(velocity_at(self.grid, place, self.q[None], shape[None])[0])
 
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
         """Return one period of the k-th mode as a solution, for :func:`animate` or :func:`plot`.

@@ -32,7 +32,7 @@ from ufl_beam.model.connector_law import ConnectorLaw, require_limit
 from ufl_beam.model.connector_laws import Controller, rubs
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Content, above, below, require_arrays
-from ufl_beam.output.recorders import Recorder, recorders_of
+from ufl_beam.output.recorders import Recorder, checked_recorders
 from ufl_beam.parallel import communicator, progress_bar
 from ufl_beam.simulation.run import running, take_steps
 from ufl_beam.simulation.simulation import Simulation
@@ -102,13 +102,13 @@ class Path(Solution):
             content |= above(f"critical/{k}/state/", point.state._arrays())
         return content
 
-    def _take(self, content: Content) -> None:
-        super()._take(content)
+    def _set_content(self, content: Content) -> None:
+        super()._set_content(content)
         critical = []
         for k, one in enumerate(content["critical"]):
             state, inside = Solution(self.scene, self.grid), below(f"critical/{k}/", content)
             require_arrays(inside, {"mode": (self.grid.size,)})
-            state._take({**{n: content[n] for n in NAMED}, **below("state/", inside)})
+            state._set_content({**{n: content[n] for n in NAMED}, **below("state/", inside)})
             kind, factor, n = str(one["kind"]), float(one["factor"]), range(len(self))[one["n"]]
             critical.append(CriticalPoint(kind, factor, n, state, inside["mode"]))
         self.critical = critical
@@ -179,7 +179,7 @@ def follow(
     require_switch(progress, "follow: progress")
     if start is not None:
         require_kind(start, (Solution, Branch), "follow: start")
-    recorders, outputs = recorders_of(record, comm, "follow")
+    recorders, outputs = checked_recorders(record, comm, "follow")
     branch, state = (start, start.state) if isinstance(start, Branch) else (None, start)
     t0 = 0.0 if state is None else float(state.times[-1])
     _require_driven(scene, t0)
