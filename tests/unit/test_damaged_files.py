@@ -257,7 +257,7 @@ WRONG = {
     "seconds": ("solution", changed("seconds", lambda x: "soon"), "ValueError("),
     "numbering": (
         "solution", changed("numbering", lambda x: x + 1),
-        f"written by version {version()} of ufl_beam, which numbers degrees of freedom otherwise",
+        f"written by version {version()} of ufl_beam, which numbers degrees of freedom differently",
     ),
     "field": (
         "solution", changed("scene", lambda s: s["records"][-1].update(odd=1) or s), "odd"
