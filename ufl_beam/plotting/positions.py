@@ -106,7 +106,7 @@ class Canvas:
         self._solution = subject if isinstance(subject, States) else None
         self.scene = subject.scene if isinstance(subject, States) else subject
         number = 0 if self._solution is None else len(self._solution.times)
-        self._shown = range(kept) if shown is None else shown
+        self._shown = range(number) if shown is None else shown
         self.spots = spots_of(self.scene)  # attachment points of bodies and of the ground
 
     @classmethod
@@ -134,12 +134,12 @@ class Canvas:
     def shape(self, n: int) -> DeformedShape:
         """Return the shape at the n-th kept time of the solution, or raise ArgumentError."""
         assert self._solution is not None
-        grid, kept = self._solution.grid, len(self._solution.times)
-        if not -kept <= n < kept:
+        grid, number = self._solution.grid, len(self._solution.times)
+        if not -number <= n < number:
             raise ArgumentError(
-                f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}"
+                f"n = {n}: the solution kept {number} times; give {-number} to {number - 1}"
             )
-        state = self._solution.part(n % kept, n % kept + 1)
+        state = self._solution.part(n % number, n % number + 1)
         nodes = grid.points + self.magnify * state.q[0, grid.dofs[:, :2]]
         return DeformedShape(self, lambda place: state.displacement(place)[0], nodes)
 
@@ -337,8 +337,8 @@ def _best(
     lines = np.vstack([lines, *(x.leader.reshape(-1, 4) for x in others)])
     number = np.arange(len(label.spots))
     gaps, choices = np.repeat(GAPS, len(number)), np.tile(number, len(GAPS))
-    ways = np.array([spot.direction for spot in label.spots])[choices]
-    spots = np.array([spot.at + spot.gap * spot.direction for spot in label.spots])[choices]
+    ways = np.array([place.direction for place in label.spots])[choices]
+    spots = np.array([place.at + place.gap * place.direction for place in label.spots])[choices]
     # At this distance the box is beyond the line through its point, perpendicular to the direction.
     centers = spots + ways * (gaps + np.abs(ways) @ half)[:, None]
     low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
