@@ -40,8 +40,9 @@ ACCELERATIONS = {
         (
             "compiled/c/newton.c:factor_tangent", "compiled/c/newton.c:solve_tangent",
             "compiled/c/newton.c:find_change", "compiled/c/newton.c:newton",
-            "compiled/c/newton.c:snes_newton", "solvers/static_condensation.py:ChainsFirst.drive",
-            "solvers/multifrontal.py:Multifrontal.drive", "solvers/substructuring.py:Klu.drive",
+            "compiled/c/newton.c:snes_newton", "solvers/multifrontal.py:Multifrontal.drive",
+            "solvers/static_condensation.py:CondensedSolver.drive",
+            "solvers/substructuring.py:Klu.drive",
         ),
     ),
     "SIMD kernels": Acceleration(
@@ -61,7 +62,7 @@ ACCELERATIONS = {
         "of subdomains are not divided among the processes.",
         by.SHIPPED, by.WHOLE,
         (
-            "compiled/c/elimination.c", "solvers/static_condensation.py:_chains",
+            "compiled/c/elimination.c", "solvers/static_condensation.py:_interior_vertices",
             "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:_plan",
             "solvers/static_condensation.py:_what_is_left",
             "solvers/static_condensation.py:Elimination",

@@ -8,8 +8,8 @@ import pytest
 from random_machines import script
 
 import ufl_beam as ub
-from ufl_beam.plotting.model import badge, notes_of
-from ufl_beam.plotting.model_sheet import Subject, draw
+from ufl_beam.plotting.model import model_notes, scene_load
+from ufl_beam.plotting.model_drawing import Subject, draw
 
 PARTS = ("joints", "supports", "loads", "masses", "initial", "damping", "connectors")
 
@@ -22,11 +22,11 @@ def machine(seed):
 
 def amount(scene):
     """Number of strokes, labels and words of a picture; and whether all numbers are finite."""
-    sheet = draw(Subject(scene), scene.size / 300.0)
-    strokes = [stroke for group in sheet.strokes.values() for stroke in group]
+    drawing = draw(Subject(scene), scene.size / 300.0)
+    strokes = [stroke for group in drawing.strokes.values() for stroke in group]
     assert all(np.isfinite(stroke.points).all() for stroke in strokes)
-    badges = [load for load in scene.loads if any(badge(load))]
-    return len(strokes) + len(sheet.labels) + len(badges) + len(notes_of(scene))
+    whole = [load for load in scene.loads if any(scene_load(load))]
+    return len(strokes) + len(drawing.labels) + len(whole) + len(model_notes(scene))
 
 
 @pytest.mark.parametrize("seed", range(25))

@@ -241,7 +241,9 @@ def test_what_it_does_not_compute():
         "follow": lambda: ub.follow(scene, ub.LoadControl(0.1), steps=1, newton=newton),
     }
     for what, call in calls.items():
-        with pytest.raises(ub.ArgumentError, match=f"reference=True does not go with {what}"):
+        with pytest.raises(
+            ub.ArgumentError, match=f"reference=True cannot be combined with {what}"
+        ):
             call()
 
 

@@ -1149,7 +1149,7 @@ def test_options_without_effect(database, name, said):
 
 
 def test_options_that_petsc_asks_for_later(database):
-    with raises("ub_snes_view; such options must stand in PETSC_OPTIONS"):
+    with raises("ub_snes_view; such options must be in PETSC_OPTIONS"):
         run(newton=ub.Newton(petsc={"snes_view": None}))
     database["snes_view"] = ":/dev/null"
     run()

@@ -153,16 +153,16 @@ def swapped(data):
 
 DAMAGES = {
     "empty": (lambda data: b"", "or is damaged: it is empty"),
-    "text": (lambda data: b"hello", "or is damaged: its end is not that of such a file"),
-    "zip": (lambda data: zipped({"a.txt": b"a"}), "its end is not that of such a file"),
-    "numpy": (lambda data: zipped({"a.npy": b"a"}), "its end is not that of such a file"),
-    "half": (lambda data: data[: len(data) // 2], "its end is not that of such a file"),
-    "last byte": (lambda data: data[:-1], "its end is not that of such a file"),
-    "longer": (lambda data: data + b"0", "its end is not that of such a file"),
-    "first byte": (lambda data: data[1:], "its checksum is not that of its content"),
-    "end alone": (lambda data: data[-256:], "its checksum is not that of its content"),
-    "swapped": (swapped, "its checksum is not that of its content"),
-    "twice": (lambda data: data + data, "its checksum is not that of its content"),
+    "text": (lambda data: b"hello", "or is damaged: its last line is wrong"),
+    "zip": (lambda data: zipped({"a.txt": b"a"}), "its last line is wrong"),
+    "numpy": (lambda data: zipped({"a.npy": b"a"}), "its last line is wrong"),
+    "half": (lambda data: data[: len(data) // 2], "its last line is wrong"),
+    "last byte": (lambda data: data[:-1], "its last line is wrong"),
+    "longer": (lambda data: data + b"0", "its last line is wrong"),
+    "first byte": (lambda data: data[1:], "its checksum does not match its content"),
+    "end alone": (lambda data: data[-256:], "its checksum does not match its content"),
+    "swapped": (swapped, "its checksum does not match its content"),
+    "twice": (lambda data: data + data, "its checksum does not match its content"),
 }
 
 
@@ -257,7 +257,7 @@ WRONG = {
     "seconds": ("solution", changed("seconds", lambda x: "soon"), "ValueError("),
     "numbering": (
         "solution", changed("numbering", lambda x: x + 1),
-        f"written by version {version()} of ufl_beam, which numbers degrees of freedom otherwise",
+        f"written by version {version()} of ufl_beam, which numbers degrees of freedom differently",
     ),
     "field": (
         "solution", changed("scene", lambda s: s["records"][-1].update(odd=1) or s), "odd"
@@ -321,7 +321,9 @@ def test_recorders_whose_state_is_missing(name, make, path, tmp_path):
     content = output_files.read(path, format)
     without = {n: x for n, x in content.items() if not n.startswith("recorder 0/")}
     output_files.write(path, format, without)
-    with pytest.raises(ub.ArgumentError, match=r"checkpoint .* cannot go on from it: KeyError\('"):
+    with pytest.raises(
+        ub.ArgumentError, match=r"checkpoint .* cannot continue from it: KeyError\('"
+    ):
         run(checkpoint=checkpoint, record=make(tmp_path / name))
 
 
@@ -359,7 +361,7 @@ MEMBERS = {
     "negative": (header((-5,)), "damaged: "),
     "too short": (header((7,)) + bytes(8), "damaged: ValueError"),
     "header": (b"\x93NUMPY\x01\x00\xff\xff{'descr': __import__('os')}", "damaged: ValueError"),
-    "bomb": (header((10**8,)) + bytes(10**8), "what it contains is larger than itself"),
+    "bomb": (header((10**8,)) + bytes(10**8), "its content is larger than the file"),
 }
 
 
@@ -445,7 +447,7 @@ def flip_and_resume(name, folder, flips):
             try:
                 recorded(folder, name, 1.0)
             except ub.ArgumentError as error:
-                refusals += "it is not what was written up to the checkpoint" in str(error)
+                refusals += "it differs from the file at the checkpoint" in str(error)
                 errors += 1
                 assert path.read_bytes() == data  # as it was found
             else:
@@ -513,7 +515,7 @@ def test_a_history_is_checked_on_all_processes(shared_path, on_first_rank):
     recorded(shared_path, "run.csv", 0.5)
     table = shared_path / "run.csv"
     on_first_rank(lambda: table.write_text(table.read_text().replace("0.2,", "0.3,", 1)))
-    with pytest.raises(ub.ArgumentError, match="it is not what was written up to the checkpoint"):
+    with pytest.raises(ub.ArgumentError, match="it differs from the file at the checkpoint"):
         recorded(shared_path, "run.csv", 1.0)
 
 

@@ -213,7 +213,7 @@ def test_what_a_scene_does_not_have():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=2)
     simulation = ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Static())
     with pytest.raises(
-        ub.ArgumentError, match=r"dolfinx\.jump: nothing in the scene can hinge; give"
+        ub.ArgumentError, match=r"dolfinx\.jump: no beam of the scene has a hinge; give"
     ):
         simulation.dolfinx.jump  # noqa: B018
     with pytest.raises(

@@ -11,7 +11,14 @@ import scenes
 from matplotlib.collections import LineCollection, PolyCollection
 
 import ufl_beam as ub
-from ufl_beam.plotting.layout import Label, Spot, areas_covered, crossings, lengths_inside, place
+from ufl_beam.plotting.positions import (
+    Candidate,
+    Label,
+    areas_covered,
+    crossings,
+    lengths_inside,
+    place,
+)
 from ufl_beam.plotting.style import GREEN, RED
 
 STEEL = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
@@ -361,7 +368,7 @@ def test_lengths_areas_and_crossings_are_those_of_sampling():
 def test_a_label_moves_away_from_lines_and_other_labels():
     up, down = np.array([0.0, 1.0]), np.array([0.0, -1.0])
     at = np.zeros(2)
-    label = Label("x", "k", 0, (Spot(at, up), Spot(at, down)))
+    label = Label("x", "k", 0, (Candidate(at, up), Candidate(at, down)))
     half = np.array([10.0, 5.0])
     nothing = np.empty((0, 4))
     (one,) = place([label], [half], nothing)

@@ -306,7 +306,7 @@ def test_a_rotation_about_the_origin_by_default():
 
 def test_a_velocity_that_a_support_takes_away():
     one = beam()
-    with warns("Velocity of girder: Clamped at girder.start (0, 0) holds", "psi", "a blow"):
+    with warns("Velocity of girder: Clamped at girder.start (0, 0) prescribes", "psi", "an impact"):
         begin(one, supports=[ub.Clamped(one.start)], initial=[ub.Velocity([one], angular=1.0)])
     # About a pin it agrees
     begin(one, supports=[ub.Pinned(one.start)], initial=[ub.Velocity([one], angular=1.0)])

@@ -308,7 +308,7 @@ def test_the_file_is_written_on_the_way(tmp_path):
         (square, [{"x": 1}, 2], ("cases[1] = 2 is not a dict",)),
         (square, [{1: 2}], ("cases[0]: name = 1 is not a str",)),
         (square, [{"x": SECTION}], ("cases[0]", "values must be numbers, texts or lists")),
-        (square, numbers(1, 2, 1), ("cases[2] = {'x': 1} is there twice",)),
+        (square, numbers(1, 2, 1), ("cases[2] = {'x': 1} occurs twice",)),
     ],
 )
 def test_calls(member, cases, says):
@@ -381,7 +381,7 @@ def test_files_that_are_no_studies(shared_path, on_first_rank):
 
 def test_files_of_another_member(shared_path):
     ub.study(square, numbers(1), path=shared_path / "a.h5")
-    with raises("a.h5 is one of square, not of fragile"):
+    with raises("a.h5 has results of square, not of fragile"):
         ub.study(fragile, numbers(1), path=shared_path / "a.h5")
 
 

@@ -13,7 +13,7 @@ import ufl_beam as ub
 from ufl_beam.analysis.critical_points import Candidate
 from ufl_beam.analysis.path_following import PathStepper
 from ufl_beam.parallel import active_comm
-from ufl_beam.plotting.layout import evenly
+from ufl_beam.plotting.positions import evenly
 
 EA, WIDTH, HEIGHT = 1e6, 4.0, 1.0  # N, m, m: half a truss
 

@@ -20,9 +20,9 @@ from matplotlib.text import Text
 
 import ufl_beam as ub
 from ufl_beam.plotting import films, symbols
-from ufl_beam.plotting.layout import Stage
+from ufl_beam.plotting.positions import Canvas
 from ufl_beam.plotting.style import BLUE, INK, RED, WHITE, decimal_prefix, number, with_unit
-from ufl_beam.plotting.symbols import EDGE, FILLED, LAWS, glyph_of, support_direction
+from ufl_beam.plotting.symbols import EDGE, FILLED, LAWS, law_symbol, support_direction
 
 FIRST = MPI.COMM_WORLD.rank == 0
 INDEX = {"N": 0, "V": 1, "M": 2}
@@ -90,7 +90,7 @@ def has(points, point):
 
 
 def pose(solution, n=-1, *, unit=0.05):
-    return Stage(solution, 1.0, unit).pose(n)
+    return Canvas(solution, 1.0, unit).shape(n)
 
 
 def boxes_of(figure):
@@ -547,7 +547,7 @@ def test_rail_reaches_along_the_whole_way_and_the_block_is_at_the_slider(engine)
 
 def test_rails_are_as_long_as_what_is_shown(engine):
     way = engine.position(engine.scene.bodies[1].middle)[:, 0]
-    rail = next(symbols.rails(Stage(engine, 1.0, 0.05, [4]).pose(4)))
+    rail = next(symbols.rails(Canvas(engine, 1.0, 0.05, [4]).shape(4)))
     ends = sorted(rail.points[:, 0])
     # From where it was made to where it is, and 1.8 units more
     np.testing.assert_allclose(ends, [way[4] - 0.09, way[0] + 0.09], atol=1e-9)
@@ -577,7 +577,7 @@ def test_a_rail_on_a_body_turns_with_it_and_is_fixed_to_it(along):
 
 def test_points_of_the_ground_are_marked(engine):
     # The bearing from beneath, the spring from its right; the rail has hatches.
-    marks = {tuple(f.at): f for f in symbols.footings(pose(engine))}
+    marks = {tuple(f.at): f for f in symbols.support_symbols(pose(engine))}
     assert set(marks) == {(0.0, 0.0), (4.5, 0.4)}
     assert marks[0.0, 0.0].angle == 0.0
     toward = math.atan2(0.1 - 0.4, 3.2 - 4.5)
@@ -586,7 +586,7 @@ def test_points_of_the_ground_are_marked(engine):
 
 def test_displacements_of_bodies_are_magnified(engine):
     point = engine.scene.bodies[0].at(0.6, 0.4)
-    (line,) = symbols.rods(Stage(engine, 3.0, 0.05).pose(-1))
+    (line,) = symbols.rods(Canvas(engine, 3.0, 0.05).shape(-1))
     expected = point.point + 3 * (engine.position(point)[-1] - point.point)
     np.testing.assert_allclose(line.points[0], expected, atol=1e-12)
 
@@ -632,7 +632,7 @@ def test_each_law_has_its_symbol():
     """All but those of a user, which have one in common."""
     own = {type(law) for law in CONNECTOR_LAWS if not isinstance(law, Quadratic)}
     assert own == set(LAWS) - {ub.ConnectorLaw}
-    assert glyph_of(Quadratic(10.0)) is LAWS[ub.ConnectorLaw]
+    assert law_symbol(Quadratic(10.0)) is LAWS[ub.ConnectorLaw]
 
 
 def test_joints_without_an_entry_have_a_plain_symbol():
@@ -650,7 +650,7 @@ def test_joints_without_an_entry_have_a_plain_symbol():
     together, link = (left.end, right.start), ub.RigidLink(right.end, apart.start)
     joints = [Own(together, (0, 1), (), True), Own(link.places, (2,), link.holders, False)]
     scene = ub.Scene([left, right, apart], joints=joints, supports=[ub.Clamped(left.start)])
-    undeformed = Stage(scene, 1.0, 0.05).undeformed
+    undeformed = Canvas(scene, 1.0, 0.05).undeformed
     (pin,) = symbols.pins(undeformed)
     np.testing.assert_array_equal(pin.at, (1, 0))
     (rod,) = symbols.rods(undeformed)
@@ -687,11 +687,11 @@ def test_each_connector_is_drawn(connect):
 def test_connectors_side_by_side_do_not_cover_each_other():
     laws = [ub.Spring(10.0), ub.Damper(1.0), ub.Spring(5.0)]
     straight = ub.simulate(slider(ub.Stretch, *laws), ub.EnergyMomentum(), t=(0, 0.1), dt=0.1)
-    lanes = Stage(straight, 1.0, 0.05).offsets
+    lanes = Canvas(straight, 1.0, 0.05).offsets
     assert sorted(lanes.values()) == [-1.6, 0.0, 1.6]
     # Springs are 0.55 to each side, dampers 0.6
     turning = ub.simulate(slider(ub.Turn, *laws), ub.EnergyMomentum(), t=(0, 0.1), dt=0.1)
-    assert np.diff(sorted(Stage(turning, 1.0, 0.05).offsets.values())).min() > 1.0
+    assert np.diff(sorted(Canvas(turning, 1.0, 0.05).offsets.values())).min() > 1.0
 
 
 def test_a_slide_of_zero_length_points_along_its_axis():
@@ -764,7 +764,7 @@ def test_slide_is_drawn_along_its_axis():
     beam = ub.Beam((0, 0), (2, 0), scenes.SLENDER)
     stop = ub.Slide(ub.ground(2.4, 0.5), beam.end, ub.Stop(1e3, high=0.3), axis=(0, 1))
     scene = ub.Scene(beams=[beam], supports=[ub.Clamped(beam.start)], connectors=[stop])
-    undeformed = Stage(scene, 1.0, 0.05).undeformed
+    undeformed = Canvas(scene, 1.0, 0.05).undeformed
     across, *glyph = symbols.connectors(undeformed)
     np.testing.assert_allclose(across.points, [(2.4, 0.0), (2.0, 0.0)], atol=1e-12)
     x, y = np.concatenate([stroke.points for stroke in glyph]).T
@@ -785,7 +785,7 @@ def test_damage_and_dissipation_without_beams(engine):
     )
     drawn = {x.get_label(): x.get_ydata() for x in ub.plot(solution, "dissipation").axes[0].lines}
     assert drawn["supplied"][-1] > 0.0
-    (spot,) = symbols.footings(pose(solution))
+    (spot,) = symbols.support_symbols(pose(solution))
     assert has(np.array([spot.at]), (0.0, 0.0))
     assert outlines(ub.plot(solution, "damage"), "connectors")
     falling = ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, inertia=0.1)], loads=[ub.Gravity()])
@@ -828,7 +828,7 @@ def test_symbols_of_supports_stand_away_from_the_beam():
         (lambda s: ub.plot(s, n=3), "n = 3: the solution kept 3 times; give -3 to 2"),
         (lambda s: ub.plot(s, magnify=0), "magnify = 0 must be positive"),
         (lambda s: ub.plot(s, "shapes", count=0), "count = 0 must be at least 1"),
-        (lambda s: ub.plot(s, "shapes", 8), "for so many shapes give count=8"),
+        (lambda s: ub.plot(s, "shapes", 8), "for a number of shapes give count=8"),
         (lambda s: ub.plot(s, "history", s.scene.beams[0].end, component="w"), "component = 'w'"),
         (lambda s: ub.plot(s, "history", s.scene.beams[0].end, component="du/dt"), "static"),
         (lambda s: ub.render(s, "a.jpg"), r"a.jpg: the name must end in .png"),

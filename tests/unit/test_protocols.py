@@ -110,7 +110,7 @@ def test_a_recorder_without_its_base_class():
         def write(self, simulation): ...
 
     refused("simulate: record[0] = <", record=[Mine()])
-    refused("is not a Recorder; classes of your own are derived from ub.Recorder", record=[Mine()])
+    refused("is not a Recorder; derive your own classes from ub.Recorder", record=[Mine()])
 
 
 def test_a_recorder_that_lacks_a_method():

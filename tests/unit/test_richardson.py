@@ -10,7 +10,7 @@ from ufl_beam.analysis.richardson import (
     DOUBTED,
     TRUSTED,
     Convergence,
-    Cross,
+    SelfConvergence,
     fit_cost,
     pareto,
     size,
@@ -28,7 +28,7 @@ def three(order, *, first=0, shape=SHAPE):
 @pytest.mark.parametrize("order", [0.6, 1.0, 1.5, 2.0])
 @pytest.mark.parametrize("first", [0, 3])
 def test_a_power_is_recognised(order, first):
-    seen = Convergence.of(three(order, first=first), first, 2.0)
+    seen = Convergence.estimate(three(order, first=first), first, 2.0)
     assert seen.seen
     assert seen.order == pytest.approx(order, abs=1e-9)
     # Whole orders are trusted, others get the larger factor.
@@ -39,54 +39,54 @@ def test_a_power_is_recognised(order, first):
     assert np.allclose(seen.lack(levels), np.outer(-(2.0 ** (-order * levels)), SHAPE))
     rest = 2.0 * 2.0 ** (-order * (first + 2))
     safety = TRUSTED if seen.trusted else DOUBTED
-    assert seen.doubt == pytest.approx((safety - 1) * rest)
-    assert seen.unsure(first) == seen.doubt
-    assert seen.unsure(first + 3) == pytest.approx(seen.doubt / 2**order)
+    assert seen.error_bound == pytest.approx((safety - 1) * rest)
+    assert seen.bound_at(first) == seen.error_bound
+    assert seen.bound_at(first + 3) == pytest.approx(seen.error_bound / 2**order)
 
 
 def test_two_levels_have_the_order_of_the_method():
     first, second, _ = three(4.0)
-    seen = Convergence.of((first, second), 0, 4.0)
+    seen = Convergence.estimate((first, second), 0, 4.0)
     assert seen.seen
     assert math.isnan(seen.order)
     assert not seen.trusted
     assert np.abs(second + seen.lack(1) - 7.0).max() < 1e-12
-    assert seen.doubt == pytest.approx((DOUBTED - 1) * size(second - 7.0))
+    assert seen.error_bound == pytest.approx((DOUBTED - 1) * size(second - 7.0))
     assert "in theory" in str(seen)
 
 
 def test_what_is_faster_than_the_method_is_not_believed():
     """From order 4 of a method of order 2 an error follows that is too large."""
-    seen = Convergence.of(three(4.0), 0, 2.0)
+    seen = Convergence.estimate(three(4.0), 0, 2.0)
     assert seen.order == pytest.approx(4.0)
     assert seen.used == 2.0
-    assert size(seen.lack(2)) + seen.doubt > 2.0 * 2.0**-8
+    assert size(seen.lack(2)) + seen.error_bound > 2.0 * 2.0**-8
     # A change that happens to be nothing leaves what the one before it would have become.
-    passing = Convergence.of((np.array(1.0), np.array(0.0), np.array(0.0)), 0, 2.0)
-    assert passing.doubt == pytest.approx(DOUBTED * 1.0 / 4 / 3)
+    passing = Convergence.estimate((np.array(1.0), np.array(0.0), np.array(0.0)), 0, 2.0)
+    assert passing.error_bound == pytest.approx(DOUBTED * 1.0 / 4 / 3)
 
 
 def test_to_and_fro_is_not_trusted():
-    seen = Convergence.of((np.array(1.0), np.array(0.0), np.array(0.25)), 0, 2.0)
+    seen = Convergence.estimate((np.array(1.0), np.array(0.0), np.array(0.25)), 0, 2.0)
     assert seen.seen
     assert not seen.trusted
-    assert size(seen.lack(2)) + seen.doubt == pytest.approx(DOUBTED * 0.25 / 3)
+    assert size(seen.lack(2)) + seen.error_bound == pytest.approx(DOUBTED * 0.25 / 3)
 
 
 @pytest.mark.parametrize("changes", [(1.0, 1.0), (1.0, 0.8), (1.0, 3.0), (0.0, 1.0)])
 def test_what_does_not_fall_is_not_seen(changes):
     """What is irregular on three levels may be as large on all of them."""
     values = tuple(map(np.array, np.cumsum([0.0, *changes])))
-    seen = Convergence.of(values, 0, 2.0)
+    seen = Convergence.estimate(values, 0, 2.0)
     assert not seen.seen
-    assert seen.doubt == seen.unsure(9) == DOUBTED * max(changes)
+    assert seen.error_bound == seen.bound_at(9) == DOUBTED * max(changes)
     assert seen.lack(5) == 0
 
 
 def test_what_does_not_change_has_no_error():
-    still = Convergence.of((np.array(1.0),) * 3, 0, 2.0)
+    still = Convergence.estimate((np.array(1.0),) * 3, 0, 2.0)
     assert still.seen
-    assert (still.doubt, still.lack(0)) == (0, 0)
+    assert (still.error_bound, still.lack(0)) == (0, 0)
 
 
 def cross(base, *, cells=(0.3, 2.0), steps=(0.1, 1.0), mixed=0.0):
@@ -97,9 +97,9 @@ def cross(base, *, cells=(0.3, 2.0), steps=(0.1, 1.0), mixed=0.0):
         return 7.0 + (cells[0] * h + steps[0] * dt + mixed * h * dt) * SHAPE
 
     i, j = base
-    along_cells = Convergence.of([value(i + k, j) for k in range(3)], i, 2.0)
-    along_steps = Convergence.of([value(i, j + k) for k in range(3)], j, 2.0)
-    return Cross.of(value(i, j), along_cells, along_steps), value
+    along_cells = Convergence.estimate([value(i + k, j) for k in range(3)], i, 2.0)
+    along_steps = Convergence.estimate([value(i, j + k) for k in range(3)], j, 2.0)
+    return SelfConvergence.extrapolate(value(i, j), along_cells, along_steps), value
 
 
 @pytest.mark.parametrize("base", [(0, 0), (2, 1)])

@@ -13,7 +13,7 @@ import ufl
 
 import ufl_beam as ub
 from ufl_beam.discretization.compiled_forms import prepared
-from ufl_beam.plotting.model import notes_of
+from ufl_beam.plotting.model import model_notes
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
 EXACT = [ub.EnergyMomentum(), ub.EnergyMomentum(0.1, 0.1), ub.EnergyMomentumDecaying(0.6)]
@@ -339,7 +339,7 @@ def test_a_continued_run():
 
 
 def test_a_picture_names_the_works():
-    notes = notes_of(flying())
+    notes = model_notes(flying())
     assert "magnet: acts as its function says on beam" in notes
     assert "air: acts as its function says" in notes
 

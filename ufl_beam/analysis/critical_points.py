@@ -117,10 +117,12 @@ class Stiffness:
             of freedom; (grid.size,).
     """
 
-    def __init__(self, share: Share, A: Csr, held: Index, rate: Array, weights: Array) -> None:
+    def __init__(
+        self, share: Share, A: Csr, constrained: Index, rate: Array, weights: Array
+    ) -> None:
         grid = share.grid
-        entries = share.dofs[A.rows()], share.dofs[A.indices], A.data
-        parts = share.comm.allgather((*entries, share.dofs, rate, share.dofs[held]))
+        triplets = share.dofs[A.rows()], share.dofs[A.indices], A.data
+        parts = share.comm.allgather((*triplets, share.dofs, rate, share.dofs[constrained]))
         rows, columns, data, dofs, rates, fixed = map(np.concatenate, zip(*parts, strict=True))
         free = np.setdiff1d(np.arange(grid.size), fixed)
         shape = (grid.size, grid.size)
@@ -129,19 +131,19 @@ class Stiffness:
         self._free, self._size, self._weights = free, grid.size, weights[free]
         self._motions = n = len(free) - len(grid.multipliers)
 
-        K, G, of_forces = self._K[:n, :n], self._K[:n, n:], self._K[n:, :n]
+        K, G, B = self._K[:n, :n], self._K[:n, n:], self._K[n:, :n]
         β = self._K.diagonal()[n:]
         squares = np.asarray(G.multiply(G).sum(axis=0)).ravel()
-        products = np.asarray(G.multiply(of_forces.T).sum(axis=0)).ravel()
+        products = np.asarray(G.multiply(B.T).sum(axis=0)).ravel()
         α = products / np.where(squares > 0, squares, 1.0)
         holds = β == 0.0
         slope = α / np.where(holds, 1.0, β)
         self._unit = np.where(holds, 1.0, np.sqrt(np.abs(slope)))
-        self._of_row = self._unit / np.where(α == 0.0, 1.0, α)
+        self._row_scale = self._unit / np.where(α == 0.0, 1.0, α)
         self._β, self._G = np.where(holds, np.inf, β), G
         negative = holds | (slope < 0.0)
         diagonal = np.where(holds, 0.0, np.where(negative, -1.0, 1.0))
-        lower = [diags_array(self._of_row) @ of_forces, diags_array(diagonal)]
+        lower = [diags_array(self._row_scale) @ B, diags_array(diagonal)]
         blocks = [[K, G @ diags_array(self._unit)], lower]
         try:
             self._factors = Factorisation(csr_array(block_array(blocks)))
@@ -156,10 +158,10 @@ class Stiffness:
     def _solve(self, b: Array) -> Array:
         """Solve with the tangent for one right-hand side."""
         n = self._motions
-        given = b[n:] / self._β
-        held = np.where(np.isinf(self._β), self._of_row * b[n:], 0.0)
-        x = self._factors.solve(np.concatenate([b[:n] - self._G @ given, held]))
-        x[n:] = given + self._unit * x[n:]
+        forces = b[n:] / self._β
+        scaled = np.where(np.isinf(self._β), self._row_scale * b[n:], 0.0)
+        x = self._factors.solve(np.concatenate([b[:n] - self._G @ forces, scaled]))
+        x[n:] = forces + self._unit * x[n:]
         return x
 
     @property
@@ -170,9 +172,9 @@ class Stiffness:
         forces = np.abs(self._forces[moving]) / units[moving]
         return float(forces.sum() * np.abs(self.softest[1][self._free] * units).max())
 
-    def _spread(self, of_free: Array) -> Array:
+    def _spread(self, free_values: Array) -> Array:
         values = np.zeros(self._size)
-        values[self._free] = of_free
+        values[self._free] = free_values
         return values
 
     @cached_property
@@ -199,7 +201,7 @@ class Candidate(NamedTuple):
 
     trial: Trial
     stiffness: Stiffness
-    way: Array
+    direction: Array
     #: Change of the load factor along the path over the change of the configuration.  As
     #: K q' = f t', a slope of zero means that the direction of the path is critical, and that the
     #: load f does work on it.  At a bifurcation it does no work on the critical direction.
@@ -227,7 +229,7 @@ class Candidate(NamedTuple):
 
     def passed(self, before: Candidate) -> bool:
         """Return whether an eigenvalue passed zero, or the load factor turned, since ``before``."""
-        turned = (self.way[-1] < 0) != (before.way[-1] < 0)
+        turned = (self.direction[-1] < 0) != (before.direction[-1] < 0)
         now, then = self.stiffness, before.stiffness
         change = now.negative - then.negative
         even = not (now.symmetric and then.symmetric) and change % 2 == 0

@@ -260,7 +260,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     guess = np.exp(logarithm), -slope
     try:
         with np.errstate(over="ignore"):
-            found, covariance = scipy.optimize.curve_fit(
+            fitted, covariance = scipy.optimize.curve_fit(
                 lambda t, initial, rate: initial * np.exp(-rate * t), τ, a, guess,
                 # A difference quotient fails at rate 0.
                 jac=lambda t, initial, rate: np.exp(-rate * t)[:, None] * np.stack(
@@ -273,7 +273,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
             "are they successive peaks of one free vibration?"
         ) from None
     half = units * np.sqrt(np.diag(covariance))
-    initial, rate = found * units
+    initial, rate = fitted * units
     exponential = _envelope((initial, rate), half, A - initial * np.exp(-rate * s))
     return Decay(t, A, mean, each, linear, exponential)
 

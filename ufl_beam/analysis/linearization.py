@@ -34,7 +34,7 @@ from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
 
 V = TypeVar("V", Array, Complex)
 
-COUPLING_TOLERANCE = 1e-9  # couplings below this fraction of the largest damping do not count
+MODAL_TOLERANCE = 1e-9  # couplings below this fraction of the largest damping do not count
 BALANCED = 1e-13  # forces below this fraction of stiffness times size are round-off
 AT_REST = 1e150  # time step so long that rates vanish, but with a finite square; s
 
@@ -47,8 +47,8 @@ def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array
     simulation.controllers.ask(simulation)
     for cells in simulation.inelastic:
         cells.points.freeze()
-    for coupling in simulation.couplings:
-        coupling.response.freeze()
+    for group in simulation.couplings:
+        group.response.freeze()
     step = Step(0.0, dt, simulation.q, simulation.t, simulation.t, fraction=1.0)
     return simulation.equation.linearise(q, step)
 
@@ -83,8 +83,8 @@ class _Standstill(Newmark):
     kept: tuple[str, ...] = ()  # type: ignore[assignment]
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
-        of = super().coefficients(dt, last_dt, known)
-        return Coefficients(of.inertia, (1 / dt, 0.0, 0.0), of.rates[:1])
+        own = super().coefficients(dt, last_dt, known)
+        return Coefficients(own.inertia, (1 / dt, 0.0, 0.0), own.rates[:1])
 
 
 class SmallMotions:
@@ -220,7 +220,7 @@ class SmallMotions:
         N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
         Λ = N.T @ (C @ N)
         _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
-        W = rows[sizes <= COUPLING_TOLERANCE * abs(C).max() * np.abs(N).max(initial=0.0)].T
+        W = rows[sizes <= MODAL_TOLERANCE * abs(C).max() * np.abs(N).max(initial=0.0)].T
         N, Λ = N @ W, W.T @ Λ @ W
         B = csr_array(self.M @ N * (abs(self.K).max() / abs(self.M).max() ** 0.5))
         K = csr_array(block_array([[self.K, B], [B.T, csr_array((B.shape[1],) * 2)]]))
@@ -231,9 +231,7 @@ class SmallMotions:
         s, x = eigensolvers.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
         s, x = self._with_zeros(s, x[: len(free)], free)
         decay, how = np.linalg.eig(-Λ)
-        decay = np.where(
-            np.abs(decay.imag) <= COUPLING_TOLERANCE * np.abs(decay), decay.real, decay
-        )
+        decay = np.where(np.abs(decay.imag) <= MODAL_TOLERANCE * np.abs(decay), decay.real, decay)
         slows = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
         return np.concatenate([s, decay[slows]]), np.hstack([x, N @ how[:, slows]])
 
@@ -241,11 +239,11 @@ class SmallMotions:
         """Replace eigenvalues of rigid-body modes that are nearly zero by exact zeros."""
         momentum, mass = free.T @ (self.M @ x), np.sum(x.conj() * (self.M @ x), axis=0).real
         own = np.linalg.solve(free.T @ (self.M @ free), momentum)
-        part = np.sum(momentum.conj() * own, axis=0).real / mass
+        fraction = np.sum(momentum.conj() * own, axis=0).real / mass
         noise = 16 * ROUND_OFF * np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0) / mass
-        other = (part < 0.5) | (np.abs(s) ** 2 > noise)
+        elastic = (fraction < 0.5) | (np.abs(s) ** 2 > noise)
         zeros = np.zeros(free.shape[1])
-        return np.concatenate([zeros, s[other]]), np.hstack([free, x[:, other]])
+        return np.concatenate([zeros, s[elastic]]), np.hstack([free, x[:, elastic]])
 
     # -- buckling ------------------------------------------------------------------------------
 
@@ -270,9 +268,9 @@ class SmallMotions:
         """
         T, laws, Z = self._derivative(self.q, AT_REST), self._laws, self._Z
         flexibility = diags_array(1 / T.diagonal()[laws])
-        of_laws = eye_array(self.grid.size, format="csr")[:, laws]
-        right = Z - of_laws @ (flexibility @ (T[laws, :] @ Z))
-        left = Z.T - ((Z.T @ T[:, laws]) @ flexibility) @ of_laws.T
+        columns = eye_array(self.grid.size, format="csr")[:, laws]
+        right = Z - columns @ (flexibility @ (T[laws, :] @ Z))
+        left = Z.T - ((Z.T @ T[:, laws]) @ flexibility) @ columns.T
         return csr_array(right), csr_array(left)
 
     def _path(self) -> Array:
@@ -281,9 +279,9 @@ class SmallMotions:
         r, data = linearise(simulation, self.q, AT_REST)
         T, Q = self._matrix(data), self._axes()
         before = supports.in_axes(self.q)
-        given = before.copy()
-        supports.move(given, before, Step(0.0, 1.0, self.q, simulation.t, simulation.t, 1.0))
-        g = Q @ (given - before)
+        after = before.copy()
+        supports.move(after, before, Step(0.0, 1.0, self.q, simulation.t, simulation.t, 1.0))
+        g = Q @ (after - before)
         Z = Q[:, np.setdiff1d(np.arange(len(g)), supports.dofs)]
         rest = Z.T @ (r + T @ g)
         if not rest.any():

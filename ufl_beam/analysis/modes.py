@@ -31,7 +31,7 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
-from ufl_beam.output.postprocessing import velocity_of
+from ufl_beam.output.postprocessing import velocity_at
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of
@@ -88,7 +88,7 @@ class Shapes(Rich, ABC):
         """
         self._require(k)
         shape: Any = self.shapes[:, k]
-        return np.asarray(velocity_of(self.grid, place, self.q[None], shape[None])[0])
+        return np.asarray(velocity_at(self.grid, place, self.q[None], shape[None])[0])
 
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
         """Return one period of the k-th mode as a solution, for :func:`animate` or :func:`plot`.
@@ -110,11 +110,12 @@ class Shapes(Rich, ABC):
         share = Share(self.grid, MPI.COMM_SELF)
         fields, r = Fields(share), np.zeros(share.size)
         form = fields.kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
-        forces_of, cells = CellForces(share, [InCells(lambda: form, lib.STRESS, fields.order)]), []
+        cell_forces = CellForces(share, [InCells(lambda: form, lib.STRESS, fields.order)])
+        cells = []
         for q in states:
             form.add(q, r)
-            forces_of.accept()
-            cells.append(forces_of(q, q))
+            cell_forces.accept()
+            cells.append(cell_forces(q, q))
         history = {"t": times, "q": states, "every": np.array([1]), FORCES: np.array(cells)}
         solution = Solution(self.scene, self.grid)
         solution.resume(history)
@@ -301,7 +302,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         require_no_prestress(scene, "modes", IN_EQUILIBRIUM)
         scene, at = reference_state(scene, mesh)
     else:
-        _require_of(at, scene, mesh, "modes")
+        _require_same_scene(at, scene, mesh, "modes")
     small = SmallMotions(scene, at, mesh=mesh)
     if at is None and (said := small.unbalanced()):
         warn(said)
@@ -348,7 +349,7 @@ def buckling(
         if isinstance(load, FollowerLoad | RotatingFrame | VirtualWork):
             raise ArgumentError(
                 f"buckling: a {type(load).__name__} has a stiffness of its own; use "
-                "modes(..., at=) about states with more and more of it, and see where a frequency "
+                "modes(..., at=) about states with an increasing load, and find where a frequency "
                 "vanishes or a damping ratio becomes negative"
             )
     if at is None:
@@ -358,13 +359,13 @@ def buckling(
             )
         require_no_prestress(scene, "buckling", IN_EQUILIBRIUM)
     else:
-        _require_of(at, scene, mesh, "buckling")
+        _require_same_scene(at, scene, mesh, "buckling")
     small = SmallMotions(scene, at, t, mesh)
     factors, shapes = small.buckling(n)
     return Buckling(scene, small.grid, small.q, shapes, factors)
 
 
-def _require_of(at: Solution, scene: Scene, mesh: Mesh | None, what: str) -> None:
+def _require_same_scene(at: Solution, scene: Scene, mesh: Mesh | None, what: str) -> None:
     require_kind(at, Solution, f"{what}: at")
     if not Grid(scene, mesh_of(at, mesh)).agrees(at.grid):
         raise ArgumentError(

@@ -76,8 +76,8 @@ class Study(Rich):
     seconds: Array
 
     @classmethod
-    def of(cls, member: str, records: dict[str, Record]) -> Study:
-        """Make a study from outcome and seconds of each case; keys are as in :func:`_text_of`."""
+    def from_records(cls, member: str, records: dict[str, Record]) -> Study:
+        """Make a study from outcome and seconds of each case; keys are as in :func:`_case_text`."""
         outcomes = [outcome for outcome, _ in records.values()]
         failed = {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)}
         first: dict[str, Array] = next((row for row in outcomes if not isinstance(row, str)), {})
@@ -88,12 +88,12 @@ class Study(Rich):
         return cls(member, tuple(map(json.loads, records)), results, failed, seconds)
 
     def records(self) -> dict[str, Record]:
-        """Return the data from which :meth:`of` makes this study."""
-        found: dict[str, Record] = {}
+        """Return the data from which :meth:`from_records` makes this study."""
+        records: dict[str, Record] = {}
         for i, case in enumerate(self.cases):
             row = {name: values[i] for name, values in self.results.items()}
-            found[_text_of(case)] = self.failed.get(i, row), float(self.seconds[i])
-        return found
+            records[_case_text(case)] = self.failed.get(i, row), float(self.seconds[i])
+        return records
 
     def __len__(self) -> int:
         return len(self.cases)
@@ -121,7 +121,7 @@ class Study(Rich):
         """
         file = require_path(path, "study")
         content = {
-            "member": self.member, "cases": [*map(_text_of, self.cases)], "seconds": self.seconds,
+            "member": self.member, "cases": [*map(_case_text, self.cases)], "seconds": self.seconds,
             "errors": [self.failed.get(i, "") for i in range(len(self))],
         }  # fmt: skip
         write(file, FORMAT, {**content, **above("results/", self.results)})
@@ -142,7 +142,7 @@ class Study(Rich):
             for name, values in results.items():
                 require_arrays(results, {name: (len(cases), *values.shape[1:])})
             if len(content["errors"]) != len(cases):
-                raise ArgumentError("the file is damaged: it has not one 'errors' for each case")
+                raise ArgumentError("the file is damaged: 'errors' has not an entry for each case")
             made = tuple(map(json.loads, cases))
             return cls(str(content["member"]), made, results, failed, content["seconds"])
 
@@ -213,9 +213,9 @@ def study(
                 f"study: member = {shorten(member)} cannot be called; give a function"
             )
         for i, case in enumerate(require_sequence(cases, "study: cases")):
-            key = _text_of(case, f"study: cases[{i}]")
+            key = _case_text(case, f"study: cases[{i}]")
             if key in todo:
-                raise ArgumentError(f"study: cases[{i}] = {case} is there twice")
+                raise ArgumentError(f"study: cases[{i}] = {case} occurs twice")
             todo[key] = case
         if not todo:
             raise ArgumentError("study: cases is empty")
@@ -224,7 +224,7 @@ def study(
             old = Study.load(path)
             if not anew:
                 if old.member != name:
-                    raise ArgumentError(f"study {path} is one of {old.member}, not of {name}")
+                    raise ArgumentError(f"study {path} has results of {old.member}, not of {name}")
                 for key, (outcome, seconds) in old.records().items():
                     if key not in todo or not isinstance(outcome, str):
                         records[key] = outcome, seconds
@@ -234,7 +234,7 @@ def study(
         if path is not None:
             order = [key for key in todo if key in records]
             order += [key for key in records if key not in todo]
-            Study.of(name, {key: records[key] for key in order}).save(path)
+            Study.from_records(name, {key: records[key] for key in order}).save(path)
 
     def gather() -> None:
         missing = {key: case for key, case in todo.items() if key not in records}
@@ -259,7 +259,7 @@ def study(
             for _ in _outcomes(comm, member, {}):
                 pass  # this process serves until the first process has all results
         on_first(comm, gather)
-    result = Study.of(name, comm.bcast({key: records[key] for key in todo}))
+    result = Study.from_records(name, comm.bcast({key: records[key] for key in todo}))
     if len(result.failed) == len(result):
         raise RuntimeError(f"study: all {len(result)} members failed, {result.failed[0]}")
     if result.failed and comm.rank == 0:
@@ -292,17 +292,17 @@ def _shared_out(
     futures = {pool.submit(_run, case): key for key, case in cases.items()}
     ended: SimpleQueue[Any] = SimpleQueue()
 
-    def note(future: Any) -> None:
+    def finish(future: Any) -> None:
         if not future.cancelled():
             ended.put(future)
 
     for future in futures:
-        future.add_done_callback(note)
+        future.add_done_callback(finish)
     # Meanwhile a thread of the pool communicates, which not every MPI allows.
     left = [*futures] if MPI.Query_thread() == MPI.THREAD_MULTIPLE else []
-    given = 0
+    finished = 0
     try:
-        while given < len(futures):
+        while finished < len(futures):
             if left and ended.empty():
                 future = left.pop()
                 if not future.cancel():
@@ -311,7 +311,7 @@ def _shared_out(
             else:
                 future = ended.get()
                 outcome = future.result()
-            given += 1
+            finished += 1
             yield futures[future], *outcome
     finally:
         for future in futures:
@@ -326,7 +326,7 @@ def _run(case: Case) -> Record:
             returned = _MEMBER.get()(**case)
     except Exception as error:
         return f"{type(error).__name__}: {error}", time.perf_counter() - begin
-    return _numbers_of(case, returned), time.perf_counter() - begin
+    return _result_arrays(case, returned), time.perf_counter() - begin
 
 
 def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> None:
@@ -334,18 +334,18 @@ def _require_alike(case: Case, outcome: Outcome, records: dict[str, Record]) -> 
     if isinstance(outcome, str):
         return
     new = {name: outcome[name].shape for name in sorted(outcome)}
-    for other, (row, _) in records.items():
+    for known, (row, _) in records.items():
         if not isinstance(row, str):
             old = {name: row[name].shape for name in sorted(row)}
             if new != old:
                 raise ArgumentError(
-                    f"study: {case} returned names and shapes {new}, but {other} {old}; return "
+                    f"study: {case} returned names and shapes {new}, but {known} {old}; return "
                     "the same from all members, and begin a new file if they have changed"
                 )
             return
 
 
-def _text_of(case: dict[str, Any], what: str = "case") -> str:
+def _case_text(case: dict[str, Any], what: str = "case") -> str:
     """Write a case as JSON with all digits and sorted names, for comparison of cases."""
     require_kind(case, dict, what)
     for name in case:
@@ -355,11 +355,11 @@ def _text_of(case: dict[str, Any], what: str = "case") -> str:
     except (TypeError, ValueError):
         raise ArgumentError(
             f"{what} = {case}: values must be numbers, texts or lists of them; let the member "
-            "make of these what else it needs"
+            "make other objects from these"
         ) from None
 
 
-def _numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
+def _result_arrays(case: dict[str, Any], returned: Any) -> dict[str, Array]:
     """Return the result of a member as arrays of floats, or raise :class:`ArgumentError`."""
     if not isinstance(returned, dict) or not returned:
         raise ArgumentError(
@@ -368,13 +368,13 @@ def _numbers_of(case: dict[str, Any], returned: Any) -> dict[str, Array]:
     arrays = {}
     for name, value in returned.items():
         if not isinstance(name, str) or name in {"", "."} or "/" in name or not name.isprintable():
-            raise ArgumentError(f"study: {case} returned {name!r}, which is no name of a result")
+            raise ArgumentError(f"study: {case} returned {name!r}, which names no result")
         array = np.asarray(None)  # stays so if rows have different lengths
         with suppress(ValueError):
             array = np.asarray(value)
         if array.dtype.kind not in "biuf":
             raise ArgumentError(
-                f"study: {case} returned {name} = {value!r}, which is no number or array of them"
+                f"study: {case} returned {name} = {value!r}, which is no number or array of numbers"
             )
         arrays[name] = array.astype(float)
     return arrays

@@ -27,7 +27,7 @@ from ufl_beam.simulation.stepper import Trial
 from ufl_beam.terms.term import Term
 
 MOST_DOUBLINGS = 30  # most doublings of a step until something dissipates in it
-ONSET_PART = 1e-6  # fraction of a step's dissipated energy that defines the onset of dissipation
+ONSET_FRACTION = 1e-6  # fraction of the energy dissipated in a step that defines the onset
 CONTROL_TOLERANCE = 1e-9  # largest error of the equation of the control, as a fraction of a step
 
 
@@ -56,7 +56,7 @@ class PathCorrector:
             the size of the scene, the load factor by ``factor``; displacements and rotations enter
             with their mean square.  Degrees of freedom owned by another process have the weight
             zero, so that sums of the processes add up.
-        of_factor: Gradient of the load factor.
+        factor_gradient: Gradient of the load factor.
         direction: Direction of the path at the beginning of the step.
         sought: The predicted step.
     """
@@ -69,12 +69,12 @@ class PathCorrector:
         squares[share.num_owned :] = 0.0
         squares /= grid.size - len(grid.multipliers)
         self._all_weights = share.gather(squares)
-        self.of_factor = np.append(0.0 * squares, share.comm.rank == 0)
-        self.weights = np.append(squares, 0.0) + self.of_factor / factor**2
+        self.factor_gradient = np.append(0.0 * squares, share.comm.rank == 0)
+        self.weights = np.append(squares, 0.0) + self.factor_gradient / factor**2
         self.t = simulation.t
         self.dissipates = False
         self.crossing: Crossing | None = None
-        self._driven: list[Term] = [*simulation.loads, *simulation.couplings]
+        self._loading: list[Term] = [*simulation.loads, *simulation.couplings]
         self.direction = self.sought = 0.0 * self.weights
 
     @property
@@ -84,18 +84,18 @@ class PathCorrector:
 
     # -- measures ------------------------------------------------------------------------------
 
-    def along(self, normal: Array, way: Array) -> float:
-        """Return the derivative along ``way`` of a linear quantity with the gradient ``normal``."""
-        return self.share.total(float(normal @ way))
+    def along(self, normal: Array, direction: Array) -> float:
+        """Return the derivative along a direction of a quantity with the gradient ``normal``."""
+        return self.share.total(float(normal @ direction))
 
-    def length(self, way: Array) -> float:
+    def length(self, direction: Array) -> float:
         """Return the length of a direction, however small; dimensionless."""
-        largest = self.share.largest(float(np.abs(way[:-1]).max(initial=0.0)))
-        largest = max(largest, abs(way[-1]) / self.factor)
+        largest = self.share.largest(float(np.abs(direction[:-1]).max(initial=0.0)))
+        largest = max(largest, abs(direction[-1]) / self.factor)
         if largest == 0.0 or not math.isfinite(largest):
             return largest
         # Squares of components below 1e-154 would underflow.
-        unit = np.asarray(way / largest)
+        unit = np.asarray(direction / largest)
         return largest * math.sqrt(self.along(self.weights * unit, unit))
 
     def size(self, motion: Array) -> float:
@@ -104,16 +104,16 @@ class PathCorrector:
 
     def dissipation(self, q: Array) -> float:
         """Return the energy that beams and springs dissipate in the step to ``q``; J."""
-        in_cells = sum(one.dissipation(q) for one in self.simulation.inelastic)
-        here = sum((one.dissipation(q) for one in self.simulation.couplings), in_cells)
-        return self.share.total(here)
+        in_cells = sum(term.dissipation(q) for term in self.simulation.inelastic)
+        local = sum((term.dissipation(q) for term in self.simulation.couplings), in_cells)
+        return self.share.total(local)
 
-    def dissipation_side(self, q: Array, way: Array) -> float:
-        """Return a number with the sign of the change of dissipation along ``way``, or 0."""
-        motion = way[:-1]
+    def dissipation_side(self, q: Array, direction: Array) -> float:
+        """Return a number with the sign of the change of dissipation along ``direction``, or 0."""
+        motion = direction[:-1]
         now, size = self.dissipation(q), self.size(motion)
-        here = any(one.response.way.any() for one in self.simulation.couplings)
-        flows = self.share.total(float(here))
+        active = any(group.response.way.any() for group in self.simulation.couplings)
+        flows = self.share.total(float(active))
         for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * motion) - self.dissipation(q - δ * motion)
@@ -140,27 +140,27 @@ class PathCorrector:
         self.begin()
         if self.dissipates or not (whole := self.dissipation(q + motion)) > 0:
             return None
-        onset = ONSET_PART * whole
-        gone = bisect(lambda p: self.dissipation(q + p * motion) > onset, 0.0, 1.0, 40) * step
-        q, t = q + gone[:-1], self.simulation.t + gone[-1]
-        _, way = self.direction_at(q, t)
-        return gone, -way if self.dissipation_side(q, way) < 0 else way
+        onset = ONSET_FRACTION * whole
+        increment = bisect(lambda p: self.dissipation(q + p * motion) > onset, 0.0, 1.0, 40) * step
+        q, t = q + increment[:-1], self.simulation.t + increment[-1]
+        _, direction = self.direction_at(q, t)
+        return increment, -direction if self.dissipation_side(q, direction) < 0 else direction
 
-    def _until(self, energy: float, gone: Array, way: Array) -> Array:
-        """Extend the step ``gone`` along a direction until it dissipates an energy; J."""
-        q = self.simulation.q + gone[:-1]
+    def _until(self, energy: float, increment: Array, direction: Array) -> Array:
+        """Extend the step ``increment`` along a direction until it dissipates an energy; J."""
+        q = self.simulation.q + increment[:-1]
 
         def enough(length: float) -> bool:
-            return self.dissipation(q + length * way[:-1]) >= energy
+            return self.dissipation(q + length * direction[:-1]) >= energy
 
-        low, high = 0.0, 1e-6 / self.length(way)
+        low, high = 0.0, 1e-6 / self.length(direction)
         for _ in range(MOST_DOUBLINGS):
             if enough(high):
                 break
             low, high = high, 2 * high
         else:
             raise StepFailed("nothing dissipates in the direction of the path")
-        return gone + bisect(enough, low, high, 12) * way
+        return increment + bisect(enough, low, high, 12) * direction
 
     # -- the border ----------------------------------------------------------------------------
 
@@ -177,16 +177,16 @@ class PathCorrector:
     def arrive(self, x: Array) -> None:
         """Set the loads to the load factor of an iterate."""
         self._x = x.copy()
-        self.simulation.equation.begin(self.step_at(self.t), self._driven)
+        self.simulation.equation.begin(self.step_at(self.t), self._loading)
 
     def tangent(self, x: Array, r: Array) -> None:
         """Assemble the tangent and the load-factor derivative, exact for linear functions."""
         simulation, t = self.simulation, self.t
         q, ε = simulation.supports.in_plane(x), 1e-6 * max(1.0, abs(t))
         for δ, weight in ((ε, 0.5 / ε), (-ε, -0.5 / ε), (0.0, 0.0)):  # last: the tangent's state
-            simulation.equation.begin(self.step_at(t + δ), self._driven)
+            simulation.equation.begin(self.step_at(t + δ), self._loading)
             forces = np.zeros(self.share.size)
-            for term in self._driven:
+            for term in self._loading:
                 term.add_residual(q, forces)
             r += weight * forces
         simulation.supports.enter(r)
@@ -200,9 +200,9 @@ class PathCorrector:
             z = z - self._rates
         if self.crossing is not None:
             _, mode, speed = self.crossing
-            of_mode = self.weights[:-1] * mode
-            y -= self.along(of_mode, y) * mode
-            z = z - (self.along(of_mode, z) + speed) * mode
+            weighted = self.weights[:-1] * mode
+            y -= self.along(weighted, y) * mode
+            z = z - (self.along(weighted, z) + speed) * mode
         by_y = self._derivative(np.append(supports.in_plane(y), 0.0))
         by_z = self._derivative(np.append(supports.in_plane(z), -1.0))
         change = (self._missing(supports.in_plane(self._x)) - by_y) / by_z if by_z else math.nan
@@ -220,15 +220,16 @@ class PathCorrector:
             return self.dissipation(q) / self._reach - 1.0
         return self.along(self._normal, np.append(q, self.t) - self._end) / self._reach
 
-    def _derivative(self, way: Array) -> float:
+    def _derivative(self, direction: Array) -> float:
         """Return the derivative of the error; for an energy, by a central difference."""
         if self._normal is not None:
-            return self.along(self._normal, way) / self._reach
-        q, size = self.simulation.supports.in_plane(self._x), self.size(way[:-1])
+            return self.along(self._normal, direction) / self._reach
+        q, size = self.simulation.supports.in_plane(self._x), self.size(direction[:-1])
         if size == 0.0:
             return 0.0
         ε = 1e-3 * self.size(q - self.simulation.q) / size
-        return (self._missing(q + ε * way[:-1]) - self._missing(q - ε * way[:-1])) / (2 * ε)
+        change = ε * direction[:-1]
+        return (self._missing(q + change) - self._missing(q - change)) / (2 * ε)
 
     # -- a step --------------------------------------------------------------------------------
 
@@ -271,14 +272,14 @@ class PathCorrector:
         stiffness = Stiffness(self.share, self._A, supports.dofs, rate, self._all_weights)
         motion = stiffness.flow[self.share.dofs] + self._rates
         supports.leave(motion)
-        way = np.append(motion, 1.0)
-        size = self.length(way)
+        direction = np.append(motion, 1.0)
+        size = self.length(direction)
         if not math.isfinite(size) or not self.size(motion) > 0:
             raise StepFailed(
-                "nothing moves with the load factor here; let a load or a motion go on to change, "
-                "as with amplitude=lambda t: t"
+                "nothing moves with the load factor here; let a load or a motion continue to "
+                "change, as with amplitude=lambda t: t"
             )
-        return stiffness, way / size
+        return stiffness, direction / size
 
 
 def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
@@ -317,31 +318,32 @@ class Control(ABC):
         """Raise :class:`ArgumentError` if the control does not fit the scene."""
 
     @abstractmethod
-    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+    def normal(self, corrector: PathCorrector, direction: Array) -> Array:
         """Return the gradient of the quantity, which grows in a step along a direction."""
 
-    def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
-        """Return a positive number if the path continues along ``way``.
+    def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
+        """Return a positive number if the path continues along ``direction``.
 
-        The path came by the step ``gone``, or begins (None).
+        The path came by the step ``increment``, or begins (None).
         """
-        return corrector.along(self.normal(corrector, way), way)
+        return corrector.along(self.normal(corrector, direction), direction)
 
-    def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
+    def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
         """Solve for the end of a fraction of a step; :class:`StepFailed` if there is none.
 
         If this fails and dissipation begins in the step, the direction changes at its onset.
         """
-        reach, gone, way = abs(self.step) * part, 0.0 * corrector.direction, corrector.direction
+        reach, direction = abs(self.step) * fraction, corrector.direction
+        increment = 0.0 * direction
         rest, hold = reach, True
         while True:
-            normal = self.normal(corrector, way)
-            speed = corrector.along(normal, way)
+            normal = self.normal(corrector, direction)
+            speed = corrector.along(normal, direction)
             if not speed > 0:
                 raise StepFailed(
-                    f"{self.quantity} turns back, where this control cannot follow; take ArcLength"
+                    f"{self.quantity} turns back, where this control cannot follow; use ArcLength"
                 )
-            step = gone + rest / speed * way
+            step = increment + rest / speed * direction
             try:
                 return corrector.attempt(step, normal, reach, hold=hold)
             except StepFailed as failure:
@@ -349,13 +351,13 @@ class Control(ABC):
                 if kink is None and hold and self.quantity:
                     raise StepFailed(
                         f"{failure}; perhaps {self.quantity} turns back here, where this control "
-                        "cannot follow: take ArcLength",
+                        "cannot follow: use ArcLength",
                         failure.residuals,
                     ) from None
                 if kink is None:
                     raise
-            gone, way = kink
-            rest = max(reach - corrector.along(normal, gone), self.least_rest * reach)
+            increment, direction = kink
+            rest = max(reach - corrector.along(normal, increment), self.least_rest * reach)
             hold = False
 
 
@@ -393,19 +395,19 @@ class ArcLength(Control):
         super().__post_init__()
         require_number(self.factor, "ArcLength: factor", positive=True)
 
-    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+    def normal(self, corrector: PathCorrector, direction: Array) -> Array:
         """Return the gradient of the arc length, in a step along the direction of the path."""
-        return np.asarray(corrector.weights * way / corrector.length(way))
+        return np.asarray(corrector.weights * direction / corrector.length(direction))
 
-    def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
+    def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return the sense: first by the sign of ``step``, then by dissipation, else by the angle.
 
         The angle between successive steps must be below π/2.
         """
-        if gone is None:
-            return self.step * float(way[-1])
-        side = corrector.dissipation_side(corrector.simulation.q + gone[:-1], way)
-        return side or corrector.along(corrector.weights * gone, way)
+        if increment is None:
+            return self.step * float(direction[-1])
+        side = corrector.dissipation_side(corrector.simulation.q + increment[:-1], direction)
+        return side or corrector.along(corrector.weights * increment, direction)
 
 
 @dataclass(frozen=True)
@@ -427,9 +429,9 @@ class LoadControl(Control):
     step: float
     quantity = "the load factor"
 
-    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+    def normal(self, corrector: PathCorrector, direction: Array) -> Array:
         """Return the gradient of the load factor, with the sign of ``step``."""
-        return math.copysign(1.0, self.step) * corrector.of_factor
+        return math.copysign(1.0, self.step) * corrector.factor_gradient
 
 
 @dataclass(frozen=True)
@@ -478,7 +480,7 @@ class DisplacementControl(Control):
         """Name of the component and the place."""
         return f"{self.component} of {self.place}"
 
-    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+    def normal(self, corrector: PathCorrector, direction: Array) -> Array:
         """Return the gradient of the component, with the sign of ``step``."""
         share, normal = corrector.share, np.zeros(corrector.share.grid.size)
         nodes, weights = share.grid.weights(self.place)
@@ -521,22 +523,22 @@ class DissipationControl(Control):
         """Factor of the arc length."""
         return self.otherwise.factor
 
-    def normal(self, corrector: PathCorrector, way: Array) -> Array:
+    def normal(self, corrector: PathCorrector, direction: Array) -> Array:
         """Return the gradient of the arc length; used where nothing dissipates."""
-        return self.otherwise.normal(corrector, way)
+        return self.otherwise.normal(corrector, direction)
 
-    def sense(self, corrector: PathCorrector, way: Array, gone: Array | None) -> float:
+    def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return the sense of the arc length; used where nothing dissipates."""
-        return self.otherwise.sense(corrector, way, gone)
+        return self.otherwise.sense(corrector, direction, increment)
 
-    def solve_step(self, corrector: PathCorrector, part: float) -> Trial:
+    def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
         """Solve for the next dissipated energy, unless an arc-length step dissipates nothing."""
         if not corrector.dissipates:
             with suppress(StepFailed):
-                trial = self.otherwise.solve_step(corrector, part)
+                trial = self.otherwise.solve_step(corrector, fraction)
                 if corrector.dissipation(trial.q1) == 0.0:
                     return trial
-        energy = self.step * part
+        energy = self.step * fraction
         try:
             return corrector.attempt(
                 corrector.predict_dissipation(energy), None, energy, hold=False
@@ -544,4 +546,4 @@ class DissipationControl(Control):
         except StepFailed:
             if not corrector.dissipates:
                 raise
-        return self.otherwise.solve_step(corrector, part)
+        return self.otherwise.solve_step(corrector, fraction)

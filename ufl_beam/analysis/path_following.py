@@ -32,7 +32,7 @@ from ufl_beam.model.connector_law import ConnectorLaw, require_limit
 from ufl_beam.model.connector_laws import Controller, rubs
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Content, above, below, require_arrays
-from ufl_beam.output.recorders import Recorder, recorders_of
+from ufl_beam.output.recorders import Recorder, checked_recorders
 from ufl_beam.parallel import communicator, progress_bar
 from ufl_beam.simulation.run import running, take_steps
 from ufl_beam.simulation.simulation import Simulation
@@ -47,7 +47,7 @@ ADVICE = (
     "displacements, DissipationControl through softening that snaps back"
 )
 
-SMALLEST_STEP_PART = 2.0**-12  # smallest fraction to which a step is cut
+SMALLEST_FRACTION = 2.0**-12  # smallest fraction to which a step is cut
 TARGET_ITERATIONS = 12  # steps with more iterations shorten the next step, with fewer lengthen it
 MOST_FAILURES = 4  # failed steps before a critical point is sought from another state
 LOCATION_TOLERANCE = 1e-7  # accuracy of the location of critical points, as a fraction of a step
@@ -55,13 +55,13 @@ BRACKET = 1e-2  # fraction of a step within which motions along a critical mode 
 SEPARABLE = 1.5e-5  # critical points closer than this fraction of a step may count as one point
 MOST_CROSSING_STEPS = 8  # most steps from a bracket to its bifurcation point
 SOFT = 0.1  # largest ratio of an eigenvalue in such a bracket to its size at the ends of a step
-IDLE = 1e-6  # fraction of the most work of a load below which the load does no work
+NO_WORK = 1e-6  # fraction of the most work of a load below which the load does no work
 MOST_LOCATION_STEPS = 60  # most steps to locate a critical point
 LEAST_COSINE = 0.5  # least cosine of the angle between a step and its predictor
 LARGEST_LENGTH_RATIO = 10.0  # largest ratio of the lengths of a step and its predictor
-UNCHECKED_PART = 2.0**-6  # shorter fractions of a step are not checked: a law may have a kink
-SAME_POINT_PART = 1e-3  # fraction of a step within which a critical point is the last one again
-LEAP_PART = 0.1  # fraction of a step that states before and at a critical point never exceed
+UNCHECKED_FRACTION = 2.0**-6  # shorter fractions of a step are not checked: a law may have a kink
+SAME_POINT_FRACTION = 1e-3  # fraction of a step within which a critical point is the last one again
+LARGEST_GAP = 0.1  # fraction of a step that states before and at a critical point never exceed
 SINGULAR_RATIO = 1e-3  # ratio to its size at the ends of a step below which a measure vanishes
 
 
@@ -102,14 +102,15 @@ class Path(Solution):
             content |= above(f"critical/{k}/state/", point.state._arrays())
         return content
 
-    def _take(self, content: Content) -> None:
-        super()._take(content)
+    def _set_content(self, content: Content) -> None:
+        super()._set_content(content)
         critical = []
-        for k, one in enumerate(content["critical"]):
+        for k, entry in enumerate(content["critical"]):
             state, inside = Solution(self.scene, self.grid), below(f"critical/{k}/", content)
             require_arrays(inside, {"mode": (self.grid.size,)})
-            state._take({**{n: content[n] for n in NAMED}, **below("state/", inside)})
-            kind, factor, n = str(one["kind"]), float(one["factor"]), range(len(self))[one["n"]]
+            state._set_content({**{n: content[n] for n in NAMED}, **below("state/", inside)})
+            kind, factor = str(entry["kind"]), float(entry["factor"])
+            n = range(len(self))[entry["n"]]
             critical.append(CriticalPoint(kind, factor, n, state, inside["mode"]))
         self.critical = critical
 
@@ -179,10 +180,10 @@ def follow(
     require_switch(progress, "follow: progress")
     if start is not None:
         require_kind(start, (Solution, Branch), "follow: start")
-    recorders, outputs = recorders_of(record, comm, "follow")
+    recorders, outputs = checked_recorders(record, comm, "follow")
     branch, state = (start, start.state) if isinstance(start, Branch) else (None, start)
     t0 = 0.0 if state is None else float(state.times[-1])
-    _require_driven(scene, t0)
+    _require_load_factor(scene, t0)
     began = time.perf_counter()
     simulation = Simulation(
         scene, Static(), t0=t0, start=state, newton=newton, mesh=mesh, comm=comm, kind=Path
@@ -201,7 +202,7 @@ def follow(
     return path
 
 
-def _require_driven(scene: Scene, t0: float) -> None:
+def _require_load_factor(scene: Scene, t0: float) -> None:
     """Raise unless a load or motion depends on the load factor, and no law on physical time."""
     for link in scene.links:
         if isinstance(link.law, Controller):
@@ -220,11 +221,11 @@ def _require_driven(scene: Scene, t0: float) -> None:
                 "use simulate(scene, Static(), ...)"
             )
     times = (t0 + 1e-3, t0 + 1.0, t0 - 1e-3, t0 - 1.0)
-    driven = any("t" in work.asked for work in scene.works)
-    if not driven and not any(f(t) != f(t0) for _, f in scene.time_functions() for t in times):
+    changes = any("t" in work.asked for work in scene.works)
+    if not changes and not any(f(t) != f(t0) for _, f in scene.time_functions() for t in times):
         raise ArgumentError(
             "follow: no load and no motion depends on time, which is the load factor here; give "
-            "the one that is to grow amplitude=lambda t: t"
+            "the load or motion that grows amplitude=lambda t: t"
         )
 
 
@@ -238,7 +239,7 @@ class PathStepper:
         self.finished = False
         self.corrector = PathCorrector(simulation, control.factor)
         self.critical: list[CriticalPoint] = []
-        self._part = 1.0
+        self._fraction = 1.0
         self._before: Candidate | None = None
         self._landed = False
 
@@ -249,14 +250,16 @@ class PathStepper:
             corrector.direction = np.append(branch.mode[corrector.share.dofs], 0.0)
             return
         if fresh:
-            factor = corrector.of_factor  # the load factor is prescribed
+            factor = corrector.factor_gradient  # the load factor is prescribed
             simulation.accept(corrector.attempt(0.0 * factor, factor, 1.0))
         corrector.begin()
-        stiffness, way = corrector.direction_at(simulation.q, simulation.t)
-        corrector.direction = way if self._control.sense(corrector, way, None) > 0 else -way
-        here = Trial(corrector.step_at(simulation.t), simulation.q, np.zeros(corrector.share.size))
+        stiffness, direction = corrector.direction_at(simulation.q, simulation.t)
+        sense = self._control.sense(corrector, direction, None)
+        corrector.direction = direction if sense > 0 else -direction
+        step = corrector.step_at(simulation.t)
+        initial = Trial(step, simulation.q, np.zeros(corrector.share.size))
         # The path may continue a run that ended at a critical point.
-        self._before = self._candidate(here, stiffness, corrector.direction)
+        self._before = self._candidate(initial, stiffness, corrector.direction)
         self._landed = not fresh
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
@@ -268,153 +271,161 @@ class PathStepper:
         while True:
             iterations = self._simulation.iterations
             try:
-                found = self._seek(self._part)
+                candidate = self._seek(self._fraction)
                 break
             except StepFailed:
-                self._part /= 2
-                if self._part < SMALLEST_STEP_PART:
+                self._fraction /= 2
+                if self._fraction < SMALLEST_FRACTION:
                     raise
-        count, part = self._simulation.iterations - iterations, self._part
-        self._part = min(1.0, part * min(2.0, TARGET_ITERATIONS / max(count, 1)))
-        self._accept(found, part)
+        count, fraction = self._simulation.iterations - iterations, self._fraction
+        self._fraction = min(1.0, fraction * min(2.0, TARGET_ITERATIONS / max(count, 1)))
+        self._accept(candidate, fraction)
         self.steps = self.progress = self.steps + 1
         self.finished = self.steps == self._most
         if keep:
             self._simulation.keep()
 
-    def _accept(self, found: Candidate, part: float) -> None:
+    def _accept(self, candidate: Candidate, fraction: float) -> None:
         """Go to the end of a step, or to a critical point before it."""
         corrector, before = self.corrector, self._before
-        if before is None or not found.passed(before):
+        if before is None or not candidate.passed(before):
             self._landed = False
-            self._take(found)
+            self._go_to(candidate)
             return
-        after = found
-        found, reached = self._locate(before, after, part)
-        if self._landed and reached < SAME_POINT_PART * part:
+        after = candidate
+        candidate, reached = self._locate(before, after, fraction)
+        if self._landed and reached < SAME_POINT_FRACTION * fraction:
             # The signs at one critical point may change in different last digits.
             self._landed = False
-            self._take(self._seek(part))
+            self._go_to(self._seek(fraction))
             return
-        if found.mode is not None:
-            way, self._landed = corrector.direction, False  # has the signs beyond it
-            self._take(found)
-            self._note(found, way, len(self._simulation.solution), limit=False)
+        if candidate.mode is not None:
+            direction, self._landed = corrector.direction, False  # has the signs beyond it
+            self._go_to(candidate)
+            self._store(candidate, direction, len(self._simulation.solution), limit=False)
             return
-        self._landed = found.passed(before)
+        self._landed = candidate.passed(before)
         # At a limit point the load factor has turned in the located state, as at a kink, or its
         # slope vanishes.  It and the eigenvalue may change their signs in different last digits.
-        soft = _vanishes("softness", found, before, after)
-        limit = self._turned(found) or _vanishes("slope", found, before, after)
-        limit = limit and not (soft and _idle(found, before, after))
-        if self._landed and not corrector.dissipates and corrector.dissipation(found.trial.q1) > 0:
-            self._pass_kink(found, reached - 2 * LOCATION_TOLERANCE * part, part, limit)
+        soft = _vanishes("softness", candidate, before, after)
+        limit = self._turned(candidate) or _vanishes("slope", candidate, before, after)
+        limit = limit and not (soft and _no_work(candidate, before, after))
+        if (
+            self._landed
+            and not corrector.dissipates
+            and corrector.dissipation(candidate.trial.q1) > 0
+        ):
+            self._pass_kink(candidate, reached - 2 * LOCATION_TOLERANCE * fraction, fraction, limit)
             return
         # Yielding or opening may change signs without an eigenvalue of zero.
-        way = corrector.direction
-        self._take(found)
+        direction = corrector.direction
+        self._go_to(candidate)
         if self._landed and (soft or limit):
-            self._note(found, way, len(self._simulation.solution), limit)
+            self._store(candidate, direction, len(self._simulation.solution), limit)
 
-    def _pass_kink(self, after: Candidate, last: float, part: float, limit: bool) -> None:
+    def _pass_kink(self, after: Candidate, last: float, fraction: float, limit: bool) -> None:
         """Go to the last state without dissipation, if the load factor turns there."""
         before, n = self.corrector.direction, len(self._simulation.solution)
         if limit and last > 0:
-            self._take(self._seek(last))
-            self._note(after, before, n, limit)
+            self._go_to(self._seek(last))
+            self._store(after, before, n, limit)
             self._before = after
             return
         if limit:
-            self._note(after, before, n - 1, limit)
-        self._take(self._seek(part))
+            self._store(after, before, n - 1, limit)
+        self._go_to(self._seek(fraction))
 
-    def _take(self, found: Candidate) -> None:
+    def _go_to(self, candidate: Candidate) -> None:
         corrector = self.corrector
-        corrector.dissipates = corrector.dissipation(found.trial.q1) > 0.0
-        self._simulation.accept(found.trial)
-        corrector.direction, self._before = found.way, found
+        corrector.dissipates = corrector.dissipation(candidate.trial.q1) > 0.0
+        self._simulation.accept(candidate.trial)
+        corrector.direction, self._before = candidate.direction, candidate
 
     def _candidate(
-        self, trial: Trial, stiffness: Stiffness, way: Array, mode: Array | None = None
+        self, trial: Trial, stiffness: Stiffness, direction: Array, mode: Array | None = None
     ) -> Candidate:
-        slope = abs(way[-1]) / self.corrector.size(way[:-1])
-        return Candidate(trial, stiffness, way, slope, mode)
+        slope = abs(direction[-1]) / self.corrector.size(direction[:-1])
+        return Candidate(trial, stiffness, direction, slope, mode)
 
-    def _seek(self, part: float) -> Candidate:
+    def _seek(self, fraction: float) -> Candidate:
         """Solve for the end of a fraction of a step; reject it if it leaves the direction."""
         corrector = self.corrector
-        trial = self._control.solve_step(corrector, part)
-        stiffness, way = corrector.direction_at(trial.q1, trial.step.t1)
-        gone = np.append(trial.q1, trial.step.t1) - corrector.start
-        size, sought = (corrector.length(one) for one in (gone, corrector.sought))
-        aligned = corrector.along(corrector.weights * gone, corrector.sought)
+        trial = self._control.solve_step(corrector, fraction)
+        stiffness, direction = corrector.direction_at(trial.q1, trial.step.t1)
+        step = np.append(trial.q1, trial.step.t1) - corrector.start
+        size, sought = (corrector.length(x) for x in (step, corrector.sought))
+        aligned = corrector.along(corrector.weights * step, corrector.sought)
         turns = aligned < LEAST_COSINE * size * sought or size > LARGEST_LENGTH_RATIO * sought
-        if part > UNCHECKED_PART and turns:
+        if fraction > UNCHECKED_FRACTION and turns:
             raise StepFailed("the path turns too sharply, or the step leaps to another branch")
-        if self._control.sense(corrector, way, gone) < 0:
-            way = -way
-        return self._candidate(trial, stiffness, way)
+        if self._control.sense(corrector, direction, step) < 0:
+            direction = -direction
+        return self._candidate(trial, stiffness, direction)
 
-    def _locate(self, before: Candidate, after: Candidate, part: float) -> tuple[Candidate, float]:
+    def _locate(
+        self, before: Candidate, after: Candidate, fraction: float
+    ) -> tuple[Candidate, float]:
         """Return the first state with changed signs, and the fraction of the step that leads to it.
 
         It is located by false position with halved weights (Illinois).  A bifurcation is located
         from states on both sides that are far enough for small round-off along the mode, see
-        :meth:`_cross`.  If an intermediate step fails, or the signs change by a leap to another
-        branch, return the last state before, from which shorter steps follow.
+        :meth:`_bifurcation_point`.  If an intermediate step fails, or the signs change by a leap to
+        another branch, return the last state before, from which shorter steps follow.
         """
-        low, high, first, last = 0.0, part, before, after
+        low, high, first, last = 0.0, fraction, before, after
         weight_low, weight_high, bracket = 1.0, 1.0, BRACKET
         side = failed = 0
         for _ in range(MOST_LOCATION_STEPS):
-            if high - low <= LOCATION_TOLERANCE * part:
+            if high - low <= LOCATION_TOLERANCE * fraction:
                 break
             turned = self._turned(last)
-            if not turned and high - low <= bracket * part and _soft(last, before, after):
+            if not turned and high - low <= bracket * fraction and _soft(last, before, after):
                 several = abs(last.stiffness.negative - before.stiffness.negative) > 1
                 if not several or bracket <= SEPARABLE:
                     with suppress(StepFailed):
-                        return self._cross((low, high), (first, last), (before, after), part)
+                        return self._bifurcation_point(
+                            (low, high), (first, last), (before, after), fraction
+                        )
                 bracket /= 10
-            sizes = [one.slope if turned else one.softness for one in (first, last)]
-            here, there = weight_low * sizes[0], -weight_high * sizes[1]
-            middle = (low * there - high * here) / (there - here)
-            if not turned and high - low > bracket * part:
+            sizes = [x.slope if turned else x.softness for x in (first, last)]
+            value_low, value_high = weight_low * sizes[0], -weight_high * sizes[1]
+            middle = (low * value_high - high * value_low) / (value_high - value_low)
+            if not turned and high - low > bracket * fraction:
                 # Go beyond the estimate, so that two states bracket it.
-                middle += 0.4 * bracket * part * (1 if here < -there else -1)
-            margin = min(0.01 * (high - low), LOCATION_TOLERANCE * part)
+                middle += 0.4 * bracket * fraction * (1 if value_low < -value_high else -1)
+            margin = min(0.01 * (high - low), LOCATION_TOLERANCE * fraction)
             middle = min(max(middle, low + margin), high - margin)
             try:
-                found = self._seek(middle)
+                candidate = self._seek(middle)
             except StepFailed:
                 failed += 1
                 if failed < MOST_FAILURES:
                     weight_high *= 4
                     continue
                 if low > 0:
-                    self._part = (high - low) / 2
+                    self._fraction = (high - low) / 2
                     return self._seek(low), low
                 break
-            if found.passed(before):
+            if candidate.passed(before):
                 weight_low *= 0.5 if side < 0 else 1.0
-                high, last, weight_high, side = middle, found, 1.0, -1
+                high, last, weight_high, side = middle, candidate, 1.0, -1
             else:
                 weight_high *= 0.5 if side > 0 else 1.0
-                low, first, weight_low, side = middle, found, 1.0, 1
-        found, start = self._seek(high), self.corrector.start
+                low, first, weight_low, side = middle, candidate, 1.0, 1
+        candidate, start = self._seek(high), self.corrector.start
         below = start if low == 0.0 else first.end
-        leap, whole = (self.corrector.length(found.end - one) for one in (below, start))
-        if low > 0 and leap > LEAP_PART * whole:
-            self._part = (part - low) / 2
+        leap, whole = (self.corrector.length(candidate.end - x) for x in (below, start))
+        if low > 0 and leap > LARGEST_GAP * whole:
+            self._fraction = (fraction - low) / 2
             return self._seek(low), low
-        return found, high
+        return candidate, high
 
-    def _cross(
+    def _bifurcation_point(
         self,
-        parts: tuple[float, float],
-        near: tuple[Candidate, Candidate],
+        fractions: tuple[float, float],
+        pair: tuple[Candidate, Candidate],
         ends: tuple[Candidate, Candidate],
-        part: float,
+        fraction: float,
     ) -> tuple[Candidate, float]:
         """Return the bifurcation point between two nearby states, and its fraction of the step.
 
@@ -425,77 +436,78 @@ class PathStepper:
         Raises:
             StepFailed: The point is no bifurcation point, or was not found.
         """
-        corrector, leave = self.corrector, self._simulation.supports.leave
-        (first, last), (before, after) = near, ends
+        corrector, to_plane = self.corrector, self._simulation.supports.leave
+        (first, last), (before, after) = pair, ends
         whole, stiffness = last.end - first.end, last.stiffness
-        if not whole[-1] * first.way[-1] * last.way[-1]:
+        if not whole[-1] * first.direction[-1] * last.direction[-1]:
             raise StepFailed("the load factor turns here")
-        speeds = [whole[-1] / one.way[-1] * one.way for one in near]
+        speeds = [whole[-1] / state.direction[-1] * state.direction for state in pair]
         path = CubicHermiteSpline([0.0, 1.0], [first.end, last.end], speeds)
-        (x0, λ0), (x, λ) = ((float(k), one.stiffness.softest[0]) for k, one in enumerate(near))
+        (x0, λ0), (x, λ) = ((float(k), state.stiffness.softest[0]) for k, state in enumerate(pair))
         for _ in range(MOST_CROSSING_STEPS):
             x0, x = x, (x0 * λ - x * λ0) / (λ - λ0) if λ != λ0 else math.nan
             if not 0.0 <= x <= 1.0:
                 break
-            end, way = path(x), path(x, 1)  # the load factor is linear
+            end, direction = path(x), path(x, 1)  # the load factor is linear
             mode = np.array(stiffness.softest[1][corrector.share.dofs])
-            leave(seen := mode.copy())
-            speed = corrector.along(corrector.weights[:-1] * seen, way[:-1]) / way[-1]
+            to_plane(seen := mode.copy())
+            speed = corrector.along(corrector.weights[:-1] * seen, direction[:-1]) / direction[-1]
             corrector.crossing = Crossing(end - corrector.start, mode, speed)
-            reached = (1 - x) * parts[0] + x * parts[1]
+            reached = (1 - x) * fractions[0] + x * fractions[1]
             try:
-                found = self._seek(reached)
+                candidate = self._seek(reached)
             finally:
                 corrector.crossing = None
-            stiffness = found.stiffness
+            stiffness = candidate.stiffness
             λ0, λ = λ, stiffness.softest[0]
-            near_by = abs(x - x0) * (parts[1] - parts[0]) <= LOCATION_TOLERANCE * part
-            if not near_by and abs(λ) < abs(λ0) / 2:
+            converged = abs(x - x0) * (fractions[1] - fractions[0]) <= LOCATION_TOLERANCE * fraction
+            if not converged and abs(λ) < abs(λ0) / 2:
                 continue
             # An eigenvalue that no longer falls is round-off.
-            if not _soft(found, first, last) or not _idle(found, before, after):
+            if not _soft(candidate, first, last) or not _no_work(candidate, before, after):
                 break
-            way = (1.0 if way[-1] * first.way[-1] > 0 else -1.0) / corrector.length(way) * way
-            leave(mode := np.array(stiffness.softest[1][corrector.share.dofs]))
-            return self._candidate(found.trial, last.stiffness, way, mode), reached
+            sign = 1.0 if direction[-1] * first.direction[-1] > 0 else -1.0
+            direction = sign / corrector.length(direction) * direction
+            to_plane(mode := np.array(stiffness.softest[1][corrector.share.dofs]))
+            return self._candidate(candidate.trial, last.stiffness, direction, mode), reached
         raise StepFailed("no bifurcation point was found")
 
-    def _turned(self, found: Candidate) -> bool:
+    def _turned(self, candidate: Candidate) -> bool:
         """Return whether the load factor has reversed its direction since the step began."""
-        return bool(found.way[-1] * self.corrector.direction[-1] < 0)
+        return bool(candidate.direction[-1] * self.corrector.direction[-1] < 0)
 
-    def _note(self, found: Candidate, before: Array, n: int, limit: bool) -> None:
-        """Store state n of the path as a critical point; ``found`` is at or beyond it."""
-        corrector, simulation, way = self.corrector, self._simulation, found.way
+    def _store(self, candidate: Candidate, before: Array, n: int, limit: bool) -> None:
+        """Store state n of the path as a critical point; ``candidate`` is at or beyond it."""
+        corrector, simulation, direction = self.corrector, self._simulation, candidate.direction
         if limit:
             # At a limit point the path is tangent to the mode.
-            mode = np.asarray(way[:-1] / corrector.size(way[:-1]))
-        elif found.mode is not None:
-            mode = found.mode
+            mode = np.asarray(direction[:-1] / corrector.size(direction[:-1]))
+        elif candidate.mode is not None:
+            mode = candidate.mode
         else:
-            mode = np.array(found.stiffness.softest[1][corrector.share.dofs])
+            mode = np.array(candidate.stiffness.softest[1][corrector.share.dofs])
             simulation.supports.leave(mode)
             # A singular stiffness gives no accurate component of the path along the mode.
-            along = corrector.along(corrector.weights[:-1] * mode, (way - before)[:-1])
-            corrector.direction = way - along * np.append(mode, 0.0)
+            along = corrector.along(corrector.weights[:-1] * mode, (direction - before)[:-1])
+            corrector.direction = direction - along * np.append(mode, 0.0)
         kind = "limit" if limit else "bifurcation"
         state = simulation.snapshot()
         mode = corrector.share.gather(mode)
         self.critical.append(CriticalPoint(kind, simulation.t, n, state, mode))
 
 
-def _vanishes(what: str, found: Candidate, before: Candidate, after: Candidate) -> bool:
+def _vanishes(what: str, candidate: Candidate, before: Candidate, after: Candidate) -> bool:
     """Return whether a measure is nearly zero in a state located between two others."""
-    size, *ends = (getattr(one, what) for one in (found, before, after))
+    size, *ends = (getattr(x, what) for x in (candidate, before, after))
     return bool(size < SINGULAR_RATIO * max(ends))
 
 
-def _idle(found: Candidate, before: Candidate, after: Candidate) -> bool:
+def _no_work(candidate: Candidate, before: Candidate, after: Candidate) -> bool:
     """Return whether the load does no work on the critical mode, except round-off."""
-    least = IDLE * found.stiffness.most_work
-    return found.work < least or _vanishes("work", found, before, after)
+    least = NO_WORK * candidate.stiffness.most_work
+    return candidate.work < least or _vanishes("work", candidate, before, after)
 
 
-def _soft(found: Candidate, before: Candidate, after: Candidate) -> bool:
+def _soft(candidate: Candidate, before: Candidate, after: Candidate) -> bool:
     """Return whether an eigenvalue is small, compared with its values at the ends of a step."""
-    return found.softness < SOFT * max(before.softness, after.softness)
+    return candidate.softness < SOFT * max(before.softness, after.softness)

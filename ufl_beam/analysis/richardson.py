@@ -42,12 +42,12 @@ class Convergence:
     used: float  # order for predictions, at most the order in theory
     trusted: bool  # whether the changes fit an integer order, at most the order in theory
     lacks: Array  # limit minus value of each level and of the limit (zero); (levels + 1, ...)
-    doubt: float  # bound of the error of the limit; unit of the quantity
+    error_bound: float  # bound of the error of the limit; unit of the quantity
 
     __repr__ = one_line
 
     @classmethod
-    def of(cls, values: Sequence[Array], coarsest: int, method: float) -> Convergence:
+    def estimate(cls, values: Sequence[Array], coarsest: int, method: float) -> Convergence:
         """Evaluate the convergence of values on two or three levels."""
         changes = np.diff(np.stack(values), axis=0)
         sizes = tuple(map(size, changes))
@@ -63,12 +63,12 @@ class Convergence:
             # A change that fell faster than the method can explain may have passed through zero.
             most = max(last, first / 2**method)
         used = method if math.isnan(order) else min(max(order, LEAST_ORDER), method)
-        rest, doubt = changes[-1] * 0.0, DOUBTED * max(sizes)  # irregular: as large on all levels
+        rest, bound = changes[-1] * 0.0, DOUBTED * max(sizes)  # irregular: as large on all levels
         if not order < LEAST_ORDER:
             rest = changes[-1] / (2**used - 1)
-            doubt = (TRUSTED if trusted else DOUBTED) * most / (2**used - 1) - size(rest)
+            bound = (TRUSTED if trusted else DOUBTED) * most / (2**used - 1) - size(rest)
         lacks = np.stack([*(values[-1] + rest - value for value in values), 0.0 * rest])
-        return cls(coarsest, sizes, method, order, used, trusted, lacks, doubt)
+        return cls(coarsest, sizes, method, order, used, trusted, lacks, bound)
 
     @property
     def seen(self) -> bool:
@@ -87,16 +87,16 @@ class Convergence:
         """
         levels = np.append(np.arange(len(self.changes), -1.0, -1.0), 0.0)
         s = np.append(0.0, 2.0 ** (-self.used * levels[:-1]))
-        of_power = scipy.interpolate.make_interp_spline(s, self.lacks[::-1], k=1)
-        return np.asarray(of_power(2.0 ** (-self.used * (np.asarray(level) - self.coarsest))))
+        spline = scipy.interpolate.make_interp_spline(s, self.lacks[::-1], k=1)
+        return np.asarray(spline(2.0 ** (-self.used * (np.asarray(level) - self.coarsest))))
 
-    def unsure(self, level: float) -> float:
+    def bound_at(self, level: float) -> float:
         """Bound the error of the limit extrapolated from a run on a level; unit of the quantity.
 
         It falls beyond the finest level.  Irregular changes are assumed equal on all levels.
         """
         finer = max(0.0, level - self.finest) if self.seen else 0.0
-        return float(self.doubt * 2 ** (-self.used * finer))
+        return float(self.error_bound * 2 ** (-self.used * finer))
 
     def __str__(self) -> str:
         changes = ", then ".join(f"{change:.1e}" for change in self.changes)
@@ -106,7 +106,7 @@ class Convergence:
 
 
 @dataclass(frozen=True, eq=False)
-class Cross:
+class SelfConvergence:
     """Self-convergence of a quantity with cells and with steps."""
 
     cells: Convergence  # with refined cells
@@ -117,16 +117,16 @@ class Cross:
     __repr__ = one_line
 
     @classmethod
-    def of(cls, value: Array, cells: Convergence, steps: Convergence) -> Cross:
+    def extrapolate(cls, value: Array, cells: Convergence, steps: Convergence) -> SelfConvergence:
         """Extrapolate from the coarsest run: both errors add up."""
         limit = np.asarray(value + cells.lacks[0] + steps.lacks[0])
-        return cls(cells, steps, limit, cells.doubt + steps.doubt)
+        return cls(cells, steps, limit, cells.error_bound + steps.error_bound)
 
     def lack(self, i: float, j: float) -> Array:
         """Predict the limit minus the value of a run on two levels; unit of the quantity."""
         return self.cells.lack(i) + self.steps.lack(j)
 
-    def confirmed(self, value: Array, i: float, j: float) -> Cross:
+    def confirmed(self, value: Array, i: float, j: float) -> SelfConvergence:
         """Return a copy with the limit extrapolated from a run with finer cells and finer steps.
 
         The limit moves because errors of cells and steps depend on each other.  Take an error term
@@ -135,12 +135,13 @@ class Cross:
         """
         limit = np.asarray(value + self.lack(i, j))
         c, s = (
-            2.0 ** (-dial.used * (level - dial.coarsest))
-            for dial, level in ((self.cells, i), (self.steps, j))
+            2.0 ** (-x.used * (level - x.coarsest))
+            for x, level in ((self.cells, i), (self.steps, j))
         )
         moved = size(limit - self.limit)
-        doubt = self.cells.unsure(i) + self.steps.unsure(j) + moved / ((1 - c) * (1 - s)) - moved
-        return replace(self, limit=limit, uncertainty=doubt)
+        bound = self.cells.bound_at(i) + self.steps.bound_at(j)
+        bound = bound + moved / ((1 - c) * (1 - s)) - moved
+        return replace(self, limit=limit, uncertainty=bound)
 
     def __str__(self) -> str:
         return f"\n    cells: {self.cells}\n    steps: {self.steps}"

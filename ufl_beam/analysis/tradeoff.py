@@ -16,8 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.analysis.parameter_study import study
-from ufl_beam.analysis.richardson import Convergence, Cross, fit_cost, size
-from ufl_beam.analysis.tradeoff_result import Dials, Refinement, Run, Target, Tradeoff
+from ufl_beam.analysis.richardson import Convergence, SelfConvergence, fit_cost, size
+from ufl_beam.analysis.tradeoff_result import Refinement, Run, Setting, Target, Tradeoff
 from ufl_beam.arrays import Array
 from ufl_beam.errors import (
     ArgumentError,
@@ -56,14 +56,14 @@ NOISE = 1e-9  # fraction of a quantity: Newton's method leaves residuals of 1e-1
 STEP_ORDER = 2.0  # largest order of the schemes; the order of cells is twice their degree
 FURTHER = 2  # most levels to the next base: up to the finest levels of the last base
 REACH = 8  # levels beyond all runs: errors of second order fall to 2**-16, the most possible
-GRID = 8  # settings per level: an error of second order changes by 2**(2/8), a fifth
+SETTINGS_PER_LEVEL = 8  # settings per level: an error of second order changes by 2**(2/8), a fifth
 DOUBTS = 4  # levels without visible convergence before giving up; 16 times finer than the coarsest
 TRIALS = 3  # most settings tried; they cost less than the run for the limit, of 4 times the cost
 SCATTER = 0.1  # relative scatter of times of one run on a quiet machine, see bench_budget.py
 
 Quantity = Callable[[Solution], npt.ArrayLike]
 
-One = TypeVar("One")
+Value = TypeVar("Value")
 
 
 def tradeoff(
@@ -133,7 +133,7 @@ def tradeoff(
                 f"tradeoff: quantity {name!r} = {shorten(quantity)} cannot be called; give a "
                 "function of a Solution"
             )
-    target = _target_of(quantities, tolerance, budget)
+    target = _checked_target(quantities, tolerance, budget)
     require_number(max_seconds, "tradeoff: max_seconds", positive=True)
     require_switch(progress, "tradeoff: progress")
     comm = communicator(comm, "tradeoff: comm")
@@ -141,14 +141,14 @@ def tradeoff(
     meshes = _several(MESHES if mesh is None else mesh, Mesh, "mesh")
     newtons = _several(NEWTONS if newton is None else newton, Newton, "newton")
     schemes: tuple[Scheme, ...] = _several(scheme, object, "scheme")
-    for i, one in enumerate(schemes):
-        require_scheme(one, f"tradeoff: scheme[{i}]" if len(schemes) > 1 else "tradeoff: scheme")
+    for i, x in enumerate(schemes):
+        require_scheme(x, f"tradeoff: scheme[{i}]" if len(schemes) > 1 else "tradeoff: scheme")
     steps: tuple[float | Adaptive, ...] = _several(dt, object, "dt")
     for i, step in enumerate(steps):
         if not isinstance(step, Adaptive):
             what = f"tradeoff: dt[{i}]" if len(steps) > 1 else "tradeoff: dt"
             require_number(step, what, positive=True)
-    families = [Dials(*one, newtons[0]) for one in product(schemes, steps, meshes)]
+    families = [Setting(*x, newtons[0]) for x in product(schemes, steps, meshes)]
     with progress_bar(progress, comm, unit="run", bar_format=BAR) as bar:
         runs = _Runs(
             scene,
@@ -163,14 +163,14 @@ def tradeoff(
         )
         best, others, notes = _find(runs, target)
         run = best.best()
-    for other in others:
-        if other.unsure > LIMIT:
+    for search in others:
+        if search.uncertainty > LIMIT:
             continue  # its coarse runs give no limit
-        for name, cross in other.crosses.items():
+        for name, convergence in search.crosses.items():
             known = best.crosses[name]
-            apart = size(cross.limit - known.limit)
-            if apart > cross.uncertainty + known.uncertainty:
-                notes.append(f"{families[other.family]}: its limit of {name} is {apart:.2g} away")
+            apart = size(convergence.limit - known.limit)
+            if apart > convergence.uncertainty + known.uncertainty:
+                notes.append(f"{families[search.family]}: its limit of {name} is {apart:.2g} away")
     return Tradeoff(
         runs=tuple(runs.runs.values()), best=run, t=t, crosses=best.crosses, units=best.units,
         target=target, families=tuple(map(str, families)), notes=tuple(notes + best.remarks(run)),
@@ -186,18 +186,18 @@ def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str
     searches: list[_Search] = []
     notes: list[str] = []
     wrong: list[ArgumentError] = []
-    for k, dials in enumerate(runs.families):
+    for k, setting in enumerate(runs.families):
         try:
             runs.begin(k)
             searches.append(_Search(runs, k, target))
         except ArgumentError as error:
             wrong.append(error)
-            notes.append(f"{dials}: {error}")
+            notes.append(f"{setting}: {error}")
         except TradeoffError as error:
-            notes.append(f"{dials}: {error}")
+            notes.append(f"{setting}: {error}")
     if len(wrong) == len(runs.families):
         raise wrong[0]
-    searches.sort(key=lambda one: one.objective)
+    searches.sort(key=lambda search: search.objective)
     for n, best in enumerate(searches):
         try:
             best.find()
@@ -205,14 +205,14 @@ def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str
             notes.append(f"{runs.families[best.family]}: {error}")
             continue
         notes += [
-            f"{runs.families[one.family]}: given up, others are better by its coarse runs"
-            for one in searches[n + 1 :]
+            f"{runs.families[search.family]}: given up, others are better by its coarse runs"
+            for search in searches[n + 1 :]
         ]
-        return best, [one for one in searches if one is not best], notes
+        return best, [search for search in searches if search is not best], notes
     raise TradeoffError("tradeoff: " + "\n".join(notes), tuple(runs.runs.values()))
 
 
-def _target_of(
+def _checked_target(
     quantities: Mapping[str, Quantity],
     tolerance: float | Mapping[str, float] | None,
     budget: float | None,
@@ -229,14 +229,14 @@ def _target_of(
     if set(tolerance) != set(quantities):
         raise ArgumentError(
             f"tradeoff: tolerance is of {', '.join(tolerance)}, quantities are "
-            f"{', '.join(quantities)}; name the same"
+            f"{', '.join(quantities)}; name the same quantities"
         )
     for name, value in tolerance.items():
         require_number(value, f"tradeoff: tolerance of {name}", positive=True)
     return Target(tolerance, 0.0, math.inf)
 
 
-def _several(values: One | Sequence[One], kind: type, what: str) -> tuple[One, ...]:
+def _several(values: Value | Sequence[Value], kind: type, what: str) -> tuple[Value, ...]:
     """Return one value, or a sequence of them, as a tuple of values of a kind."""
     if not isinstance(values, Sequence) or isinstance(values, str | bytes):
         require_kind(values, kind, f"tradeoff: {what}")
@@ -255,7 +255,7 @@ class _Runs:
     scene: Scene
     quantities: Mapping[str, Quantity]
     simulate: Callable[..., Solution]
-    families: Sequence[Dials]  # coarsest setting of each family
+    families: Sequence[Setting]  # coarsest setting of each family
     newtons: Sequence[Newton]
     t: tuple[float, float]
     max_seconds: float  # largest total wall time of the runs; s
@@ -274,7 +274,7 @@ class _Runs:
         with alone():
             try:
                 self._simulate(first, until)
-                self._take(first, self._member(*first))
+                self._store(first, self._member(*first))
                 self.bar.update(1)
             except ConvergenceError as error:
                 self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may converge
@@ -294,10 +294,12 @@ class _Runs:
                 f"the next {len(missing)} runs would take about {needed:.3g} s after "
                 f"{self.spent:.3g} s of runs, more than max_seconds = "
                 f"{self.max_seconds:g} s; the finest is "
-                f"{self.dials(missing[-1])}"
+                f"{self.setting(missing[-1])}"
             )
-        self.bar.set_postfix_str(f"{len(missing)} more up to {self.dials(missing[-1])}")
-        cases = [one._asdict() | {"refine": str(one.refine)} for one in missing]
+        self.bar.set_postfix_str(f"{len(missing)} more up to {self.setting(missing[-1])}")
+        cases = [
+            refinement._asdict() | {"refine": str(refinement.refine)} for refinement in missing
+        ]
         try:
             done = study(self._member, cases, progress=False, comm=self.comm)
         except RuntimeError as error:  # all of them failed
@@ -309,27 +311,27 @@ class _Runs:
         finally:
             self.bar.set_postfix_str("", refresh=False)
             self.bar.update(len(missing))
-        for k, one in enumerate(missing):
+        for k, refinement in enumerate(missing):
             if k not in done.failed:
-                self._take(one, {name: done[name][k] for name in done.results})
+                self._store(refinement, {name: done[name][k] for name in done.results})
             elif done.failed[k].startswith(WRONG):
                 raise ArgumentError(done.failed[k].removeprefix(WRONG))
             else:
-                self.failed[one] = done.failed[k]
+                self.failed[refinement] = done.failed[k]
 
-    def dials(self, one: Refinement) -> Dials:
+    def setting(self, refinement: Refinement) -> Setting:
         """Return the setting of a refinement."""
-        finer = self.families[one.family].finer(one.refine, one.level, self.t)
-        return replace(finer, newton=self.newtons[one.newton])
+        finer = self.families[refinement.family].finer(refinement.refine, refinement.level, self.t)
+        return replace(finer, newton=self.newtons[refinement.newton])
 
-    def of(self, family: int) -> list[Run]:
+    def in_family(self, family: int) -> list[Run]:
         """Return the runs of a family."""
-        return [run for one, run in self.runs.items() if one.family == family]
+        return [run for refinement, run in self.runs.items() if refinement.family == family]
 
     def divisor(self, family: int) -> int:
         """Return the largest q up to GRID so that refinement by (q+1)/q fits between all places."""
         mesh, scene = self.families[family].mesh, self.scene
-        for q in range(GRID, 1, -1):
+        for q in range(SETTINGS_PER_LEVEL, 1, -1):
             finer = replace(mesh, refine=mesh.refine * Fraction(q + 1, q))
             try:
                 for beam in scene.beams:
@@ -339,26 +341,26 @@ class _Runs:
             return q
         return 1
 
-    def _longest(self, one: Refinement) -> float:
+    def _longest(self, refinement: Refinement) -> float:
         """Bound the wall time by the nearest run; s; 0 if there is no run."""
         times = (
             run.seconds
-            * 2 ** max(0.0, one.level - run.refinement.level)
-            * max(1.0, float(one.refine / run.refinement.refine))
-            for run in self.of(one.family)
+            * 2 ** max(0.0, refinement.level - run.refinement.level)
+            * max(1.0, float(refinement.refine / run.refinement.refine))
+            for run in self.in_family(refinement.family)
         )
         return min(times, default=0.0)
 
-    def _simulate(self, one: Refinement, until: float) -> Solution:
+    def _simulate(self, refinement: Refinement, until: float) -> Solution:
         t = self.t[0], until
-        return self.simulate(self.scene, t=t, progress=False, **self.dials(one).arguments)
+        return self.simulate(self.scene, t=t, progress=False, **self.setting(refinement).arguments)
 
     def _member(
         self, family: int, refine: str | Fraction, level: float, newton: int
     ) -> dict[str, Any]:
         """Compute one run, as a member of a study."""
         solution = self._simulate(Refinement(family, Fraction(refine), level, newton), self.t[1])
-        found: dict[str, Any] = {
+        content: dict[str, Any] = {
             "seconds": solution.seconds,
             "building": solution.building,
             "steps": solution.parts,
@@ -376,23 +378,23 @@ class _Runs:
                     "in another with other steps or cells; give a number, or an array at times "
                     "and places of your own (np.interp)"
                 )
-            found[f"quantity {n}"] = value
-        return found
+            content[f"quantity {n}"] = value
+        return content
 
-    def _take(self, one: Refinement, found: Mapping[str, Any]) -> None:
+    def _store(self, refinement: Refinement, content: Mapping[str, Any]) -> None:
         """Store a run with the data of the first process."""
-        found = self.comm.bcast(found)
+        content = self.comm.bcast(content)
         values = {
-            name: np.asarray(found[f"quantity {n}"]) for n, name in enumerate(self.quantities)
+            name: np.asarray(content[f"quantity {n}"]) for n, name in enumerate(self.quantities)
         }
         self._shapes |= {name: value.shape for name, value in values.items()}
         measured = ("seconds", "building", "steps", "cells", "iterations")
-        took = {name: float(found[name]) for name in measured}
+        took = {name: float(content[name]) for name in measured}
         self.spent += took["seconds"]
-        self.runs[one] = Run(one, self.dials(one), values, **took)
+        self.runs[refinement] = Run(refinement, self.setting(refinement), values, **took)
 
 
-class _Choice(NamedTuple):
+class _Candidate(NamedTuple):
     """Setting of a run with its predicted time and error."""
 
     refine: Fraction  # divisor of each cell
@@ -416,7 +418,7 @@ class _Search:
 
     def __init__(self, runs: _Runs, family: int, target: Target) -> None:
         self.family = family
-        self.crosses: dict[str, Cross] = {}
+        self.crosses: dict[str, SelfConvergence] = {}
         self.units: dict[str, float] = {}
         self._runs, self._target = runs, target
         self._base = [0, 0]  # levels of cells and of steps
@@ -426,25 +428,27 @@ class _Search:
         self._newton = 0
         self._divisor = runs.divisor(family)
         self._refine_base()
-        choice = self._choose(NEGLIGIBLE)
-        self.objective = choice.seconds if math.isinf(target.budget) else choice.bound
+        candidate = self._choose(NEGLIGIBLE)
+        self.objective = candidate.seconds if math.isinf(target.budget) else candidate.bound
 
     def find(self) -> None:
         """Do the runs that determine the setting and its error; TradeoffError if none serves."""
         while True:
-            choice = self._choose(min(self.unsure, NEGLIGIBLE))  # uncertainty after refinement
+            candidate = self._choose(
+                min(self.uncertainty, NEGLIGIBLE)
+            )  # uncertainty after refinement
             some, base = next(iter(self.crosses.values())), self._base
             finest = some.cells.finest, some.steps.finest
-            far = any(level > last for level, last in zip(choice.levels, finest, strict=True))
-            if far or self.unsure > self._share(choice):
+            far = any(level > last for level, last in zip(candidate.levels, finest, strict=True))
+            if far or self.uncertainty > self._negligible(candidate):
                 base = [
                     min(max(old, round(level) - 1), old + FURTHER)
-                    for old, level in zip(base, choice.levels, strict=True)
+                    for old, level in zip(base, candidate.levels, strict=True)
                 ]
             before = self._base.copy()
             if base == self._base:
-                self._confirm(choice)
-                if self.unsure <= LIMIT:
+                self._confirm(candidate)
+                if self.uncertainty <= LIMIT:
                     break
                 self._base[self._worst()[0]] += 1
             else:
@@ -452,7 +456,7 @@ class _Search:
             try:
                 self._refine_base()
             except TradeoffError:
-                if self.unsure > LIMIT:
+                if self.uncertainty > LIMIT:
                     raise
                 self._base = before  # no time for more runs, but these may suffice
                 break
@@ -460,20 +464,20 @@ class _Search:
         self._try()
 
     @property
-    def unsure(self) -> float:
+    def uncertainty(self) -> float:
         """Largest uncertainty of a limit, in its unit."""
-        return max(cross.uncertainty / self.units[n] for n, cross in self.crosses.items())
+        return max(x.uncertainty / self.units[n] for n, x in self.crosses.items())
 
     def best(self) -> Run:
         """Return the best of all runs."""
-        return min(self._runs.of(self.family), key=self._rank)
+        return min(self._runs.in_family(self.family), key=self._rank)
 
     def remarks(self, run: Run) -> list[str]:
         """Return notes on an unseen order, and on a run that misses the target."""
         notes = [
-            f"the order of convergence is not seen: {name}{cross}"
-            for name, cross in self.crosses.items()
-            if not (cross.cells.seen and cross.steps.seen)
+            f"the order of convergence is not seen: {name}{convergence}"
+            for name, convergence in self.crosses.items()
+            if not (convergence.cells.seen and convergence.steps.seen)
         ]
         if not self._accepts(run):
             ratio = self.ratio(run)
@@ -504,89 +508,93 @@ class _Search:
             ]  # fmt: skip
             self._runs.run(wanted[:1])  # predicts the times of the others
             self._runs.run(wanted)
-            failed = [self._runs.failed[one] for one in wanted if one in self._runs.failed]
+            failed = [self._runs.failed[run] for run in wanted if run in self._runs.failed]
             if failed:
-                self._doubt(failed[0], dial=1)
+                self._move_base(failed[0], axis=1)
                 continue
-            values = [self._runs.runs[one].values for one in wanted]
+            values = [self._runs.runs[run].values for run in wanted]
             for name, value in values[-1].items():
                 unit = self._target.absolute.get(name, self._target.relative * size(value))
                 if unit == 0:
                     raise ArgumentError(
-                        f"tradeoff: quantity {name!r} is zero, so that no part of it can be a "
-                        "tolerance; give tolerances by name, in units of the quantities"
+                        f"tradeoff: quantity {name!r} is zero, so that a tolerance cannot be a "
+                        "fraction of it; give tolerances by name, in units of the quantities"
                     )
                 self.units[name] = unit
             thirds = [self._at(2 ** (i + 2), j), self._at(2**i, j + 2)]
-            counts = [self._counts(values[0], found) for found in values[1:]]
-            self._runs.run([one for one, needed in zip(thirds, counts, strict=True) if needed])
+            counts = [self._counts(values[0], finer) for finer in values[1:]]
+            self._runs.run([run for run, needed in zip(thirds, counts, strict=True) if needed])
             along = [
-                [first, other, third] if needed and third in self._runs.runs else [first, other]
-                for other, third, needed in zip(others, thirds, counts, strict=True)
+                [first, second, third] if needed and third in self._runs.runs else [first, second]
+                for second, third, needed in zip(others, thirds, counts, strict=True)
             ]
             orders = 2.0 * self._runs.families[self.family].mesh.degree, STEP_ORDER
             for name in self.units:
                 cells, steps = (
-                    Convergence.of([self._runs.runs[one].values[name] for one in dial], base, order)
-                    for dial, base, order in zip(along, self._base, orders, strict=True)
+                    Convergence.estimate(
+                        [self._runs.runs[run].values[name] for run in line], base, order
+                    )
+                    for line, base, order in zip(along, self._base, orders, strict=True)
                 )
-                self.crosses[name] = Cross.of(values[0][name], cells, steps)
-            if self.unsure <= LIMIT or self._worst()[1]:
+                self.crosses[name] = SelfConvergence.extrapolate(values[0][name], cells, steps)
+            if self.uncertainty <= LIMIT or self._worst()[1]:
                 return
-            self._doubt("".join(f"\n  {name}{cross}" for name, cross in self.crosses.items()))
+            self._move_base(
+                "".join(f"\n  {name}{convergence}" for name, convergence in self.crosses.items())
+            )
 
     def _counts(self, values: Mapping[str, Array], finer: Mapping[str, Array]) -> bool:
         """Return whether a change between levels matters for the target."""
-        part = NEGLIGIBLE if math.isinf(self._target.budget) else 0.0
+        least = NEGLIGIBLE if math.isinf(self._target.budget) else 0.0
         return any(
-            size(finer[name] - values[name]) > max(part * unit, NOISE * size(finer[name]))
+            size(finer[name] - values[name]) > max(least * unit, NOISE * size(finer[name]))
             for name, unit in self.units.items()
         )
 
     def _worst(self) -> tuple[int, bool]:
         """Return the largest source of doubt, cells (0) or steps (1), and if its changes fall."""
-        dials = [
-            (convergence.doubt / self.units[name], dial, convergence.seen)
-            for name, cross in self.crosses.items()
-            for dial, convergence in enumerate((cross.cells, cross.steps))
+        sources = [
+            (convergence.error_bound / self.units[name], axis, convergence.seen)
+            for name, x in self.crosses.items()
+            for axis, convergence in enumerate((x.cells, x.steps))
         ]
-        return max(dials)[1:]
+        return max(sources)[1:]
 
-    def _doubt(self, said: str, dial: int | None = None) -> None:
-        """Refine cells (``dial=0``) or steps (1) of the base, by default the main uncertainty.
+    def _move_base(self, said: str, axis: int | None = None) -> None:
+        """Refine cells (``axis=0``) or steps (1) of the base, by default the main uncertainty.
 
         Raises:
             TradeoffError: The base was refined too often.
         """
-        where = self._runs.dials(self._at(2 ** self._base[0], self._base[1]))
+        where = self._runs.setting(self._at(2 ** self._base[0], self._base[1]))
         self._doubts.append(f"\n  from {where} on: {said}")
         if len(self._doubts) == DOUBTS:
             raise TradeoffError("self-convergence is not seen" + "".join(self._doubts))
-        self._base[self._worst()[0] if dial is None else dial] += 1
+        self._base[self._worst()[0] if axis is None else axis] += 1
 
-    def _confirm(self, choice: _Choice) -> None:
+    def _confirm(self, candidate: _Candidate) -> None:
         """Run with cells and steps a level finer than a choice and the base, for the limit."""
         i, j = self._base
-        parts = 2 * max(round(2**choice.level), 2**j)
-        finer = self._at(2 * max(choice.refine, Fraction(2**i)), math.log2(parts))
+        parts = 2 * max(round(2**candidate.level), 2**j)
+        finer = self._at(2 * max(candidate.refine, Fraction(2**i)), math.log2(parts))
         if self._runs.allowed([finer]):
             self._runs.run([finer])
         if finer in self._runs.runs:
-            found, at = self._runs.runs[finer].values, (math.log2(finer.refine), finer.level)
-            for name, cross in self.crosses.items():
-                self.crosses[name] = cross.confirmed(found[name], *at)
+            values, at = self._runs.runs[finer].values, (math.log2(finer.refine), finer.level)
+            for name, convergence in self.crosses.items():
+                self.crosses[name] = convergence.confirmed(values[name], *at)
 
     def _choose_newton(self) -> None:
         """Choose the fastest options of Newton's method that change the quantities little."""
         first = self._at(2 ** self._base[0], self._base[1])
         strict = self._runs.runs[first]
-        most = self._share(self._choose(self.unsure))
+        most = self._negligible(self._choose(self.uncertainty))
         least = (1 - SCATTER) * strict.stepping
         for newton in range(1, len(self._runs.newtons)):
-            other = first._replace(newton=newton)
-            if self._runs.allowed([other]):
-                self._runs.run([other])
-            run = self._runs.runs.get(other)
+            second = first._replace(newton=newton)
+            if self._runs.allowed([second]):
+                self._runs.run([second])
+            run = self._runs.runs.get(second)
             if run is None:
                 continue
             self._speeds[newton] = run.seconds / strict.seconds
@@ -598,50 +606,52 @@ class _Search:
     def _try(self) -> None:
         """Run the chosen setting; if it misses the target, correct predictions and try again."""
         for _ in range(TRIALS):
-            choice = self._choose(self.unsure)
-            one = self._at(choice.refine, choice.level, self._newton)
-            if not self._rank(self.best())[0] and not self._runs.allowed([one]):
+            candidate = self._choose(self.uncertainty)
+            setting = self._at(candidate.refine, candidate.level, self._newton)
+            if not self._rank(self.best())[0] and not self._runs.allowed([setting]):
                 return
-            self._runs.run([one])
-            if one in self._runs.failed:
-                raise TradeoffError(f"the chosen setting failed: {self._runs.failed[one]}")
-            run = self._runs.runs[one]
+            self._runs.run([setting])
+            if setting in self._runs.failed:
+                raise TradeoffError(f"the chosen setting failed: {self._runs.failed[setting]}")
+            run = self._runs.runs[setting]
             if self._accepts(run):
                 return
-            self._speeds[self._newton] *= run.seconds / choice.seconds
-            if choice.likely > 0:
+            self._speeds[self._newton] *= run.seconds / candidate.seconds
+            if candidate.likely > 0:
                 # Errors are not known more accurately than the limit.
-                self._larger *= max(self.ratio(run), self.unsure) / choice.likely
+                self._larger *= max(self.ratio(run), self.uncertainty) / candidate.likely
 
     # -- decisions -----------------------------------------------------------------------------
 
-    def _share(self, choice: _Choice) -> float:
+    def _negligible(self, candidate: _Candidate) -> float:
         """Return the negligible error over its unit, for the size of the errors of a choice."""
-        return NEGLIGIBLE * (1.0 if math.isinf(self._target.budget) else choice.bound)
+        return NEGLIGIBLE * (1.0 if math.isinf(self._target.budget) else candidate.bound)
 
-    def _choose(self, unsure: float) -> _Choice:
+    def _choose(self, uncertainty: float) -> _Candidate:
         """Choose the cheapest setting that is accurate enough, or the most accurate in the budget.
 
-        The uncertainty of the limit is ``unsure``, in its unit.
+        The uncertainty of the limit is ``uncertainty``, in its unit.
         """
-        some, dials = next(iter(self.crosses.values())), self._runs.families[self.family]
+        some, setting = next(iter(self.crosses.values())), self._runs.families[self.family]
         top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
-        first = math.ceil(self._divisor / dials.mesh.degree)  # nodes of the given cells at degree 1
+        first = math.ceil(
+            self._divisor / setting.mesh.degree
+        )  # nodes of the given cells at degree 1
         refine = [Fraction(k, self._divisor) for k in _spread(first, self._divisor * top[0])]
         # Whole multiples of the number of the user's steps, so that all runs end at the same time.
-        parts = np.array(_spread(1, top[1]), dtype=float)
-        of_cells, of_steps = np.log2(np.array(refine, dtype=float)), np.log2(parts)
-        likely = bound = np.zeros((len(of_cells), len(of_steps)))
-        for name, cross in self.crosses.items():
+        multiples = np.array(_spread(1, top[1]), dtype=float)
+        cell_levels, step_levels = np.log2(np.array(refine, dtype=float)), np.log2(multiples)
+        likely = bound = np.zeros((len(cell_levels), len(step_levels)))
+        for name, convergence in self.crosses.items():
             unit = self.units[name] / self._larger
-            cells = cross.cells.lack(of_cells).reshape(len(of_cells), 1, -1) / unit
-            steps = cross.steps.lack(of_steps).reshape(1, len(of_steps), -1) / unit
+            cells = convergence.cells.lack(cell_levels).reshape(len(cell_levels), 1, -1) / unit
+            steps = convergence.steps.lack(step_levels).reshape(1, len(step_levels), -1) / unit
             likely = np.maximum(likely, np.abs(cells + steps).max(axis=2))
             bound = np.maximum(bound, np.abs(cells).max(axis=2) + np.abs(steps).max(axis=2))
-        seconds = self._speeds[self._newton] * self._seconds(2.0 ** of_cells[:, None], parts)
+        seconds = self._speeds[self._newton] * self._seconds(2.0 ** cell_levels[:, None], multiples)
         if math.isinf(self._target.budget):
             # The middle half, on a logarithmic scale, of the allowed errors.
-            largest = 1 - unsure
+            largest = 1 - uncertainty
             least, most = ((LEAST_USED ** (1 - p)) * largest**p for p in (1 / 4, 3 / 4))
             allowed = (likely <= most) & (bound <= largest)
             costs = np.where(allowed, seconds, np.inf)
@@ -656,18 +666,18 @@ class _Search:
                 k = k if allowed.any() else seconds.argmin()
                 raise TradeoffError(
                     f"no setting serves; the nearest takes {seconds.flat[k]:.3g} s and has errors "
-                    f"of {bound.flat[k]:.2g} {self._target.measure}; steps and cells as they are "
-                    "given are the coarsest"
+                    f"of {bound.flat[k]:.2g} {self._target.measure}; the given steps and cells "
+                    "are the coarsest"
                 )
         row, column = np.unravel_index(k, seconds.shape)
-        numbers = (float(x.flat[k]) for x in (seconds, likely, bound))
-        return _Choice(refine[row], float(of_steps[column]), *numbers)
+        predicted = (float(x.flat[k]) for x in (seconds, likely, bound))
+        return _Candidate(refine[row], float(step_levels[column]), *predicted)
 
-    def _seconds(self, refine: npt.ArrayLike, parts: npt.ArrayLike) -> Array:
+    def _seconds(self, refine: npt.ArrayLike, multiples: npt.ArrayLike) -> Array:
         """Predict wall times with the first options of Newton's method; s."""
-        runs = [run for run in self._runs.of(self.family) if run.refinement.newton == 0]
+        runs = [run for run in self._runs.in_family(self.family) if run.refinement.newton == 0]
         a, b, c, d = fit_cost(*np.array([(r.steps, r.cells, r.seconds) for r in runs]).T)
-        steps = runs[0].steps / 2 ** runs[0].refinement.level * np.asarray(parts)
+        steps = runs[0].steps / 2 ** runs[0].refinement.level * np.asarray(multiples)
         cells = runs[0].cells / float(runs[0].refinement.refine) * np.asarray(refine)
         return np.asarray(a + b * cells + steps * (c + d * cells))
 
@@ -675,7 +685,7 @@ class _Search:
         """Return whether a run is accurate or fast enough, but not much more than required."""
         budget, ratio = self._target.budget, self.ratio(run)
         if math.isinf(budget):
-            return LEAST_USED <= ratio <= 1 - self.unsure
+            return LEAST_USED <= ratio <= 1 - self.uncertainty
         return (1 - 2 * SCATTER) * budget <= run.seconds <= budget
 
     def _rank(self, run: Run) -> tuple[bool, bool, float]:
@@ -691,12 +701,12 @@ class _Search:
         if math.isfinite(self._target.budget):
             slow = run.seconds > self._target.budget
             return slow, False, run.seconds if slow else bound
-        wrong = self.ratio(run) + self.unsure > 1 or bound > 1
+        wrong = self.ratio(run) + self.uncertainty > 1 or bound > 1
         seconds = self._speeds[newton] * float(self._seconds(float(refine), 2**level))
         return wrong, not self._accepts(run), self.ratio(run) if wrong else seconds
 
 
 def _spread(first: int, last: int) -> list[int]:
     """Return integers in nearly geometric progression, GRID for each factor of 2."""
-    spread = first * 2 ** np.arange(0.0, math.log2(last / first) + 1e-9, 1 / GRID)
-    return [int(one) for one in np.unique(np.round(spread))]
+    spread = first * 2 ** np.arange(0.0, math.log2(last / first) + 1e-9, 1 / SETTINGS_PER_LEVEL)
+    return [int(x) for x in np.unique(np.round(spread))]

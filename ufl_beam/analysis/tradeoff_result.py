@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ufl_beam.analysis.richardson import Cross, pareto, size
+from ufl_beam.analysis.richardson import SelfConvergence, pareto, size
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich, bracketed, one_line
 from ufl_beam.mechanics.time_schemes import Scheme
@@ -20,7 +20,7 @@ from ufl_beam.solvers.newton_options import Newton
 
 
 @dataclass(frozen=True)
-class Dials:
+class Setting:
     """Setting of a run, the arguments of :func:`simulate`."""
 
     scheme: Scheme  # the time scheme
@@ -28,7 +28,7 @@ class Dials:
     mesh: Mesh  # the cells
     newton: Newton  # how exactly equilibria are found
 
-    def finer(self, refine: Fraction, level: float, t: tuple[float, float]) -> Dials:
+    def finer(self, refine: Fraction, level: float, t: tuple[float, float]) -> Setting:
         """Divide each cell by ``refine`` and multiply the number of steps by about ``2**level``.
 
         The error of an adaptive step is of third order, so the number of steps is proportional to
@@ -69,7 +69,7 @@ class Run:
     """Result of a run, and its cost."""
 
     refinement: Refinement  # its family and refinement
-    dials: Dials  # its setting
+    dials: Setting  # its setting
     values: dict[str, Array]  # the quantities
     seconds: float  # wall time without compiling; s
     building: float  # part of it before the first step; s
@@ -138,7 +138,7 @@ class Tradeoff(Rich):
     runs: tuple[Run, ...]
     best: Run
     t: tuple[float, float]
-    crosses: Mapping[str, Cross]
+    crosses: Mapping[str, SelfConvergence]
     units: dict[str, float]
     target: Target
     families: tuple[str, ...]
@@ -153,12 +153,12 @@ class Tradeoff(Rich):
     @property
     def limit(self) -> dict[str, Array]:
         """Extrapolated limits of the quantities."""
-        return {name: cross.limit for name, cross in self.crosses.items()}
+        return {name: convergence.limit for name, convergence in self.crosses.items()}
 
     @property
     def uncertainty(self) -> dict[str, float]:
         """Uncertainty of the limits; unit of each quantity."""
-        return {name: cross.uncertainty for name, cross in self.crosses.items()}
+        return {name: convergence.uncertainty for name, convergence in self.crosses.items()}
 
     def errors(self, run: Run) -> dict[str, float]:
         """Return the distances of a run from the limits, by quantity, in its unit."""
@@ -199,9 +199,9 @@ class Tradeoff(Rich):
         """Return lines on convergence, cost and the recommended setting."""
         shown = {*self.front, self.best}
         lines = [f"and {len(self.runs) - len(shown)} runs that others beat in both"]
-        for name, cross in self.crosses.items():
-            value = np.array2string(cross.limit, precision=9, threshold=6, edgeitems=2)
-            lines.append(f"{name}: limit {value} ± {cross.uncertainty:.1g}{cross}")
+        for name, convergence in self.crosses.items():
+            value = np.array2string(convergence.limit, precision=9, threshold=6, edgeitems=2)
+            lines.append(f"{name}: limit {value} ± {convergence.uncertainty:.1g}{convergence}")
         lines.append(
             f"{len(self.runs)} runs took {self.spent:.3g} s, "
             f"{self.spent / self.best.seconds:.2g} times the recommended one; their steps "

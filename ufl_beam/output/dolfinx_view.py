@@ -75,13 +75,13 @@ class DolfinxView:
         True
     """
 
-    def __init__(self, of: Any) -> None:  # a `StateView`, which is above this module
-        self._of = of
-        self._fields = DolfinxFields(of.share)
+    def __init__(self, view: Any) -> None:  # a `StateView`, which is above this module
+        self._view = view
+        self._fields = DolfinxFields(view.share)
         self._functions: dict[str, fem.Function] = {}
 
     def __repr__(self) -> str:
-        return f"<DolfinxView of {self._of!r}>"
+        return f"<DolfinxView of {self._view!r}>"
 
     # -- mesh and spaces -------------------------------------------------------------------------
 
@@ -98,7 +98,7 @@ class DolfinxView:
             >>> simulation.section_forces()[view.cells].shape
             (4, 3)
         """
-        return np.asarray(self._of.share.cells[self._fields.order])
+        return np.asarray(self._view.share.cells[self._fields.order])
 
     @cached_property
     def cell_tags(self) -> meshes.MeshTags:
@@ -110,7 +110,7 @@ class DolfinxView:
             >>> print(round(view.total(fem.Constant(view.mesh, 1.0) * dx(0)), 9))
             2.0
         """
-        beams = self._of.share.grid.beam_of_cell[self.cells]
+        beams = self._view.share.grid.beam_of_cell[self.cells]
         numbers = np.arange(len(beams), dtype=np.int32)
         return meshes.meshtags(self.mesh, 1, numbers, beams.astype(np.int32))
 
@@ -134,10 +134,10 @@ class DolfinxView:
             >>> bool((view.configuration.x.array == simulation.q[view.dofs]).all())
             True
         """
-        here = dofs_of_cells(self.function_space)
-        of_scene = np.empty(here.max(initial=-1) + 1, dtype=np.int32)
-        of_scene[here] = self._fields.cell_dofs
-        return of_scene
+        local = dofs_of_cells(self.function_space)
+        scene_dofs = np.empty(local.max(initial=-1) + 1, dtype=np.int32)
+        scene_dofs[local] = self._fields.cell_dofs
+        return scene_dofs
 
     @property
     def dx(self) -> ufl.Measure:
@@ -160,7 +160,7 @@ class DolfinxView:
             >>> print(round(length, 9), bool(view.total(u_y) < 0))
             2.0 True
         """
-        return float(self._of.share.total(integrated(integral, self.mesh)))
+        return float(self._view.share.total(integrated(integral, self.mesh)))
 
     # -- functions -------------------------------------------------------------------------------
 
@@ -183,7 +183,7 @@ class DolfinxView:
             >>> bool(np.isclose(ψ.x.array.min(), simulation.displacement(beam.end)[2]))
             True
         """
-        return self._function("configuration", self._of.q[self._fields.cell_dofs])
+        return self._function("configuration", self._view.q[self._fields.cell_dofs])
 
     @property
     def velocity(self) -> fem.Function:
@@ -192,9 +192,9 @@ class DolfinxView:
         Raises:
             ArgumentError: The scheme is static.
         """
-        if not has_inertia(self._of.scheme):
+        if not has_inertia(self._view.scheme):
             raise ArgumentError("dolfinx.velocity: a static scheme has no velocities; run dynamics")
-        return self._function("velocity", self._of.velocities()[0][self._fields.cell_dofs])
+        return self._function("velocity", self._view.velocities()[0][self._fields.cell_dofs])
 
     @property
     def strains(self) -> fem.Function:
@@ -202,7 +202,7 @@ class DolfinxView:
 
         Strains of the bulk do not include jumps, see ``mechanics/functional.py``.
         """
-        return self._function("strains", self._of.now.mean_strains(0)[self.cells])
+        return self._function("strains", self._view.now.mean_strains(0)[self.cells])
 
     @property
     def forces(self) -> fem.Function:
@@ -213,7 +213,7 @@ class DolfinxView:
             >>> bool(np.allclose(M, simulation.section_forces()[view.cells, 2]))
             True
         """
-        return self._function("forces", self._of.section_forces()[self.cells])
+        return self._function("forces", self._view.section_forces()[self.cells])
 
     @property
     def jump(self) -> fem.Function:
@@ -223,7 +223,7 @@ class DolfinxView:
         first cell.  If a cell has several jumps, the value is the largest jump.
 
         Raises:
-            ArgumentError: Nothing in the scene can hinge.
+            ArgumentError: No beam of the scene has a hinge.
 
         Example:
             >>> opening = ub.Simulation(hinged, ub.Static())
@@ -231,21 +231,21 @@ class DolfinxView:
             >>> print(opening.dolfinx.jump.x.array.round(3)[:3])
             [-0.024  0.     0.   ]
         """
-        scene = self._of.scene
+        scene = self._view.scene
         if not scene.hinges and all(beam.section.hinge is None for beam in scene.beams):
             raise ArgumentError(
-                "dolfinx.jump: nothing in the scene can hinge; give a beam "
+                "dolfinx.jump: no beam of the scene has a hinge; give a beam "
                 "hinges={0.5: Softening(...)}, or a section hinge=Softening(...)"
             )
-        return self._function("jump", self._of.damage()[0][self.cells])
+        return self._function("jump", self._view.damage()[0][self.cells])
 
     def _function(self, name: str, values: Array) -> fem.Function:
         """Return the function of a quantity, with values at the degrees of freedom of cells."""
         if name not in self._functions:
-            of = self._fields.element
-            space = of.stiffness.function_space
+            element = self._fields.element
+            space = element.stiffness.function_space
             if name in ("configuration", "velocity"):
-                space = of.space
+                space = element.space
             elif name == "jump":
                 space = fem.functionspace(self.mesh, ("DG", 0))
             self._functions[name] = fem.Function(space, name=name)
@@ -271,9 +271,9 @@ class DolfinxView:
         """
         forms = self._forms
         for function in (forms.q0, forms.q1):
-            put_in_cells(function, self._of.q[self._fields.cell_dofs])
-        tables = [np.zeros((len(self._of.share.grid.cells), k)) for k in (3, 9)]
-        for cells, *values in (one.about_state() for one in self._of.inelastic):
+            put_in_cells(function, self._view.q[self._fields.cell_dofs])
+        tables = [np.zeros((len(self._view.share.grid.cells), k)) for k in (3, 9)]
+        for cells, *values in (beams.about_state() for beams in self._view.inelastic):
             for table, rows in zip(tables, values, strict=True):
                 table[cells] = rows
         for function, table in zip(self._around, tables, strict=False):  # none if all is elastic
@@ -286,13 +286,14 @@ class DolfinxView:
 
         Cells with material points have no elastic stiffness; elastic cells have no b and D.
         """
-        of, scheme = self._fields.element, self._of.scheme
+        element, scheme = self._fields.element, self._view.scheme
         self._around: tuple[fem.Function, ...] = ()
-        work = elastic_forms(of, scheme).work
-        if self._of.inelastic:
-            points = inelastic_forms(of, scheme)
+        work = elastic_forms(element, scheme).work
+        if self._view.inelastic:
+            points = inelastic_forms(element, scheme)
             work, self._around = work + points.around, (points.b, points.D)
-            of_points = np.concatenate([one.kept()[0] for one in self._of.inelastic])
-            dofs = dofs_of_cells(of.stiffness.function_space)
-            of.stiffness.x.array[dofs[np.isin(self.cells, of_points)]] = 0.0
-        return BeamForms(of.q0, of.q1, work, derivative(work, of.q1), mass_form(of))
+            cells = np.concatenate([beams.kept()[0] for beams in self._view.inelastic])
+            dofs = dofs_of_cells(element.stiffness.function_space)
+            element.stiffness.x.array[dofs[np.isin(self.cells, cells)]] = 0.0
+        q0, q1 = element.q0, element.q1
+        return BeamForms(q0, q1, work, derivative(work, q1), mass_form(element))

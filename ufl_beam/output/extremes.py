@@ -53,35 +53,36 @@ class AlongCells(NamedTuple):
 
 
 @stated
-def along_cells(of: Element, parts: tuple[float, ...], works: bool) -> AlongCells:
+def along_cells(element: Element, parts: tuple[float, ...], works: bool) -> AlongCells:
     """State :func:`section_force` as a form; its entries are (N, V, M)."""
-    mesh, h, between = Mesh(degree=of.degree), of.axis.h, set(parts) > {0.0, 1.0}
+    mesh, h, between = Mesh(degree=element.degree), element.axis.h, set(parts) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
     # All are constant in cells: interpolation in a cell would take longer than the evaluation.
-    motions, numbers, angles, values = map(of.in_cells, (moves, first, 2, 3 * len(parts)))
+    motions, numbers, angles, values = map(element.in_cells, (moves, first, 2, 3 * len(parts)))
     order = [0, *range(2, n), 1]  # of the nodes along a cell
     *displacements, rotations = ([motions[k + i] for i in order] for k in range(0, moves, n))
 
     def weighted(weights: Array, values: list[Expr]) -> Expr:
         return sum(float(a) * x for a, x in zip(weights, values, strict=True))
 
-    def way(part: float) -> tuple[Any, Any]:
-        x, y = h * of.axis.t0[0], h * of.axis.t0[1]
+    def tangent(fraction: float) -> tuple[Any, Any]:
+        x, y = h * element.axis.t0[0], h * element.axis.t0[1]
         if not between:
             return x, y
-        u, v = (weighted(mesh.slopes(part), nodes) for nodes in displacements)
+        u, v = (weighted(mesh.slopes(fraction), nodes) for nodes in displacements)
         return x + u, y + v
 
     known = [numbers[k] for k in range(first)] + [0.0] * (lib.CELL_NUMBERS - first)
-    at, at_end = section_force(known, way, works=works), known[lib.END_X : lib.END_M + 1]
-    found = list[Expr]()
-    for part in parts:
-        turn = weighted(mesh.weights(part), rotations)
-        angle = (1 - part) * angles[0] + part * angles[1] + turn
-        plane = at(part) if part < 1 else tuple(at_end)
-        found += in_section(plane, ufl.cos(angle), ufl.sin(angle))
-    form = ufl.dot(ufl.as_vector(found), ufl.TestFunction(values.function_space)) / h * of.dx(1)
+    at, at_end = section_force(known, tangent, works=works), known[lib.END_X : lib.END_M + 1]
+    rows = list[Expr]()
+    for fraction in parts:
+        rotation = weighted(mesh.weights(fraction), rotations)
+        angle = (1 - fraction) * angles[0] + fraction * angles[1] + rotation
+        plane = at(fraction) if fraction < 1 else tuple(at_end)
+        rows += in_section(plane, ufl.cos(angle), ufl.sin(angle))
+    test = ufl.TestFunction(values.function_space)
+    form = ufl.dot(ufl.as_vector(rows), test) / h * element.dx(1)
     return AlongCells(form, motions, numbers, angles, first, moves)
 
 
@@ -98,21 +99,21 @@ class ExtremesInC:
         parts: Array,
     ) -> None:  # fmt: skip
         size, works = fields.share.size, bool(fields.share.grid.scene.works)
-        of = along_cells(fields.element, tuple(map(float, parts)), works)
-        self._kernel = fields.kernel(of.form, of.motions, fields.cell_dofs[:, -of.moves :])
-        _, self._lanes, spare = self._kernel.keep_entries()
+        form = along_cells(fields.element, tuple(map(float, parts)), works)
+        self._kernel = fields.kernel(form.form, form.motions, fields.cell_dofs[:, -form.moves :])
+        _, self._batch, spare = self._kernel.keep_entries()
         self._cells, self._points, self._forces = len(along.angles), len(parts), cell_forces
         sizes = spare.size, size
         self._extents = [dict(zip(EXTENT, np.zeros((4, n)), strict=True)) for n in sizes]
         cell_forces.keep_latest()
         self.c = struct(
             "watch", forces=cell_forces.c, along=self._kernel.cells, between=between,
-            angles=in_batches(along.angles, self._lanes), q=np.zeros(size), first=of.first,
-            at_angles=self._kernel.position(of.angles),
-            at_numbers=self._kernel.position(of.numbers),
+            angles=in_batches(along.angles, self._batch), q=np.zeros(size), first=form.first,
+            at_angles=self._kernel.position(form.angles),
+            at_numbers=self._kernel.position(form.numbers),
             numbers=np.zeros(lib.CELL_NUMBERS * self._cells),
             some=np.zeros(lib.SOME * self._kernel.cells.width),
-            in_order=cell_forces.in_order(self._lanes),
+            in_order=cell_forces.in_order(self._batch),
         )  # fmt: skip
         self.seen = -1
         for c, extent in zip((self.c.of_forces, self.c.of_motion), self._extents, strict=True):
@@ -120,28 +121,28 @@ class ExtremesInC:
             for name, values in extent.items():
                 setattr(c, name, doubles(values))
 
-    def take(self, parts: int, t: float, q: Array, before: Array) -> None:
+    def add(self, parts: int, t: float, q: Array, before: Array) -> None:
         """Include the state after ``parts`` steps, if C has not."""
         if parts == self.seen:
             return
         numbers = self._forces(q, before)
-        given, self._forces.c.given = self._forces.c.given, doubles(numbers)
+        previous, self._forces.c.given = self._forces.c.given, doubles(numbers)
         lib.watch_step(self.c, 0, t, doubles(before), doubles(q))
-        self._forces.c.given = given
+        self._forces.c.given = previous
         self.seen = parts
 
     def begin(self, parts: int, extents: Any) -> None:
         """Begin with the extremes after ``parts`` steps, as :meth:`extents` returns them."""
-        for to, of in zip(self._extents, extents, strict=True):
-            for name, values in zip(EXTENT, of, strict=True):
-                batches = in_batches(values, self._lanes) if values.ndim == 3 else values
+        for to, extent in zip(self._extents, extents, strict=True):
+            for name, values in zip(EXTENT, extent, strict=True):
+                batches = in_batches(values, self._batch) if values.ndim == 3 else values
                 to[name][:] = batches.ravel()
         self.seen = parts
 
     def extents(self) -> list[list[Array]]:
         """Return extremes and times: of forces, (num_cells, points, 3), and motions, (size,)."""
-        forces, motion = ([of[name] for name in EXTENT] for of in self._extents)
-        shape = -1, 3 * self._points, self._lanes
+        forces, motion = ([extent[name] for name in EXTENT] for extent in self._extents)
+        shape = -1, 3 * self._points, self._batch
         in_cells = [
             x.reshape(shape).transpose(0, 2, 1).reshape(-1, self._points, 3)[: self._cells].copy()
             for x in forces
@@ -202,7 +203,7 @@ class Extremes(Restartable):
 
     def __init__(self, points: int = 2) -> None:
         require_number(points, "Extremes: points", at_least=2)
-        self._parts = np.arange(int(points)) / (int(points) - 1)
+        self._fractions = np.arange(int(points)) / (int(points) - 1)
         self._in_c: ExtremesInC | None = None
         self._taken: list[Extent] = []
 
@@ -210,9 +211,9 @@ class Extremes(Restartable):
         """Begin with the initial state, or continue from a :meth:`state`."""
         self._grid: Grid = simulation.grid
         self._solution = simulation.solution
-        self._in_c = simulation.watch(self._parts)
+        self._in_c = simulation.watch(self._fractions)
         self.by_itself = self._in_c is not None
-        shapes = (len(self._grid.cells), len(self._parts), 3), (self._grid.size,)
+        shapes = (len(self._grid.cells), len(self._fractions), 3), (self._grid.size,)
         self._taken = []
         for what, shape in zip(("forces", "q"), shapes, strict=True):
             extent = Extent(*(np.full(shape, x) for x in (np.inf, -np.inf, 0.0, 0.0)))
@@ -229,9 +230,9 @@ class Extremes(Restartable):
     def write(self, simulation: StateView) -> None:
         """Include the state of a step."""
         if self._in_c is not None:
-            self._in_c.take(simulation.parts, simulation.t, simulation.q, simulation.q_before)
+            self._in_c.add(simulation.parts, simulation.t, simulation.q, simulation.q_before)
             return
-        forces = simulation.now.cell_forces(0, self._parts)
+        forces = simulation.now.cell_forces(0, self._fractions)
         q = simulation.share.gather(simulation.q)  # the same on every process
         for extent, values in zip(self._taken, (forces, q), strict=True):
             for reached, when, beyond in (
@@ -250,13 +251,13 @@ class Extremes(Restartable):
     def _extents(self) -> list[Extent]:
         """Extremes of forces and of motions."""
         if self._in_c is not None:
-            return [Extent(*of) for of in self._in_c.extents()]
+            return [Extent(*extent) for extent in self._in_c.extents()]
         return self._taken
 
     def state(self) -> State:
         """Return the extremes so far, by name."""
         extents = zip(("forces", "q"), self._extents, strict=True)
-        return {f"{of} {name}": x for of, extent in extents for name, x in extent._asdict().items()}
+        return {f"{k} {name}": x for k, extent in extents for name, x in extent._asdict().items()}
 
     @property
     def grid(self) -> Grid:

@@ -360,7 +360,7 @@ class Fatigue(Restartable):
         """Begin to count with the initial state, or continue from a :meth:`state`."""
         at = [simulation.grid.cell_and_part(spot.place) for spot in self.spots]
         self._cells = np.array([cell for cell, _ in at], dtype=np.int64)
-        self._parts, self._part = np.unique([part for _, part in at], return_inverse=True)
+        self._fractions, self._column = np.unique([s for _, s in at], return_inverse=True)
         self._block: list[Array] = []
         self._counters = {}
         for i, spot in enumerate(dict.fromkeys(self.spots)):
@@ -375,8 +375,8 @@ class Fatigue(Restartable):
 
     def write(self, simulation: StateView) -> None:
         """Store the section forces, and count after each block of steps."""
-        forces = simulation.now.cell_forces(0, self._parts)
-        self._block.append(forces[self._cells, self._part])
+        forces = simulation.now.cell_forces(0, self._fractions)
+        self._block.append(forces[self._cells, self._column])
         self._end = simulation.t
         if len(self._block) == BLOCK:
             self._count()

@@ -28,7 +28,7 @@ from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
-from ufl_beam.output.postprocessing import links_of
+from ufl_beam.output.postprocessing import connector_indices
 from ufl_beam.output.recorders import Restartable, StateView
 from ufl_beam.output.state_rows import DISSIPATED, FORCE, HINGE, PLASTIC
 from ufl_beam.parallel import on_first
@@ -79,14 +79,14 @@ class History(Restartable):
         require_count(max_rows, f"History {path}: max_rows")
         self._first_every, self._max_rows = every, max_rows
         self._path = require_path(path, "History")
-        self._part = beside(self._path)  # replaces it when rows are deleted
-        self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._part)
+        self._temporary = beside(self._path)  # replaces it when rows are deleted
+        self.files = (self._path,) if max_rows == sys.maxsize else (self._path, self._temporary)
         self._places = require_sequence(places, f"History {path}: places")
         self._connectors = require_sequence(connectors, f"History {path}: connectors")
         for i, place in enumerate(self._places):
             require_anchors(f"History {path}: places[{i}]", place)
-        for i, one in enumerate(self._connectors):
-            require_kind(one, (Connector, Joint), f"History {path}: connectors[{i}]")
+        for i, connector in enumerate(self._connectors):
+            require_kind(connector, (Connector, Joint), f"History {path}: connectors[{i}]")
         self._open: list[OutputFile] = []
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
@@ -95,7 +95,7 @@ class History(Restartable):
         self._links = {
             link: name
             for followed in self._connectors
-            for link, name in _named_links(simulation.scene, followed)
+            for link, name in _named_components(simulation.scene, followed)
         }
         names = [f"{c} {place} [{unit}]" for place in self._places for c, unit in MOTION]
         for link, name in self._links.items():
@@ -106,7 +106,7 @@ class History(Restartable):
         for twice in {*names} & {*energies}:
             raise ArgumentError(
                 f"History {self._path}: {twice!r} would be a column of a connector and of the "
-                "energy ledger; give the work that is called so another name"
+                "energy ledger; give the work another name"
             )
         columns = [simulation.parameter.column, *names, *energies]
         # Spreadsheets read such beginnings as formulas, which may run programs
@@ -134,16 +134,16 @@ class History(Restartable):
         """Write the row of the state if it is due."""
         self._steps += 1
         if self._steps == (self._max_rows + 1) * self._every:
-            on_first(simulation.comm, self._thin)
+            on_first(simulation.comm, self._drop_rows)
             self._every *= 2
         if self._steps % self._every == 0:
             row = self._row(simulation)
             on_first(simulation.comm, lambda: self._append(row))
 
-    def _thin(self) -> None:
+    def _drop_rows(self) -> None:
         """Delete every other row; a whole file exists at any time."""
         rows = self._open[0].read(len(self._header), self._length).splitlines(keepends=True)
-        self._write_anew(self._part, self._header + b"".join(rows[::2]))
+        self._write_anew(self._temporary, self._header + b"".join(rows[::2]))
         self._open[0].rename(self._path)
 
     def _row(self, simulation: StateView) -> bytes:
@@ -205,9 +205,9 @@ def _line(cells: Sequence[str]) -> bytes:
     return text.getvalue().encode()
 
 
-def _named_links(scene: Scene, followed: Connector | Joint) -> list[tuple[int, str]]:
+def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[int, str]]:
     """Return numbers and names of links; names of links between the same places differ."""
-    links = links_of(scene, followed)
+    links = connector_indices(scene, followed)
     if isinstance(followed, Connector):
         names = COMPONENTS if followed.components else (type(followed.law).__name__,)
         return [(link, f"{followed}, {name}") for link, name in zip(links, names, strict=False)]
@@ -224,10 +224,10 @@ def _named_links(scene: Scene, followed: Connector | Joint) -> list[tuple[int, s
 Flags = npt.NDArray[np.bool_]
 
 IN_CELLS = ("yields", "opens", "is free")  # once in a cell; hinges and cracks open and end
-OF_CONNECTORS = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # with their ends
-KINDS = (*IN_CELLS, *(kind for pair in OF_CONNECTORS.values() for kind in pair))  # all events
+CONNECTOR_EVENTS = {Stop: ("touches", "lets go"), Coulomb: ("slides", "sticks")}  # with their ends
+KINDS = (*IN_CELLS, *(kind for pair in CONNECTOR_EVENTS.values() for kind in pair))  # all events
 Row = tuple[float, int, str]  # time, number of the cell or connector, kind of event
-BROKEN_PART = 0.999  # fraction of the energy of a hinge after which it is called a joint
+BROKEN_FRACTION = 0.999  # fraction of the energy of a hinge after which it is called a joint
 
 
 class Event(NamedTuple):
@@ -300,10 +300,10 @@ class Events(Restartable):
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
         breaking = [law is not None and law.limit > 0 for law in laws]
         energies = np.array([law.fracture_energy if law is not None else np.inf for law in laws])
-        self._enough = np.where(breaking, BROKEN_PART * energies, np.inf)
+        self._enough = np.where(breaking, BROKEN_FRACTION * energies, np.inf)
         self._breaks = np.isfinite(energies)
         links = simulation.scene.links
-        self._links = [i for i, link in enumerate(links) if type(link.law) in OF_CONNECTORS]
+        self._links = [i for i, link in enumerate(links) if type(link.law) in CONNECTOR_EVENTS]
         self._in_cells, self._on = self._look(simulation)
 
     def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
@@ -332,7 +332,7 @@ class Events(Restartable):
         changes = np.argwhere(in_cells & ~self._in_cells)
         new = [(t, int(cell), IN_CELLS[n]) for cell, n in changes]
         for k in np.flatnonzero(on != self._on):
-            begins, ends = OF_CONNECTORS[type(simulation.scene.links[self._links[k]].law)]
+            begins, ends = CONNECTOR_EVENTS[type(simulation.scene.links[self._links[k]].law)]
             new.append((t, self._links[k], begins if on[k] else ends))
         self._in_cells, self._on = in_cells, on
         events = self._add(simulation, new)

@@ -75,18 +75,18 @@ def require_apart(outputs: Sequence[Output], call: str) -> None:
         identities: list[object] = []
         try:
             identities = [real := os.path.realpath(path)]
-            found = os.stat(real)
-            same = (found.st_dev, found.st_ino)
-            identities = [real, same] if stat.S_ISREG(found.st_mode) else []
+            status = os.stat(real)
+            same = (status.st_dev, status.st_ino)
+            identities = [real, same] if stat.S_ISREG(status.st_mode) else []
         except OSError:
             pass  # there is no file yet
         except ValueError as error:  # a null character
             raise ArgumentError(f"output {path} cannot be written: {error}") from None
         for identity in identities:
-            other = owners.setdefault(identity, owner)
-            if other is not owner:
+            writer = owners.setdefault(identity, owner)
+            if writer is not owner:
                 raise ArgumentError(
-                    f"{call}: {other} and {owner} would both write {os.path.realpath(path)}; "
+                    f"{call}: {writer} and {owner} would both write {os.path.realpath(path)}; "
                     "give one of them another path"
                 )
 
@@ -206,12 +206,12 @@ class OutputFile:
 
     def close(self) -> None:
         """Close the file; warn if it was removed or replaced."""
-        there = is_at(self._file, self.path)
+        in_place = is_at(self._file, self.path)
         os.close(self._file)
-        if not there:
+        if not in_place:
             warnings.warn(
-                f"output {self.path} was removed or replaced during the run; what was written to "
-                "it is lost",
+                f"output {self.path} was removed or replaced during the run; data written to "
+                "it are lost",
                 RuntimeWarning,
                 stacklevel=2,
             )
@@ -219,15 +219,15 @@ class OutputFile:
 
 def put_in_place(path: Path, data: bytes | memoryview) -> None:
     """Write a whole file; the previous file stays until the new file is on the disk."""
-    part = beside(path)
+    temporary = beside(path)
     try:
-        with part.open("wb") as file:
+        with temporary.open("wb") as file:
             file.write(data)
             file.flush()
             os.fsync(file.fileno())
-        os.replace(part, path)
+        os.replace(temporary, path)
     except BaseException:
-        part.unlink(missing_ok=True)
+        temporary.unlink(missing_ok=True)
         raise
     sync(path.parent)
 
@@ -235,8 +235,8 @@ def put_in_place(path: Path, data: bytes | memoryview) -> None:
 def changed(what: str) -> ArgumentError:
     """Return the error of an output that differs from its state in the checkpoint."""
     return ArgumentError(
-        f"{what}: it is not what was written up to the checkpoint: it is missing, or was changed "
-        "while the run was down; bring it back, or delete the checkpoint to begin anew"
+        f"{what}: it differs from the file at the checkpoint: it is missing, or was changed "
+        "while the run was down; restore it, or delete the checkpoint to begin anew"
     )
 
 
@@ -268,9 +268,9 @@ def version() -> str:
     project = Path(__file__).resolve().parents[2] / "pyproject.toml"
     if project.is_file():
         text = project.read_text(encoding="utf-8")
-        stated = re.search(r'^name = "ufl_beam"\nversion = "([^"]+)"', text, re.MULTILINE)
-        if stated:
-            return stated[1]
+        match = re.search(r'^name = "ufl_beam"\nversion = "([^"]+)"', text, re.MULTILINE)
+        if match:
+            return match[1]
     return metadata.version("ufl_beam")
 
 
@@ -311,7 +311,7 @@ def write(path: Path, format: str, content: Content, at: str = "") -> None:
                     NPY.write_array(member, values, allow_pickle=False)
     except (TypeError, ValueError) as error:
         raise ArgumentError(
-            f"{what} {path}{at} cannot be written: a state() has something else than numbers, "
+            f"{what} {path}{at} cannot be written: a state() must consist of numbers, "
             f"texts, lists and dicts: {error}"
         ) from None
     try:
@@ -358,22 +358,22 @@ def read(path: Path, format: str) -> Content:
     except OSError as error:
         raise ArgumentError(f"the file cannot be read: {error.strerror}") from None
     kind = format.rpartition(", ")[0]
-    found = by = ""
+    actual = by = ""
     if end := END.fullmatch(data[-256:]):
         if hashlib.sha256(data[:-DIGEST]).hexdigest().encode() != data[-DIGEST:]:
-            raise ArgumentError("the file is damaged: its checksum is not that of its content")
-        found, by = end[1].decode(), end[2].decode()
-    if not found:
-        why = "its end is not that of such a file" if data else "it is empty"
+            raise ArgumentError("the file is damaged: its checksum does not match its content")
+        actual, by = end[1].decode(), end[2].decode()
+    if not actual:
+        why = "its last line is wrong" if data else "it is empty"
         raise ArgumentError(f"the file holds no {kind}, or is damaged: {why}")
-    if found != format:
+    if actual != format:
         raise ArgumentError(
-            f"the file is a {found}, written by version {by} of ufl_beam; this version, "
+            f"the file is a {actual}, written by version {by} of ufl_beam; this version, "
             f"{version()}, reads a {format}"
         )
     with zipfile.ZipFile(io.BytesIO(data)) as archive:
         if sum(member.file_size for member in archive.infolist()) > len(data):
-            raise ArgumentError("the file is damaged: what it contains is larger than itself")
+            raise ArgumentError("the file is damaged: its content is larger than the file")
         content: Content = json.loads(archive.read("text.json"))
         for member in archive.namelist():
             name, _, ending = member.rpartition(".")
@@ -383,15 +383,15 @@ def read(path: Path, format: str) -> Content:
     return content
 
 
-def require_arrays(found: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> None:
+def require_arrays(content: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> None:
     """Raise :class:`ArgumentError` unless arrays of numbers have these shapes; -1 is any length."""
     for name, shape in shapes.items():
-        values = np.asarray(found.get(name))
+        values = np.asarray(content.get(name))
         same = len(values.shape) == len(shape) and all(
             expected in (length, -1) for length, expected in zip(values.shape, shape, strict=True)
         )
         if not same or values.dtype.kind not in "fi" or values.dtype.itemsize != 8:
-            is_ = f"{values.dtype} of shape {values.shape}" if name in found else "missing"
+            is_ = f"{values.dtype} of shape {values.shape}" if name in content else "missing"
             raise ArgumentError(
                 f"the file is damaged: the array {name!r} is {is_}, and must be numbers of 64 bits "
                 f"of shape {shape}"

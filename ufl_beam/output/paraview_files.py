@@ -49,11 +49,11 @@ class Rod(NamedTuple):
 
     a: Anchor
     b: Anchor
-    part: int  # BODY or LINK
+    group: int  # BODY or LINK
     along: Connector | None = None  # connector whose force acts along it
 
 
-def rods_of(scene: Scene) -> list[Rod]:
+def scene_rods(scene: Scene) -> list[Rod]:
     """Return lines from the centre of each body to its points, and along links and springs."""
     spots, rods = spots_of(scene), list[Rod]()
     for body in scene.bodies:
@@ -61,7 +61,7 @@ def rods_of(scene: Scene) -> list[Rod]:
         # A body with attachments at its centre alone also gets a line, which shows its rotation.
         beside = body.at(x + 0.02 * scene.size, y)
         others = [s for s in spots[body] if s.point != body.center] or [beside]
-        rods += [Rod(body.middle, spot, BODY) for spot in others]
+        rods += [Rod(body.middle, place, BODY) for place in others]
     for joint in scene.joints:
         if isinstance(joint, RigidLink | Link):
             a, b = joint.places
@@ -83,22 +83,22 @@ class LineData:
     """
 
     def __init__(self, simulation: StateView) -> None:
-        grid, rods = simulation.grid, rods_of(simulation.scene)
-        ends = [anchor for rod in rods for anchor in (rod.a, rod.b)]
-        corners = np.reshape([anchor.point for anchor in ends], (-1, 2))
+        grid, rods = simulation.grid, scene_rods(simulation.scene)
+        ends = [end for rod in rods for end in (rod.a, rod.b)]
+        corners = np.reshape([end.point for end in ends], (-1, 2))
         own = len(grid.points) + np.arange(len(ends)).reshape(-1, 2)
         self.lines = Lines(
             np.insert(np.concatenate([grid.points, corners]), 2, 0.0, axis=1),
             np.concatenate([grid.pieces, own]),
-            np.append(np.zeros(len(grid.pieces)), [rod.part for rod in rods]),
+            np.append(np.zeros(len(grid.pieces)), [rod.group for rod in rods]),
         )
         self._nodes = np.concatenate([grid.dofs, *(grid.node(a)[None] for a in ends)])
         self._ends = slice(len(grid.points), None)
-        self._arms = np.reshape([arm(anchor) for anchor in ends], (-1, 2))
+        self._arms = np.reshape([arm(end) for end in ends], (-1, 2))
         links = simulation.scene.links
         # Lines, and links whose forces act along them
         self._pulls = {k: links.index(rod.along) for k, rod in enumerate(rods) if rod.along}
-        self._pieces_of_cell, self._num_rods = grid.mesh.degree, len(rods)
+        self._pieces_per_cell, self._num_rods = grid.mesh.degree, len(rods)
 
     def fields(self, simulation: StateView) -> LineFields:
         """Compute the fields of the present state, see :class:`XDMF`; all processes call it."""
@@ -113,12 +113,12 @@ class LineData:
             velocity[self._ends, :2] += v[self._ends, 2:] * arms[:, ::-1] * (-1.0, 1.0)
             at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
         forces = simulation.section_forces()
-        of_cells: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
+        fields: dict[str, Array] = {name: forces[:, k] for k, name in enumerate("NVM")}
         if simulation.may_break:
-            of_cells["jump"], of_cells["dissipated energy"] = simulation.damage()
+            fields["jump"], fields["dissipated energy"] = simulation.damage()
         in_cells = {
-            name: np.append(np.repeat(values, self._pieces_of_cell), np.zeros(self._num_rods))
-            for name, values in of_cells.items()
+            name: np.append(np.repeat(values, self._pieces_per_cell), np.zeros(self._num_rods))
+            for name, values in fields.items()
         }
         if self._pulls:
             rods = in_cells["N"][len(self.lines.cells) - self._num_rods :]
@@ -134,7 +134,7 @@ HEAD = (
 )
 TAIL = b"</Grid></Domain></Xdmf>\n<?spare "  # steps to come are written into the instruction
 CLOSING = b"<?e?>"  # its end; a separate instruction once the previous one has lost its end
-PAGE, ROOM = mmap.PAGESIZE, 1 << 16
+PAGE, CAPACITY = mmap.PAGESIZE, 1 << 16
 
 
 class Complete(NamedTuple):
@@ -142,7 +142,7 @@ class Complete(NamedTuple):
 
     steps: int  # number of steps
     tail: int  # position of TAIL, the end of the document
-    room: int  # position of CLOSING, the end of the spare instruction
+    capacity: int  # position of CLOSING, the end of the spare instruction
     data: int  # length of the numbers
 
 
@@ -175,13 +175,13 @@ class XdmfWriter:
             f'<Attribute Name="part" AttributeType="Scalar" Center="Cell">{items[2]}</Attribute>'
         )
         new = complete is None
-        self.complete = Complete(*(complete or (0, len(HEAD), ROOM, len(mesh))))
+        self.complete = Complete(*(complete or (0, len(HEAD), CAPACITY, len(mesh))))
         self._data, self._xml = OutputFile(beside(path, ".bin"), new=new), OutputFile(path, new=new)
         if new:
             self._data.put(0, mesh)
-            self._xml.put(0, (HEAD + TAIL).ljust(ROOM) + CLOSING)
+            self._xml.put(0, (HEAD + TAIL).ljust(CAPACITY) + CLOSING)
         else:
-            short = self._xml.size < self.complete.room + len(CLOSING)
+            short = self._xml.size < self.complete.capacity + len(CLOSING)
             if short or self.sync() != digest:
                 self._xml.close()
                 self._data.close()
@@ -201,7 +201,7 @@ class XdmfWriter:
         """Append a step with its fields."""
         if self._data.size > self.complete.data:  # after an interrupted step
             self._cut()
-        steps, tail, room, length = self.complete
+        steps, tail, capacity, length = self.complete
         text = f'<Grid Name="{steps}" GridType="Uniform"><Time Value="{t!r}"/>{self._mesh}'
         data = bytearray()
         for center, by_name in zip(("Node", "Cell"), fields, strict=True):
@@ -217,28 +217,29 @@ class XdmfWriter:
         new_tail = start + len(grid)
         if new_tail % PAGE + len(TAIL) > PAGE:
             new_tail += -new_tail % PAGE
-        if (least := new_tail + len(TAIL)) > room:
-            new_room = least + ROOM + -(least + ROOM) % PAGE  # CLOSING lies within one page, too
-            after = room + len(CLOSING)
-            self._xml.put(after, b" " * (new_room - after))
-            self._xml.put(new_room, CLOSING)
-            self._xml.put(room, b" " * len(CLOSING))
-            room = new_room
+        if (least := new_tail + len(TAIL)) > capacity:
+            # CLOSING lies within one page, too
+            new_capacity = least + CAPACITY + -(least + CAPACITY) % PAGE
+            after = capacity + len(CLOSING)
+            self._xml.put(after, b" " * (new_capacity - after))
+            self._xml.put(new_capacity, CLOSING)
+            self._xml.put(capacity, b" " * len(CLOSING))
+            capacity = new_capacity
         self._xml.put(start, grid.ljust(new_tail - start) + TAIL)  # still in the instruction
         self._xml.put(tail, b" " * len(TAIL))  # now in the document
-        self.complete = Complete(steps + 1, new_tail, room, length + len(data))
+        self.complete = Complete(steps + 1, new_tail, capacity, length + len(data))
 
     def _cut(self) -> None:
         """Cut off data after the last complete step; the document is valid at any time.
 
         Numbers of a step are written before its text, and cut off after it.
         """
-        _, tail, room, length = self.complete
+        _, tail, capacity, length = self.complete
         self._xml.put(tail, TAIL)
-        spare, after = tail + len(TAIL), room + len(CLOSING)
-        self._xml.put(spare, b" " * (room - spare))
+        spare, after = tail + len(TAIL), capacity + len(CLOSING)
+        self._xml.put(spare, b" " * (capacity - spare))
         self._xml.put(after, b" " * (self._xml.size - len(CLOSING) - after))
-        self._xml.put(room, CLOSING)
+        self._xml.put(capacity, CLOSING)
         self._xml.cut(after)
         self._data.cut(length)
 
@@ -264,10 +265,10 @@ class XdmfWriter:
 
 # -- VTKHDF ---------------------------------------------------------------------------------------
 
-LAYOUT = (2, 0)  # version of the format; VTK 9.3 warns of later versions
+FORMAT_VERSION = (2, 0)  # version of the format; VTK 9.3 warns of later versions
 LINE = 3  # VTK's number of the type of a cell
 KINDS = ("PointData", "CellData")  # groups of fields
-SAME = {  # rows of each step, since all have one mesh
+ZERO_OFFSETS = {  # rows of each step, since all have one mesh
     "Steps/PartOffsets": np.array([0]),
     "Steps/CellOffsets": np.array([[0]]),
     "Steps/NumberOfParts": np.array([1]),
@@ -308,11 +309,11 @@ class VtkhdfWriter:
         self._hashes = [hashlib.sha256() for _ in rows]
         self._hashed = 0  # steps that the checksums include
         chunks = (dataset.chunks for dataset, _ in self._growing.values())
-        self._room = INDEX + sum(8 * math.prod(chunk) for chunk in chunks)
+        self._step_size = INDEX + sum(8 * math.prod(chunk) for chunk in chunks)
         if complete is not None:
-            self._take_over(path, digest)
+            self._resume(path, digest)
 
-    def _take_over(self, path: Path, digest: bytes) -> None:
+    def _resume(self, path: Path, digest: bytes) -> None:
         """Copy the complete steps of a file, and replace it by the copy if the digest agrees.
 
         So the run does not append to a damaged file, in which HDF5 may crash.
@@ -320,7 +321,7 @@ class VtkhdfWriter:
         import h5py
 
         try:
-            self._output.allocate(path.stat().st_size + 2 * self._room)
+            self._output.allocate(path.stat().st_size + 2 * self._step_size)
             try:
                 with h5py.File(path, "r", locking=False) as file:
                     for name, (new, rows) in self._growing.items():
@@ -341,7 +342,7 @@ class VtkhdfWriter:
 
     def write(self, t: float, fields: LineFields) -> None:
         """Append a step with its fields."""
-        self._output.allocate(self._file.id.get_filesize() + self._room)
+        self._output.allocate(self._file.id.get_filesize() + self._step_size)
         (steps,) = self.complete
         (times, time), *others = _rows(t, steps, fields).items()
         for name, values in others:
@@ -409,7 +410,7 @@ def _rows(t: float, n: int, fields: LineFields) -> dict[str, Array]:
         rows |= {f"{kind}/{name}": values for name, values in by_name.items()}
         first, length = next((name, len(values)) for name, values in by_name.items())
         offsets[f"Steps/{kind}Offsets/{first}"] = np.array([n * length])
-    return {**rows, **offsets, **SAME}
+    return {**rows, **offsets, **ZERO_OFFSETS}
 
 
 def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> bytes:
@@ -418,7 +419,7 @@ def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> byt
 
     with h5py.File("vtkhdf", "w", driver="core", backing_store=False) as file:
         root = file.create_group("VTKHDF")
-        root.attrs["Version"] = np.array(LAYOUT)
+        root.attrs["Version"] = np.array(FORMAT_VERSION)
         root.attrs["Type"] = np.bytes_("UnstructuredGrid")  # of fixed length; a str is refused
         root["NumberOfPoints"] = np.array([len(lines.points)])
         root["NumberOfCells"] = np.array([len(lines.cells)])

@@ -51,20 +51,21 @@ class JointHistory(NamedTuple):
     moment: Array
 
 
-def links_of(scene: Scene, of: Connector | Joint) -> list[int]:
-    """Return the numbers of the links of a connector, or of the links that hold a joint."""
-    if isinstance(of, Connector):
-        links = of.components or (of,)
+def connector_indices(scene: Scene, connector: Connector | Joint) -> list[int]:
+    """Return the indices of the components of a connector, or of a joint."""
+    if isinstance(connector, Connector):
+        links = connector.components or (connector,)
         if links[0] not in scene.links:
-            raise ArgumentError(f"{of} is not in the scene")
+            raise ArgumentError(f"{connector} is not in the scene")
         return [scene.links.index(link) for link in links]
-    if of not in scene.joints:
-        raise ArgumentError(f"{of} is not in the scene")
-    if not of.holders:
+    if connector not in scene.joints:
+        raise ArgumentError(f"{connector} is not in the scene")
+    if not connector.holders:
         raise ArgumentError(
-            f"{of} shares unknowns, so that its force is not known; make it with multipliers=True"
+            f"{connector} shares unknowns, so that its force is not known; make it with "
+            "multipliers=True"
         )
-    return [scene.links.index(holder) for holder in of.holders]
+    return [scene.links.index(holder) for holder in connector.holders]
 
 
 def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
@@ -86,7 +87,7 @@ def values_at(grid: Grid, place: Anchor, states: Vectors) -> Array:
     return np.asarray(weights @ np.ascontiguousarray(states[:, dofs]))
 
 
-def velocity_of(grid: Grid, place: Anchor, states: Vectors, velocities: Vectors) -> Array:
+def velocity_at(grid: Grid, place: Anchor, states: Vectors, velocities: Vectors) -> Array:
     """Return the velocity of a place; (n, 3); m/s, m/s, rad/s."""
     motion = values_at(grid, place, velocities)
     if isinstance(place, Spot):
@@ -144,42 +145,44 @@ POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 GAUSS = [(float(1 + x) / 2, float(w) / 2) for x, w in zip(POINTS, WEIGHTS, strict=True)]
 """Points and weights of the Gauss rule on a cell, which is exact for all integrals here."""
 
-Way = Callable[[Any], tuple[Any, Any]]
+Tangent = Callable[[Any], tuple[Any, Any]]
 """Derivative of the position by the fraction of the cell, at a fraction."""
 
 
-def section_force(numbers: Any, way: Way, *, works: bool) -> Callable[[Any], tuple[Any, Any, Any]]:
+def section_force(
+    numbers: Any, tangent: Tangent, *, works: bool
+) -> Callable[[Any], tuple[Any, Any, Any]]:
     """Return the force in the plane and the moment as a function of the fraction of a cell.
 
     The fraction is 0 at the start of the cell and 1 at its end.
 
     Args:
         numbers: Forces of the cell, ``cell_number`` of loops.h: arrays, or expressions of UFL.
-        way: Derivative of the position in the configuration of equilibrium.
+        tangent: Derivative of the position in the configuration of equilibrium.
         works: Whether forces across the cell may have any distribution, due to works of a user.
     """
     start, end, skew = ((numbers[k], numbers[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X))
     at_start, at_end, couple = (numbers[k] for k in (lib.START_M, lib.END_M, lib.COUPLE))
 
-    def force(part: Any) -> list[Any]:
-        bend = -6 * part * (1 - part)
-        return [part * (a + b) - a + bend * c for a, b, c in zip(start, end, skew, strict=True)]
+    def force(s: Any) -> list[Any]:
+        bend = -6 * s * (1 - s)
+        return [s * (a + b) - a + bend * c for a, b, c in zip(start, end, skew, strict=True)]
 
-    def lever(part: Any) -> Any:
-        """Return the moment of the forces up to ``part`` about the point there, over ``part``."""
-        pairs = ((weight, way(at * part), force(at * part)) for at, weight in GAUSS)
+    def lever(s: Any) -> Any:
+        """Return the moment of the forces up to ``s`` about the point at ``s``, over ``s``."""
+        pairs = ((weight, tangent(at * s), force(at * s)) for at, weight in GAUSS)
         return sum(weight * (x[0] * f[1] - x[1] * f[0]) for weight, x, f in pairs)
 
     # The moments at both ends also determine couples, or the distribution of works across.
-    missed = at_start + at_end - couple + lever(1.0)
+    imbalance = at_start + at_end - couple + lever(1.0)
     if works:
-        ways = [[6 * w * at * (1 - at) * x for x in way(at)] for at, w in GAUSS]
-        x, y = (sum(one) for one in zip(*ways, strict=True))
-        turned = missed / (x * x + y * y)
+        arms = [[6 * w * at * (1 - at) * x for x in tangent(at)] for at, w in GAUSS]
+        x, y = (sum(column) for column in zip(*arms, strict=True))
+        turned = imbalance / (x * x + y * y)
         skew = skew[0] - turned * y, skew[1] + turned * x
     else:
-        couple = couple + missed
-    return lambda part: (*force(part), part * (couple - lever(part)) - at_start)
+        couple = couple + imbalance
+    return lambda s: (*force(s), s * (couple - lever(s)) - at_start)
 
 
 def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, Any]:
@@ -208,7 +211,7 @@ class ForcesAlongCells:
         self._places: Array = grid.points[nodes[:, self._along]].transpose(2, 0, 1)
         x, y = self._places[:, :, -1] - self._places[:, :, 0]
         angles = np.asarray(np.arctan2(y, x))
-        self.angles = angles[:, None] + _turns(grid, angles)
+        self.angles = angles[:, None] + _axis_angles(grid, angles)
 
     def __call__(self, cells: Index | slice, parts: Array, numbers: Array, q: Array) -> Array:
         """Compute section forces at fractions of cells; N, N, N m.
@@ -227,16 +230,16 @@ class ForcesAlongCells:
         x, y = self._places[:, cells] + (u, v)
         mesh, (start, end) = self._mesh, self.angles[cells].T
 
-        def way(part: Array | float) -> tuple[Array, Array]:
-            slopes = mesh.slopes(np.ravel(part)).T
+        def tangent(s: Array | float) -> tuple[Array, Array]:
+            slopes = mesh.slopes(np.ravel(s)).T
             return x @ slopes, y @ slopes
 
         angle = np.outer(start, 1 - parts) + np.outer(end, parts) + ψ @ mesh.weights(parts).T
-        at = section_force(numbers[:, :, None], way, works=self._works)
+        at = section_force(numbers[:, :, None], tangent, works=self._works)
         return np.stack(in_section(at(parts), np.cos(angle), np.sin(angle)), axis=2)
 
 
-def _turns(grid: Any, angles: Array) -> Array:
+def _axis_angles(grid: Any, angles: Array) -> Array:
     """Return angles from both ends of cells to the smooth axis of beams; (num_cells, 2); rad.
 
     The axis halves the angle between two cells at a vertex, except at corners of the beam.  Its

@@ -26,7 +26,7 @@ from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import Output, require_apart, require_writable
-from ufl_beam.output.postprocessing import links_of
+from ufl_beam.output.postprocessing import connector_indices
 from ufl_beam.output.state_rows import FORCE, Connection, connection
 from ufl_beam.output.states import States
 from ufl_beam.parallel import on_first
@@ -53,7 +53,7 @@ class PresentState(ABC):
         """Return the ledger over all processes: state, supplied, lost; J."""
         columns, row = self.now.row(0)
         numbers: Any = row.tolist()
-        return tuple({name: numbers[at] for name, at in of.items()} for of in columns.ledger)
+        return tuple({name: numbers[at] for name, at in group.items()} for group in columns.ledger)
 
     def connections(self) -> Array:
         """Return columns of :class:`Connection` for all links of the scene; (links, columns)."""
@@ -65,7 +65,7 @@ class PresentState(ABC):
         Raises:
             ArgumentError: The connector is not in the scene.
         """
-        return connection(self.connections()[links_of(self.scene, connector)])
+        return connection(self.connections()[connector_indices(self.scene, connector)])
 
     def displacement(self, place: Anchor) -> Array:
         """Return displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
@@ -80,7 +80,7 @@ class PresentState(ABC):
         if not has_inertia(self.scheme):
             raise ArgumentError(
                 f"velocity of {place}: the run is static; there is none. A controller for both "
-                "kinds of runs can ask now.scheme.dynamic"
+                "kinds of runs can test now.scheme.dynamic"
             )
         return np.asarray(self.now.velocity(place)[0])
 
@@ -94,7 +94,7 @@ class PresentState(ABC):
             number = self.scene.supports.index(joint)
             return float(np.linalg.norm(self.now.column("reactions")[0, number, :2]))
         links = self.scene.links
-        numbers = [n for n in links_of(self.scene, joint) if not links[n].turns]
+        numbers = [n for n in connector_indices(self.scene, joint) if not links[n].turns]
         return float(np.linalg.norm(self.connections()[numbers, FORCE]))
 
     def section_forces(self) -> Array:
@@ -222,8 +222,8 @@ class Recorder(ABC):
             ArgumentError: The recorder cannot be restarted.
         """
         raise ArgumentError(
-            f"{type(self).__name__}: this recorder cannot go on from a checkpoint; give it methods "
-            "state() and resume(simulation, state), or run without a checkpoint"
+            f"{type(self).__name__}: this recorder cannot continue from a checkpoint; give it "
+            "methods state() and resume(simulation, state), or run without a checkpoint"
         )
 
     def resume(self, simulation: StateView, state: State) -> None:
@@ -251,7 +251,7 @@ class Restartable(Recorder):
         self.begin(simulation, state)
 
 
-def recorders_of(
+def checked_recorders(
     record: Sequence[Recorder] | Recorder, comm: MPI.Intracomm, call: str, *others: Output
 ) -> tuple[tuple[Recorder, ...], list[Output]]:
     """Check the recorders of a run; return them and all outputs, ``others`` included."""
@@ -261,13 +261,13 @@ def recorders_of(
         name = f"record[{i}]"
         if not isinstance(recorder, Recorder):
             raise ArgumentError(
-                f"{call}: {name} = {shorten(recorder)} is not a Recorder; classes of your own are "
-                "derived from ub.Recorder"
+                f"{call}: {name} = {shorten(recorder)} is not a Recorder; derive your own classes "
+                "from ub.Recorder"
             )
         if why := unlike(recorder, Recorder):
             kind = type(recorder).__name__
             raise ArgumentError(f"{call}: {name}: {kind} is not a recorder: {why}")
-        first = next(k for k, one in enumerate(recorders) if one is recorder)
+        first = next(k for k, x in enumerate(recorders) if x is recorder)
         if first != i:
             raise ArgumentError(
                 f"{call}: record[{first}] and {name} are the same {type(recorder).__name__}; "

@@ -46,10 +46,10 @@ class SavedFunction:
     values: tuple[float, ...]  # one for each time
 
     @classmethod
-    def of(cls, function: Callable[[float], float], times: Iterable[float]) -> SavedFunction:
+    def sampled(cls, function: Callable[[float], float], times: Iterable[float]) -> SavedFunction:
         """Sample a function at times and at 0; times at which it fails are left out."""
         known = _sampled(lambda t: float(function(t)), {0.0, *times})
-        return cls(name_of(function), tuple(known), tuple(known.values()))
+        return cls(function_name(function), tuple(known), tuple(known.values()))
 
     def __call__(self, t: float) -> float:
         """Return the value at a sampled time; :class:`ArgumentError` at other times."""
@@ -72,7 +72,7 @@ class SavedCurve:
     points: tuple[Point, ...]  # a point for each parameter; m
 
     @classmethod
-    def of(
+    def sampled(
         cls, curve: Callable[[float], Any], first: float, last: float, more: Iterable[float] = ()
     ) -> SavedCurve:
         """Sample a curve between two parameters and at ``more``, except where it fails."""
@@ -83,7 +83,7 @@ class SavedCurve:
             return float(x), float(y)
 
         known = _sampled(point, {*even, *more})
-        return cls(name_of(curve), tuple(known), tuple(known.values()))
+        return cls(function_name(curve), tuple(known), tuple(known.values()))
 
     def __call__(self, s: float) -> Point:
         """Return the point at a parameter; exact at sampled parameters."""
@@ -92,8 +92,8 @@ class SavedCurve:
             return self.points[n]
         count = 4 if 0 < n < len(self.s) else 2
         first = max(min(n - count // 2, len(self.s) - count), 0)
-        near = slice(first, first + count)
-        x, y = KroghInterpolator(self.s[near], self.points[near])(s)
+        nearest = slice(first, first + count)
+        x, y = KroghInterpolator(self.s[nearest], self.points[nearest])(s)
         return float(x), float(y)
 
 
@@ -122,7 +122,7 @@ def _sampled(function: Callable[[float], T], at: Iterable[float]) -> dict[float,
     return known
 
 
-def name_of(function: Any) -> str:
+def function_name(function: Any) -> str:
     """Return the name of a function, or of the class of a callable object."""
     return str(getattr(function, "__qualname__", type(function).__qualname__))
 
@@ -159,7 +159,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
         if isinstance(value, np.ndarray):
             return {"array": value.tolist()}
         if isinstance(value, tuple | list):
-            return [describe(one, owner, field) for one in value]
+            return [describe(item, owner, field) for item in value]
         if isinstance(value, Mapping):
             pairs = [[describe(x, owner, field) for x in pair] for pair in value.items()]
             return {"mapping": pairs}
@@ -171,7 +171,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
             if RECORDS.get(type(value).__name__) is not type(value):
                 if callable(value):
                     known = sampling(owner, field, value) if sampling else None
-                    record = LostFunction(name_of(value)) if known is None else known
+                    record = LostFunction(function_name(value)) if known is None else known
                 elif not dataclasses.is_dataclass(value):
                     raise ArgumentError(
                         f"{value!r} cannot be saved: {type(value).__name__} is no record of "
@@ -225,11 +225,11 @@ def from_data(data: Data) -> Any:
         warnings.simplefilter("ignore", ModelWarning)
         for record in data["records"]:
             fields = {name: make(value) for name, value in record.items() if name != "is"}
-            made.append(made_of(RECORDS[record["is"]], fields))
+            made.append(make_record(RECORDS[record["is"]], fields))
     return make(data["root"])
 
 
-def made_of(kind: type[T], fields: Mapping[str, Any]) -> T:
+def make_record(kind: type[T], fields: Mapping[str, Any]) -> T:
     """Make a dataclass from its fields, even if its constructor has other arguments."""
     known = {field.name for field in dataclasses.fields(kind) if field.init}  # type: ignore[arg-type]
     if fields.keys() != known:
@@ -281,10 +281,10 @@ class Description:
             if first != name:
                 self.texts[name] = f"the same as {first}"
                 return
-        for part, what in self._parts(name, value):
-            self._put(f"{name}{part}", what)
+        for key, what in self._members(name, value):
+            self._put(f"{name}{key}", what)
 
-    def _parts(self, name: str, value: Any) -> Iterator[tuple[str, Any]]:
+    def _members(self, name: str, value: Any) -> Iterator[tuple[str, Any]]:
         """Store the type of an object, and yield its parts with their names."""
         if has_state(value):
             self.stateful[name] = value
@@ -298,16 +298,16 @@ class Description:
             self.texts[name] = f"{value.dtype} of shape {value.shape}, checksum {digest}"
         elif isinstance(value, Mapping):
             self.texts[name] = f"{len(value)} by name"
-            yield from ((f"[{key!r}]", part) for key, part in value.items())
+            yield from ((f"[{key!r}]", member) for key, member in value.items())
         elif isinstance(value, Sequence | set | frozenset):
             self.texts[name] = f"{len(value)} in a row"
-            parts = value if isinstance(value, Sequence) else sorted(value, key=repr)
-            for i, part in enumerate(parts):
-                label = getattr(part, "name", None)
-                yield f"[{i}]{f' {label!r}' if isinstance(label, str) else ''}", part
+            sequence = value if isinstance(value, Sequence) else sorted(value, key=repr)
+            for i, member in enumerate(sequence):
+                label = getattr(member, "name", None)
+                yield f"[{i}]{f' {label!r}' if isinstance(label, str) else ''}", member
         elif isinstance(value, FunctionType):
             self.texts[name] = f"function {value.__qualname__}"
-            yield from self._of_function(name, value)
+            yield from self._function_members(name, value)
         elif isinstance(value, MethodType):
             self.texts[name] = f"method {value.__func__.__qualname__}"
             yield "", value.__func__
@@ -319,11 +319,11 @@ class Description:
             self.texts[name] = type(value).__qualname__
             if not type(value).__module__.startswith("ufl_beam."):
                 members = getattr(value, "__dict__", {})
-                yield from ((f".{key}", part) for key, part in members.items())
+                yield from ((f".{key}", member) for key, member in members.items())
 
-    def _of_function(self, name: str, function: FunctionType) -> Iterator[tuple[str, Any]]:
+    def _function_members(self, name: str, function: FunctionType) -> Iterator[tuple[str, Any]]:
         code, names = function.__code__, set[str]()
-        text = _text_of(code, names)
+        text = _code_text(code, names)
         self.texts[f"{name}.{CODE}"] = hashlib.sha256(text.encode()).hexdigest()[:16]
         for variable, cell in zip(code.co_freevars, function.__closure__ or (), strict=True):
             try:
@@ -350,11 +350,11 @@ def has_state(value: Any) -> bool:
     return own or isinstance(value, np.random.Generator | np.random.RandomState)
 
 
-def _text_of(code: CodeType, names: set[str]) -> str:
+def _code_text(code: CodeType, names: set[str]) -> str:
     """Return code as text for comparison, and add the names that it uses to ``names``."""
     names.update(code.co_names)
     constants = [
-        _text_of(c, names)
+        _code_text(c, names)
         if isinstance(c, CodeType)
         else repr(sorted(c, key=repr) if isinstance(c, frozenset) else c)
         for c in code.co_consts

@@ -30,10 +30,10 @@ from ufl_beam.output.postprocessing import (
     ForcesAlongCells,
     JointHistory,
     Material,
-    links_of,
+    connector_indices,
     turned,
     values_at,
-    velocity_of,
+    velocity_at,
 )
 from ufl_beam.output.state_rows import (
     BEFORE,
@@ -52,7 +52,7 @@ from ufl_beam.output.state_rows import (
 )
 from ufl_beam.terms.energy_ledger import Energy
 
-LEAST_ROOM, MOST_NUMBERS = 8, 2**17
+LEAST_ROWS, MOST_VALUES = 8, 2**17
 """Least number of rows in a new block, and limit of the numbers in them.  Small blocks fit into
 used memory; the first access of new pages takes a considerable fraction of a step."""
 
@@ -120,9 +120,9 @@ class States:
             or (block.columns is not columns and block.columns.at != columns.at)
             or block.number == len(block.space)
         ):
-            most = MOST_NUMBERS // columns.width
-            number_of_rows = max(number, min(max(len(self), LEAST_ROOM), most))
-            space = new_rows(number_of_rows, columns.width)
+            most = MOST_VALUES // columns.width
+            rows = max(number, min(max(len(self), LEAST_ROWS), most))
+            space = new_rows(rows, columns.width)
             self._blocks.append(block := Block(columns, space, 0))
         return block.space[block.number : block.number + number]
 
@@ -171,7 +171,7 @@ class States:
         """Return the column of this name in all states that have it; (n+1, ...)."""
         return Column(self._blocks, name)
 
-    def _one(self, name: str, n: int) -> Array:
+    def _row(self, name: str, n: int) -> Array:
         """Return a view of a column of the n-th state."""
         columns, row = self.row(n)
         return columns.of_rows(name, row)
@@ -182,7 +182,7 @@ class States:
         columns, row = self.row(n)
         if BEFORE in columns.at:
             return columns.of_rows(BEFORE, row)
-        return self._one("q", n - 1 if n and self.begun else n)
+        return self._row("q", n - 1 if n and self.begun else n)
 
     def numbers(self, n: int) -> Array:
         """Return ``cell_number`` of loops.h in the n-th state; (9, num_cells); N, N m."""
@@ -190,7 +190,7 @@ class States:
         if FORCES in columns.at:
             return columns.of_rows(FORCES, row)
         if self.of_record is None:
-            raise ArgumentError("section forces: these states were kept without them")
+            raise ArgumentError("section forces: these states were stored without them")
         record, q = (columns.of_rows(name, row) for name in (RECORD, "q"))
         return self.of_record(record, q, self.before(n))
 
@@ -267,7 +267,7 @@ class States:
         """
         if not len(v := self.column("v")):
             raise ArgumentError("velocity: the run was static; there is none")
-        return velocity_of(self.grid, place, self.column("q"), v)
+        return velocity_at(self.grid, place, self.column("q"), v)
 
     def position(self, place: Anchor) -> Array:
         """Return the coordinates of a place; (n+1, 2); m."""
@@ -279,7 +279,7 @@ class States:
     def shape(self, beam: Member, n: int = -1) -> Array:
         """Return coordinates of the vertices of a beam at the n-th time; (num_vertices, 2); m."""
         vertices, grid = self.grid.vertices_of(beam), self.grid
-        return np.asarray(grid.points[vertices] + self._one("q", n)[grid.dofs[vertices, :2]])
+        return np.asarray(grid.points[vertices] + self._row("q", n)[grid.dofs[vertices, :2]])
 
     # -- joints --------------------------------------------------------------------------------
 
@@ -289,7 +289,7 @@ class States:
         Raises:
             ArgumentError: The connector is not in the scene.
         """
-        return connection(self.column("connectors")[:, links_of(self.scene, connector)])
+        return connection(self.column("connectors")[:, connector_indices(self.scene, connector)])
 
     def joint(self, joint: Joint) -> JointHistory:
         """Return the relative motion and the forces of the first two places of a joint.
@@ -297,7 +297,7 @@ class States:
         Raises:
             ArgumentError: The joint is not in the scene, or its places share unknowns.
         """
-        numbers, (a, b, *_) = links_of(self.scene, joint), joint.places
+        numbers, (a, b, *_) = connector_indices(self.scene, joint), joint.places
         if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
             raise ArgumentError(
                 f"{joint}: {a} and {b} share unknowns, so that the force between them is not "
@@ -319,10 +319,10 @@ class States:
                 moment -= λ
             else:
                 force -= λ[:, None] * self._direction(holder, turns[0])
-        in_a, in_b = (turned(force, -turn) for turn in turns)
+        in_a, in_b = (turned(force, -angle) for angle in turns)
         return JointHistory(motion, force, in_a, in_b, moment)
 
-    def _direction(self, holder: Connector, turn: Array) -> Array:
+    def _direction(self, holder: Connector, angle: Array) -> Array:
         """Return unit vectors in the plane along which a motion grows; (n+1, 2)."""
         if holder.stretches:
             between = self.position(holder.b) - self.position(holder.a)
@@ -335,7 +335,7 @@ class States:
                 x, y = tangent(curve, s, step)
                 normals.append((-y, x))
             return np.asarray(normals / np.linalg.norm(normals, axis=1)[:, None])
-        return turned(holder.axis, turn if holder.follows_a else np.zeros_like(turn))
+        return turned(holder.axis, angle if holder.follows_a else np.zeros_like(angle))
 
     def reaction(self, support: Support) -> Array:
         """Return force and moment of a support on the scene; (n+1, 3); N, N, N m.
@@ -367,15 +367,15 @@ class States:
         Returns:
             Section forces; (num_cells, len(parts), 3); N, N, N m.
         """
-        asked = range(len(self))[n], parts.tobytes()
-        if self._computed is None or self._computed[0] != asked:
-            q = self._one("q", n)
+        key = range(len(self))[n], parts.tobytes()
+        if self._computed is None or self._computed[0] != key:
+            q = self._row("q", n)
             if self.between < 1:
                 q = (1 - self.between) * self.before(n) + self.between * q
             along = self.cells.along
             forces = along(slice(None), parts, self.numbers(n), q[along.dofs])
             forces.flags.writeable = False
-            self._computed = asked, forces
+            self._computed = key, forces
         return self._computed[1]
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
@@ -435,7 +435,7 @@ class States:
     def mean_strains(self, n: int) -> Array:
         """Return (Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
         strains = np.empty((len(self.grid.cells), 3))
-        strains[self.cells.fields.order] = self.cells.strains.mean(self._one("q", n))
+        strains[self.cells.fields.order] = self.cells.strains.mean(self._row("q", n))
         return strains
 
     def material(self, beam: Member, n: int = -1) -> Material:
@@ -456,7 +456,7 @@ class States:
         """Return column "material" of all cells; elastic cells get ``forces``; (num_cells, 6)."""
         everything = np.zeros((len(self.grid.cells), self.row(n)[0].shapes["material"][1]))
         everything[:, :3] = forces
-        everything[self.grid.inelastic_cells] = self._one("material", n)
+        everything[self.grid.inelastic_cells] = self._row("material", n)
         return everything
 
     def material_at(self, place: Place) -> Material:
@@ -473,8 +473,8 @@ class States:
         states = zip(*(self._material(n, cell) for n in range(len(self))), strict=True)
         forces, jump, plastic, energy = map(np.array, states)
         if hinge is not None:
-            of_hinge = self.connector(hinge)
-            forces[:, 2], jump, energy = of_hinge.force, of_hinge.motion, of_hinge.dissipated
+            history = self.connector(hinge)
+            forces[:, 2], jump, energy = history.force, history.motion, history.dissipated
         return Material(forces, jump, plastic, energy)
 
     def damage(self, n: int = -1) -> tuple[Array, Array]:
@@ -483,10 +483,10 @@ class States:
         Plastic hinges at the ends of cells are included.  If a cell has several jumps, the value
         is the largest jump.
         """
-        of_cells = self.cells_of(n)
-        jump, dissipated = of_cells[:, 3].copy(), of_cells[:, PLASTIC] + of_cells[:, HINGE]
+        states = self.cells_of(n)
+        jump, dissipated = states[:, 3].copy(), states[:, PLASTIC] + states[:, HINGE]
         if self.scene.hinges:
-            hinges = Connection(*self._one("connectors", n)[-len(self.scene.hinges) :].T)
+            hinges = Connection(*self._row("connectors", n)[-len(self.scene.hinges) :].T)
             np.add.at(dissipated, self.grid.cells_at_hinges, hinges.dissipated)
             for cell, motion in zip(self.grid.cells_at_hinges, hinges.motion, strict=True):
                 jump[cell] = max(jump[cell], motion, key=abs)
@@ -498,11 +498,11 @@ class States:
         """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
         parts = []
         for k in range(len(LEDGER)):
-            found = [(block.rows, block.columns.ledger[k]) for block in self._blocks]
-            names = dict.fromkeys(name for _, at in found for name in at)
+            columns = [(block.rows, block.columns.ledger[k]) for block in self._blocks]
+            names = dict.fromkeys(name for _, at in columns for name in at)
             parts.append({
                 name: np.concatenate([
-                    rows[:, at[name]] if name in at else np.zeros(len(rows)) for rows, at in found
+                    rows[:, at[name]] if name in at else np.zeros(len(rows)) for rows, at in columns
                 ])
                 for name in names
             })  # fmt: skip
@@ -530,7 +530,7 @@ class States:
 
         states = []
         for n in range(len(self)):
-            q, p = self._one("q", n), times(self._one("v", n))
+            q, p = self._row("q", n), times(self._row("v", n))
             turning = (X + q[u]) * p[v] - (Y + q[v]) * p[u]
             states.append((p[u].sum(), p[v].sum(), turning.sum() + p[ψ].sum()))
         return np.array(states)

@@ -12,15 +12,15 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
-from ufl_beam.plotting import layout, style, symbols
+from ufl_beam.plotting import positions, style, symbols
 from ufl_beam.plotting.inelastic import circle, dissipated_per_length, draw_damage, open_hinges
-from ufl_beam.plotting.layout import (
+from ufl_beam.plotting.positions import (
+    Candidate,
+    Canvas,
+    DeformedShape,
     Label,
-    Pose,
-    Spot,
-    Stage,
     joined,
-    left_of,
+    normal,
     segments,
     unit_vectors,
 )
@@ -57,14 +57,14 @@ SIGNS = {
 Values = tuple[Member, Array]  # a beam, and values at points of its cells, (num_cells, points)
 
 
-def plane_stage(
+def plane_canvas(
     solution: Solution,
     shown: Sequence[int],
     magnify: float,
     ax: Axes | None = None,
     size: tuple[float, float] | None = None,
-) -> tuple[Stage, tuple[float, float]]:
-    """Make a stage whose symbols have a size in points.
+) -> tuple[Canvas, tuple[float, float]]:
+    """Make a canvas whose symbols have a size in points.
 
     Args:
         solution: Solution to draw.
@@ -75,33 +75,33 @@ def plane_stage(
             points need at this width; inch.
 
     Returns:
-        The stage, and the size of the figure.
+        The canvas, and the size of the figure.
     """
-    points = Stage(solution, magnify, 0.02 * solution.scene.size, shown).points()
+    points = Canvas(solution, magnify, 0.02 * solution.scene.size, shown).points()
     extent = np.ptp(points, axis=0)
     high = float(np.clip(8.0 * extent[1] / max(extent[0], 1e-12), 3.2, 6.8))
     size = (9.0, high) if size is None else size
     if ax is None:
-        room = np.subtract(size, (0.9, 0.9))  # without numbers and words
+        space = np.subtract(size, (0.9, 0.9))  # without numbers and words
     else:
         style.require_axes(ax)
-        room = style.size_of(ax) / POINTS
-    scale = float(np.max((1.12, 1.20) * extent / room)) / POINTS
-    return Stage.at_scale(solution, magnify, scale, shown), size
+        space = style.axes_size(ax) / POINTS
+    scale = float(np.max((1.12, 1.20) * extent / space)) / POINTS
+    return Canvas.at_scale(solution, magnify, scale, shown), size
 
 
 def draw_beams(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
     """Draw the axes of all beams through these points."""
     grid = solution.grid
-    chains = [points[grid.nodes_along(beam)] for beam in solution.scene.beams]
-    axes.plot(*joined(chains).T, **line)
+    lines = [points[grid.nodes_along(beam)] for beam in solution.scene.beams]
+    axes.plot(*joined(lines).T, **line)
 
 
-def draw_undeformed(axes: Axes, solution: Solution, stage: Stage) -> None:
+def draw_undeformed(axes: Axes, solution: Solution, canvas: Canvas) -> None:
     """Draw undeformed beams, bodies and rods in grey."""
-    pose = stage.undeformed
-    draw_beams(axes, solution, pose.nodes, color=GREY, linewidth=1.2, zorder=1)
-    outlines = joined(s.points for s in (*symbols.bodies(pose), *symbols.rods(pose)))
+    shape = canvas.undeformed
+    draw_beams(axes, solution, shape.nodes, color=GREY, linewidth=1.2, zorder=1)
+    outlines = joined(s.points for s in (*symbols.bodies(shape), *symbols.rods(shape)))
     axes.plot(*outlines.T, color=GREY, linewidth=1.2, zorder=1)
 
 
@@ -115,31 +115,33 @@ def draw_shape(
     positive values are red, negative values blue.  Between vertices they follow from equilibrium,
     see :meth:`Solution.diagram`.  Peaks of areas are labelled in the unit of the title; the largest
     and the least value are bold.  Yielded or cracked cells are orange; open hinges are circles as
-    in :func:`draw_state_of_damage`.
+    in :func:`draw_damage_state`.
 
     Raises:
         ArgumentError: No such time, ``magnify`` not positive, or ``ax`` no axes.
     """
-    pose = plane_stage(solution, [n], magnify, ax, MOST)[0].pose(n)
+    shape = plane_canvas(solution, [n], magnify, ax, MOST)[0].shape(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
     if quantity == "shape":
-        return draw_frame(ax, solution, n, pose, ("shape", when))
-    found = [(beam, getattr(solution.diagram(beam, n), quantity)) for beam in solution.scene.beams]
-    diagrams = [(b, values.reshape(len(solution.grid.cells_of(b)), -1)) for b, values in found]
+        return draw_frame(ax, solution, n, shape, ("shape", when))
+    results = [
+        (beam, getattr(solution.diagram(beam, n), quantity)) for beam in solution.scene.beams
+    ]
+    diagrams = [(b, values.reshape(len(solution.grid.cells_of(b)), -1)) for b, values in results]
     name = f"{RESULTANTS[quantity][0]} {quantity}"
-    return draw_frame(ax, solution, n, pose, (name, when), quantity, diagrams)
+    return draw_frame(ax, solution, n, shape, (name, when), quantity, diagrams)
 
 
 def draw_frame(
     ax: Axes | None,
     solution: Solution,
     n: int,
-    pose: Pose,
+    shape: DeformedShape,
     title: tuple[str, str],
     what: str = "",
     diagrams: Sequence[Values] = (),
 ) -> Figure:
-    """Draw the frame in a pose, with diagrams of a section force, their peaks, and damage.
+    """Draw the deformed frame, with diagrams of a section force, their peaks, and damage.
 
     The damage is shown at the n-th kept time.  The unit stands between both parts of the title.
     """
@@ -151,19 +153,19 @@ def draw_frame(
     unit = f"({prefix}{RESULTANTS[what][1]}) " if diagrams else ""
     with style.panel(ax, MOST) as axes:
         style.plane_axes(axes, f"{name} {unit}{when}")
-        draw_undeformed(axes, solution, pose.stage)
+        draw_undeformed(axes, solution, shape.canvas)
         peaks: list[Peak] = []
         if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # more than rounding
-            rows = _draw_diagrams(axes, solution, pose.nodes, what, diagrams)
+            rows = _draw_diagrams(axes, solution, shape.nodes, what, diagrams)
             peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MANY else 1.0)
-        draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.6, zorder=4)
-        draw_strokes(axes, symbols.in_plane(pose))
+        draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.6, zorder=4)
+        draw_strokes(axes, symbols.in_plane(shape))
         meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
         areas = {area.get_gid(): area for area in axes.collections}
         named: dict[str, Artist] = {
             words: areas[color] for color, words in meanings.items() if color in areas
         }
-        named |= draw_damage(axes, solution, n, pose.nodes)
+        named |= draw_damage(axes, solution, n, shape.nodes)
         for words, artist in named.items():
             artist.set_label(words)
         if named:
@@ -172,7 +174,7 @@ def draw_frame(
                 ncols=1 if len(named) <= 2 else 2, fontsize=font_size(11.0),
             )  # fmt: skip
         _arrange(axes, peaks, own=ax is None)
-    return style.figure_of(axes)
+    return style.parent_figure(axes)
 
 
 def _draw_diagrams(
@@ -188,17 +190,17 @@ def _draw_diagrams(
 
     side = -1.0 if what == "M" else 1.0
     cells = np.concatenate([solution.grid.cells_of(beam) for beam, _ in diagrams])
-    found = np.concatenate([values for _, values in diagrams])
-    largest = float(np.abs(found).max())
+    all_values = np.concatenate([values for _, values in diagrams])
+    largest = float(np.abs(all_values).max())
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
-    values = np.where(np.abs(found) > DRAWN_AS_ZERO * largest, found, 0.0).ravel()
+    values = np.where(np.abs(all_values) > DRAWN_AS_ZERO * largest, all_values, 0.0).ravel()
     # A beam may have several diagrams, which are not connected.
-    diagram = np.repeat(np.arange(len(diagrams)), [len(of_cells) for _, of_cells in diagrams])
-    axis, left = _along(solution, cells, diagram, nodes, found.shape[1])
+    diagram = np.repeat(np.arange(len(diagrams)), [len(cell_values) for _, cell_values in diagrams])
+    axis, left = _along(solution, cells, diagram, nodes, all_values.shape[1])
     ordinates = scale * values[:, None] * left
     rows: list[Array] = []
     outlines: defaultdict[str, list[Array]] = defaultdict(list)
-    diagram = np.repeat(diagram, found.shape[1])
+    diagram = np.repeat(diagram, all_values.shape[1])
     for area in _areas(axis, axis + ordinates, values, diagram):
         outlines[RED if area.peak > 0 else BLUE].append(area.outline)
         rows.append(np.array([area.peak, *axis[area.place], *ordinates[area.place]]))
@@ -208,8 +210,8 @@ def _draw_diagrams(
             first, *_, last = np.flatnonzero(diagram == k)
             low, high = (first + last) // 2, (first + last + 1) // 2
             (x, y), (across, up) = (axis[low] + axis[high]) / 2, left[high]
-            turn = math.degrees(math.atan2(up, across)) - 180.0  # of an arrow that points up
-            axes.plot(x, y, marker=(3, 0, turn), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
+            angle = math.degrees(math.atan2(up, across)) - 180.0  # of an arrow that points up
+            axes.plot(x, y, marker=(3, 0, angle), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
     for color, group in outlines.items():
         look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}
         axes.add_collection(PolyCollection(group, **look, linewidths=1.0, zorder=2))
@@ -256,19 +258,19 @@ def _along(
 
     ``diagram`` is the number of the diagram of each cell.
     """
-    mesh, parts = solution.grid.mesh, np.linspace(0.0, 1.0, points)
+    mesh, fractions = solution.grid.mesh, np.linspace(0.0, 1.0, points)
     start, end, *between = solution.grid.nodes_of_cells[cells].T
-    chains = nodes[np.column_stack([start, *between, end])]
-    ahead = unit_vectors(mesh.slopes(parts) @ chains)
+    lines = nodes[np.column_stack([start, *between, end])]
+    ahead = unit_vectors(mesh.slopes(fractions) @ lines)
     # Ordinates at corners between cells of a beam bisect the angle; ordinates near them lean
     # towards the bisector.
-    lean = np.zeros((len(chains), 2, 2))
+    lean = np.zeros((len(lines), 2, 2))
     k = np.flatnonzero(diagram[:-1] == diagram[1:])
     half = unit_vectors(ahead[k, -1] + ahead[k + 1, 0])
     lean[k, 1], lean[k + 1, 0] = half - ahead[k, -1], half - ahead[k + 1, 0]
-    ahead = ahead + np.column_stack([1.0 - parts, parts]) @ lean
-    left = left_of(unit_vectors(ahead))
-    return (mesh.weights(parts) @ chains).reshape(-1, 2), left.reshape(-1, 2)
+    ahead = ahead + np.column_stack([1.0 - fractions, fractions]) @ lean
+    left = normal(unit_vectors(ahead))
+    return (mesh.weights(fractions) @ lines).reshape(-1, 2), left.reshape(-1, 2)
 
 
 class Area(NamedTuple):
@@ -283,8 +285,8 @@ def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[
     """Divide diagrams, whose numbers are ``diagram``, where the sign changes."""
     # At a change of sign both areas end in a point of the axis.
     first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
-    part = values[first] / (values[first] - values[first + 1])
-    zeros = axis[first] + part[:, None] * (axis[first + 1] - axis[first])
+    fraction = values[first] / (values[first] - values[first + 1])
+    zeros = axis[first] + fraction[:, None] * (axis[first + 1] - axis[first])
     places = np.insert(np.arange(len(values)), first + 1, first)
     axis, tips = (np.insert(points, first + 1, zeros, axis=0) for points in (axis, tips))
     values, diagram = (
@@ -305,7 +307,7 @@ def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[
             yield Area(outline, sign * largest, int(places[begin + equal[len(equal) // 2]]))
 
 
-def draw_state_of_damage(
+def draw_damage_state(
     solution: Solution, *, n: int = -1, magnify: float = 1.0, ax: Axes | None = None
 ) -> Figure:
     """Draw yielded cells and opened hinges on the frame at the n-th kept time.
@@ -332,24 +334,24 @@ def draw_state_of_damage(
     grid = solution.grid
     for beam in solution.scene.beams[:1]:
         solution.material(beam)  # raises if the scene is elastic
-    stage, (width, height) = plane_stage(solution, [n], magnify, ax)
-    pose, density = stage.pose(n), dissipated_per_length(solution, n)
-    length, rise = np.ptp(stage.points(), axis=0)
+    canvas, (width, height) = plane_canvas(solution, [n], magnify, ax)
+    shape, density = canvas.shape(n), dissipated_per_length(solution, n)
+    length, rise = np.ptp(canvas.points(), axis=0)
     # Upright frames need less width; the bar and the legend have their own widths.
     across = height * length / max(rise, 1e-12)
     with style.panel(ax, (min(width, max(6.0, across + 3.0)), height)) as axes:
         time = solution.parameter.at(solution.times[n])
         style.plane_axes(axes, f"damage at {time}{style.magnified(magnify)}")
         axes.set_adjustable("datalim")  # space for the broad lines of a slender frame
-        draw_undeformed(axes, solution, stage)
-        draw_beams(axes, solution, pose.nodes, color=shade(INK), linewidth=2.0, zorder=2)
-        draw_strokes(axes, symbols.in_plane(pose))
+        draw_undeformed(axes, solution, canvas)
+        draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.0, zorder=2)
+        draw_strokes(axes, symbols.in_plane(shape))
         yielded = density > 0.0
         if yielded.any():
             unit, prefix = style.decimal_prefix(float(density.max()))
             colors = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
             zones = LineCollection(
-                list(pose.nodes[grid.cells[yielded]]),
+                list(shape.nodes[grid.cells[yielded]]),
                 colors=colors.to_rgba(density[yielded] / unit),
                 linewidths=11.0, capstyle="butt", zorder=3, gid="yielded",
             )  # fmt: skip
@@ -358,14 +360,14 @@ def draw_state_of_damage(
             cracks = any(p is not None and p.fibres.softening is not None for p in placed)
             title = "dissipated by plastic strains" + (" and cracks" if cracks else "")
             style.draw_bar(axes, colors, f"{title} ({prefix}J/m)")
-        if hinges := open_hinges(solution, n, pose.nodes):
+        if hinges := open_hinges(solution, n, shape.nodes):
             for hinge in hinges:
-                axes.plot(*hinge.at, **circle(hinge.part))
+                axes.plot(*hinge.at, **circle(hinge.fraction))
             examples = (0.1, "hinge, 10 % broken"), (0.5, "50 %"), (1.0, "fully open")
-            sizes = [axes.plot([], [], **circle(part), label=words)[0] for part, words in examples]
+            sizes = [axes.plot([], [], **circle(x), label=words)[0] for x, words in examples]
             style.draw_legend(axes, ax, sizes, loc="outside upper left", ncols=3)
-        style.make_room(axes)
-    return style.figure_of(axes)
+        style.fit_texts(axes)
+    return style.parent_figure(axes)
 
 
 # -- labels ------------------------------------------------------------------------------------
@@ -383,7 +385,7 @@ def _arrange(axes: Axes, peaks: Sequence[Peak], *, own: bool) -> None:
             text.remove()
         written = _write(axes, peaks)
         axes.dataLim.set(without_texts)
-        style.make_room(axes)
+        style.fit_texts(axes)
     _fit(axes, own)
 
 
@@ -395,7 +397,7 @@ def _fit(axes: Axes, own: bool) -> None:
     axes.autoscale_view()
     if not own:
         return
-    figure = style.figure_of(axes)
+    figure = style.parent_figure(axes)
     figure.draw_without_rendering()
     wide, high = 0.0, 0.0
     for legend in figure.legends:
@@ -409,14 +411,14 @@ def _fit(axes: Axes, own: bool) -> None:
 
 def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     """Write peaks beside areas and lines; omit peaks that find no space, except extremes."""
-    figure = style.figure_of(axes)
+    figure = style.parent_figure(axes)
     figure.draw_without_rendering()
     looks: tuple[dict[str, Any], ...] = (
         {"size": font_size(10.0), "weight": "normal"},
         {"size": font_size(13.0), "weight": "bold"},
     )
     halves = [style.half_size(axes, peak.text, **looks[peak.extreme]) for peak in peaks]
-    crowded = 4 * sum(map(np.prod, halves)) > CROWDED * np.prod(style.size_of(axes))
+    crowded = 4 * sum(map(np.prod, halves)) > CROWDED * np.prod(style.axes_size(axes))
     chosen = [k for k, peak in enumerate(peaks) if peak.extreme or not crowded]
     if not chosen:
         return []
@@ -429,18 +431,18 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
         # First perpendicular to the axis, then more and more aside.
         turns = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
         x, y = peaks[k].outward
-        at, ways = in_points(peaks[k].tip), layout.directions(math.atan2(y, x) + turns)
-        spots = tuple(Spot(at, way) for way in ways)
+        at, ways = in_points(peaks[k].tip), positions.directions(math.atan2(y, x) + turns)
+        spots = tuple(Candidate(at, direction) for direction in ways)
         labels.append(Label(peaks[k].text, peaks[k].color, k, spots))
     written = []
-    for one in layout.place(labels, [halves[k] for k in chosen], _lines(axes, in_points)):
-        text, color, k, _ = one.label
-        (x, y), (right, up), arrow = peaks[k].tip, one.center - one.spot, None
-        if len(one.leader):
-            end = (one.leader[1] - one.center + one.half) / (2 * one.half)
+    for box in positions.place(labels, [halves[k] for k in chosen], _lines(axes, in_points)):
+        text, color, k, _ = box.label
+        (x, y), (right, up), arrow = peaks[k].tip, box.center - box.target, None
+        if len(box.leader):
+            end = (box.leader[1] - box.center + box.half) / (2 * box.half)
             line = {"arrowstyle": "-", "color": color, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
             arrow = {**line, "relpos": end, "patchA": None}  # else Matplotlib computes this end
-        if one.overlap == 0.0 or peaks[k].extreme:
+        if box.overlap == 0.0 or peaks[k].extreme:
             mark = axes.annotate(
                 text, (x, y), (right, up), textcoords="offset points", color=color,
                 ha="center", va="center", zorder=6, arrowprops=arrow, **looks[peaks[k].extreme],
@@ -451,25 +453,23 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
 
 def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
     """Return lines that texts should not cover, also lines within areas; (n, 4); points."""
-    chains = [
-        np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"
-    ]
+    lines = [np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"]
     areas = []
     for collection in axes.collections:
         outlines = [np.asarray(path.vertices) for path in collection.get_paths()]
-        chains += outlines
+        lines += outlines
         areas += outlines if collection.get_gid() in (RED, BLUE) else []
-    pieces = segments(in_points(joined(chains)))
-    found = [pieces[np.isfinite(pieces).all(axis=1)]]
+    pieces = segments(in_points(joined(lines)))
+    groups = [pieces[np.isfinite(pieces).all(axis=1)]]
     for line in axes.lines:
         half = line.get_markersize() / 2
-        cross = np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
+        diagonals = np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
         if line.get_linestyle() == "None":  # symbols
-            found += [segments(point + cross) for point in in_points(line.get_xydata())]
+            groups += [segments(point + diagonals) for point in in_points(line.get_xydata())]
     for outline in map(in_points, areas[:FEW]):
         # Ordinates, from a point of the outline to its opposite point on the axis.
-        for part in (0.0, 0.5):
-            between = outline[:-1] + part * np.diff(outline, axis=0)
-            feet = (outline[1:] - part * np.diff(outline, axis=0))[::-1]
-            found.append(np.hstack([between, feet])[1 : len(outline) // 2])
-    return np.concatenate(found)
+        for fraction in (0.0, 0.5):
+            between = outline[:-1] + fraction * np.diff(outline, axis=0)
+            feet = (outline[1:] - fraction * np.diff(outline, axis=0))[::-1]
+            groups.append(np.hstack([between, feet])[1 : len(outline) // 2])
+    return np.concatenate(groups)

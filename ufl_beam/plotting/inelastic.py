@@ -33,13 +33,13 @@ class OpenHinge(NamedTuple):
 
     beam: Member
     at: Array  # its present position; (2,); m
-    part: float  # dissipated fraction of its fracture energy, 1 for a joint; 0 if it hardens
+    fraction: float  # dissipated fraction of its fracture energy, 1 for a joint; 0 if it hardens
 
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
     """Find open hinges, in cells and of zero length; ``points`` are the drawn nodes."""
     grid = solution.grid
-    found: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
+    hinges: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
     for beam in solution.scene.beams:
         laws = grid.hinges(beam)
         if all(law is None or math.isinf(law.limit) for law in laws):
@@ -48,16 +48,16 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
         rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
         for cell, law, jump, lost in rows:
             if law is not None and (jump != 0.0 or lost > 0.0):
-                found.append((beam, points[grid.cells[cell]].mean(axis=0), law, float(lost)))
+                hinges.append((beam, points[grid.cells[cell]].mean(axis=0), law, float(lost)))
     for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
         kept = solution.connector(hinge)
         if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
             dissipated = float(kept.dissipated[n])
-            found.append((place_of(hinge).beam, points[vertex], law_of(hinge), dissipated))
+            hinges.append((place_of(hinge).beam, points[vertex], law_of(hinge), dissipated))
     return [
         # A hinge without strength is a joint.
         OpenHinge(beam, at, min(lost / law.fracture_energy, 1.0) if law.limit > 0.0 else 1.0)
-        for beam, at, law, lost in found
+        for beam, at, law, lost in hinges
     ]
 
 
@@ -74,11 +74,11 @@ def dissipated_per_length(solution: Solution, n: int) -> Array:
     return energy / grid.lengths(np.arange(len(grid.cells)))
 
 
-def circle(part: float) -> dict[str, Any]:
+def circle(fraction: float) -> dict[str, Any]:
     """Return the marker of a hinge that has dissipated a fraction of its fracture energy."""
     paper = shade(WHITE)
-    inside, edge = (paper, BLUE) if part >= FULLY_OPEN else (BLUE, paper)
-    size = 4.0 + 6.0 * math.sqrt(part)
+    inside, edge = (paper, BLUE) if fraction >= FULLY_OPEN else (BLUE, paper)
+    size = 4.0 + 6.0 * math.sqrt(fraction)
     look: dict[str, Any] = {"marker": "o", "ms": size, "mfc": inside, "mec": edge, "mew": 1.8}
     return {**look, "ls": "none", "zorder": 6}
 
@@ -91,8 +91,8 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
         (zone,) = axes.plot(*ends.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
         named["yielded or cracked"] = zone
     for hinge in open_hinges(solution, n, nodes):
-        (mark,) = axes.plot(*hinge.at, **circle(hinge.part))
-        named["fully open hinge" if hinge.part >= FULLY_OPEN else "hinge, open"] = mark
+        (mark,) = axes.plot(*hinge.at, **circle(hinge.fraction))
+        named["fully open hinge" if hinge.fraction >= FULLY_OPEN else "hinge, open"] = mark
     return named
 
 
@@ -123,7 +123,7 @@ def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None =
         style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
         axes.set_xlabel("curvature K (1/m)")
         axes.set_title(f"cell at {place}", loc="left")
-    return style.figure_of(axes)
+    return style.parent_figure(axes)
 
 
 def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
@@ -157,8 +157,10 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
         moves = np.flatnonzero(np.diff(jump))
         turns = moves[1:][np.diff(np.sign(np.diff(jump)[moves])) != 0]
         for first, last in pairwise([0, *turns, len(jump) - 1]):
-            part = slice(first, last + 1)
-            axes.fill_between(jump[part], M[part], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2)
+            window = slice(first, last + 1)
+            axes.fill_between(
+                jump[window], M[window], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2
+            )
         _draw_path(axes, solution, jump, M)
         style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
         _prefix(axes.xaxis, jump, "jump of rotation", "rad")
@@ -167,7 +169,7 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
             whole = law.fracture_energy
             spent += f", {100 * lost / whole:.3g} % of {with_unit(whole, 'J')}"
         axes.set_title(f"hinge at {place}: {spent}", loc="left")
-    return style.figure_of(axes)
+    return style.parent_figure(axes)
 
 
 def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
@@ -192,10 +194,10 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
             raise ArgumentError("plot: the scene has neither beams nor connectors")
         solution.material(solution.scene.beams[0])  # raises if the scene is elastic
     energy, t = solution.energy, solution.progress
-    held = energy.total
-    work, gone = (sum(x.values(), np.zeros_like(t)) for x in (energy.supplied, energy.lost))
-    supplied = held[0] + gone[0] + work - work[0]
-    start = held[0] > 1e-12 * energy.throughput
+    inside = energy.total
+    work, lost = (sum(x.values(), np.zeros_like(t)) for x in (energy.supplied, energy.lost))
+    supplied = inside[0] + lost[0] + work - work[0]
+    start = inside[0] > 1e-12 * energy.throughput
     with style.panel(ax, (8.0, 5.0)) as axes:
         style.time_axes(axes)
         # Blue is reserved for the energy in the scene; the colours repeat.
@@ -204,14 +206,14 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         axes.stackplot(t, *energy.lost.values(), labels=labels, colors=colors)
         label = "at the start, and supplied" if start else "supplied"
         axes.plot(t, supplied, color=shade(INK), label=label)
-        axes.plot(t, held, color=BLUE, label="in the scene")
-        _prefix(axes.yaxis, np.concatenate([supplied, held]), "energy", "J")
+        axes.plot(t, inside, color=BLUE, label="in the scene")
+        _prefix(axes.yaxis, np.concatenate([supplied, inside]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
         digits, power = f"{energy.worst:.1e}".split("e")
         worst, through = rf"${digits}\times10^{{{int(power)}}}$", with_unit(energy.throughput, "J")
         axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left")
         style.draw_legend(axes, ax, loc="outside upper left", ncols=3)
-    return style.figure_of(axes)
+    return style.parent_figure(axes)
 
 
 def _prefix(axis: Axis, values: Array, quantity: str, unit: str) -> None:

@@ -17,16 +17,16 @@ from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.loads import Gravity, Load, Rayleigh, RotatingFrame
 from ufl_beam.model.scene import Scene, spots_of
 from ufl_beam.plotting import notebook, style
-from ufl_beam.plotting.layout import Placed, place, segments
-from ufl_beam.plotting.model_sheet import (
+from ufl_beam.plotting.model_drawing import (
     CAPTIONS,
     MOST_LABELS,
     NAMES,
-    Sheet,
+    Drawing,
     Subject,
     draw,
     in_time,
 )
+from ufl_beam.plotting.positions import Placed, place, segments
 from ufl_beam.plotting.style import POINTS, RED, TEXT, WHITE, font_size, shade, with_unit
 from ufl_beam.plotting.symbols import draw_strokes
 
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 LEAST, MOST = (5.5, 3.0), (9.0, 6.8)  # sizes of the figure; inch
-LEFT, RIGHT, BELOW, ABOVE, NOTE = 66.0, 14.0, 46.0, 34.0, 16.0  # space around axes; points
+LEFT, RIGHT, BELOW, ABOVE, REMARK = 66.0, 14.0, 46.0, 34.0, 16.0  # space around axes; points
 LABEL_SIZE, TITLE_SIZE, ARROW_SIZE = 11.0, 14.0, 26.0  # of labels, title, arrows above; points
-BADGE = 60.0  # width for the arrow of a load on the whole scene, with spacing; points
+ARROW_WIDTH = 60.0  # width for the arrow of a load on the whole scene, with spacing; points
 
 Measure = Callable[[str], Array]  # half of width and height of a text; (2,); points
 UNBOUNDED = np.array([-np.inf, -np.inf, np.inf, np.inf])  # frame before its position is known
@@ -55,62 +55,64 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
         ArgumentError: Constraints of the scene are redundant, or ``ax`` is no axes.
     """
     require_independent(scene)
-    subject, notes = Subject(scene), notes_of(scene)
+    subject, notes = Subject(scene), model_notes(scene)
     cells = (subject.cells, "cell", "cells")
     beams, bodies = (len(scene.beams), "beam", "beams"), (len(scene.bodies), "body", "bodies")
     title = f"model: {counted(beams, cells, bodies)}"
     with style.panel(ax, MOST) as axes:
         measure: Measure = cache(lambda text: style.half_size(axes, text, font_size(LABEL_SIZE)))
-        note = font_size(NOTE)
+        line_height = font_size(REMARK)
         axes.set(xlabel="x (m)", ylabel="y (m)")
-        pad = 8.0 + note * len(notes)
+        pad = 8.0 + line_height * len(notes)
         axes.set_title(title, loc="left", fontsize=font_size(TITLE_SIZE), pad=pad)
         for k, words in enumerate(reversed(notes)):
             axes.annotate(
-                words, (0.0, 1.0), (0.0, 6.0 + note * k), xycoords="axes fraction",
+                words, (0.0, 1.0), (0.0, 6.0 + line_height * k), xycoords="axes fraction",
                 textcoords="offset points", fontsize=font_size(LABEL_SIZE), color=shade(TEXT),
                 gid="notes",
             )  # fmt: skip
         if ax is None:
-            style.figure_of(axes).set_layout_engine("none")
-            around = LEFT + RIGHT, font_size(BELOW + ABOVE + NOTE * len(notes))
+            style.parent_figure(axes).set_layout_engine("none")
+            around = LEFT + RIGHT, font_size(BELOW + ABOVE + REMARK * len(notes))
             least, most = (POINTS * np.array(size) - around for size in (LEAST, MOST))
             # At least as wide as the words above the axes.
-            badges = [2 * measure(text)[0] + BADGE for text, *_ in map(badge, scene.loads) if text]
-            first = 2 * TITLE_SIZE / LABEL_SIZE * measure(title)[0] + sum(badges)
+            texts = [text for text, *_ in map(scene_load, scene.loads) if text]
+            widths = [2 * measure(text)[0] + ARROW_WIDTH for text in texts]
+            first = 2 * TITLE_SIZE / LABEL_SIZE * measure(title)[0] + sum(widths)
             above = max([first, *(2 * measure(words)[0] for words in notes)])
             least[0] = min(max(least[0], above), most[0])
         else:
-            least = most = style.size_of(axes)
-        sheet, placed, frame = _planned(subject, measure, least, most)
-        _fit(axes, sheet.scale, frame, len(notes) if ax is None else None)
-        draw_strokes(axes, sheet.strokes)
-        _write(axes, placed, sheet.scale)
+            least = most = style.axes_size(axes)
+        drawing, placed, frame = _planned(subject, measure, least, most)
+        _fit(axes, drawing.scale, frame, len(notes) if ax is None else None)
+        draw_strokes(axes, drawing.strokes)
+        _write(axes, placed, drawing.scale)
         # Loads on the whole scene, at the right above the axes.
         x, y = frame[2:] - frame[:2] + (0.0, 17.0)
-        for text, arrow, angle in filter(any, map(badge, scene.loads)):
-            for words, size, turn in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
+        for text, arrow, angle in filter(any, map(scene_load, scene.loads)):
+            for words, size, rotation in ((text, LABEL_SIZE, 0.0), (arrow, ARROW_SIZE, angle)):
                 axes.annotate(
                     words, (x, y), xycoords="axes points", ha="right", va="center", color=RED,
-                    fontsize=font_size(size), rotation=turn, gid="badges", annotation_clip=False,
+                    fontsize=font_size(size), rotation=rotation, annotation_clip=False,
+                    gid="badges",
                 )  # fmt: skip
-                x -= 2 * float(measure(text)[0]) + 6.0 if words is text else BADGE
-    return style.figure_of(axes)
+                x -= 2 * float(measure(text)[0]) + 6.0 if words is text else ARROW_WIDTH
+    return style.parent_figure(axes)
 
 
 @html_of.register
-def of_scene(scene: Scene) -> str:
+def scene_page(scene: Scene) -> str:
     """Write a scene: its parts, and its picture."""
     return notebook.lines(str(scene)) + notebook.image("model", partial(draw_model, scene))
 
 
-def notes_of(scene: Scene) -> list[str]:
+def model_notes(scene: Scene) -> list[str]:
     """Return notes on damping, works, and hinges that may form, for a legend."""
     notes = []
     for damping in scene.damping:
         if isinstance(damping, Rayleigh):
-            parts = (("mass", damping.mass, "1/s"), ("stiffness", damping.stiffness, "s"))
-            sizes = ", ".join(f"{name} {x:.3g} {unit}" for name, x, unit in parts if x)
+            coefficients = (("mass", damping.mass, "1/s"), ("stiffness", damping.stiffness, "s"))
+            sizes = ", ".join(f"{name} {x:.3g} {unit}" for name, x, unit in coefficients if x)
             notes.append(f"Rayleigh damping, {sizes}")
         else:
             beams = damping.beams or ()
@@ -129,7 +131,7 @@ def notes_of(scene: Scene) -> list[str]:
     return notes
 
 
-def badge(load: Load) -> tuple[str, str, float]:
+def scene_load(load: Load) -> tuple[str, str, float]:
     """Describe a load on the whole scene: words, an arrow, and its angle (degrees); or nothing."""
     if isinstance(load, Gravity):
         x, y = load.acceleration
@@ -144,50 +146,50 @@ def badge(load: Load) -> tuple[str, str, float]:
 
 def _planned(
     subject: Subject, measure: Measure, least: Array, most: Array
-) -> tuple[Sheet, list[Placed], Array]:
-    """Return the sheet at the largest scale that fits, its labels, and the corners of the axes.
+) -> tuple[Drawing, list[Placed], Array]:
+    """Return the drawing at the largest scale that fits, its labels, and the corners of the axes.
 
     The least and the largest size of the axes, and the corners, are in points.
     """
     scene = subject.scene
     points = [*subject.axes.values(), *(np.array([body.center]) for body in scene.bodies)]
-    points += [np.array([spot.point]) for spots in spots_of(scene).values() for spot in spots]
+    points += [np.array([point.point]) for spots in spots_of(scene).values() for point in spots]
     low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
     scale, frame = max(*(high - low) / (400.0, 250.0), scene.size / 500.0), UNBOUNDED
     # Symbols around the beams have sizes in points, so a second iteration is needed to fit them.
     for _ in range(2):
-        sheet = draw(subject, scale)
-        placed = _arrange(sheet, measure, frame)
-        points = [stroke.points / scale for stroke in chain(*sheet.strokes.values())]
-        points += [one.center + sign * one.half[None] for one in placed for sign in (-1, 1)]
+        drawing = draw(subject, scale)
+        placed = _arrange(drawing, measure, frame)
+        points = [stroke.points / scale for stroke in chain(*drawing.strokes.values())]
+        points += [box.center + sign * box.half[None] for box in placed for sign in (-1, 1)]
         everything = np.concatenate(points)
         below = low / scale - everything.min(axis=0) + 8.0
         beyond = everything.max(axis=0) - high / scale + 8.0
-        room = np.maximum(most - below - beyond, 0.3 * most)
-        scale = float(np.max((high - low) / room)) or scale
+        space = np.maximum(most - below - beyond, 0.3 * most)
+        scale = float(np.max((high - low) / space)) or scale
         first, last = low / scale - below, high / scale + beyond
         more = np.maximum(least - (last - first), 0.0) / 2
         frame = np.concatenate([first - more, last + more])
-    sheet = draw(subject, scale)
-    return sheet, _arrange(sheet, measure, frame), frame
+    drawing = draw(subject, scale)
+    return drawing, _arrange(drawing, measure, frame), frame
 
 
-def _arrange(sheet: Sheet, measure: Measure, frame: Array) -> list[Placed]:
+def _arrange(drawing: Drawing, measure: Measure, frame: Array) -> list[Placed]:
     """Place the labels; omit labels that others would cover."""
-    labels = sheet.labels
+    labels = drawing.labels
     for rank in (NAMES, CAPTIONS):
         if len(labels) > MOST_LABELS:
             labels = [label for label in labels if label.rank < rank]
     in_points = [
         label._replace(
-            spots=tuple(s._replace(at=np.divide(s.at, sheet.scale)) for s in label.spots)
+            spots=tuple(s._replace(at=np.divide(s.at, drawing.scale)) for s in label.spots)
         )
         for label in labels[:MOST_LABELS]
     ]
-    lines = np.concatenate([segments(stroke.points) for stroke in chain(*sheet.strokes.values())])
+    lines = np.concatenate([segments(stroke.points) for stroke in chain(*drawing.strokes.values())])
     halves = [measure(label.text) for label in in_points]
-    placed = place(in_points, halves, lines / sheet.scale, frame)
-    return [one for one in placed if one.overlap < 0.1]
+    placed = place(in_points, halves, lines / drawing.scale, frame)
+    return [box for box in placed if box.overlap < 0.1]
 
 
 def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
@@ -200,8 +202,8 @@ def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
         number = min(max(int(length / font_size(each)), 2), 9)
         line.set_major_locator(MaxNLocator(number, steps=[1, 2, 2.5, 5, 10]))
     if notes is not None:
-        below, above = font_size(BELOW), font_size(ABOVE + NOTE * notes)
-        figure = style.figure_of(axes)
+        below, above = font_size(BELOW), font_size(ABOVE + REMARK * notes)
+        figure = style.parent_figure(axes)
         left, width, height = LEFT, across + LEFT + RIGHT, up + below + above
         for _ in range(2):  # the second time with the width of the numbers at the axis
             figure.set_size_inches(width / POINTS, height / POINTS)
@@ -215,14 +217,14 @@ def _fit(axes: Axes, scale: float, frame: Array, notes: int | None) -> None:
 
 def _write(axes: Axes, placed: list[Placed], scale: float) -> None:
     """Write the labels, and lines from distant labels to their objects."""
-    for one in placed:
-        if len(one.leader):
+    for box in placed:
+        if len(box.leader):
             axes.plot(
-                *scale * one.leader.T, color="#999999", linewidth=0.8, zorder=6, gid="leaders"
+                *scale * box.leader.T, color="#999999", linewidth=0.8, zorder=6, gid="leaders"
             )
-        x, y = scale * one.center
+        x, y = scale * box.center
         axes.text(
-            x, y, one.label.text, color=shade(one.label.color), fontsize=font_size(LABEL_SIZE),
+            x, y, box.label.text, color=shade(box.label.color), fontsize=font_size(LABEL_SIZE),
             ha="center", va="center", zorder=7, gid="labels",
             bbox={"facecolor": shade(WHITE), "edgecolor": "none", "alpha": 0.75, "pad": 0.8},
         )  # fmt: skip

@@ -20,14 +20,14 @@ ROWS = 12  # most cases of a study in a table
 
 
 @html_of.register
-def of_energy(energy: Energy) -> str:
+def energy_page(energy: Energy) -> str:
     """Write an energy ledger as a table of its final entries."""
     rows = [(kind, name, f"{value:.6g}") for kind, name, value in energy.entries()]
     return table(("energy", "", "at the end (J)"), rows) + lines(energy.balance()) if rows else ""
 
 
 @html_of.register
-def of_study(results: Study) -> str:
+def study_page(results: Study) -> str:
     """Write a study: its first cases with their scalar results."""
     title, *failed = str(results).splitlines()
     numbers = {name: x for name, x in results.results.items() if x.ndim == 1}

@@ -27,7 +27,7 @@ PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
     Solution: {
         "shape": diagrams.draw_shape,
         **{name: partial(diagrams.draw_shape, quantity=name) for name in RESULTANTS},
-        "damage": diagrams.draw_state_of_damage,
+        "damage": diagrams.draw_damage_state,
         "shapes": plots.draw_shapes,
         "history": plots.draw_history,
         "energy": plots.draw_energy,

@@ -19,8 +19,8 @@ from ufl_beam.model.bodies import Anchor
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import notebook, style, symbols
-from ufl_beam.plotting.diagrams import MOST, draw_beams, draw_frame, draw_undeformed, plane_stage
-from ufl_beam.plotting.layout import evenly
+from ufl_beam.plotting.diagrams import MOST, draw_beams, draw_frame, draw_undeformed, plane_canvas
+from ufl_beam.plotting.positions import evenly
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes
 from ufl_beam.simulation.solution import Solution
@@ -73,44 +73,44 @@ def draw_shapes(
     require_number(count, "plot: count", at_least=1)
     if np.ndim(times) != 1:
         raise ArgumentError(
-            f"plot: times = {times!r} must be a sequence of times (s); for so many shapes "
+            f"plot: times = {times!r} must be a sequence of times (s); for a number of shapes "
             f"give count={times!r}"
         )
     kept = solution.times
     nearest = [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
     chosen = nearest or evenly(solution.progress, int(count))
-    stage, size = plane_stage(solution, chosen, magnify, ax)
-    poses = [stage.pose(n) for n in chosen]
+    canvas, size = plane_canvas(solution, chosen, magnify, ax)
+    shapes = [canvas.shape(n) for n in chosen]
     with style.panel(ax, size) as axes:
-        of_time = style.scale("viridis", 0.0, 0.88, kept[chosen].min(), kept[chosen].max())
+        colors = style.scale("viridis", 0.0, 0.88, kept[chosen].min(), kept[chosen].max())
         style.plane_axes(axes, style.magnified(magnify, ""))
-        draw_undeformed(axes, solution, stage)
-        for pose, color in zip(poses, map(to_hex, of_time.to_rgba(kept[chosen])), strict=True):
-            moving = *symbols.bodies(pose), *symbols.rods(pose)
+        draw_undeformed(axes, solution, canvas)
+        for shape, color in zip(shapes, map(to_hex, colors.to_rgba(kept[chosen])), strict=True):
+            moving = *symbols.bodies(shape), *symbols.rods(shape)
             draw_strokes(axes, {"moving": moving}, color)
-            draw_beams(axes, solution, pose.nodes, color=color, linewidth=2.2, zorder=3)
-            draw_strokes(axes, {"masses": symbols.masses(pose, color)})
-        last = poses[-1]
+            draw_beams(axes, solution, shape.nodes, color=color, linewidth=2.2, zorder=3)
+            draw_strokes(axes, {"masses": symbols.masses(shape, color)})
+        last = shapes[-1]
         still = *symbols.rails(last), *symbols.connectors(last), *symbols.supports(last)
         draw_strokes(axes, {"still": still})
-        style.draw_bar(axes, of_time, solution.parameter.name)
-    return style.figure_of(axes)
+        style.draw_bar(axes, colors, solution.parameter.name)
+    return style.parent_figure(axes)
 
 
 @html_of.register
-def of_solution(solution: Solution) -> str:
+def solution_page(solution: Solution) -> str:
     """Write a solution: its summary, the energy ledger, and successive shapes.
 
     Small displacements are magnified.
     """
     text = (
         notebook.lines(*solution.summary())
-        + notebook.of_energy(solution.energy)
+        + notebook.energy_page(solution.energy)
         + notebook.lines(solution.open_ledger)
     )
     moved = solution.q[:, solution.grid.dofs[:, :2]]
-    part = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
-    magnify = max(x for x in FACTORS if x == 1 or (part > 0.0 and x * part <= VISIBLE))
+    fraction = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
+    magnify = max(x for x in FACTORS if x == 1 or (fraction > 0.0 and x * fraction <= VISIBLE))
     shapes = partial(draw_shapes, solution, count=SHAPES, magnify=magnify)
     return text + notebook.image("shapes", shapes)
 
@@ -137,7 +137,7 @@ def draw_history(
     Example:
         >>> ub.plot(solution, "history", beam.end, component="v").savefig("history.png")
     """
-    style.require_choice(component, COMPONENTS, "plot: component")
+    style.require_option(component, COMPONENTS, "plot: component")
     followed = (places,) if isinstance(places, Anchor) else tuple(places)
     number = list(COMPONENTS).index(component)
     motion = solution.displacement if number < 3 else solution.velocity
@@ -150,7 +150,7 @@ def draw_history(
         axes.set_ylabel(f"{quantity} {component.replace('psi', 'ψ')} ({unit})")
         axes.set_xlabel(solution.parameter.name)
         style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
-    return style.figure_of(axes)
+    return style.parent_figure(axes)
 
 
 def draw_energy(solution: Solution) -> Figure:
@@ -165,26 +165,28 @@ def draw_energy(solution: Solution) -> Figure:
     energy, precision = solution.energy, float(np.finfo(np.float64).eps)
     along = solution.progress
     groups = (energy.state, "-"), (energy.supplied, "--"), (energy.lost, ":")
-    entries = [(name, values, line) for group, line in groups for name, values in group.items()]
+    curves = [(name, values, line) for group, line in groups for name, values in group.items()]
     with style.picture((8.0, 6.0)) as figure:
         ledger, check = map(
             style.time_axes, figure.subplots(2, 1, sharex=True, height_ratios=(2.4, 1))
         )
-        for name, values, line in entries:
+        for name, values, line in curves:
             ledger.plot(along, values, line, label=name)
         ledger.set_ylabel("energy (J)")
         ledger.plot(along, energy.total, color=shade(INK), linewidth=1.2, label="in the scene")
         figure.legend(loc="outside upper left", ncols=5)
-        part = np.abs(energy.imbalance) / (energy.throughput or 1.0)
+        fraction = np.abs(energy.imbalance) / (energy.throughput or 1.0)
         # A balance that is exactly zero has no logarithm: its points are at the lower edge.
-        check.semilogy(along, np.maximum(part, 1e-2 * precision), color=style.RED, linewidth=1.2)
+        check.semilogy(
+            along, np.maximum(fraction, 1e-2 * precision), color=style.RED, linewidth=1.2
+        )
         check.axhline(precision, color=style.GREY, linewidth=1.0, zorder=1)
         check.annotate(
             "machine precision", (1.0, precision), (0, -3), va="top", ha="right",
             fontsize=style.font_size(11.0),
             xycoords=check.get_yaxis_transform(), textcoords="offset points", color=style.FRAME,
         )  # fmt: skip
-        check.set_ylim(1e-2 * precision, 10 * max(float(part.max()), 10 * precision))
+        check.set_ylim(1e-2 * precision, 10 * max(float(fraction.max()), 10 * precision))
         check.set_ylabel("imbalance\nper throughput")
         check.set_xlabel(solution.parameter.progress)
     return figure
@@ -211,11 +213,11 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
     if not chosen:
         raise ArgumentError("plot: there is no shape")
     swings = [shapes.motion(k, amplitude=amplitude, count=2) for k in chosen]
-    stages = [plane_stage(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
-    box = np.concatenate([stage.points() for stage in stages])
+    stages = [plane_canvas(swing, [0, 1], 1.0, size=(4.0, np.inf))[0] for swing in swings]
+    box = np.concatenate([canvas.points() for canvas in stages])
     # Space for the symbols of supports.
-    room = 0.08 * np.hypot(*np.ptp(box, axis=0))
-    corners = np.array([box.min(axis=0) - room, box.max(axis=0) + room])
+    margin = 0.08 * np.hypot(*np.ptp(box, axis=0))
+    corners = np.array([box.min(axis=0) - margin, box.max(axis=0) + margin])
     width, height = np.ptp(corners, axis=0)
     columns = min(len(chosen), 3 if height < 0.8 * width else 4)
     rows = -(-len(chosen) // columns)
@@ -223,19 +225,19 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
         grid = np.ravel(figure.subplots(rows, columns, squeeze=False))
         for axes in grid:
             axes.set_axis_off()
-        for k, swing, stage, axes in zip(chosen, swings, stages, grid, strict=False):
-            there, back = stage.pose(0), stage.pose(1)
-            draw_undeformed(axes, swing, stage)
-            draw_beams(axes, swing, back.nodes, color=SKY, linewidth=1.6, zorder=2)
-            draw_beams(axes, swing, there.nodes, color=BLUE, linewidth=2.6, zorder=4)
-            draw_strokes(axes, symbols.in_plane(there))
+        for k, swing, canvas, axes in zip(chosen, swings, stages, grid, strict=False):
+            forward, backward = canvas.shape(0), canvas.shape(1)
+            draw_undeformed(axes, swing, canvas)
+            draw_beams(axes, swing, backward.nodes, color=SKY, linewidth=1.6, zorder=2)
+            draw_beams(axes, swing, forward.nodes, color=BLUE, linewidth=2.6, zorder=4)
+            draw_strokes(axes, symbols.in_plane(forward))
             axes.set_title(f"{k}: {shapes.titles[k]}", loc="left")
             axes.set(aspect="equal", xlim=corners[:, 0], ylim=corners[:, 1])
     return figure
 
 
 @html_of.register
-def of_shapes(shapes: Shapes) -> str:
+def shapes_page(shapes: Shapes) -> str:
     """Write modes: their frequencies or load factors, and pictures of the first ones."""
     rows = [(str(k), title) for k, title in enumerate(shapes.titles)]
     first = range(min(MODES, len(shapes)))
@@ -292,19 +294,19 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
             axes, ax, loc="outside lower center", ncols=2, fontsize=small, title="size: cells",
             title_fontsize=small,
         )  # fmt: skip
-    return style.figure_of(axes)
+    return style.parent_figure(axes)
 
 
 @html_of.register
-def of_tradeoff(found: Tradeoff) -> str:
+def tradeoff_page(result: Tradeoff) -> str:
     """Write a trade-off: the runs that no other run beats, remarks, and a picture."""
-    head, *rows = found.table()
+    head, *rows = result.table()
     text = (
-        notebook.lines(found.title())
+        notebook.lines(result.title())
         + notebook.table(head, rows)
-        + notebook.lines(*found.remarks())
+        + notebook.lines(*result.remarks())
     )
-    return text + notebook.image("errors over wall times", partial(draw_tradeoff, found))
+    return text + notebook.image("errors over wall times", partial(draw_tradeoff, result))
 
 
 def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = None) -> Figure:
@@ -324,13 +326,13 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
     reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
     diagrams = [
         (beam, values[:, index].reshape(len(solution.grid.cells_of(beam)), -1))
-        for beam, found in reached
-        for values in (found.high, found.low)
+        for beam, extent in reached
+        for values in (extent.high, extent.low)
     ]
     until = f"until {solution.parameter.at(solution.times[-1])}"
     title = f"extremes of the {style.RESULTANTS[quantity][0]} {quantity}", until
-    pose = plane_stage(solution, [], 1.0, ax, MOST)[0].undeformed
-    return draw_frame(ax, solution, -1, pose, title, quantity, diagrams)
+    shape = plane_canvas(solution, [], 1.0, ax, MOST)[0].undeformed
+    return draw_frame(ax, solution, -1, shape, title, quantity, diagrams)
 
 
 def draw_study(study: Study) -> Figure:
@@ -357,11 +359,11 @@ def draw_study(study: Study) -> Figure:
     rows, columns = len(study.results), len(varied)
     with picture((max(6.0, 4.0 * columns), max(4.0, 2.6 * rows))) as figure:
         grid = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
-        for of_row, (result, values) in zip(grid, study.results.items(), strict=True):
-            of_case = np.abs(values.reshape(len(study), -1)).max(axis=1)
-            of_row[0].set_ylabel(result)
-            for axes, x in zip(of_row, varied.values(), strict=True):
-                axes.plot(x, of_case if values.ndim > 1 else values, "o", color=BLUE, ms=5.0)
+        for panels, (result, values) in zip(grid, study.results.items(), strict=True):
+            sizes = np.abs(values.reshape(len(study), -1)).max(axis=1)
+            panels[0].set_ylabel(result)
+            for axes, x in zip(panels, varied.values(), strict=True):
+                axes.plot(x, sizes if values.ndim > 1 else values, "o", color=BLUE, ms=5.0)
         for axes, name in zip(grid[-1], varied, strict=True):
             axes.set_xlabel(name)
     return figure
@@ -401,10 +403,10 @@ def draw_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
         matrix, spectrum, damage = figure.subplots(1, 3, sharey=True, width_ratios=(1.25, 1, 0.8))
         middle, half = (means.max() + means.min()) / 2, 0.6 * max(np.ptp(means), edges[-1] / 4)
         columns = np.linspace(middle - half, middle + half, CLASSES + 1)
-        found, _, _ = np.histogram2d(means, ranges, (columns, edges), weights=cycles.count)
+        counts, _, _ = np.histogram2d(means, ranges, (columns, edges), weights=cycles.count)
         colors = matrix.pcolormesh(
-            columns, edges, np.where(found > 0, found, np.nan).T,  # empty classes are white
-            norm=LogNorm(0.5, max(10.0, found.max())), cmap="viridis_r", rasterized=True,
+            columns, edges, np.where(counts > 0, counts, np.nan).T,  # empty classes are white
+            norm=LogNorm(0.5, max(10.0, counts.max())), cmap="viridis_r", rasterized=True,
         )  # fmt: skip
         style.draw_bar(matrix, colors, "number")
         matrix.set(xlabel="mean stress (MPa)", ylabel="stress range (MPa)")

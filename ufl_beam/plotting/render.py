@@ -22,13 +22,13 @@ from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.films import WRITERS, Film, screen
 from ufl_beam.plotting.inelastic import open_hinges
-from ufl_beam.plotting.layout import (
-    Pose,
-    Stage,
+from ufl_beam.plotting.positions import (
+    Canvas,
+    DeformedShape,
     directions,
     evenly,
     in_frame,
-    left_of,
+    normal,
     unit_vectors,
 )
 from ufl_beam.plotting.style import RESULTANTS
@@ -87,9 +87,9 @@ class Camera(Record):
     follow: Annotated[Anchor | None, _require_place] = None
     width: Annotated[float | None, partial(require_number, positive=True)] = None
 
-    def origin(self, pose: Pose) -> Array:
+    def origin(self, shape: DeformedShape) -> Array:
         """Return the point of the plane that the camera moves with; (2,); m."""
-        return np.zeros(2) if self.follow is None else pose.at(self.follow)
+        return np.zeros(2) if self.follow is None else shape.at(self.follow)
 
     def aim(self, plotter: Any, box: Array, origin: Array, size: tuple[int, int]) -> None:
         """Fit a box into the picture, above the colour bar and below the time.
@@ -164,7 +164,7 @@ def render(
     solids = Solids(solution, [n], quantity, thickness, magnify, size)
     path = _require_suffix(path, (".png",))
     require_kind(camera, Camera, "render: camera")
-    camera.origin(solids.stage.pose(n))
+    camera.origin(solids.canvas.shape(n))
     if active_comm().rank == 0:
         with closing(_frames(solids, camera)) as frames:
             imsave(path, next(frames))
@@ -219,7 +219,7 @@ def animate(
     require_number(seconds, "animate: seconds", positive=True)
     shown = evenly(solution.progress, max(1, round(fps * seconds)))
     solids = Solids(solution, shown, quantity, thickness, magnify, size)
-    camera.origin(solids.stage.undeformed)
+    camera.origin(solids.canvas.undeformed)
     if active_comm().rank == 0:
         with closing(_frames(solids, camera)) as frames:
             about = {"iterable": frames, "total": len(shown), "unit": "frame"}
@@ -236,7 +236,7 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
         raise ImportError(
             "pictures of solid bodies need PyVista; install it by: pip install ufl_beam[view]"
         ) from error
-    solution, stage, size = solids.solution, solids.stage, solids.size
+    solution, canvas, size = solids.solution, solids.canvas, solids.size
     grid, beams = solution.grid, solution.scene.beams
     largest = max(float(np.abs(solids.values(n)).max(initial=0.0)) for n in set(solids.shown))
     factor, prefix = style.decimal_prefix(largest)
@@ -246,8 +246,8 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
         "title": "values", "color": "black", "n_labels": 5, "fmt": "%.3g", "width": 0.48,
         "height": 0.09, "position_x": 0.46, "position_y": 0.01, "label_font_size": size[1] // 36,
     }  # fmt: skip
-    xy = np.concatenate([pose.points() - camera.origin(pose) for pose in stage.poses()])
-    margin, half = 2.2 * stage.unit, solids.thickest(beams)[1] / 2
+    xy = np.concatenate([shape.points() - camera.origin(shape) for shape in canvas.shapes()])
+    margin, half = 2.2 * canvas.unit, solids.thickest(beams)[1] / 2
     box = np.array([[*(xy.min(axis=0) - margin), -half], [*(xy.max(axis=0) + margin), half]])
     with screen(pyvista):
         plotter = pyvista.Plotter(off_screen=True, window_size=list(size))
@@ -260,17 +260,17 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
                 plotter.add_text(f"{words} ({prefix}{unit})", position=(0.02, 0.025), **text)
             for n in solids.shown:
                 plotter.suppress_rendering = True
-                pose = stage.pose(n)
-                camera.aim(plotter, box, camera.origin(pose), size)
+                shape = canvas.shape(n)
+                camera.aim(plotter, box, camera.origin(shape), size)
                 # Meshes and texts replace the old ones of the same name.
                 if beams:
                     plotter.add_mesh(
-                        solids.beams(n, pose, factor), scalars="values", clim=(-limit, limit),
+                        solids.beams(n, shape, factor), scalars="values", clim=(-limit, limit),
                         cmap="coolwarm", name="beams", scalar_bar_args=bar, reset_camera=False,
                         ambient=0.4, diffuse=0.7,
                     )  # fmt: skip
                     plotter.scalar_bars["values"].SetTitle("")  # VTK draws it over the numbers
-                for color, meshes in solids.others(n, pose).items():
+                for color, meshes in solids.others(n, shape).items():
                     look = {"color": color, "name": color, "ambient": 0.25}
                     plotter.add_mesh(pyvista.merge(meshes), reset_camera=False, **look)
                 time = solution.parameter.at(solution.times[n], ".3f")
@@ -312,25 +312,25 @@ class Solids:
     size: tuple[int, int]
 
     def __post_init__(self) -> None:
-        style.require_choice(self.quantity, QUANTITIES, "quantity")
+        style.require_option(self.quantity, QUANTITIES, "quantity")
         require_number(self.thickness, "thickness", positive=True)
         require_number(self.magnify, "magnify", positive=True)
         for pixels in self.size:
             require_number(pixels, "size", at_least=16)
 
     @cached_property
-    def stage(self) -> Stage:
-        """Stage of bodies, joints, connectors and supports."""
+    def canvas(self) -> Canvas:
+        """Canvas of bodies, joints, connectors and supports."""
         scene = self.solution.scene
         symbol = max(0.022 * scene.size, 0.7 * self.thickest(scene.beams)[0])
-        return Stage(self.solution, self.magnify, symbol, sorted(set(self.shown)))
+        return Canvas(self.solution, self.magnify, symbol, sorted(set(self.shown)))
 
-    def thickest(self, of: Iterable[Member | Anchor]) -> tuple[float, float]:
+    def thickest(self, objects: Iterable[Member | Anchor]) -> tuple[float, float]:
         """Return the largest depth in the plane and width across it of beams, or at places; m.
 
         Slender beams and bodies have a minimum width.
         """
-        beams = [x.beam if isinstance(x, Place) else x for x in of if not isinstance(x, Spot)]
+        beams = [x.beam if isinstance(x, Place) else x for x in objects if not isinstance(x, Spot)]
         depth = self.thickness * max((float(b.section.depth) for b in beams), default=0.0)
         return depth, max(depth, 0.04 * self.solution.scene.size)
 
@@ -344,7 +344,7 @@ class Solids:
         forces = [solution.diagram(beam, n, points=2)[1 + index] for beam in beams]
         return np.concatenate([np.empty(0), *forces]).reshape(-1, 2)
 
-    def beams(self, n: int, pose: Pose, factor: float) -> Any:
+    def beams(self, n: int, shape: DeformedShape, factor: float) -> Any:
         """Make a hexahedron for each cell of the beams, with values for the colours.
 
         Cross-sections rotate with ψ; at corners between cells of a beam they bisect the angle.
@@ -361,10 +361,10 @@ class Solids:
             halves[end] = sizes[grid.beam_of_cell] / 2
         angle = np.arctan2(mean[:, 1], mean[:, 0]) + self.solution.q[n][grid.dofs[vertices, 2]]
         depth, width = halves.T
-        left = depth[:, None] * left_of(directions(angle))
+        left = depth[:, None] * normal(directions(angle))
         corners = np.stack(  # of cross-sections; (num_vertices, 4, 3)
             [
-                np.column_stack([pose.nodes[vertices] + sign * left, side * width])
+                np.column_stack([shape.nodes[vertices] + sign * left, side * width])
                 for sign, side in ((1, 1), (-1, 1), (-1, -1), (1, -1))
             ],
             axis=1,
@@ -375,59 +375,59 @@ class Solids:
         mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)
         return mesh
 
-    def others(self, n: int, pose: Pose) -> dict[str, list[Any]]:
+    def others(self, n: int, shape: DeformedShape) -> dict[str, list[Any]]:
         """Make meshes of bodies, joints, connectors, masses and supports, by their colours."""
         from pyvista import Cylinder, PolyData, Sphere
 
-        found: defaultdict[str, list[Any]] = defaultdict(list)
-        self._add_strokes(found, pose)
-        pins = [(pin, PIN) for pin in symbols.pins(pose)]
-        for hinge in open_hinges(self.solution, n, pose.nodes):
+        meshes: defaultdict[str, list[Any]] = defaultdict(list)
+        self._add_strokes(meshes, shape)
+        pins = [(pin, PIN) for pin in symbols.pins(shape)]
+        for hinge in open_hinges(self.solution, n, shape.nodes):
             pins.append((Pin(hinge.at, True, (hinge.beam.start,)), style.ORANGE))
         # Joints are cylinders as thick as the beams that they join; equal cylinders share a mesh.
         alike: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)
         for pin, color in pins:
             depth, width = self.thickest(pin.places)
-            least = 0.4 * pose.stage.unit if pin.turns or not depth else 0.0
+            least = 0.4 * shape.canvas.unit if pin.turns or not depth else 0.0
             height = width * (1.25 if pin.turns else 1.02)
             alike[max(depth / 2, least), height, color].append(pin.at)
         solids: list[tuple[Any, str, list[Array]]] = []
         for (radius, height, color), places in alike.items():
             axis = {"direction": (0, 0, 1), "radius": radius, "height": height}
             solids.append((Cylinder(**axis, resolution=32).triangulate(), color, places))
-        if masses := [pose.at(mass.place) for mass in self.solution.scene.masses]:
-            solids.append((Sphere(radius=1.1 * pose.stage.unit), style.INK, masses))
+        if masses := [shape.at(mass.place) for mass in self.solution.scene.masses]:
+            solids.append((Sphere(radius=1.1 * shape.canvas.unit), style.INK, masses))
         for solid, color, places in solids:
             points = PolyData(np.insert(np.array(places), 2, 0.0, axis=1))
-            found[color].append(points.glyph(geom=solid, orient=False, scale=False))
-        for at, angle, outlines, color, place in symbols.footings(pose):
-            half, ahead = 0.6 * self.thickest([place])[1], pose.stage.unit * directions(angle)
-            found[color] += [_extruded(in_frame(x, at, ahead), -half, half) for x in outlines]
-        return found
+            meshes[color].append(points.glyph(geom=solid, orient=False, scale=False))
+        for at, angle, outlines, color, place in symbols.support_symbols(shape):
+            half, ahead = 0.6 * self.thickest([place])[1], shape.canvas.unit * directions(angle)
+            meshes[color] += [_extruded(in_frame(x, at, ahead), -half, half) for x in outlines]
+        return meshes
 
-    def _add_strokes(self, found: dict[str, list[Any]], pose: Pose) -> None:
+    def _add_strokes(self, meshes: dict[str, list[Any]], shape: DeformedShape) -> None:
         """Add bodies as plates, lines as rods, and filled areas as blocks."""
         beams = self.solution.scene.beams
         body, front = self.thickest(())[1], 0.7 * self.thickest(beams)[1]
         lines: defaultdict[tuple[str, float], list[Array]] = defaultdict(list)
         for strokes, half in (
-            (symbols.bodies(pose), 0.4 * body),
-            (symbols.centres(pose), 0.48 * body),
-            (symbols.rods(pose), 0.1 * body),
-            (symbols.rails(pose), 0.45 * body),
-            (symbols.connectors(pose), 0.45 * body),
+            (symbols.bodies(shape), 0.4 * body),
+            (symbols.centres(shape), 0.48 * body),
+            (symbols.rods(shape), 0.1 * body),
+            (symbols.rails(shape), 0.45 * body),
+            (symbols.connectors(shape), 0.45 * body),
         ):
             for points, color, weight, fill, layer in strokes:
                 base = front if layer >= FRONT else half
                 low, high = (-half, half) if layer <= MIDDLE else (base, 1.1 * base)
                 if fill is not None:
-                    found[fill].append(_extruded(points, low, high))
+                    meshes[fill].append(_extruded(points, low, high))
                 if fill != FILLED:
                     z = 0.0 if fill is None and layer <= MIDDLE else high
                     lines[color, weight].append(np.insert(points, 2, z, axis=1))
         for (color, weight), several in lines.items():
-            tubes = _lines(several).tube(radius=weight * pose.stage.unit / 20.0, n_sides=12)
-            found[color].append(tubes)
+            tubes = _lines(several).tube(radius=weight * shape.canvas.unit / 20.0, n_sides=12)
+            meshes[color].append(tubes)
 
 
 def _lines(lines: list[Array]) -> Any:

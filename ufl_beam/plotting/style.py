@@ -77,11 +77,11 @@ def magnified(factor: float, before: str = ", ") -> str:
     return f"{before}displacements × {factor:g}" if factor != 1 else ""
 
 
-def require_choice(choice: str, choices: Iterable[str], what: str) -> None:
-    """Raise :class:`ArgumentError` naming ``what`` unless ``choice`` is one of ``choices``."""
-    if choice not in choices:
-        names = ", ".join(f'"{name}"' for name in choices)
-        raise ArgumentError(f"{what} = {choice!r} is not one of {names}")
+def require_option(option: str, options: Iterable[str], what: str) -> None:
+    """Raise :class:`ArgumentError` naming ``what`` unless ``option`` is one of ``options``."""
+    if option not in options:
+        names = ", ".join(f'"{name}"' for name in options)
+        raise ArgumentError(f"{what} = {option!r} is not one of {names}")
 
 
 @contextmanager
@@ -195,7 +195,7 @@ def time_axes(axes: Axes) -> Axes:
     return axes
 
 
-def figure_of(axes: Axes) -> Figure:
+def parent_figure(axes: Axes) -> Figure:
     """Return the figure that axes are in."""
     return axes.figure.figure
 
@@ -210,7 +210,7 @@ def draw_legend(
 ) -> None:
     """Draw a legend outside the axes of a new figure, or inside the user's axes ``ax``."""
     if ax is None:
-        figure_of(axes).legend(handles=handles, fontsize=fontsize, **outside)
+        parent_figure(axes).legend(handles=handles, fontsize=fontsize, **outside)
     else:
         where = "best" if handles is None else "lower left"
         axes.legend(handles=handles, fontsize=fontsize, loc=where)
@@ -233,9 +233,9 @@ def draw_bar(axes: Axes, colors: Any, label: str) -> None:
     bar.ax.spines["outline"].set_visible(False)
 
 
-def make_room(axes: Axes) -> None:
+def fit_texts(axes: Axes) -> None:
     """Extend the limits so that texts are inside, and a legend below covers nothing."""
-    figure = figure_of(axes)
+    figure = parent_figure(axes)
     figure.draw_without_rendering()
     for text in axes.texts:
         box = text.get_window_extent().get_points()
@@ -247,9 +247,9 @@ def make_room(axes: Axes) -> None:
     axes.autoscale_view()
 
 
-def size_of(axes: Axes) -> Array:
+def axes_size(axes: Axes) -> Array:
     """Measure the present width and height of axes; (2,); points."""
-    figure = figure_of(axes)
+    figure = parent_figure(axes)
     figure.draw_without_rendering()
     return np.multiply(axes.get_window_extent().size, POINTS / figure.dpi)
 
@@ -259,4 +259,4 @@ def half_size(axes: Axes, text: str, size: float, **style: Any) -> Array:
     probe = axes.text(0.0, 0.0, text, fontsize=size, **style)
     box = probe.get_window_extent()
     probe.remove()
-    return np.asarray(np.array([box.width, box.height]) / 2 * POINTS / figure_of(axes).dpi)
+    return np.asarray(np.array([box.width, box.height]) / 2 * POINTS / parent_figure(axes).dpi)

@@ -3,7 +3,7 @@
 
 Supports are entries of :data:`SUPPORTS`, joints of :data:`JOINTS`, and connector laws of
 :data:`LAWS`; joints and laws without an entry have a plain symbol.  Half a symbol has the length 1.
-Symbols of loads are in `model_sheet.py`.
+Symbols of loads are in `model_drawing.py`.
 """
 
 from __future__ import annotations
@@ -22,15 +22,15 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Guided, Joint, Link, Prismatic, Release, RigidLink
 from ufl_beam.model.supports import Support
-from ufl_beam.plotting import layout
-from ufl_beam.plotting.layout import Pose, directions, in_frame, left_of, unit_vectors
+from ufl_beam.plotting import positions
+from ufl_beam.plotting.positions import DeformedShape, directions, in_frame, normal, unit_vectors
 from ufl_beam.plotting.style import GREY, INK, ORANGE, WHITE, number, shade, with_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 # Layers: below the beams, above the beams, on the areas of that layer, pins, and above pins.
-BACK, MIDDLE, UPON, PINS, FRONT = 2.5, 4.2, 4.3, 5.0, 5.5
+BEHIND, MIDDLE, UPON, PINS, FRONT = 2.5, 4.2, 4.3, 5.0, 5.5
 
 FILLED, EDGE = "#D6E2ED", "#5F7A94"  # colours of bodies
 STEEL, DARK, GROUND_GREY = "#6E6E6E", "#4A4A4A", "#808080"  # of rails, rods and fixed supports
@@ -60,12 +60,12 @@ def draw_strokes(axes: Axes, groups: Mapping[str, Iterable[Stroke]], color: Any 
     for group, strokes in groups.items():
         for points, own, weight, fill, layer in strokes:
             alike[group, own, weight, fill, layer].append(points)
-    for (group, own, weight, fill, layer), chains in alike.items():
+    for (group, own, weight, fill, layer), lines in alike.items():
         edge = shade(own) if color is None else color
         inside = "none" if fill is None else shade(fill) if color is None else (color, 0.15)
         kind = LineCollection if fill is None else PolyCollection
         collection = kind(
-            chains, edgecolors=edge, facecolors=inside, linewidths=weight, zorder=layer,
+            lines, edgecolors=edge, facecolors=inside, linewidths=weight, zorder=layer,
             joinstyle="round", capstyle="round", gid=group,
         )  # fmt: skip
         axes.add_collection(collection)
@@ -102,7 +102,7 @@ SUPPORTS = ((_DIAMOND,), (_TRIANGLE, _TRACK), (_TRIANGLE, _PLATE), (_CLAMP,))
 origin, and the beam comes from above."""
 
 
-class Footing(NamedTuple):
+class SupportSymbol(NamedTuple):
     """Symbol of a support, or of a point of the ground."""
 
     at: Array  # (2,); m
@@ -112,43 +112,47 @@ class Footing(NamedTuple):
     place: Anchor
 
 
-def footings(pose: Pose) -> Iterator[Footing]:
+def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
     """Find supports, and points of the ground with joints or connectors."""
-    scene = pose.stage.scene
+    scene = shape.canvas.scene
     for support in scene.supports:
-        angle = support_direction(support, pose.turn(support.place))
+        angle = support_direction(support, shape.rotation(support.place))
         color = ORANGE if support.moving else GROUND_GREY
-        held = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
-        yield Footing(pose.at(support.place), angle, SUPPORTS[held], color, support.place)
-    held_by: list[tuple[Sequence[Anchor], bool]] = [
-        (j.places, _turns(j)) for j in scene.joints if look_of(j).grounded
+        number = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
+        yield SupportSymbol(shape.at(support.place), angle, SUPPORTS[number], color, support.place)
+    grounded: list[tuple[Sequence[Anchor], bool]] = [
+        (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
-    held_by += [((c.a, c.b), False) for c in scene.connectors if not c.turns]
+    grounded += [((c.a, c.b), False) for c in scene.connectors if not c.turns]
     grounds: dict[Spot, tuple[float, bool]] = {}  # direction from it; if free to turn
-    for places, turns in held_by:
-        for spot in places:
-            if isinstance(spot, Spot) and spot.body is GROUND:
-                other = next(place for place in places if place != spot)
-                (x, y), (X, Y) = spot.point, other.point
-                if (x, y) == (X, Y) and isinstance(other, Spot):
-                    X, Y = other.body.center
+    for places, turns in grounded:
+        for point in places:
+            if isinstance(point, Spot) and point.body is GROUND:
+                far = next(place for place in places if place != point)
+                (x, y), (X, Y) = point.point, far.point
+                if (x, y) == (X, Y) and isinstance(far, Spot):
+                    X, Y = far.body.center
                 away = (x, y) != (X, Y)
-                inward = math.atan2(Y - y, X - x) if away else _inward(other)
-                known, before = grounds.get(spot, (inward, True))
-                grounds[spot] = known, before and turns
-    for spot, (inward, turns) in grounds.items():
+                inward = math.atan2(Y - y, X - x) if away else _inward(far)
+                known, before = grounds.get(point, (inward, True))
+                grounds[point] = known, before and turns
+    for point, (inward, turns) in grounds.items():
         angle = _upright(inward) if turns else inward - math.pi / 2
-        yield Footing(np.array(spot.point), angle, SUPPORTS[2 if turns else 3], GROUND_GREY, spot)
+        yield SupportSymbol(
+            np.array(point.point), angle, SUPPORTS[2 if turns else 3], GROUND_GREY, point
+        )
 
 
-def supports(pose: Pose) -> Iterator[Stroke]:
+def supports(shape: DeformedShape) -> Iterator[Stroke]:
     """Draw supports; fixed supports are on hatched ground."""
-    for at, angle, outlines, color, _ in footings(pose):
-        ahead = pose.stage.outside * directions(angle)
+    for at, angle, outlines, color, _ in support_symbols(shape):
+        ahead = shape.canvas.outside * directions(angle)
         yield from (Stroke(in_frame(x, at, ahead), color, 0.5, color, 3.5) for x in outlines)
         if color != ORANGE:
             low = min(y for outline in outlines for _, y in outline)
-            yield from _hatches(in_frame([(-1.0, low), (1.0, low)], at, ahead), pose.stage.outside)
+            yield from _hatches(
+                in_frame([(-1.0, low), (1.0, low)], at, ahead), shape.canvas.outside
+            )
 
 
 def support_direction(support: Support, turned: float) -> float:
@@ -164,40 +168,42 @@ def _upright(inward: float, angle: float = 0.0) -> float:
     return angle + (math.pi if math.sin(inward - angle) < -0.5 else 0.0)
 
 
-def _inward(anchor: Anchor) -> float:
+def _inward(place: Anchor) -> float:
     """Return the direction in which a beam leaves its end, or upwards for other places; rad."""
-    if not isinstance(anchor, Place) or 0.0 < anchor.s < 1.0:
+    if not isinstance(place, Place) or 0.0 < place.s < 1.0:
         return math.pi / 2
-    (x, y), (X, Y) = anchor.point, anchor.beam.curve(1e-3 if anchor.s == 0.0 else 1.0 - 1e-3)
+    (x, y), (X, Y) = place.point, place.beam.curve(1e-3 if place.s == 0.0 else 1.0 - 1e-3)
     return math.atan2(Y - y, X - x)
 
 
 def _hatches(line: Array, unit: float) -> Iterator[Stroke]:
     """Draw the hatching of the ground along a line, to its right."""
-    lengths = layout.lengths_along(line)
+    lengths = positions.lengths_along(line)
     at = np.arange(0.3 * unit, lengths[-1], 0.55 * unit)
     step = np.minimum(np.searchsorted(lengths, at), len(line) - 1) - 1
     ahead = unit_vectors(np.diff(line, axis=0)[step])
-    tops = layout.points_along(line, at / lengths[-1])
-    for ends in np.stack([tops, tops - 0.4 * unit * (ahead + left_of(ahead))], axis=1):
-        yield Stroke(ends, STEEL, 1.0, layer=BACK)
+    tops = positions.points_along(line, at / lengths[-1])
+    for ends in np.stack([tops, tops - 0.4 * unit * (ahead + normal(ahead))], axis=1):
+        yield Stroke(ends, STEEL, 1.0, layer=BEHIND)
 
 
 # -- bodies and joints -------------------------------------------------------------------------
 
 
-def bodies(pose: Pose) -> list[Stroke]:
+def bodies(shape: DeformedShape) -> list[Stroke]:
     """Draw outlines of the rigid bodies."""
-    outlines = pose.stage.outlines.items()
-    return [Stroke(pose.of_body(body, line), EDGE, 1.6, FILLED, BACK) for body, line in outlines]
+    outlines = shape.canvas.outlines.items()
+    return [
+        Stroke(shape.body_points(body, line), EDGE, 1.6, FILLED, BEHIND) for body, line in outlines
+    ]
 
 
-def centres(pose: Pose) -> Iterator[Stroke]:
+def centres(shape: DeformedShape) -> Iterator[Stroke]:
     """Draw centres of mass as circles, two quarters dark."""
-    arc = 0.45 * pose.stage.unit * directions(np.linspace(0.0, math.pi / 2, 13))
+    arc = 0.45 * shape.canvas.unit * directions(np.linspace(0.0, math.pi / 2, 13))
     quarter = np.vstack([(0.0, 0.0), arc, (0.0, 0.0)])
-    for body in pose.stage.scene.bodies:
-        at, ψ = pose.at(body.middle), pose.turn(body.middle)
+    for body in shape.canvas.scene.bodies:
+        at, ψ = shape.at(body.middle), shape.rotation(body.middle)
         for k, fill in enumerate((EDGE, WHITE, EDGE, WHITE)):
             ahead = directions(ψ + k * math.pi / 2)
             yield Stroke(in_frame(quarter, at, ahead), EDGE, 1.0, fill)
@@ -208,17 +214,17 @@ class Look(NamedTuple):
 
     rod: float = 0.0  # width of a line from place to place; points
     pins: tuple[int, ...] = ()  # numbers of the places with a pin; with a rail only if it turns
-    rail: Callable[[Pose, Joint], Iterator[Stroke]] | None = None
+    rail: Callable[[DeformedShape, Joint], Iterator[Stroke]] | None = None
     grounded: bool = True  # a point of the ground has the symbol of a support
 
 
-def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
+def _rail(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     """Draw the rail, as long as the range of motion, and the block on it."""
     (across,), (base, slider) = joint.holders, joint.places
-    unit, start, block = pose.stage.unit, pose.at(base), pose.at(slider)
-    ahead = -left_of(pose.turned(across.axis, base))
+    unit, start, block = shape.canvas.unit, shape.at(base), shape.at(slider)
+    ahead = -normal(shape.turned(across.axis, base))
     s = float((block - start) @ ahead)
-    low, high = pose.stage.travels[across]
+    low, high = shape.canvas.travels[across]
     # Magnified rotations may leave this range.
     low, high = min(low, s) - 1.8 * unit, max(high, s) + 1.8 * unit
     rail = block + np.outer((low - s, high - s), ahead)
@@ -232,27 +238,27 @@ def _rail(pose: Pose, joint: Joint) -> Iterator[Stroke]:
     yield Stroke(in_frame(corners, block, unit * ahead), INK, 1.8, WHITE)
 
 
-def _guide(pose: Pose, joint: Joint) -> Iterator[Stroke]:
+def _guide(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     """Draw the used part of a guide curve."""
     (holder,) = joint.holders
     assert isinstance(holder.law, laws.Guide)
-    low, high = pose.stage.travels[holder]
+    low, high = shape.canvas.travels[holder]
     curve = np.array([holder.law.curve(s) for s in np.linspace(low, high, 200)], dtype=float)
-    yield Stroke(curve, STEEL, 2.2, layer=BACK)
-    yield from _hatches(curve, pose.stage.unit)
+    yield Stroke(curve, STEEL, 2.2, layer=BEHIND)
+    yield from _hatches(curve, shape.canvas.unit)
 
 
-def _sleeve(pose: Pose, joint: Joint) -> Iterator[Stroke]:
+def _sleeve(shape: DeformedShape, joint: Joint) -> Iterator[Stroke]:
     """Draw two bars along the free direction of a release, or a box if both are free."""
     if 0 in joint.shared:
         return
     place = joint.places[0]
-    held = pose.turned(joint.holders[0].axis if joint.holders else (0.0, 1.0), place)
+    axis = shape.turned(joint.holders[0].axis if joint.holders else (0.0, 1.0), place)
     bars = [[(-0.9, t), (0.9, t)] for t in (0.6, -0.6)]
     if not joint.holders:
         bars += [[(s, -0.6), (s, 0.6)] for s in (0.9, -0.9)]
     for bar in bars:
-        points = in_frame(bar, pose.at(place), -pose.stage.unit * left_of(held))
+        points = in_frame(bar, shape.at(place), -shape.canvas.unit * normal(axis))
         yield Stroke(points, INK, 2.4, layer=FRONT)
 
 
@@ -266,28 +272,28 @@ JOINTS: dict[type[Joint], Look] = {
 """Symbols of joints by their class or a base; other joints have a pin or a thin rod."""
 
 
-def look_of(joint: Joint) -> Look:
+def joint_symbol(joint: Joint) -> Look:
     """Return the symbol of a joint."""
     plain = Look(pins=(0,)) if joint.meets else Look(rod=1.6)
     return next((JOINTS[kind] for kind in type(joint).__mro__ if kind in JOINTS), plain)
 
 
-def _turns(joint: Joint) -> bool:
+def _rotates(joint: Joint) -> bool:
     return 2 not in joint.shared and not any(holder.turns for holder in joint.holders)
 
 
-def rods(pose: Pose) -> Iterator[Stroke]:
+def rods(shape: DeformedShape) -> Iterator[Stroke]:
     """Draw links, from place to place."""
-    for joint in pose.stage.scene.joints:
-        if weight := look_of(joint).rod:
-            yield Stroke(np.array([pose.at(place) for place in joint.places]), DARK, weight)
+    for joint in shape.canvas.scene.joints:
+        if weight := joint_symbol(joint).rod:
+            yield Stroke(np.array([shape.at(place) for place in joint.places]), DARK, weight)
 
 
-def rails(pose: Pose) -> Iterator[Stroke]:
+def rails(shape: DeformedShape) -> Iterator[Stroke]:
     """Draw rails, guide curves, and the blocks on them."""
-    for joint in pose.stage.scene.joints:
-        if draw := look_of(joint).rail:
-            yield from draw(pose, joint)
+    for joint in shape.canvas.scene.joints:
+        if draw := joint_symbol(joint).rail:
+            yield from draw(shape, joint)
 
 
 class Pin(NamedTuple):
@@ -298,13 +304,13 @@ class Pin(NamedTuple):
     places: tuple[Anchor, ...]
 
 
-def pins(pose: Pose) -> Iterator[Pin]:
+def pins(shape: DeformedShape) -> Iterator[Pin]:
     """Find the pins of joints; joints that only slide have none."""
-    for joint in pose.stage.scene.joints:
-        look, turns = look_of(joint), _turns(joint)
+    for joint in shape.canvas.scene.joints:
+        look, turns = joint_symbol(joint), _rotates(joint)
         for k in look.pins if turns or look.rail is None else ():
             places = joint.places[k : k + 1] if look.rod else joint.places[k:]
-            yield Pin(pose.at(joint.places[k]), turns, places)
+            yield Pin(shape.at(joint.places[k]), turns, places)
 
 
 # -- connectors --------------------------------------------------------------------------------
@@ -313,72 +319,72 @@ def pins(pose: Pose) -> Iterator[Pin]:
 # -2 at its place a to 2 at its place b, with the body from -1 to 1; t is perpendicular.
 
 
-class Glyph(NamedTuple):
+class LawSymbol(NamedTuple):
     """Symbol of a connector law, and words on its size."""
 
     straight: list[Stroke]
-    words: Callable[[Any, str, str], str] = lambda law, force, way: type(law).__name__.lower()
+    words: Callable[[Any, str, str], str] = lambda law, force, unit: type(law).__name__.lower()
     """Function of the law and the units of force and motion; it returns words on the law's size."""
     turning: list[Stroke] | None = None  # around a pin; by default the straight one with spokes
     sweep: float = math.pi + 1.0  # angle from place a to place b in the undeformed scene; rad
     spins: bool = False  # rotates rigidly with b; else begins at a and ends at b
 
 
-def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke) -> Glyph:
+def _drive(straight: list[Stroke], fill: str, tail: float = -2.0, *more: Stroke) -> LawSymbol:
     """Make the symbol of a drive; around a pin, a curved arrow."""
     head = np.array([(1.45, 0.95), (2.05, 0.0), (1.45, -0.95), (1.45, 0.95)])
     turning = [_line((tail, 0), (1.6, 0), weight=2.6), Stroke(head, INK, 1.4, fill), *more]
-    return Glyph(straight, turning=turning, sweep=1.4 * math.pi, spins=True)
+    return LawSymbol(straight, turning=turning, sweep=1.4 * math.pi, spins=True)
 
 
 CENTRE = -9.0  # the coordinate t of the pin
 _SPOKES = [_line((s, CENTRE), (s, 0)) for s in (-2, 2)]
 _TEETH = [(float(s), 0.55 * (-1.0) ** k) for k, s in enumerate(np.linspace(-1.0, 1.0, 13)[1::2])]
 _BOXED = [_line((-2, 0), (-0.8, 0)), _line((0.8, 0), (2, 0)), _box(-0.8, 0.8, 0.6, WHITE)]
-_PUSHED = [_line((-2, 0), (-0.8, 0)), _line((0.35, 0), (2, 0), weight=3.2)]
+_ACTUATOR = [_line((-2, 0), (-0.8, 0)), _line((0.35, 0), (2, 0), weight=3.2)]
 _CYLINDER = [
-    *(*_PUSHED, _box(-0.8, 0.35, 0.6, WHITE)),
+    *(*_ACTUATOR, _box(-0.8, 0.35, 0.6, WHITE)),
     _line((-0.6, 0), (0, 0), weight=2.2, layer=UPON),
     Stroke(
         np.array([(-0.12, 0.34), (0.2, 0.0), (-0.12, -0.34), (-0.12, 0.34)]), INK, 1.0, ORANGE, UPON
     ),
 ]
-_STATED = [
+_CURVE = [
     *_BOXED,
     _line((-0.55, -0.35), (-0.25, -0.27), (0.25, 0.27), (0.55, 0.35), layer=UPON),
 ]
 
 
-def _stop_in_words(law: laws.Stop, force: str, way: str) -> str:
+def _stop_in_words(law: laws.Stop, force: str, unit: str) -> str:
     ends = [end for end in (law.low, law.high) if math.isfinite(end)]
-    words = [with_unit(x, way) if way == "m" else f"{number(x)} {way}" for x in ends]
+    words = [with_unit(x, unit) if unit == "m" else f"{number(x)} {unit}" for x in ends]
     sign = "≤ " if math.isinf(law.low) else "≥ " if math.isinf(law.high) else ""
     return f"stop {sign}{' … '.join(words)}"
 
 
-def _friction_in_words(law: laws.Coulomb, force: str, way: str) -> str:
+def _friction_in_words(law: laws.Coulomb, force: str, unit: str) -> str:
     words = [with_unit(law.force, force)] if law.force else []
-    words += [f"{law.coefficient:g}{' m' * (way == 'rad')} × press"] if law.coefficient else []
+    words += [f"{law.coefficient:g}{' m' * (unit == 'rad')} × press"] if law.coefficient else []
     return f"friction {' + '.join(words)}"
 
 
-LAWS: dict[type, Glyph] = {  # drives are orange, filled if they prescribe the motion
-    laws.Spring: Glyph(
+LAWS: dict[type, LawSymbol] = {  # drives are orange, filled if they prescribe the motion
+    laws.Spring: LawSymbol(
         [_line((-2, 0), (-1, 0), *_TEETH, (1, 0), (2, 0))],
-        lambda law, force, way: with_unit(law.stiffness, f"{force}/{way}")
+        lambda law, force, unit: with_unit(law.stiffness, f"{force}/{unit}")
         + ", yields" * bool(law.law) + ", breaks" * bool(law.softening),
         [_line((2, CENTRE), (2, -2.1), (-2, 0))], sweep=4.3 * math.pi,
     ),
-    laws.Damper: Glyph(
+    laws.Damper: LawSymbol(
         [
             _line((-2, 0), (-0.5, 0)),
             _line((0.6, 0.6), (-0.5, 0.6), (-0.5, -0.6), (0.6, -0.6)),
             _line((0.15, 0.42), (0.15, -0.42), weight=2.6),
             _line((0.15, 0), (2, 0)),
         ],
-        lambda law, force, way: with_unit(law.viscosity, f"{force} s/{way}"),
+        lambda law, force, unit: with_unit(law.viscosity, f"{force} s/{unit}"),
     ),
-    laws.Stop: Glyph(
+    laws.Stop: LawSymbol(
         [
             _line((-2, 0), (-0.25, 0)),
             _line((-0.25, 0.7), (-0.25, -0.7), weight=3.6),
@@ -387,7 +393,7 @@ LAWS: dict[type, Glyph] = {  # drives are orange, filled if they prescribe the m
         ],
         _stop_in_words,
     ),
-    laws.Coulomb: Glyph(
+    laws.Coulomb: LawSymbol(
         [
             _line((-2, 0), (-0.8, 0), (-0.8, 0.3), (0.6, 0.3), weight=2.2),
             _line((2, 0), (0.8, 0), (0.8, -0.3), (-0.6, -0.3), weight=2.2),
@@ -395,58 +401,58 @@ LAWS: dict[type, Glyph] = {  # drives are orange, filled if they prescribe the m
         ],
         _friction_in_words,
     ),
-    laws.PrescribedMotion: _drive([*_PUSHED, _box(-0.8, 0.35, 0.6, ORANGE)], ORANGE),
+    laws.PrescribedMotion: _drive([*_ACTUATOR, _box(-0.8, 0.35, 0.6, ORANGE)], ORANGE),
     laws.PrescribedForce: _drive(_CYLINDER, WHITE),
     laws.Controller: _drive(
         [*_CYLINDER, _line((0.9, 0), (0.9, 1.15), (-0.25, 1.15), (-0.25, 0.6), weight=1.0)],
         WHITE, -1.4, _box(-2.0, -1.4, 0.5, WHITE),
     ),
-    laws.ForceLaw: Glyph(_STATED),
-    laws.RigidPlastic: Glyph(  # no motion below the limit, flow at it
+    laws.ForceLaw: LawSymbol(_CURVE),
+    laws.RigidPlastic: LawSymbol(  # no motion below the limit, flow at it
         [*_BOXED, _line((-0.55, -0.35), (0, -0.35), (0, 0.35), (0.55, 0.35), layer=UPON)],
-        lambda law, force, way: f"rigid up to {with_unit(float(law.law.limit), force)}",
+        lambda law, force, unit: f"rigid up to {with_unit(float(law.law.limit), force)}",
     ),
-    ConnectorLaw: Glyph(_STATED, lambda law, force, way: type(law).__name__),  # of a user
+    ConnectorLaw: LawSymbol(_CURVE, lambda law, force, unit: type(law).__name__),  # of a user
 }  # fmt: skip
 
 
-def glyph_of(law: laws.Law) -> Glyph:
+def law_symbol(law: laws.Law) -> LawSymbol:
     """Return the symbol of a connector law; laws without an entry share one symbol."""
     return LAWS.get(type(law), LAWS[ConnectorLaw])
 
 
-def connectors(pose: Pose) -> Iterator[Stroke]:
+def connectors(shape: DeformedShape) -> Iterator[Stroke]:
     """Draw springs, dampers, motors and other connectors."""
-    for connector in pose.stage.scene.connectors:
-        yield from (_around if connector.turns else _straight)(pose, connector)
+    for connector in shape.canvas.scene.connectors:
+        yield from (_around if connector.turns else _straight)(shape, connector)
 
 
-def ends_of(pose: Pose, connector: Connector) -> tuple[Array, Array]:
+def connector_ends(shape: DeformedShape, connector: Connector) -> tuple[Array, Array]:
     """Return the start and end of the drawing of a straight connector; (2,) each; m.
 
     A sliding connector is drawn along its axis and ends at the projection of its place b onto the
     axis.  It begins before a if it would be too short in the undeformed scene.
     """
-    a, b = pose.at(connector.a), pose.at(connector.b)
+    a, b = shape.at(connector.a), shape.at(connector.b)
     if not connector.follows_a:
         return a, b
-    ahead = pose.turned(connector.axis, connector.a)
+    ahead = shape.turned(connector.axis, connector.a)
     start = float(np.dot(connector.apart, connector.axis))
-    least = math.copysign(max(LEAST_SLIDE * pose.stage.unit, abs(start)), start)
+    least = math.copysign(max(LEAST_SLIDE * shape.canvas.unit, abs(start)), start)
     return a - (least - start) * ahead, a + ((b - a) @ ahead) * ahead
 
 
-def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
-    a, b = ends_of(pose, connector)
-    unit, offset = pose.stage.unit, pose.stage.offsets[connector]
+def _straight(shape: DeformedShape, connector: Connector) -> Iterator[Stroke]:
+    a, b = connector_ends(shape, connector)
+    unit, offset = shape.canvas.unit, shape.canvas.offsets[connector]
     length = math.hypot(*connector.apart)
     if connector.follows_a:
-        yield Stroke(np.array([b, pose.at(connector.b)]), STEEL, 1.0)
+        yield Stroke(np.array([b, shape.at(connector.b)]), STEEL, 1.0)
         along_axis = abs(float(np.dot(connector.apart, connector.axis)))
         length = max(along_axis, LEAST_SLIDE * unit)
     apart = np.linalg.norm(b - a) > 0.1 * unit
-    axis = unit_vectors(b - a) if apart else pose.turned(connector.axis, connector.a)
-    across = unit * left_of(axis)
+    axis = unit_vectors(b - a) if apart else shape.turned(connector.axis, connector.a)
+    across = unit * normal(axis)
     if offset:
         for end, far in ((a, b), (b, a)):
             lane = end + 0.06 * (far - end)
@@ -456,30 +462,30 @@ def _straight(pose: Pose, connector: Connector) -> Iterator[Stroke]:
     # The body is a constant fraction of the length, so that it stretches with the motion.
     body = min(0.66, 6.0 * unit / max(length, unit))
     places = 0.0, (1 - body) / 2, (1 + body) / 2, 1.0
-    for stroke in glyph_of(connector.law).straight:
+    for stroke in law_symbol(connector.law).straight:
         s, t = stroke.points.T
-        part = np.interp(s, (-2.0, -1.0, 1.0, 2.0), places)
-        yield stroke._replace(points=a + np.outer(part, b - a) + np.outer(t, across))
+        fraction = np.interp(s, (-2.0, -1.0, 1.0, 2.0), places)
+        yield stroke._replace(points=a + np.outer(fraction, b - a) + np.outer(t, across))
 
 
-def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
-    glyph, pin = glyph_of(connector.law), pose.at(connector.b)
-    radius = (1.6 + pose.stage.offsets[connector]) * pose.stage.unit
-    a, b = pose.turn(connector.a), pose.turn(connector.b)
-    first, sweep = (b, 0.0) if glyph.spins else (a, b - a)
+def _around(shape: DeformedShape, connector: Connector) -> Iterator[Stroke]:
+    symbol, pin = law_symbol(connector.law), shape.at(connector.b)
+    radius = (1.6 + shape.canvas.offsets[connector]) * shape.canvas.unit
+    a, b = shape.rotation(connector.a), shape.rotation(connector.b)
+    first, sweep = (b, 0.0) if symbol.spins else (a, b - a)
     # Limit the winding of the symbol for many revolutions.
-    sweep = glyph.sweep + min(max(sweep, -0.75 * glyph.sweep), 2.0)
-    for stroke in glyph.turning or [*glyph.straight, *_SPOKES]:
+    sweep = symbol.sweep + min(max(sweep, -0.75 * symbol.sweep), 2.0)
+    for stroke in symbol.turning or [*symbol.straight, *_SPOKES]:
         # Steps of 5 degrees bend straight lines between two points.
         steps = np.abs(np.diff(stroke.points[:, 0])) / 4.0 * sweep / math.radians(5.0)
         counts = np.maximum(1, np.ceil(steps)).astype(int)
         at = np.concatenate([[0.0], *(k + np.arange(1, n + 1) / n for k, n in enumerate(counts))])
         s, t = (np.interp(at, np.arange(len(stroke.points)), x) for x in stroke.points.T)
         r = np.maximum(radius * (1.0 + t / 3.0), 0.18 * radius)
-        way = directions(first - 0.5 + sweep * (s + 2.0) / 4.0)
+        direction = directions(first - 0.5 + sweep * (s + 2.0) / 4.0)
         layer = FRONT + stroke.layer - MIDDLE
-        yield stroke._replace(points=pin + r[:, None] * way, layer=layer)
-    start = pose.at(connector.a)
+        yield stroke._replace(points=pin + r[:, None] * direction, layer=layer)
+    start = shape.at(connector.a)
     if np.linalg.norm(pin - start) > radius and node(connector.a) is not GROUND:
         yield Stroke(np.array([start, pin]), GREY, 1.0)
 
@@ -487,28 +493,28 @@ def _around(pose: Pose, connector: Connector) -> Iterator[Stroke]:
 # -- all symbols -------------------------------------------------------------------------------
 
 
-def in_plane(pose: Pose) -> dict[str, list[Stroke]]:
+def in_plane(shape: DeformedShape) -> dict[str, list[Stroke]]:
     """Draw bodies, joints, connectors, supports and masses in the plane; many bodies as dots."""
-    scene, unit = pose.stage.scene, pose.stage.unit
+    scene, unit = shape.canvas.scene, shape.canvas.unit
     few = len(scene.bodies) <= MOST_BODIES
     square = 0.27 * unit * np.array([(-1, -1), (1, -1), (1, 1), (-1, 1), (-1, -1)])
     return {
-        "bodies": bodies(pose)
+        "bodies": bodies(shape)
         if few
-        else [disc(pose.at(body.middle), 0.4 * unit, INK, GREY) for body in scene.bodies],
-        "joints": [*rods(pose), *rails(pose)],
-        "connectors": [*connectors(pose)],
-        "supports": [*supports(pose)],
-        "centres": [*centres(pose)] if few else [],
+        else [disc(shape.at(body.middle), 0.4 * unit, INK, GREY) for body in scene.bodies],
+        "joints": [*rods(shape), *rails(shape)],
+        "connectors": [*connectors(shape)],
+        "supports": [*supports(shape)],
+        "centres": [*centres(shape)] if few else [],
         "pins": [
             disc(at, unit / 3, INK, WHITE) if turns else Stroke(at + square, INK, 1.0, INK, PINS)
-            for at, turns, _ in pins(pose)
+            for at, turns, _ in pins(shape)
         ],
-        "masses": masses(pose),
+        "masses": masses(shape),
     }
 
 
-def masses(pose: Pose, color: str = INK) -> list[Stroke]:
+def masses(shape: DeformedShape, color: str = INK) -> list[Stroke]:
     """Draw point masses as dots."""
-    at = [pose.at(mass.place) for mass in pose.stage.scene.masses]
-    return [disc(point, 0.45 * pose.stage.unit, color, color) for point in at]
+    at = [shape.at(mass.place) for mass in shape.canvas.scene.masses]
+    return [disc(point, 0.45 * shape.canvas.unit, color, color) for point in at]

@@ -82,10 +82,10 @@ class Checkpoint:
         if self.minutes is not None:
             require_number(self.minutes, f"{what}: minutes", at_least=0.0)
         object.__setattr__(self, "also", require_sequence(self.also, f"{what}: also"))
-        for i, one in enumerate(self.also):
-            if not has_state(one):
+        for i, item in enumerate(self.also):
+            if not has_state(item):
                 raise ArgumentError(
-                    f"{what}: also[{i}] = {shorten(one)} has no state; give a random generator of "
+                    f"{what}: also[{i}] = {shorten(item)} has no state; give a random generator of "
                     "NumPy, or an object with methods state() and restore(state)"
                 )
 
@@ -100,13 +100,13 @@ class Keeper:
     """The checkpoint of one run; its file is locked until the :attr:`lock` is released.
 
     The ``call`` holds the arguments of the run by name.  A run with equal steps of length ``step``
-    (s) may continue to another end ``t1`` (s).  ``found`` is the content of the file until
+    (s) may continue to another end ``t1`` (s).  ``content`` is that of the file until
     :meth:`resume`.
     """
 
     def __init__(
         self,
-        choice: Checkpoint,
+        checkpoint: Checkpoint,
         call: Mapping[str, Any],
         step: float | None,
         t1: float,
@@ -116,12 +116,12 @@ class Keeper:
         for recorder in recorders:
             if type(recorder).state is Recorder.state:
                 recorder.state()  # raises, as it cannot be restarted
-        self._choice, self._call, self._step, self._t1, self._comm = choice, call, step, t1, comm
-        self.path, self._recorders = Path(choice.path), recorders
+        self._call, self._step, self._t1, self._comm = call, step, t1, comm
+        self._checkpoint, self.path, self._recorders = checkpoint, Path(checkpoint.path), recorders
         self._described = Description(call)
-        also = {f"also[{i}]": one for i, one in enumerate(choice.also)}
+        also = {f"also[{i}]": item for i, item in enumerate(checkpoint.also)}
         self._stateful = {**self._described.stateful, **also}
-        self.found: Content = {}
+        self.content: Content = {}
         self.lock = Lock(self.path)
         try:
             on_first(comm, self._find)
@@ -129,7 +129,7 @@ class Keeper:
             self.lock.release()
             raise
         if comm.size > 1:
-            self.found = comm.bcast(self.found)
+            self.content = comm.bcast(self.content)
         self._last_time, self._last_step = time.perf_counter(), -1
 
     # -- restart -------------------------------------------------------------------------------
@@ -155,55 +155,55 @@ class Keeper:
             )
         if exists:
             with decoding(self.path, FORMAT):
-                self.found = read(self.path, FORMAT)
-                now, then = self._described.texts, self.found["call"]
-                if self.found["python"] != PYTHON:
+                self.content = read(self.path, FORMAT)
+                now, then = self._described.texts, self.content["call"]
+                if self.content["python"] != PYTHON:
                     now, then = (
-                        {name: one for name, one in texts.items() if not name.endswith(f".{CODE}")}
+                        {n: text for n, text in texts.items() if not n.endswith(f".{CODE}")}
                         for texts in (now, then)
                     )
-                step, before, differs = self._step, self.found["step"], difference(now, then)
+                step, before, differs = self._step, self.content["step"], difference(now, then)
                 if not differs and (step is None) != (before is None):
                     differs = "steps are equal in one of both, and adaptive in the other"
                 if not differs and step and abs(step - before) > 1e-9 * before:
                     differs = f"the step is {step!r} s, in the file {before!r} s"
-                if not differs and [*self._stateful] != [*self.found["stateful"]]:
+                if not differs and [*self._stateful] != [*self.content["stateful"]]:
                     differs = "other objects have a state"
                 if differs:
                     raise ArgumentError(f"it is of another run: {differs}")
-                t, t1 = float(self.found["state/t"][0]), self._t1
+                t, t1 = float(self.content["state/t"][0]), self._t1
                 if t > t1 and t - t1 > 1e-9 * (self._step or 0.0):
                     raise ArgumentError(f"it is at t = {t:.9g} s, beyond the end t[1] = {t1:.9g} s")
         require_writable(self.path)
 
     def resume(self, simulation: Simulation, pace: Any) -> None:
         """Restore the run, its step control ``pace`` and recorders; then drop the content."""
-        found, solution = self.found, simulation.solution
+        content, solution = self.content, simulation.solution
         with decoding(self.path, FORMAT):
-            simulation.remember(Memory(simulation.share, below("state/", found)))
-            solution.resume(below("history/", found))
-            pace.restore(found["pace"])
-            solution.seconds = float(found["seconds"])
+            simulation.remember(Memory(simulation.share, below("state/", content)))
+            solution.resume(below("history/", content))
+            pace.restore(content["pace"])
+            solution.seconds = float(content["seconds"])
         solution.parts, solution.iterations = simulation.parts, simulation.iterations
         solution.time_error = pace.error
-        solution.warnings = found["warnings"]
-        states = found["stateful"].values()
-        for one, state in zip(self._stateful.values(), states, strict=True):
-            if isinstance(one, np.random.Generator):
-                one.bit_generator.state = state
-            elif isinstance(one, np.random.RandomState):
-                one.set_state(state)
+        solution.warnings = content["warnings"]
+        states = content["stateful"].values()
+        for item, state in zip(self._stateful.values(), states, strict=True):
+            if isinstance(item, np.random.Generator):
+                item.bit_generator.state = state
+            elif isinstance(item, np.random.RandomState):
+                item.set_state(state)
             else:
-                one.restore(state)
+                item.restore(state)
         for i, recorder in enumerate(self._recorders):
             try:
-                recorder.resume(simulation, below(f"recorder {i}/", found))
+                recorder.resume(simulation, below(f"recorder {i}/", content))
             except ArgumentError as error:
                 raise ArgumentError(f"checkpoint {self.path}: {error}") from None
             except (LookupError, TypeError, ValueError) as error:
-                why = f"checkpoint {self.path}: {recorder} cannot go on from it: {error!r}"
+                why = f"checkpoint {self.path}: {recorder} cannot continue from it: {error!r}"
                 raise ArgumentError(f"{why}. {ADVICE['checkpoint']}") from error
-        self._last_step, self.found = pace.steps, {}
+        self._last_step, self.content = pace.steps, {}
 
     # -- writing -------------------------------------------------------------------------------
 
@@ -212,7 +212,7 @@ class Keeper:
         if self._last_step < 0:  # report an error now rather than after an hour
             self._require_told()
             self._last_step = 0
-        every, minutes = self._choice.every, self._choice.minutes
+        every, minutes = self._checkpoint.every, self._checkpoint.minutes
         due = every is not None and steps - self._last_step >= every
         if minutes is not None:
             over = time.perf_counter() - self._last_time >= 60 * minutes
@@ -223,15 +223,15 @@ class Keeper:
         """Write the file after ``seconds`` of the run; all processes call it together."""
 
         def states() -> dict[str, Any]:
-            found = dict[str, Any]()
-            for name, one in self._stateful.items():
-                if isinstance(one, np.random.Generator):
-                    found[name] = one.bit_generator.state
-                elif isinstance(one, np.random.RandomState):
-                    found[name] = one.get_state(legacy=False)
+            by_name = dict[str, Any]()
+            for name, item in self._stateful.items():
+                if isinstance(item, np.random.Generator):
+                    by_name[name] = item.bit_generator.state
+                elif isinstance(item, np.random.RandomState):
+                    by_name[name] = item.get_state(legacy=False)
                 else:
-                    found[name] = one.state()
-            return found
+                    by_name[name] = item.state()
+            return by_name
 
         solution, memory = simulation.solution, Memory(simulation.share)
         simulation.remember(memory)
@@ -257,8 +257,8 @@ class Keeper:
         changed = difference(Description(self._call).texts, self._described.texts)
         if changed:
             raise ArgumentError(
-                f"checkpoint {self.path}: a function of the scene remembers what no checkpoint "
-                f"knows of: {changed.replace(', in the file', ', at the beginning')}. Make it an "
+                f"checkpoint {self.path}: a function of the scene has changed data that no file "
+                f"contains: {changed.replace(', in the file', ', at the beginning')}. Make it an "
                 "object with methods state() and restore(state), see docs/restart.md"
             )
 
@@ -267,7 +267,7 @@ PYTHON = ".".join(map(str, sys.version_info[:2]))
 """Version of Python, on which the code of functions depends."""
 
 
-def end_of(start: Solution | None) -> str:
+def checksum_at(start: Solution | None) -> str:
     """Return a checksum of the state with which a run begins."""
     if start is None:
         return "nothing"

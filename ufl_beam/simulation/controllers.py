@@ -20,7 +20,7 @@ from ufl_beam.model.connector_laws import (
 )
 from ufl_beam.model.connectors import Connector
 
-SAME = 1e-9
+SAMPLE_TOLERANCE = 1e-9
 """Distance between the end of a step and a sample that is round-off; fraction of a sample time."""
 
 
@@ -37,12 +37,12 @@ class Controllers:
 
     def __init__(self, share: Share) -> None:
         links = share.grid.scene.links
-        asked = [link for link in links if isinstance(link.law, Controller | Coulomb)]
-        self.at: dict[Connector, int] = {link: i for i, link in enumerate(asked)}
-        self.numbers, self.fresh = np.zeros(len(asked)), np.zeros(len(asked), dtype=np.int32)
+        active = [link for link in links if isinstance(link.law, Controller | Coulomb)]
+        self.at: dict[Connector, int] = {link: i for i, link in enumerate(active)}
+        self.numbers, self.fresh = np.zeros(len(active)), np.zeros(len(active), dtype=np.int32)
         self.sampled: dict[int, float] = {}
         self._changing: list[tuple[int, Connector]] = []
-        for i, link in enumerate(asked):
+        for i, link in enumerate(active):
             if isinstance(link.law, Coulomb) and not link.law.joint:
                 self.numbers[i] = link.law.force
                 continue
@@ -52,7 +52,7 @@ class Controllers:
         self.asks = bool(self._changing)
         self._numbers = np.array([i for i, link in enumerate(links) if link in self.at], dtype=int)
         # Time of the first sample (s) and number of the last sample; NaN without a sample time.
-        self._samples = np.full((len(asked), 2), math.nan)
+        self._samples = np.full((len(active), 2), math.nan)
 
     def place(self, link: Connector) -> Any:
         """Return the address of the force or limit of a connector."""
@@ -92,8 +92,8 @@ class Controllers:
         """
         if not len(self.numbers):
             return
-        held = np.column_stack([self.numbers, self._samples, np.full(len(self.numbers), t)])
-        rows = memory.rows("asked", self._numbers, held, known=True)
+        values = np.column_stack([self.numbers, self._samples, np.full(len(self.numbers), t)])
+        rows = memory.rows("asked", self._numbers, values, known=True)
         self.numbers[:] = rows[:, 0]
         if np.all(rows[:, 3] == t):
             self._samples[:] = rows[:, 1:3]
@@ -101,7 +101,7 @@ class Controllers:
 
 def _rounding(sample: float, *times: float) -> float:
     """Return the difference of times that is round-off; s."""
-    return SAME * sample + 4 * math.ulp(max(map(abs, times)))
+    return SAMPLE_TOLERANCE * sample + 4 * math.ulp(max(map(abs, times)))
 
 
 # -- forces that alternate -------------------------------------------------------------------------
@@ -109,21 +109,21 @@ def _rounding(sample: float, *times: float) -> float:
 ALTERNATIONS = 20
 """Number of successive reversals of a force that is reported as a fault."""
 
-LARGE = 0.5
+LEAST_CHANGE = 0.5
 """Least change of such a force, as a fraction of the largest force so far."""
 
 MOVED = 1e-9
 """Least motion in such a step, as a fraction of the size of the scene or in rad."""
 
 CONTROLLED = (
-    "the controller answers the motion that it has caused by the time it is asked again. A force "
-    "of kd times a rate that is held for a time dt needs kd dt < 2 J; J is the inertia (along a "
-    "line the mass) that it moves within dt, and a beam without a body has hardly any there, "
-    "whatever the step. Give the place the inertia of its drive, as PointMass or Body, take "
+    "the controller is evaluated again after its force has changed the motion too much. A force of "
+    "kd times a rate that is constant for a time dt needs kd dt < 2 J; J is the inertia (along a "
+    "line the mass) that it moves within dt, and a beam without a body has hardly any inertia at a "
+    "place, whatever the step. Give the place the inertia of its drive, as PointMass or Body, use "
     "smaller gains, or state the force as a ForceLaw, which has no delay; see docs/howto_machine.md"
 )
-DRIVEN = (
-    "it drives a motion that is too fast for the steps. Use smaller ones, or a scheme that damps "
+TOO_FAST = (
+    "it drives a motion that is too fast for the steps. Use smaller steps, or a scheme that damps "
     "such motions, as EnergyMomentum(alpha=0.05, beta=0.05) does"
 )
 """Reasons and remedies for a controller and for a force law."""
@@ -140,11 +140,11 @@ class ForceWatch:
 
     def __init__(self, couplings: Sequence[Any], controllers: Controllers, size: float) -> None:
         kinds = Controller, ForceLaw
-        found = [
-            (link, one, k) for one in couplings for k, link in enumerate(one.links)
+        watched = [
+            (link, group, k) for group in couplings for k, link in enumerate(group.links)
             if isinstance(link.law, kinds)
         ]  # fmt: skip
-        self._links, n = [link for link, *_ in found], len(found)
+        self._links, n = [link for link, *_ in watched], len(watched)
         if not n:
             return
         values, fresh = (
@@ -153,10 +153,10 @@ class ForceWatch:
         )
         self._told, none = np.full(n, math.nan), np.zeros((3, n))
         self.c = struct(
-            "force_watch", number=n, most=ALTERNATIONS, large=LARGE, moved=MOVED,
-            dof=np.array([one.forces_at[k] for _, one, k in found], dtype=np.int32),
+            "force_watch", number=n, most=ALTERNATIONS, large=LEAST_CHANGE, moved=MOVED,
+            dof=np.array([group.forces_at[k] for _, group, k in watched], dtype=np.int32),
             value=ffi.new("double *[]", values), fresh=ffi.new("int32_t *[]", fresh),
-            rate=ffi.new("double *[]", [doubles(one.rate) + k for _, one, k in found]),
+            rate=ffi.new("double *[]", [doubles(group.rate) + k for _, group, k in watched]),
             length=np.array([1.0 if link.turns else size for link in self._links]),
             force=none[0], change=none[1], largest=none[2], told=self._told,
             count=np.zeros(n, dtype=np.int32),
@@ -171,7 +171,7 @@ class ForceWatch:
         for link, t in zip(self._links, map(float, self._told), strict=True):
             if math.isnan(t):
                 continue
-            times, why = "steps", DRIVEN
+            times, why = "steps", TOO_FAST
             if isinstance(link.law, Controller):
                 times, why = "samples" if link.law.sample else "steps", CONTROLLED
             yield (

@@ -35,28 +35,28 @@ from ufl_beam.solvers.newton import Solver
 from ufl_beam.solvers.null_vectors import SINGULAR, free_matrix, null_vectors
 from ufl_beam.terms.term import KINDS
 
-SHARE = 0.1
+LEAST_NAMED = 0.1
 """Least motion or deformation that is named, as a fraction of the largest motion."""
 
 SOFT = 1e-3
 """Largest stiffness of a yielding connector or cell, as a fraction of its elastic stiffness."""
 
-NEAR = 1e-3
+PROBE_DISTANCE = 1e-3
 """Distance from the initial state of a step, in sizes of the scene or radians, at which the tangent
 shows which parts yield at the start of the step."""
 
-NOT_HELD = (
-    "Loads can hold it where they balance, as a weight below its hinge, and there is no such state "
-    f"near that in which the run begins. Begin there. {INSTEAD}. In the first step: "
+FREE_MOTION = (
+    "Loads can hold it only in a state in which they balance, as a weight below its hinge, and the "
+    f"run does not begin near such a state. Begin in one. {INSTEAD}. In the first step: "
 )
 """Message of a static run whose first step fails while a motion without strain is free."""
 
-WEAK = 0.1
+LIMIT_STIFFNESS = 0.1
 """Least stiffness near a limit load, as a fraction of the least stiffness in the first state.
 
 It is the root of 1/4096 if the limit load is as far away as the smallest substep."""
 
-ROOM = 10.0
+LEDGER_TOLERANCE = 10.0
 """Largest ratio of the imbalance of an exact ledger to the tolerance of the solver."""
 
 NAMED = 3
@@ -85,7 +85,7 @@ def no_equilibrium(
     ``loose`` describes a motion without strain that no equilibrium has held yet; it may be empty.
     """
     if loose:
-        return ModelError(f"{loose}{NOT_HELD}{failure}")
+        return ModelError(f"{loose}{FREE_MOTION}{failure}")
     (t, end), named = times, solution.parameter
     q1 = equation.supports.in_plane(newton.unknowns.copy())
     vectors = {kind: np.zeros(equation.share.size) for kind in KINDS}
@@ -101,13 +101,13 @@ def no_equilibrium(
         where = f"after {named.at(t, '.9g')}, even with {named.over(end - t)}"
     why = ""
     if not isinstance(failure, NoNumber):  # where a function has no value there is no tangent
-        near = _near(equation, q0, q1)
+        probe = _probe_state(equation, q0, q1)
         why = _singularity(equation, q1)
         # If the latest tangent is inconclusive, an earlier tangent may have sent Newton's method
         # far away.  Then the tangent near the beginning of the step is examined.
-        if not why and near is not q0 and equation.respond_at(near):
-            why = _singularity(equation, near)
-        why = why or _near_limit(equation, solution, q0, near)
+        if not why and probe is not q0 and equation.evaluate(probe):
+            why = _singularity(equation, probe)
+        why = why or _limit_point(equation, solution, q0, probe)
     said = f"{failure} ({sizes})" if sizes else str(failure)
     return ConvergenceError(
         f"no equilibrium {where}: {why}{'; ' if why else ''}{said}. {advice}", time=t, dt=end - t,
@@ -115,18 +115,18 @@ def no_equilibrium(
     )  # fmt: skip
 
 
-def _near_limit(equation: StepEquation, solution: Solution, q0: Array, near: Array) -> str:
+def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: Array) -> str:
     """Return a message if a limit load or bifurcation is near ``q0`` in statics, else empty.
 
     There the least stiffness is a small fraction of its value in the first state, or the number of
     negative pivots of the tangent differs.  The pivots are also counted a little beyond ``q0``, at
-    ``near``, because yielding reduces the stiffness there.
+    ``probe``, because yielding reduces the stiffness there.
     """
     if not len(equation.force) or not len(solution):
         return ""
     signs, least = [], []
-    for q in (solution.q[0][equation.share.dofs], q0, near):
-        if not np.isfinite(q).all() or not equation.respond_at(q):
+    for q in (solution.q[0][equation.share.dofs], q0, probe):
+        if not np.isfinite(q).all() or not equation.evaluate(q):
             return ""
         K, free = free_matrix(equation.share, equation.A, equation.supports.dofs)
         if not len(free):
@@ -136,7 +136,7 @@ def _near_limit(equation: StepEquation, solution: Solution, q0: Array, near: Arr
             least.append(null_vectors(K)[0][-1])
         except (np.linalg.LinAlgError, RuntimeError):
             return ""
-    if len(set(signs)) == 1 and least[1] > WEAK * least[0]:
+    if len(set(signs)) == 1 and least[1] > LIMIT_STIFFNESS * least[0]:
         return ""
     return (
         "a limit load or a bifurcation is near, where the tangent stiffness is singular; follow "
@@ -144,12 +144,12 @@ def _near_limit(equation: StepEquation, solution: Solution, q0: Array, near: Arr
     )
 
 
-def _near(equation: StepEquation, q0: Array, q1: Array) -> Array:
-    """Return a state between ``q0`` and ``q1``, at most :data:`NEAR` away from ``q0``."""
+def _probe_state(equation: StepEquation, q0: Array, q1: Array) -> Array:
+    """Return a state between ``q0`` and ``q1``, at most :data:`PROBE_DISTANCE` away from ``q0``."""
     share = equation.share
-    way = np.abs(q1 - q0) * share.grid.scales[share.dofs]
-    far = share.largest(float(way.max(initial=0.0)))
-    return np.asarray(q0 + min(1.0, NEAR / far) * (q1 - q0)) if 0 < far < np.inf else q0
+    increment = np.abs(q1 - q0) * share.grid.scales[share.dofs]
+    far = share.largest(float(increment.max(initial=0.0)))
+    return np.asarray(q0 + min(1.0, PROBE_DISTANCE / far) * (q1 - q0)) if 0 < far < np.inf else q0
 
 
 def _singularity(equation: StepEquation, q: Array) -> str:
@@ -187,15 +187,15 @@ def _singularity(equation: StepEquation, q: Array) -> str:
 def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     """Return the deformations of all connectors and of all cells in a motion ``x`` from ``q``."""
     share, grid, scene = equation.share, equation.share.grid, equation.share.grid.scene
-    here, ε = x[share.dofs], 1e-6
+    x_local, ε = x[share.dofs], 1e-6
     links, left = np.zeros(len(scene.links)), np.ones(len(scene.links))
-    for one in equation.couplings:
+    for group in equation.couplings:
         try:
-            change = (one.motion(q + ε * here) - one.motion(q - ε * here)) / (2 * ε)
+            change = (group.motion(q + ε * x_local) - group.motion(q - ε * x_local)) / (2 * ε)
         except StepFailed:
             continue  # no motion beyond the end of a guide; the failure of the step reports it
-        links[one.numbers] = np.abs(change)
-        left[one.numbers] = one.response.remaining()
+        links[group.numbers] = np.abs(change)
+        left[group.numbers] = group.response.remaining()
     links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
     # Strains of a small motion, times lengths of cells; (num_cells, 3); m, m, rad
     first, last = grid.cells[:, 0], grid.cells[:, 1]
@@ -208,22 +208,22 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     length = np.linalg.norm(d, axis=1)
     along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
     strains = np.column_stack([along, shear, change[:, 2]])
-    left_of_cells = np.ones(len(grid.cells))
+    left_in_cells = np.ones(len(grid.cells))
     for beams in equation.inelastic:
         cells, _ = beams.kept()
-        left_of_cells[cells] = beams.points.remaining(strains[cells])
+        left_in_cells[cells] = beams.points.remaining(strains[cells])
     if share.comm.size > 1:
         share.comm.Allreduce(MPI.IN_PLACE, links)
         share.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
-        share.comm.Allreduce(MPI.IN_PLACE, left_of_cells, op=MPI.MIN)
+        share.comm.Allreduce(MPI.IN_PLACE, left_in_cells, op=MPI.MIN)
     strains[:, :2] /= scene.size
     sizes = np.abs(strains).max(axis=1, initial=0.0)
-    found = []
-    for deformed, remaining in ((links, left), (sizes, left_of_cells)):
+    deformations = []
+    for deformed, remaining in ((links, left), (sizes, left_in_cells)):
         soft = remaining <= SOFT
-        stiff = bool((deformed[~soft] >= SHARE).any())
-        found.append(Deformed(_named(np.where(soft, deformed, 0.0)), stiff))
-    return found
+        stiff = bool((deformed[~soft] >= LEAST_NAMED).any())
+        deformations.append(Deformed(_named(np.where(soft, deformed, 0.0)), stiff))
+    return deformations
 
 
 def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> str:
@@ -243,8 +243,8 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
     ways = [str(grid.scene.links[i]) for i in links.soft]
     ways += [grid.describe_cell(i) for i in cells.soft]
     if ways:
-        give = "gives way" if len(ways) == 1 else "give way together"
-        said += f"; {_list(ways)} {give} at no further force"
+        verb = "gives way" if len(ways) == 1 else "give way together"
+        said += f"; {_list(ways)} {verb} at no further force"
     layouts = (grid.scene.beams[grid.beam_of_cell[i]].section.layout(None) for i in cells.soft)
     laws = (law for layout in layouts if layout is not None for law, _ in layout.laws)
     perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
@@ -257,9 +257,9 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
 
 
 def _named(sizes: Array) -> Index:
-    """Return the indices of all sizes from :data:`SHARE` on, in descending order."""
+    """Return the indices of all sizes from :data:`LEAST_NAMED` on, in descending order."""
     order = np.argsort(-sizes, kind="stable")
-    return order[sizes[order] >= SHARE]
+    return order[sizes[order] >= LEAST_NAMED]
 
 
 def _list(names: list[str]) -> str:
@@ -310,20 +310,20 @@ class LedgerWatch:
         # Other schemes integrate works with the mean of the forces at both ends.
         exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
         at_once = scheme.theta == scheme.load_weight  # elastic forces and variables
-        stated = [link.law for link in links if isinstance(link.law, ConnectorLaw)]
-        for law in stated:
+        user_laws = [link.law for link in links if isinstance(link.law, ConnectorLaw)]
+        for law in user_laws:
             certain = exact and (at_once or not law.variables) and judges_loss(law)
             grows[law.entry] = grows.get(law.entry, exact) and certain
         self._grows = [name for name, certain in grows.items() if certain]
-        given = any(isinstance(link.law, ForceLaw) and link.law.stored for link in links)
-        given = given or not all(isinstance(law, Stop) for law in stated)
-        self._bounded = not given and all(map(has_quadratic_energies, laws))
+        prescribed = any(isinstance(link.law, ForceLaw) and link.law.stored for link in links)
+        prescribed = prescribed or not all(isinstance(law, Stop) for law in user_laws)
+        self._bounded = not prescribed and all(map(has_quadratic_energies, laws))
         self._in_motion = has_inertia(scheme)
-        self._throughput = self._most = 0.0
+        self._transferred = self._most = 0.0
         self.judged = 0
         self._told: set[str] = set()
 
-    def judge(self, states: States, every: int, *, last: bool = False) -> Iterator[str]:
+    def faults(self, states: States, every: int, *, last: bool = False) -> Iterator[str]:
         """Yield warnings of the states since the last call, in groups of :data:`STATES`.
 
         ``every`` is the number of steps between states; ``last`` includes an incomplete group.
@@ -338,10 +338,10 @@ class LedgerWatch:
         times, (state, supplied, lost) = states.times, states.ledger()
         works = sum(float(np.abs(np.diff(work)).sum()) for work in supplied.values())
         sizes = [e if name in ENTRIES else np.abs(e - e[0]) for name, e in state.items()]
-        held = np.asarray(sum(sizes, 0.0 * times))
-        self._throughput += works + max(float(np.max(held)) - self._most, 0.0)
-        self._most = max(self._most, float(np.max(held)))
-        allowed = self._claimed * self._throughput
+        energy = np.asarray(sum(sizes, 0.0 * times))
+        self._transferred += works + max(float(np.max(energy)) - self._most, 0.0)
+        self._most = max(self._most, float(np.max(energy)))
+        allowed = self._claimed * self._transferred
         for name in self._grows:
             if name in lost and name not in self._told:
                 falls = -np.diff(lost[name])
@@ -353,9 +353,9 @@ class LedgerWatch:
                         f"{self._where(name, states, n)}the dissipated energy, the entry {name!r} "
                         f"of the ledger, falls by {falls[n]:.3g} J between t = {before:.6g} and "
                         f"{after:.6g} s. No law of the scene gives dissipated energy back: a step "
-                        "found a wrong state there, and what follows is wrong. Use smaller steps; "
-                        "check the equations of a law of your own, or let one that is to give "
-                        "energy have active = True"
+                        "found a wrong state there, and all later results are wrong. Use smaller "
+                        "steps; check the equations of a law of your own, or set active = True in "
+                        "a law that supplies energy"
                     )
         least = float(np.min(state["stored"])) if "stored" in state and self._bounded else 0.0
         if least < -allowed and "stored" not in self._told:
@@ -370,19 +370,19 @@ class LedgerWatch:
         if every > 1 or not self._in_motion or "numerical" not in lost or not len(starts):
             return
         losses = lost["numerical"][starts + STATES] - lost["numerical"][starts]
-        most = np.maximum.reduceat(held, starts)
-        wrong = losses > np.maximum(TURNOVER * most, LITTLE * self._throughput)
+        most = np.maximum.reduceat(energy, starts)
+        wrong = losses > np.maximum(TURNOVER * most, LITTLE * self._transferred)
         if wrong.any() and "numerical" not in self._told:
             self._told.add("numerical")
             k = int(np.argmax(wrong))
             begin, end = times[starts[k]], times[starts[k] + STATES]
             yield (
                 f"from t = {begin:.6g} to {end:.6g} s the time scheme took {losses[k]:.3g} J, the "
-                f"entry 'numerical', {losses[k] / most[k]:.3g} times as much as the scene held at "
-                f"most, in {STATES} steps. So most of the work that was supplied went into motions "
+                f"entry 'numerical', {losses[k] / most[k]:.3g} times the largest energy of the "
+                f"scene in these {STATES} steps. So most of the supplied work went into motions "
                 "that are too fast for the steps, and results depend on the scheme. Use smaller "
-                "steps, or smoother loads and supports; a controller that causes it needs another "
-                "sample time, inertia at its place, or a ForceLaw instead"
+                "steps, or smoother loads and supports; a controller that causes the loss needs "
+                "another sample time, inertia at its place, or a ForceLaw instead"
             )
 
     def _where(self, name: str, states: States, n: int) -> str:
@@ -402,5 +402,5 @@ class LedgerWatch:
             place = self._grid.middle(cell)
             fall = before[cell] - after[cell]
             falls[f"{place.beam.name}, cell at s = {place.s:.3g}: "] = float(fall)
-        worst = max(falls, key=lambda one: falls[one], default="")
+        worst = max(falls, key=lambda name: falls[name], default="")
         return worst if worst and falls[worst] > 0.0 else ""

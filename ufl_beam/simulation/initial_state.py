@@ -151,9 +151,9 @@ def _require_agreement(grid: Grid, v: Array) -> None:
         if link.law is HELD and abs(rate) > 1e-9 * fastest / (size if link.turns else 1.0):
             raise ArgumentError(
                 f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
-                "or rad/s; give all that is joined a Velocity that agrees"
+                "or rad/s; give all joined parts velocities that agree"
             )
-    held = {
+    supports = {
         int(grid.node(support.place)[c]): support
         for support in grid.scene.supports if not support.moving and not support.angle
         for c in support.held
@@ -163,10 +163,10 @@ def _require_agreement(grid: Grid, v: Array) -> None:
     for beam in (beam for velocity in grid.scene.initial for beam in velocity.beams):
         dofs = np.unique(grid.nodes_of(beam)[1])
         dofs = dofs[moving[dofs]]
-        lost = dofs[np.isin(dofs, [*held])]
+        lost = dofs[np.isin(dofs, [*supports])]
         if not len(lost):
             continue
-        support = held[int(lost[0])]
+        support = supports[int(lost[0])]
         if len(lost) == len(dofs):
             raise ArgumentError(
                 f"Velocity: {beam.name} does not move, because {support} holds it; remove the "
@@ -174,7 +174,7 @@ def _require_agreement(grid: Grid, v: Array) -> None:
             )
         names = ", ".join(COMPONENTS[c] for c in range(3) if np.isin(columns[c], lost).any())
         warn(
-            f"Velocity of {beam.name}: {support} holds {names} there, so that its velocity is zero "
-            "there from the start while that of the rest is not, a blow. Give a velocity that "
-            "agrees with the support, about= its place"
+            f"Velocity of {beam.name}: {support} prescribes {names}, so that the velocity at its "
+            "place is zero from the start but the rest of the beam moves, which is an impact. Give "
+            "a velocity that agrees with the support, about= its place"
         )

@@ -30,15 +30,15 @@ from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Output, reserved
-from ufl_beam.output.recorders import Recorder, recorders_of
+from ufl_beam.output.recorders import Recorder, checked_recorders
 from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.reference.solver import Solver
-from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, end_of
-from ufl_beam.simulation.diagnosis import ROOM, LedgerWatch
+from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, checksum_at
+from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch
 from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
-from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, number_of_steps
+from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, step_count
 from ufl_beam.simulation.stepper import MOST_PARTS
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
@@ -118,14 +118,14 @@ def simulate(
     if checkpoint is not None:
         require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
     kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
-    recorders, outputs = recorders_of(record, comm, "simulate", *kept)
+    recorders, outputs = checked_recorders(record, comm, "simulate", *kept)
     begin = time.perf_counter()
     if isinstance(newton, Newton) and newton.reference:
         if isinstance(dt, Adaptive):
             require_plain(newton, "adaptive steps, dt = Adaptive(...)")
         if recorders or checkpoint is not None:
             require_plain(newton, "recorders" if recorders else "checkpoint")
-        number = number_of_steps(t1 - t0, cast(float, dt))
+        number = step_count(t1 - t0, cast(float, dt))
         return simulate_by_reference(
             scene, scheme, newton, (t0, t1), number, start=start, mesh=mesh, every=every,
             max_states=max_states, comm=comm, progress=progress,
@@ -133,10 +133,10 @@ def simulate(
     with ExitStack() as stack:
         keeper: Keeper | None = None
         if checkpoint is not None:
-            step = None if isinstance(dt, Adaptive) else (t1 - t0) / number_of_steps(t1 - t0, dt)
+            step = None if isinstance(dt, Adaptive) else (t1 - t0) / step_count(t1 - t0, dt)
             call = {
                 "scene": scene, "scheme": scheme, "t[0]": t0, "dt": dt, "every": every,
-                "max_states": max_states, "newton": newton or Newton(), "start": end_of(start),
+                "max_states": max_states, "newton": newton or Newton(), "start": checksum_at(start),
                 "mesh": mesh_of(start, mesh), "t[1]": t1 if step is None else "any",
                 "record": [type(recorder).__qualname__ for recorder in recorders],
             }  # fmt: skip
@@ -184,7 +184,7 @@ def take_steps(
         begin: Value of the clock at the beginning of the run, for checkpoints; s.
     """
     solution, ended = simulation.solution, False
-    claimed = ROOM * simulation.solver.c.rtol
+    claimed = LEDGER_TOLERANCE * simulation.solver.c.rtol
     watch = LedgerWatch(simulation.grid, simulation.scheme, claimed)
 
     def after_step() -> bool:
@@ -194,7 +194,7 @@ def take_steps(
         if pace.steps % solution.every == 0 or pace.finished:
             simulation.keep()
             thins = len(solution) > max_states + 1 and not pace.finished
-            simulation.warn(watch.judge(solution, solution.every, last=thins or pace.finished))
+            simulation.warn(watch.faults(solution, solution.every, last=thins or pace.finished))
             if thins:
                 solution.thin()
                 solution.every *= 2
@@ -205,7 +205,7 @@ def take_steps(
             keeper.write(simulation, pace, time.perf_counter() - begin)
         return until is not None and bool(until(simulation))
 
-    if keeper is not None and keeper.found:
+    if keeper is not None and keeper.content:
         simulation.together(keeper.resume, simulation, pace)
         print_once(f"checkpoint {keeper.path}: the run goes on from t = {simulation.t:.9g} s")
     else:
@@ -213,12 +213,12 @@ def take_steps(
             simulation.together(recorder.open, simulation)
         simulation.keep()
     with bar:
-        quiet = until is None and keeper is None and all(one.by_itself for one in recorders)
+        quiet = until is None and keeper is None and all(r.by_itself for r in recorders)
         while not (pace.finished or ended):
             if quiet and solution.every == 1 and max_states == sys.maxsize:
                 pace.advance(sys.maxsize, keep=True)
                 solution.time_error = pace.error
-                simulation.together(simulation.warn, watch.judge(solution, solution.every))
+                simulation.together(simulation.warn, watch.faults(solution, solution.every))
             else:
                 left = solution.every - pace.steps % solution.every
                 pace.advance(left if quiet else 1)
@@ -229,7 +229,7 @@ def take_steps(
                 bar.set_postfix_str(simulation.parameter.at(simulation.t), refresh=False)
                 bar.update(pace.progress - bar.n)
     simulation.end()
-    simulation.together(simulation.warn, watch.judge(solution, solution.every, last=True))
+    simulation.together(simulation.warn, watch.faults(solution, solution.every, last=True))
 
 
 def check_ledger(simulation: Simulation) -> None:
@@ -245,7 +245,7 @@ def check_ledger(simulation: Simulation) -> None:
         everyone = share.comm.allgather(solution.warnings.splitlines(keepends=True))
         solution.warnings = "".join(dict.fromkeys(chain.from_iterable(everyone)))
     if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
-        energy, claimed = solution.energy, ROOM * simulation.solver.c.rtol
+        energy, claimed = solution.energy, LEDGER_TOLERANCE * simulation.solver.c.rtol
         if energy.opened(claimed, 0.0):
             # Errors of steps are independent: their squares add up.
             q = solution.q[:, share.dofs]

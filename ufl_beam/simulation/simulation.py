@@ -41,7 +41,7 @@ APPLYING = 1 / 8
 LONGEST = 0.05
 """Time after which C returns, so that a run can be interrupted and shows its progress; s."""
 
-ROOM = 2**20
+MOST_VALUES = 2**20
 """Limit of the numbers that C writes in a call, for the states of all its steps."""
 
 
@@ -109,26 +109,26 @@ class Simulation(Stepper):
         share = Share(grid, sharing(comm, len(grid.cells)))
         together, q, v, internal = Agreement(share.comm), *initial_state(grid, start)
         equation = StepEquation(share, scheme, t0, v[share.dofs], together)
-        inertia, q_here, loaded = equation.inertia, q[share.dofs], list[Array]()
+        inertia, q_local, loaded = equation.inertia, q[share.dofs], list[Array]()
         same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
         goes_on = same and "reactions" in internal and start is not None and not len(start.v)
         if not fresh or (inertia is not None and inertia.scheme.kept):
             rates = None if inertia is None else inertia.v
             past = Memory(share, internal) if same else None
             loads = equation.loads
-            loaded = together(lambda: [one.carry_on(t0, q_here, rates, past) for one in loads])
+            loaded = together(lambda: [x.carry_on(t0, q_local, rates, past) for x in loads])
         if start is not None:
-            equation.take_over(q_here, t0, internal, same=same)
+            equation.set_internal_variables(q_local, t0, internal, same=same)
         for term in equation.terms:
-            term.start(q_here)
-        equation.add_state(q_here)
-        for coupling in equation.couplings if fresh else ():
-            coupling.put_forces(q_here)
+            term.start(q_local)
+        equation.add_state(q_local)
+        for group in equation.couplings if fresh else ():
+            group.put_forces(q_local)
         path = None
         if inertia is None:
-            path = StaticPath(equation, q_here, t0, loaded, together, goes_on=goes_on)
+            path = StaticPath(equation, q_local, t0, loaded, together, goes_on=goes_on)
         else:
-            together(equation.inner_forces, q_here)
+            together(equation.inner_forces, q_local)
         goes_on = goes_on or inertia is not None
         solution, forces, before = kind(scene, grid), None, None
         solution.between, solution.scheme = float(scheme.average(0.0, 1.0)), scheme
@@ -138,7 +138,7 @@ class Simulation(Stepper):
             before = start.before(-1)[share.dofs] if start.begun else None
         if forces is not None or inertia is not None:
             equation.cell_forces.begin(forces)
-        super().__init__(comm, equation, newton, t0, q_here, path, solution, together, loose)
+        super().__init__(comm, equation, newton, t0, q_local, path, solution, together, loose)
         self._begun_at = before
         solution.begun = solution.between < 1 or self.cell_forces.asks_for_before
         of_scene = forces_of_scene(grid, scheme, t0)
@@ -147,7 +147,7 @@ class Simulation(Stepper):
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())
         # If forces act before the end of a step, loads that act from the start are applied first.
         self._applies = fresh and inertia is None and solution.between != 1.0 and acts
-        give_back_memory(len(q_here))
+        give_back_memory(len(q_local))
         if inertia is not None and (scene.links or scene.supports):
             motions = self.connections()[:, 0] if scene.links else np.zeros(0)
             together(warn_of_jumps, grid, t0, q, motions)
@@ -185,7 +185,7 @@ class Simulation(Stepper):
             [ -0.1 -18.9 -14.3]
             >>> simulation.close()
         """
-        c, solution, room, rows = self.march, self.solution, 0, ffi.NULL
+        c, solution, row_limit, rows = self.march, self.solution, 0, ffi.NULL
         ends = np.ascontiguousarray(ends, dtype=np.float64)
         number = len(ends) if self.share.alone else 1  # clocks of processes differ
         try:
@@ -204,18 +204,18 @@ class Simulation(Stepper):
                     not solution.begun or solution.parts_of_last == self.parts
                 ):
                     columns = self._writer.columns
-                    space = solution.room(columns, min(number, 1 + ROOM // columns.width))
-                    room, rows = len(space), doubles(space)
-                number = max(room, 1)
+                    space = solution.room(columns, min(number, 1 + MOST_VALUES // columns.width))
+                    row_limit, rows = len(space), doubles(space)
+                number = max(row_limit, 1)
             with self._in_c():
-                taken: int = lib.take_steps(c, number, doubles(ends), LONGEST, room > 0, rows)
+                taken: int = lib.take_steps(c, number, doubles(ends), LONGEST, row_limit > 0, rows)
             if keep and taken:
                 # A divided step is written again: its last substep begins after the kept state.
-                in_parts = solution.begun and room > 0 and c.parts_of_last > 1
-                if room and taken > in_parts:
-                    solution.grow(taken - in_parts)
-                    solution.count(self.parts - in_parts * c.parts_of_last, self.iterations)
-                if in_parts or not room:
+                divided = solution.begun and row_limit > 0 and c.parts_of_last > 1
+                if row_limit and taken > divided:
+                    solution.grow(taken - divided)
+                    solution.count(self.parts - divided * c.parts_of_last, self.iterations)
+                if divided or not row_limit:
                     self.keep()
             if c.failure:
                 self._fail()
@@ -228,10 +228,10 @@ class Simulation(Stepper):
         if not self.share.alone:
             return None
         along = ForcesAlongCells(self.grid), self.solution.between
-        self._watches.append(one := ExtremesInC(self.fields, self.cell_forces, *along, parts))
-        of_c = ffi.new("watch *[]", [watch.c for watch in self._watches])
-        fill(self.march, watches=len(self._watches), watch=of_c)
-        return one
+        self._watches.append(extremes := ExtremesInC(self.fields, self.cell_forces, *along, parts))
+        pointers = ffi.new("watch *[]", [watch.c for watch in self._watches])
+        fill(self.march, watches=len(self._watches), watch=pointers)
+        return extremes
 
     def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
         """End the run in its present state, because even the smallest step, to ``end``, failed.

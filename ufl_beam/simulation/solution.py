@@ -164,11 +164,11 @@ class Solution(States, Rich):
         def record(owner: Any, field: str, function: Any) -> Any:
             """Return the record for a function that is a field of ``owner``."""
             if field == "curve" and isinstance(owner, Member):
-                return SavedCurve.of(function, 0.0, 1.0, grid.parameters(owner))
+                return SavedCurve.sampled(function, 0.0, 1.0, grid.parameters(owner))
             if field == "curve":
                 return _used_curve(self, function)
             if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
-                return SavedFunction.of(function, map(float, self.times))
+                return SavedFunction.sampled(function, map(float, self.times))
             return None
 
         return {
@@ -182,7 +182,7 @@ class Solution(States, Rich):
         counts = {"counts": np.array([self.parts, self.iterations])}
         return {**counts, **above("history/", self.history()), **above("internal/", self.internal)}
 
-    def _take(self, content: Content) -> None:
+    def _set_content(self, content: Content) -> None:
         require_arrays(content, {"counts": (2,), "history/every": (1,)})
         self.resume(below("history/", content))
         self.internal = below("internal/", content)
@@ -207,7 +207,7 @@ class Solution(States, Rich):
         The shift is ``|V| h / (2 limit)`` with V at the last kept time before the opening.  Keys
         are the beams with embedded hinges that opened in the run.
         """
-        return {one.beam: one.error for one in Opened(self).hinges()}
+        return {hinges.beam: hinges.error for hinges in Opened(self).hinges()}
 
     def summary(self) -> list[str]:
         """Return lines on the model, the run, and embedded hinges that opened."""
@@ -219,7 +219,7 @@ class Solution(States, Rich):
             f"{self.seconds:.2f} s of wall time",
         ]
         if hinges := Opened(self).hinges():
-            number, worst = sum(one.number for one in hinges), max(hinges, key=lambda x: x.error)
+            number, worst = sum(x.number for x in hinges), max(hinges, key=lambda x: x.error)
             lines.append(
                 f"embedded hinges opened in {_cells_in_words(number)}; their place within the cell "
                 f"shifts the limit by at most {_percent(worst.error)} ({worst.beam.name}, cell at "
@@ -237,20 +237,20 @@ class Solution(States, Rich):
 
 def restored(content: Content, scene: Scene | None = None) -> Solution:
     """Make a solution from the content of a file, with the saved scene or the given scene."""
-    of = from_data(content["scene"]) if scene is None else scene
-    grid = Grid(of, from_data(content["mesh"]))
+    described = from_data(content["scene"]) if scene is None else scene
+    grid = Grid(described, from_data(content["mesh"]))
     if grid.checksum() != content["numbering"]:
         if scene is not None:
             raise ArgumentError(
-                "it is a solution of another scene: its beams, cells, bodies or joints are others"
+                "it is a solution of another scene: its beams, cells, bodies or joints differ"
             )
         raise ArgumentError(
             f"it was written by version {content['version']} of ufl_beam, which numbers degrees of "
-            f"freedom otherwise than this one, {version()}; load it with that version"
+            f"freedom differently from this version, {version()}; load it with the former version"
         )
     kinds = {kind.__name__: kind for kind in (Solution, *Solution.__subclasses__())}
     solution = kinds[content["kind"]](grid.scene, grid)
-    solution._take(content)
+    solution._set_content(content)
     if scene is not None:
         scenes = solution._content()["scene"], content["scene"]
         now, then = (Description({"scene": json.loads(json.dumps(d))}).texts for d in scenes)
@@ -264,10 +264,10 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
 # An embedded hinge is in the middle of its cell and feels the mean moment of the cell.  At the ends
 # of the cell the moment differs by |V| h/2, so a hinge that belongs there opens at another load.
 
-LARGE = 0.05
+WARNED_SHIFT = 0.05
 """Shift of a limit by the place of its hinge above which a run warns; fraction of the limit."""
 
-TINY = 1e-6
+INCREMENT = 1e-6
 """Increment of the opening for the slope of a resistance, as a fraction of energy / limit."""
 
 
@@ -315,18 +315,18 @@ class Opened:
     def hinges(self) -> list[OpenedHinges]:
         """Return the embedded hinges (laws of sections) that opened in the run, beam by beam."""
         grid = self._grid
-        found = []
+        hinges = []
         for beam in grid.scene.beams:
             law = beam.section.hinge
             cells, laws = grid.cells_of(beam), grid.hinges(beam)
-            cells = cells[[one is law for one in laws] & (self.first[cells] > 0)]
+            cells = cells[[other_law is law for other_law in laws] & (self.first[cells] > 0)]
             if law is None or not len(cells) or law.limit == 0:
                 continue
             errors = self.shear[cells] * grid.lengths(cells) / (2 * law.limit)
             worst = int(np.argmax(errors))
             place = grid.middle(int(cells[worst]))
-            found.append(OpenedHinges(beam, len(cells), float(errors[worst]), place))
-        return found
+            hinges.append(OpenedHinges(beam, len(cells), float(errors[worst]), place))
+        return hinges
 
     def warn(self, scheme: Scheme) -> None:
         """Issue a :class:`ModelWarning` for each beam whose results depend on the mesh.
@@ -346,21 +346,21 @@ class Opened:
             ratio, length, t = ratios[worst], lengths[worst], times[self.first[cells[worst]]]
             if ratio > 1:
                 warn(
-                    f"{beam.name}: what opened in the cell at "
-                    f"s = {grid.middle(int(cells[worst])).s:.3g} by t = {t:.6g} s did so in a "
-                    f"jump: its resistance falls {ratio:.3g} times as fast as its cell of "
+                    f"{beam.name}: the hinge in the cell at "
+                    f"s = {grid.middle(int(cells[worst])).s:.3g} opened suddenly by "
+                    f"t = {t:.6g} s: its resistance falls {ratio:.3g} times as fast as its cell of "
                     f"{length:.3g} m can follow. Energy that the cell released and the opening did "
                     "not dissipate went to the rest of the scene. Use cells shorter than "
                     f"{length / ratio:.3g} m, or an energy {ratio:.3g} times as large"
                 )
         for member, number, error, place in self.hinges():
-            if error > LARGE:
+            if error > WARNED_SHIFT:
                 warn(
                     f"{member.name}: the hinge of the section opened in {_cells_in_words(number)}, "
                     "in the middle of a cell. At the ends of the cell at "
-                    f"s = {place.s:.3g} the moment differs from that in its middle by "
-                    f"{_percent(error)} of the limit, so the load at which the hinge opens is "
-                    "uncertain by as much. Put a hinge exactly where it belongs, "
+                    f"s = {place.s:.3g} the moment differs from the moment in its middle by "
+                    f"{_percent(error)} of the limit, so the load at which the hinge opens has the "
+                    "same uncertainty. Put a hinge exactly where it belongs, "
                     "Beam(hinges={s: law}), or use shorter cells"
                 )
 
@@ -370,9 +370,9 @@ def _cells_in_words(number: int) -> str:
     return f"{number} cell{'s'[: number != 1]}"
 
 
-def _percent(part: float) -> str:
+def _percent(fraction: float) -> str:
     """Return a fraction in words: "12 %", or "more than 100 %" if the limit is near zero."""
-    return f"{100 * part:.2g} %" if part <= 1 else "more than 100 %"
+    return f"{100 * fraction:.2g} %" if fraction <= 1 else "more than 100 %"
 
 
 def _fall(layout: Layout | None, scheme: Scheme) -> tuple[float, float]:
@@ -384,7 +384,7 @@ def _fall(layout: Layout | None, scheme: Scheme) -> tuple[float, float]:
     law = None if layout is None else layout.softening
     if layout is None or law is None or law.limit == 0:
         return 0.0, 0.0
-    growth, begins = TINY * law.fracture_energy / law.limit, np.array([law.steepest[1]])
+    growth, begins = INCREMENT * law.fracture_energy / law.limit, np.array([law.steepest[1]])
     after = scheme.resistance(law, begins, np.array([growth]))
     (fall,) = (law.traction(begins) - after) / growth
     before = law.mean_traction(0 * begins, begins) * begins * layout.weights[layout.breaking].min()
@@ -418,4 +418,4 @@ def _used_curve(solution: Solution, curve: Curve) -> SavedCurve:
     first, last = float(np.nanmin(used)), float(np.nanmax(used))
     steps = (parameter_step(curve, s, scene.size) for s in (first, last))
     more = 0.1 * (last - first) + 8 * max(steps)
-    return SavedCurve.of(curve, first - more, last + more, (0.0, *NEAR_START))
+    return SavedCurve.sampled(curve, first - more, last + more, (0.0, *NEAR_START))

@@ -24,7 +24,7 @@ SAMPLES = (0.01, 0.5, 0.99)
 """Fractions of a step at which loads are evaluated."""
 
 
-def number_of_steps(time: float, dt: float) -> int:
+def step_count(time: float, dt: float) -> int:
     """Return the least number of equal steps not longer than ``dt``, up to rounding."""
     return max(1, math.ceil(time / dt * (1 - 1e-9)))
 
@@ -34,7 +34,7 @@ class EqualSteps:
 
     def __init__(self, simulation: Simulation, t1: float, dt: float) -> None:
         self._simulation, self._t0, self._time = simulation, simulation.t, t1 - simulation.t
-        self._all = number_of_steps(self._time, dt)
+        self._all = step_count(self._time, dt)
         self.steps, self.error = 0, math.nan
 
     @property
@@ -112,26 +112,26 @@ class Adaptive:
 class AdaptiveSteps:
     """Steps whose error is estimated and limited."""
 
-    def __init__(self, simulation: Simulation, t1: float, choice: Adaptive) -> None:
+    def __init__(self, simulation: Simulation, t1: float, control: Adaptive) -> None:
         self._simulation, self._t0, self._t1 = simulation, simulation.t, t1
         t0 = simulation.t
-        self._tolerance = choice.tolerance
-        self._longest = choice.longest or t1 - t0
+        self._tolerance = control.tolerance
+        self._longest = control.longest or t1 - t0
         last_digit = math.ulp(max(abs(t0), abs(t1)))
-        self._shortest = max(choice.shortest or 1e-12 * (t1 - t0), 16 * last_digit)
-        self._dt = min(choice.first or (t1 - t0) / 100, self._longest)
+        self._shortest = max(control.shortest or 1e-12 * (t1 - t0), 16 * last_digit)
+        self._dt = min(control.first or (t1 - t0) / 100, self._longest)
         functions = (function for _, function in simulation.scene.time_functions())
         self._functions = list(dict.fromkeys(functions))
         self._largest = [0.0] * len(self._functions)
         kinks = {float(t) for f in self._functions for t in getattr(f, "kinks", ())}
         # Times that differ by rounding alone are merged.
         same = max(1e-9 * (t1 - t0), self._shortest)
-        inside = sorted(t for t in (*kinks, *choice.stops) if t0 + same < t < t1 - same)
+        inside = sorted(t for t in (*kinks, *control.stops) if t0 + same < t < t1 - same)
         apart = [t for before, t in pairwise([t0, *inside]) if t - before > same]
         self._stops = [*apart, t1]
         self._fresh = True
         share = simulation.share
-        self._turns, (self._x, self._y) = share.rotations, share.translations()
+        self._rotations, (self._x, self._y) = share.rotations, share.translations()
         M = simulation.inertia.M
         bears = np.bincount(M.rows(), weights=np.abs(M.data), minlength=share.size)
         self._massless = np.flatnonzero(bears == 0.0)
@@ -201,28 +201,28 @@ class AdaptiveSteps:
         jerk = (a - before) / between
         c2, c3 = inertia.scheme.error_weights()
         error = c2 * dt**2 * a + c3 * dt**3 * jerk
-        error[self._turns] += (trial.q1 - simulation.q - trial.s)[self._turns]
+        error[self._rotations] += (trial.q1 - simulation.q - trial.s)[self._rotations]
         supports.enter(error)
         error[supports.dofs] = 0.0
         # Rotations without inertia follow the other motions, and jump with a load.
         error[self._massless] = 0.0
         supports.leave(error)
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
-        turns = np.abs(error[self._turns]).max(initial=0.0)
-        missed = simulation.together(self._missed, dt)
+        rotations = np.abs(error[self._rotations]).max(initial=0.0)
+        load_error = simulation.together(self._load_error, dt)
         return trial, simulation.share.largest(
-            float(max(moves / simulation.scene.size, turns, missed))
+            float(max(moves / simulation.scene.size, rotations, load_error))
         )
 
-    def _missed(self, dt: float) -> float:
+    def _load_error(self, dt: float) -> float:
         """Return the largest error of the midpoint rule for loads, relative to their impulses."""
-        missed, t = 0.0, self._simulation.t
+        error, t = 0.0, self._simulation.t
         for i, function in enumerate(self._functions):
             # Not at the ends, where there may be jumps
-            before, middle, after = (float(function(t + part * dt)) for part in SAMPLES)
+            before, middle, after = (float(function(t + fraction * dt)) for fraction in SAMPLES)
             self._largest[i] = max(self._largest[i], abs(before), abs(middle), abs(after))
-            missed = max(missed, abs(before - 2 * middle + after) / (self._largest[i] or 1.0))
-        return missed / 6 * dt / (self._t1 - self._t0)  # Simpson's rule less the midpoint's
+            error = max(error, abs(before - 2 * middle + after) / (self._largest[i] or 1.0))
+        return error / 6 * dt / (self._t1 - self._t0)  # Simpson's rule less the midpoint's
 
     def state(self) -> dict[str, float]:
         """Return the numbers that the next step depends on, and the counters."""

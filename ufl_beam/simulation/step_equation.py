@@ -88,21 +88,21 @@ class StepEquation:
         self.inelastic, elastic = list[InelasticBeams](), np.ones(len(share.cells), dtype=bool)
         for layout, cells in share.grid.inelastic:
             expect_entries(layout, scheme, ledger)
-            part = np.flatnonzero(np.isin(share.cells, cells))
-            if len(part):
-                elastic[part] = False
-                on_part = Fields(share, part)
-                self.inelastic.append(InelasticBeams(on_part, layout, *setting, search))
+            indices = np.flatnonzero(np.isin(share.cells, cells))
+            if len(indices):
+                elastic[indices] = False
+                subset = Fields(share, indices)
+                self.inelastic.append(InelasticBeams(subset, layout, *setting, search))
         self.beams: list[Cells] = [*self.inelastic]
         loses = scheme.alpha or isinstance(scheme, EnergyMomentumDecaying)
         if loses and sum(len(cells) for _, cells in share.grid.inelastic) < len(share.grid.cells):
             ledger.lost["numerical"] += 0.0
         others: list[Term] = []
         if elastic.any():
-            on_part = fields if elastic.all() else Fields(share, np.flatnonzero(elastic))
-            self.beams.append(ElasticBeams(on_part, *setting))
+            subset = fields if elastic.all() else Fields(share, np.flatnonzero(elastic))
+            self.beams.append(ElasticBeams(subset, *setting))
             if isinstance(scheme, EnergyMomentumDecaying):
-                others.append(SecondDifferences(scheme, on_part, A, ledger))
+                others.append(SecondDifferences(scheme, subset, A, ledger))
 
         self.controllers = Controllers(share)
         inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
@@ -139,12 +139,12 @@ class StepEquation:
         self.inner: list[Term] = [*self.beams, *self.couplings]
         self.others: list[Term] = [*self.loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]
-        self._give_to_c(search, switched)
-        in_cells = [part for term in self.terms for part in term.in_cells]
+        self._fill_c(search, switched)
+        in_cells = [forces for term in self.terms for forces in term.in_cells]
         in_c = [term.loads_in_cells() for term in self.loads if isinstance(term, DeadLoads)]
         self.cell_forces = CellForces(share, in_cells, *in_c)
 
-    def _give_to_c(self, search: Index, switched: Index) -> None:
+    def _fill_c(self, search: Index, switched: Index) -> None:
         """Fill ``equation`` of loops.h, and get the phases of the terms."""
         share, A, supports = self.share, self.A, self.supports
         self.c = struct("equation", size=A.size, owned=share.num_owned, weight=self.weights)
@@ -152,18 +152,18 @@ class StepEquation:
         loops = [term.loops for term in self.terms]
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
 
-        def take(name: str) -> Any:
+        def pop(name: str) -> Any:
             """Remove the first stiffness of this name, and return its data, or null."""
-            found = (one for one in stiffnesses if one[0] == ffi.addressof(lib, name))
-            if (one := next(found, None)) is None:
+            matches = (call for call in stiffnesses if call[0] == ffi.addressof(lib, name))
+            if (match := next(matches, None)) is None:
                 return ffi.NULL
-            stiffnesses.remove(one)
-            return one[1]
+            stiffnesses.remove(match)
+            return match[1]
 
-        product, cells = take("add_step_tangent"), take("add_cells")
-        demands = [one.demand for one in self.inner if one.demand is not None]
+        product, cells = pop("add_step_tangent"), pop("add_cells")
+        demands = [term.demand for term in self.inner if term.demand is not None]
         demanding = share.largest(float(bool(demands)))
-        predicted = [one.predicted for one in self.beams if one.predicted is not None]
+        predicted = [term.predicted for term in self.beams if term.predicted is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
             self.c,
@@ -186,7 +186,7 @@ class StepEquation:
         if self.inertia is None:
             fill(self.c, inner_force=self.force)
         # The ledger has all its entries now.  Phases write to their addresses.
-        self.phases = [one.phases(callbacks) for one in self.terms]
+        self.phases = [term.phases(callbacks) for term in self.terms]
 
     # -- continued runs ------------------------------------------------------------------------
 
@@ -194,10 +194,10 @@ class StepEquation:
         """Return the data for a run that starts here: internal variables, reactions, rates."""
         memory = Memory(self.share)
         self.controllers.remember(memory, t)
-        for one in (*self.inelastic, *self.couplings):
-            one.remember(memory, q)
-        slips = any(rubs(link.law) for link in self.share.grid.scene.links)
-        if self.inertia is None or self.supports.work or slips:
+        for term in (*self.inelastic, *self.couplings):
+            term.remember(memory, q)
+        friction = any(rubs(link.law) for link in self.share.grid.scene.links)
+        if self.inertia is None or self.supports.work or friction:
             self.supports.carry_on(memory, q)
         if self.inertia is not None:
             self.inertia.carry_on(memory, len(self.inertia.more))
@@ -206,15 +206,15 @@ class StepEquation:
             load.pass_on(memory)
         return memory.state()
 
-    def take_over(self, q: Array, t: float, internal: State, *, same: bool) -> None:
+    def set_internal_variables(self, q: Array, t: float, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
         ``same`` says that no force has changed since, so that accelerations are unchanged.
         """
         memory = Memory(self.share, internal)
         self.controllers.remember(memory, t)
-        for one in (*self.inelastic, *self.couplings):
-            one.remember(memory, NOWHERE)
+        for term in (*self.inelastic, *self.couplings):
+            term.remember(memory, NOWHERE)
         if "reactions" in internal:
             self.supports.carry_on(memory, q)
         if self.inertia is not None and same:
@@ -238,7 +238,7 @@ class StepEquation:
         some = self.terms if terms is None else terms
         before = step.q0 if step.q_before is None else step.q_before
         q0, q_before = (np.ascontiguousarray(q) for q in (step.q0, before))
-        if self.inertia is not None and any(one.kind in MOVING for one in some):
+        if self.inertia is not None and any(term.kind in MOVING for term in some):
             lib.find_numbers(self.inertia.c, step.dt)
         c = ffi.new("time_step *", {
             "t0": step.t0, "t1": step.t1, "dt": step.dt, "load_time": step.load_time,
@@ -250,10 +250,10 @@ class StepEquation:
             for term, phases in zip(self.terms, self.phases, strict=True):
                 for begin, data in phases.begin if term in some else ():
                     begin(data, c, ffi.NULL, ffi.NULL)
-        for one in self.beams:
-            if one in some and one.predicted is not None:
-                of = one.predicted
-                of.begins, of.stale, of.exact = 0, 1, 1
+        for beams in self.beams:
+            if beams in some and beams.predicted is not None:
+                predicted = beams.predicted
+                predicted.begins, predicted.stale, predicted.exact = 0, 1, 1
 
     def inner_forces(self, q: Array, t: float | None = None) -> Array:
         """Return the forces of beams at ``q``, in a step too short for viscous flow.
@@ -267,8 +267,8 @@ class StepEquation:
         if t is not None:
             step = Step.of(self.scheme, t, t + 1.0, t + 1.0, q)
             self.begin(step._replace(load_time=t, motion_time=t), self.couplings)
-            for coupling in self.couplings:
-                coupling.add_residual(q, forces)
+            for group in self.couplings:
+                group.add_residual(q, forces)
         return forces
 
     def add_state(self, q: Array) -> None:
@@ -291,7 +291,7 @@ class StepEquation:
         lib.hold_tangent(self.c)
         return self.A
 
-    def respond_at(self, q1: Array) -> bool:
+    def evaluate(self, q1: Array) -> bool:
         """Evaluate forces and tangent of the present step at ``q1``; False if a process fails."""
         lib.restart(self.c, lib.EXACT)
         self.c.raised = 0
@@ -324,8 +324,8 @@ class StepEquation:
         They are the step itself, with motions of connectors instead of their forces.
         """
         v, works = self.supports.in_plane(y), y.copy()
-        for coupling in self.couplings:
-            coupling.put_motions(q, v, works)
+        for group in self.couplings:
+            group.put_motions(q, v, works)
         return works
 
     # -- derivatives about a state -------------------------------------------------------------
@@ -348,8 +348,8 @@ class StepEquation:
     def tangent_change(self, q: Array, u: Array) -> Array:
         """Return the derivative of the tangent of :meth:`linearise` along ``u``; entries."""
         self.A.data.fill(0.0)
-        for one in (*self.inner, *self.loads):
-            one.add_tangent_change(q, u)
+        for term in (*self.inner, *self.loads):
+            term.add_tangent_change(q, u)
         return self.A.data.copy()
 
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
@@ -360,24 +360,24 @@ class StepEquation:
                 term.add_tangent(q)
         times, works = Product(self.A), np.zeros(X.shape[1])
         for i, (x, y) in enumerate(zip(*map(np.ascontiguousarray, (X.T, Y.T)), strict=True)):
-            of_beams = sum(one.tangent_work(q, x, y) for one in self.beams)
-            works[i] = of_beams + times(x) @ y
+            beam_work = sum(beams.tangent_work(q, x, y) for beams in self.beams)
+            works[i] = beam_work + times(x) @ y
         return works
 
     def tangent_works(self, q: Array, u: Array, X: Array, Y: Array) -> tuple[Array, Array]:
         """Return works of the tangent and of its derivative along u for X on Y; symmetric; J."""
         works = np.zeros((2, X.shape[1], Y.shape[1]))
         for i, j in zip(*np.triu_indices(X.shape[1]), strict=True):
-            x, y = (np.ascontiguousarray(one) for one in (X[:, i], Y[:, j]))
-            works[0, i, j] = sum(one.tangent_work(q, x, y) for one in self.beams)
-            works[1, i, j] = sum(one.tangent_work(q, x, y, u) for one in self.beams)
+            x, y = (np.ascontiguousarray(column) for column in (X[:, i], Y[:, j]))
+            works[0, i, j] = sum(beams.tangent_work(q, x, y) for beams in self.beams)
+            works[1, i, j] = sum(beams.tangent_work(q, x, y, u) for beams in self.beams)
         for k, work in enumerate(works):
             self.A.data.fill(0.0)
-            for one in (*self.couplings, *self.loads):
+            for term in (*self.couplings, *self.loads):
                 if k == 0:
-                    one.add_tangent(q)
+                    term.add_tangent(q)
                 else:
-                    one.add_tangent_change(q, u)
+                    term.add_tangent_change(q, u)
             times = Product(self.A)
             work += np.triu([times(np.ascontiguousarray(x)) @ Y for x in X.T])
             work += np.triu(work, 1).T
@@ -400,10 +400,10 @@ def forces_of_scene(grid: Grid, scheme: Scheme, t0: float) -> Callable[..., Arra
 
 # -- checks of static steps ------------------------------------------------------------------------
 
-FAR = 1e3
+LARGEST_MOTION = 1e3
 """Largest motion of a node in a step without a mechanism; sizes of the scene or radians."""
 
-KINK = 1e-6
+KINK_IMBALANCE = 1e-6
 """Imbalance of work that a kink of a law may cause, as a fraction of the energy transferred."""
 
 
@@ -436,15 +436,15 @@ class StaticPath:
             supports.enter(r)
             supports.hold(share.added(r))
             supports.take()
-        changes = [one.change for one in equation.phases if one.change is not None]
+        changes = [phases.change for phases in equation.phases if phases.change is not None]
         parts = ledger.state, ledger.supplied, ledger.lost
         self.c = struct(
-            "static_path", slack=scheme.slack, far=FAR, kink=KINK,
+            "static_path", slack=scheme.slack, far=LARGEST_MOTION, kink=KINK_IMBALANCE,
             per_far=share.grid.scales[share.dofs],
             force=self.force, terms=len(changes), weight_of_before=scheme.weight_of_before,
             change=ffi.new("change_call[]", changes), accounts=len(parts),
-            account=ffi.new("double *[]", [doubles(part.numbers) for part in parts]),
-            entries=np.array([len(part) for part in parts], dtype=np.int32),
+            account=ffi.new("double *[]", [doubles(entries.numbers) for entries in parts]),
+            entries=np.array([len(entries) for entries in parts], dtype=np.int32),
         )  # fmt: skip
 
     def remember(self, memory: Memory) -> None:
@@ -456,8 +456,8 @@ class StaticPath:
         c = self.c
         if mechanism:
             return StepFailed(
-                f"a node moves by {c.moves:.1e} times the size of the scene, or turns by so many "
-                "radians, in the step: what yields and what has opened leave a mechanism"
+                f"a node moves by {c.moves:.1e} times the size of the scene, or rotates by "
+                f"{c.moves:.1e} rad, in the step: yielding points and open hinges leave a mechanism"
             )
         return StepFailed(
             f"the step stores and dissipates {c.stored:.3e} J, but the forces along it do "

@@ -77,7 +77,7 @@ class Prediction:
 
 # -- check of static steps -------------------------------------------------------------------------
 
-LARGEST_TURN = 0.75 * math.pi
+LARGEST_ROTATION = 0.75 * math.pi
 """Largest rotation of a node in a step; the algorithmic strains are valid up to π; rad."""
 
 LEAST_AT_REST, LEAST_IN_MOTION = 2, 1
@@ -87,17 +87,17 @@ Near buckling, a column magnifies a load that is hardly larger than the toleranc
 inertia prevents this.
 """
 
-APPLYING_TURN = 0.02
+APPLYING_ROTATION = 0.02
 """Largest rotation of a node in a substep while loads are applied; rad.
 
 The relative error of a moment in a substep is a quarter of the square, about 1e-4.
 """
 
-HELD = 1e-3
+FREE_STIFFNESS = 1e-3
 """Stiffness against a motion without strain below which loads do not hold it, as a fraction of the
 forces over the size of the scene.  Weights and tensions reach some tenths."""
 
-SHORT_PART = 512
+SHORT_SUBSTEP = 512
 """Substeps shorter by this factor have no such limit: still shorter substeps rotate as far."""
 
 MOST_PARTS: int = lib.MOST_PARTS
@@ -162,17 +162,17 @@ class Stepper(StateView):
         self.parts = 0
         self.prediction = Prediction(share, q, equation.weights, in_motion=in_motion)
 
-        again = [one.again for one in phases if one.again is not None]
+        again = [phase.again for phase in phases if phase.again is not None]
         fill(equation.c, agains=len(again), again=ffi.new("again_call[]", again))
         least = LEAST_IN_MOTION if in_motion else LEAST_AT_REST
         self.solver = solver = Solver(share, equation, newton, least)
         rotations = share.rotations
         half_tangents = with_half_tangents(scheme, rotations)
-        loads = [one.vector for one in equation.loads]
+        loads = [load.vector for load in equation.loads]
         multipliers = share.multipliers.astype(np.int32)
-        opens = [one.opens for one in phases if one.opens is not None]
+        opens = [phase.opens for phase in phases if phase.opens is not None]
         places = ffi.new("openable[]", opens)
-        admits = [one.admits for one in phases if one.admits is not None]
+        admits = [phase.admits for phase in phases if phase.admits is not None]
         s = np.zeros(share.size) if equation.supports.turned else solver.change
         self.march = fill(
             ffi.new("march *"),
@@ -181,7 +181,7 @@ class Stepper(StateView):
             guess=np.zeros(share.size), in_parts=not in_motion,
             load_weight=scheme.load_weight, at=1.0 if in_motion else scheme.load_weight,
             limits_turn=scheme.limits_turn,
-            largest_turn=LARGEST_TURN, rotations=len(rotations), rotation=rotations,
+            largest_turn=LARGEST_ROTATION, rotations=len(rotations), rotation=rotations,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
             loads=len(loads), load=ffi.new("vector *[]", loads),
@@ -190,7 +190,7 @@ class Stepper(StateView):
             opens=int(share.largest(float(bool(opens)))), places=len(opens), place=places,
             admissions=len(admits), admission=ffi.new("admission_call[]", admits),
             judges=int(share.largest(float(bool(admits)))),
-            applying_turn=APPLYING_TURN, short_part=SHORT_PART,
+            applying_turn=APPLYING_ROTATION, short_part=SHORT_SUBSTEP,
         )  # fmt: skip
         if self.march.opens:
             fill(self.march, found=np.zeros(share.size))
@@ -213,7 +213,7 @@ class Stepper(StateView):
         """
         c, callbacks, controllers = self.march, self.equation.callbacks, self.controllers
         loops = {
-            name: [x for one in self.equation.phases for x in getattr(one, name)]
+            name: [x for phases in self.equation.phases for x in getattr(phases, name)]
             for name in ("begin", "accept", "add_state")
         }
         if self.equation.inertia is not None:
@@ -224,15 +224,15 @@ class Stepper(StateView):
             c.stops = callbacks.handle(lambda t: controllers.next_sample(c.t, t))
         # Calls that may raise come first, before other loops of C have accepted the step.
         asking = lib.phase_in_python, ffi.addressof(lib, "accept_guides")
-        mine = [one for one in loops["accept"] if one[0] in asking]
+        mine = [call for call in loops["accept"] if call[0] in asking]
         if self._loose:
-            mine.insert(0, callbacks.phase(self._require_held))
-        loops["accept"] = mine + [one for one in loops["accept"] if one[0] not in asking]
+            mine.insert(0, callbacks.phase(self._require_stiffness))
+        loops["accept"] = mine + [call for call in loops["accept"] if call[0] not in asking]
         if controllers.asks:
-            loops["begin"].insert(0, callbacks.phase(self._ask))
+            loops["begin"].insert(0, callbacks.phase(self._evaluate_controllers))
         if self.copies.several:
-            note = self.copies.note
-            took = callbacks.phase(lambda step, q1, s: note(step.t1, self._copy(q1)))
+            record = self.copies.note
+            took = callbacks.phase(lambda step, q1, s: record(step.t1, self._copy(q1)))
             loops["add_state"].append(took)
         for name, calls in loops.items():
             place, in_c = getattr(c, name), ffi.new("phase_call[]", calls)
@@ -241,7 +241,7 @@ class Stepper(StateView):
 
     # -- callbacks -----------------------------------------------------------------------------
 
-    def _ask(self, *_: Any) -> None:
+    def _evaluate_controllers(self, *_: Any) -> None:
         """Evaluate controllers and limits of friction in the state of C."""
         self._moved(self.march.t)
         self.together(self.controllers.ask, self)
@@ -253,10 +253,10 @@ class Stepper(StateView):
         self.inertia.keep(*more)
         self.supports.take()
         q1 = self._copy(c.x)
-        for one in self.couplings:
-            one.take(q1)
+        for group in self.couplings:
+            group.take(q1)
 
-    def _require_held(self, step: Any, q1: Any, s: Any) -> None:
+    def _require_stiffness(self, step: Any, q1: Any, s: Any) -> None:
         """Raise if a motion that only loads can hold is free in the equilibrium.
 
         If loads hold it, the tangent is regular without stiffness against zero-energy modes.  All
@@ -266,12 +266,12 @@ class Stepper(StateView):
         if not loose:
             return
         newton.forget_idle()
-        if equation.respond_at(self._copy(q1)):
+        if equation.evaluate(self._copy(q1)):
             K, free = free_matrix(self.share, equation.A, self.supports.dofs)
             x, scales = null_vectors(K)[1][:, -1], grid.scales[free]
             motion = np.abs(x * scales).max()
             forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
-            if forces <= HELD * newton.scale() * grid.scene.size * motion:
+            if forces <= FREE_STIFFNESS * newton.scale() * grid.scene.size * motion:
                 raise ArgumentError(f"{loose}The loads do not hold it either. {INSTEAD}")
         self._loose = ""
 
@@ -300,11 +300,11 @@ class Stepper(StateView):
         c = self.march
         self.solver.follow(border)
         with self._in_c():
-            of_step = c.step
-            of_step.t0, of_step.t1, of_step.dt = step.t0, step.t1, step.dt
-            of_step.load_time, of_step.motion_time = step.load_time, step.motion_time
-            of_step.fraction = of_step.at = 1.0
-            of_step.ratio, of_step.q0, of_step.q_before = 0.0, c.q, c.prediction.q_before
+            trial = c.step
+            trial.t0, trial.t1, trial.dt = step.t0, step.t1, step.dt
+            trial.load_time, trial.motion_time = step.load_time, step.motion_time
+            trial.fraction = trial.at = 1.0
+            trial.ratio, trial.q0, trial.q_before = 0.0, c.q, c.prediction.q_before
             ffi.memmove(c.guess, doubles(guess), guess.nbytes)
             solved = lib.solve_begun_step(c, hold)
         self.solver.follow(None)
@@ -323,9 +323,9 @@ class Stepper(StateView):
             self._fail()
         c = self.march
         q0, q1, s, q_before = map(self._copy, (c.q, c.x, c.s, c.step.q_before))
-        of = c.step
-        numbers = of.load_time, of.motion_time, of.fraction, of.at
-        return Trial(Step(of.t0, of.t1, q0, *numbers, q_before, of.ratio), q1, s)
+        step = c.step
+        instants = step.load_time, step.motion_time, step.fraction, step.at
+        return Trial(Step(step.t0, step.t1, q0, *instants, q_before, step.ratio), q1, s)
 
     @contextmanager
     def _in_c(self) -> Iterator[None]:
@@ -342,9 +342,9 @@ class Stepper(StateView):
             self.parts += c.parts
             if c.parts:
                 self._begun_at = None
-            for one in self._watches:
-                one.seen = self.parts
-        self.warn(self._force_watch.told(), here=not self.share.alone)
+            for extremes in self._watches:
+                extremes.seen = self.parts
+        self.warn(self._force_watch.told(), local=not self.share.alone)
 
     def _fail(self) -> None:
         """Raise the error of the latest step; all processes call it together."""
@@ -369,21 +369,21 @@ class Stepper(StateView):
             q1 = self._copy(c.x)
 
             def require() -> None:
-                for one in self.equation.inner:
-                    if one.must_dissipate:
-                        one.require_dissipation(q1)
+                for term in self.equation.inner:
+                    if term.must_dissipate:
+                        term.require_dissipation(q1)
 
             self.together(require)
         if self._path is not None:
             raise self._path.failure(failure == lib.LEAVES_MECHANISM)
         raise StepFailed("the step cannot be trusted")
 
-    def warn(self, found: Iterable[str], *, here: bool = False) -> None:
-        """Issue and store warnings that the solution lacks; one process warns, or ``here``."""
-        for said in found:
+    def warn(self, warnings: Iterable[str], *, local: bool = False) -> None:
+        """Issue and store warnings that the solution lacks; the first process warns, or this."""
+        for said in warnings:
             if said not in self.solution.warnings:
                 self.solution.warnings += f"{said}\n"
-                if here or self.comm.rank == 0:
+                if local or self.comm.rank == 0:
                     warn(said)
 
     # -- the state -----------------------------------------------------------------------------

@@ -19,7 +19,7 @@ TOLERANCE = 1e-12
 SHIFT = 1e-13
 """Shift relative to the squared frequencies of single nodes; round-off hides smaller shifts."""
 
-MORE = 8
+EXTRA = 8
 """Additional eigenvalues that are computed, so that none of several similar ones is missed."""
 
 DENSE = 200
@@ -58,7 +58,7 @@ def linear(
     A and B are symmetric, ``A - shift B`` is regular, and B has no negative eigenvalue if
     ``definite``.  The pencil has ``most`` eigenvalues; the result may have a few more than n.
     """
-    size, n = A.shape[0], min(n + MORE, most)
+    size, n = A.shape[0], min(n + EXTRA, most)
     if size <= DENSE:
         θ, x = (_inverse_definite if definite else _inverse)((A - shift * B).toarray(), B.toarray())
         return (1 / θ[:n] + shift).real, x[:, :n].real
@@ -79,12 +79,12 @@ def quadratic(
 
     Conjugate exponents count as two.
     """
-    size, n = K.shape[0], min(n + MORE, most)
+    size, n = K.shape[0], min(n + EXTRA, most)
     if size <= DENSE:
         # Linearization in the time unit 1/shift, with velocities v: s x = v, s M v = -K x - C v.
-        one, none = eye_array(size), csr_array((size, size))
-        A = block_array([[none, one], [-K, -shift * C]])
-        B = block_array([[one, none], [none, shift**2 * M]])
+        identity, none = eye_array(size), csr_array((size, size))
+        A = block_array([[none, identity], [-K, -shift * C]])
+        B = block_array([[identity, none], [none, shift**2 * M]])
         θ, x = _inverse((A - B).toarray(), B.toarray())
         return shift * (1 / θ[:n] + 1), x[:size, :n]
     slepc = _slepc()
@@ -117,10 +117,10 @@ def _inverse(A: Array, B: Array) -> tuple[Complex, Complex]:
 def _inverse_definite(A: Array, B: Array) -> tuple[Array, Array]:
     """Compute the same from the symmetric matrix Fᵀ A⁻¹ F with B = F Fᵀ."""
     scale = np.sqrt(B.diagonal())
-    there = np.flatnonzero(scale)
-    F = np.zeros((len(A), len(there)))
-    unit = B[np.ix_(there, there)] / np.outer(scale[there], scale[there])
-    F[there] = scale[there, None] * np.linalg.cholesky(unit)
+    nonzero = np.flatnonzero(scale)
+    F = np.zeros((len(A), len(nonzero)))
+    unit = B[np.ix_(nonzero, nonzero)] / np.outer(scale[nonzero], scale[nonzero])
+    F[nonzero] = scale[nonzero, None] * np.linalg.cholesky(unit)
     flexible = np.linalg.solve(A, F)
     S = F.T @ flexible
     θ, y = np.linalg.eigh((S + S.T) / 2)

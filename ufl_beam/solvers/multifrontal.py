@@ -37,18 +37,18 @@ class Multifrontal:
     def __init__(self, inner: Any, stays: npt.NDArray[np.bool_]) -> None:
         self._inner, A = inner, inner.left
         self.numbers = inner.numbers[stays]
-        *found, at, space = _structure(A.indptr, A.indices, stays)
-        arrays = dict(zip(STRUCTURE, found, strict=True))
+        *structure, at, space = _structure(A.indptr, A.indices, stays)
+        arrays = dict(zip(STRUCTURE, structure, strict=True))
         n, eliminated = len(self.numbers), A.size - len(self.numbers)
         schur, x = np.zeros(n * n), np.zeros(A.size)
         self.left = Csr(schur, np.tile(np.arange(n), n), n * np.arange(n + 1))
         self.f = x[eliminated:]
-        of_front, of_pivots, of_stack = space
+        front_size, pivots_size, stack_size = space
         self.c = struct(
             "fronts",
             size=A.size, fronts=len(arrays["parent"]), at=ffi.from_buffer("int64_t[]", at),
-            values=np.empty(at[-1]), schur=schur, stack=np.empty(of_stack), x=x,
-            space=np.empty(of_front), unit=np.empty(of_pivots),
+            values=np.empty(at[-1]), schur=schur, stack=np.empty(stack_size), x=x,
+            space=np.empty(front_size), unit=np.empty(pivots_size),
             swap=np.zeros(eliminated, np.int32), **arrays,
         )  # fmt: skip
 
@@ -71,9 +71,9 @@ class Multifrontal:
     def expand(self, small: Array, x: Array) -> None:
         """Find the solution from the solution ``small`` of the reduced system."""
         self.f[:] = small
-        of_inner = np.empty(self.c.size)
-        lib.expand_fronts(self.c, doubles(of_inner))
-        self._inner.expand(of_inner, x)
+        solution = np.empty(self.c.size)
+        lib.expand_fronts(self.c, doubles(solution))
+        self._inner.expand(solution, x)
 
 
 ORDERINGS = ("amd", "nd")
@@ -101,29 +101,29 @@ def _structure(
     n = np.count_nonzero(stays)
     pattern = csr_array((np.ones(len(indices)), indices, indptr), shape=(A.size, A.size))
     orders = [_order(pattern, stays, kind) for kind in ORDERINGS[: 1 + (A.size > ONE_FRONT)]]
-    found = [(order, *_fronts(pattern, order, A.size - n)) for order in orders]
-    unknown, first, begin, rest = min(found, key=lambda one: _operations(*one[1:3]))
+    candidates = [(order, *_fronts(pattern, order, A.size - n)) for order in orders]
+    unknown, first, begin, rest = min(candidates, key=lambda c: _operations(*c[1:3]))
     number = np.empty(A.size, dtype=np.int32)
     number[unknown] = np.arange(A.size)
     pivots, others = (np.diff(x).astype(np.int64) for x in (first, begin))
     fronts = len(pivots)
-    front_of = np.repeat(np.arange(fronts, dtype=np.int32), np.append(pivots[:-1], n))
+    front = np.repeat(np.arange(fronts, dtype=np.int32), np.append(pivots[:-1], n))
     rows, columns = number[A.rows()], number[A.indices]
-    of_entry = front_of[np.minimum(rows, columns)]
-    entry = np.argsort(of_entry, kind="stable").astype(np.int32)
-    entries = np.searchsorted(of_entry[entry], np.arange(fronts + 1)).astype(np.int32)
+    entry_front = front[np.minimum(rows, columns)]
+    entry = np.argsort(entry_front, kind="stable").astype(np.int32)
+    entry_begin = np.searchsorted(entry_front[entry], np.arange(fronts + 1)).astype(np.int32)
     place, up = np.empty(len(entry), np.int32), np.empty(len(rest), np.int32)
     parent, order, before, children = np.zeros((4, fronts), dtype=np.int32)
     c = struct("fronts", fronts=fronts, first=first, begin=begin, rest=rest, parent=parent, up=up)
-    of_entries = rows[entry], columns[entry], front_of, place, parent, up
-    lib.place_in_fronts(c, len(entry), *map(integers, of_entries))
+    arrays = rows[entry], columns[entry], front, place, parent, up
+    lib.place_in_fronts(c, len(entry), *map(integers, arrays))
     stack = lib.order_fronts(c, *map(integers, (order, before, children)))
     at = np.append(0, np.cumsum(pivots * (pivots + 2 * others)))
     # Products read a few numbers beyond the end of a front.
     largest = [x[:-1].max(initial=0) for x in (pivots + others, pivots)]
     space = np.array([largest[0] ** 2 + 2 * lib.WIDE, largest[1], stack])
     return (
-        unknown, first, begin, rest, parent, up, order, before, children, entries, entry, place,
+        unknown, first, begin, rest, parent, up, order, before, children, entry_begin, entry, place,
         at, space,
     )  # fmt: skip
 
@@ -132,9 +132,9 @@ def _order(A: csr_array, stays: npt.NDArray[np.bool_], kind: str) -> Index:
     """Return all unknowns in an elimination order of PETSc, followed by those that stay."""
     these: Index = np.arange(A.shape[0]) if kind == "nd" else np.flatnonzero(~stays)
     if len(these):
-        part = A[these][:, these]
-        _, found = Csr(part.data, part.indices, part.indptr).petsc().getOrdering(kind)
-        these = these[found.indices]
+        block = A[these][:, these]
+        _, positions = Csr(block.data, block.indices, block.indptr).petsc().getOrdering(kind)
+        these = these[positions.indices]
     order = np.concatenate([these[~stays[these]], np.flatnonzero(stays)])
     return np.asarray(order, dtype=np.int32)
 
@@ -149,14 +149,14 @@ def _fronts(A: csr_array, order: Index, eliminated: int) -> tuple[Index, Index, 
     """Return ``first``, ``begin`` and ``rest`` of the fronts, see loops.h."""
     size, pattern = A.shape[0], csr_array(A[order][:, order])
     first, begin = np.empty((2, eliminated + 2), dtype=np.int32)
-    room, space = 2 * A.nnz + 2 * size, np.empty(3 * size, dtype=np.int32)
+    capacity, space = 2 * A.nnz + 2 * size, np.empty(3 * size, dtype=np.int32)
     structure = [integers(x.astype(np.int32)) for x in (pattern.indptr, pattern.indices)]
     while True:
-        rest = np.empty(room, dtype=np.int32)
+        rest = np.empty(capacity, dtype=np.int32)
         arrays = map(integers, (first, begin, rest, space[:size], space[size:]))
-        fronts = lib.find_fronts(size, eliminated, *structure, room, *arrays)
+        fronts = lib.find_fronts(size, eliminated, *structure, capacity, *arrays)
         if fronts >= 0:
             break
-        room *= 2
+        capacity *= 2
     first, begin = (x[: fronts + 1].copy() for x in (first, begin))
     return first, begin, rest[: begin[-1]].copy()

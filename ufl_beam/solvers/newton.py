@@ -30,9 +30,9 @@ from ufl_beam.compiled.c_library import (
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
 from ufl_beam.errors import StepFailed
-from ufl_beam.solvers.newton_options import PREFIX, Newton, database, take_options
-from ufl_beam.solvers.null_vectors import hold_idle_motions
-from ufl_beam.solvers.static_condensation import ChainsFirst
+from ufl_beam.solvers.newton_options import PREFIX, Newton, apply_options, database
+from ufl_beam.solvers.null_vectors import stiffen_zero_modes
+from ufl_beam.solvers.static_condensation import CondensedSolver
 from ufl_beam.terms.term import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}
@@ -82,7 +82,7 @@ class Solver:
     def __init__(self, share: Share, equation: Any, newton: Newton, least: int) -> None:
         self._share, self._equation, self._newton = share, equation, newton
         self._weights, A = share.weights(), equation.A
-        self._factors = ChainsFirst(share, A)
+        self._factors = CondensedSolver(share, A)
         (self._x, self.unknowns), (self._f, self._r), (self._y, self.change) = (
             _vector(share) for _ in range(3)
         )
@@ -115,8 +115,8 @@ class Solver:
     def _make_snes(self) -> None:
         chosen = {**database(), **self._newton.petsc}
         ksp, snes = PETSc.KSP().create(self._x.comm), PETSc.SNES().create(self._x.comm)
-        for one in (ksp, snes):
-            one.setOptionsPrefix(PREFIX)
+        for x in (ksp, snes):
+            x.setOptionsPrefix(PREFIX)
         ksp.setType("preonly")
         ksp.getPC().setType("python")
         ksp.getPC().setPythonContext(self._factors)
@@ -129,7 +129,7 @@ class Solver:
         snes.setTolerances(max_it=self._newton.max_iterations)
         snes.setType("newtonls")
         snes.setKSP(ksp)
-        take_options(snes, {**FULL_STEPS, **chosen})
+        apply_options(snes, {**FULL_STEPS, **chosen})
         if not c.monitored:
             snes.setType("shell")
             solve, context = loop("snes_newton", c)
@@ -157,13 +157,13 @@ class Solver:
             self.c.monitored = 1
             self._let_c_fill()
             self._snes.setType("newtonls")
-            take_options(self._snes, FULL_STEPS)  # setType has reset the line search
+            apply_options(self._snes, FULL_STEPS)  # setType has reset the line search
         return self._snes
 
     def destroy(self) -> None:
         """Destroy the PETSc objects."""
-        for one in (self._snes, self._x, self._matrix):
-            one.destroy()
+        for x in (self._snes, self._x, self._matrix):
+            x.destroy()
 
     # -- callbacks of C --------------------------------------------------------------------------
 
@@ -194,11 +194,11 @@ class Solver:
         """Find new zero-energy modes and hold them by springs; return whether there are any."""
         if self._stiffness is None:
             self._stiffness = np.zeros(self._share.size)
-        of_tangent = self._equation.A, self._diagonal, self._equation.supports.dofs
+        tangent = self._equation.A, self._diagonal, self._equation.supports.dofs
         forces = self._residuals(), self.scale()
-        found = hold_idle_motions(self._stiffness, self._share, *of_tangent, *forces)
-        self._put_idle(self._stiffness)
-        return found
+        new = stiffen_zero_modes(self._stiffness, self._share, *tangent, *forces)
+        self._set_stiffness(self._stiffness)
+        return new
 
     def forget_idle(self) -> bool:
         """Release all zero-energy modes; return whether any were held, on any process."""
@@ -206,17 +206,17 @@ class Solver:
             return False
         if self._stiffness is not None:
             self._stiffness[:] = 0.0
-            self._put_idle(self._stiffness)
+            self._set_stiffness(self._stiffness)
         return True
 
-    def _put_idle(self, stiffness: Array) -> None:
+    def _set_stiffness(self, stiffness: Array) -> None:
         """Add stiffnesses against zero-energy modes to tangents from now on.
 
         Degrees of freedom that these or supports hold do not count in the round-off of forces.
         """
-        here = np.flatnonzero(stiffness)
-        idle = {"idle_entry": self._diagonal[here], "idle_stiffness": stiffness[here]}
-        fill(self.c, idle=len(here), **idle)
+        dofs = np.flatnonzero(stiffness)
+        arrays = {"idle_entry": self._diagonal[dofs], "idle_stiffness": stiffness[dofs]}
+        fill(self.c, idle=len(dofs), **arrays)
         self._moves[:] = stiffness == 0.0
         self._moves[self._equation.supports.dofs] = 0
 
@@ -259,7 +259,7 @@ class Solver:
             return True
         self._factors.solve(self._r[owned], y[owned], reduced=True)
         good = self._factors.solve(rates[owned], z[owned], reduced=False)
-        y, z = (share.gather(found)[share.dofs] for found in (y, z))
+        y, z = (share.gather(v)[share.dofs] for v in (y, z))
         border.correct(y, z)
         self.change[:], self._t[0] = y, border.t
         return not good
@@ -268,8 +268,8 @@ class Solver:
 
     def size(self, forces: Array) -> float:
         """Return the Euclidean norm of forces, and moments over the size of the scene; N."""
-        here = lib.norm(self._share.size, ffi.NULL, doubles(self._weights), doubles(forces))
-        return float(lib.over_processes(self.c, lib.HYPOT, here))
+        local = lib.norm(self._share.size, ffi.NULL, doubles(self._weights), doubles(forces))
+        return float(lib.over_processes(self.c, lib.HYPOT, local))
 
     def scale(self) -> float:
         """Return the size of the loads and of the internal forces in the latest residual; N."""
@@ -317,7 +317,7 @@ class Solver:
             if self._stiffness is None:
                 self._stiffness = np.zeros(self._share.size)
             self._stiffness[:] = memory.at_dofs("idle motions", self._stiffness)
-            self._put_idle(self._stiffness)
+            self._set_stiffness(self._stiffness)
 
 
 @from_c()
@@ -327,13 +327,13 @@ def agree_in_python(handle: Any, number: int, how: Any, values: Any) -> None:
     solver.agree(how[0:number], np.frombuffer(ffi.buffer(values, 8 * number)))
 
 
-def _call(method: str, error: int | None, handle: Any, *given: Any) -> int | None:
+def _call(method: str, error: int | None, handle: Any, *data: Any) -> int | None:
     """Call a method of a solver from C, see c_library.py; an exception returns ``error``."""
     callbacks, solver, _ = ffi.from_handle(handle)
     size = 8 * callbacks.c.size
-    vectors = (np.frombuffer(ffi.buffer(x, size)) if isinstance(x, ffi.CData) else x for x in given)
-    found = getattr(solver, method)(*vectors)
-    return None if error is None else int(found)
+    vectors = (np.frombuffer(ffi.buffer(x, size)) if isinstance(x, ffi.CData) else x for x in data)
+    result = getattr(solver, method)(*vectors)
+    return None if error is None else int(result)
 
 
 for _method, _error in {

@@ -70,8 +70,8 @@ def require_plain(newton: Newton | None, what: str) -> None:
     """Raise :class:`ArgumentError` if the reference solver is chosen, which cannot do ``what``."""
     if newton is not None and newton.reference:
         raise ArgumentError(
-            f"Newton: reference=True does not go with {what}: the reference solver computes equal "
-            "steps of simulate, on one process and without files; leave it out"
+            f"Newton: reference=True cannot be combined with {what}: the reference solver computes "
+            "equal steps of simulate, on one process and without files; leave it out"
         )
 
 
@@ -104,7 +104,7 @@ def database() -> dict[str, Any]:
     return options
 
 
-def take_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
+def apply_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
     """Apply options to a SNES, its KSP and PC; return the options that none of them has read.
 
     The database is restored afterwards, as other solvers have the same prefix.
@@ -119,8 +119,8 @@ def take_options(snes: PETSc.SNES, chosen: Mapping[str, Any]) -> list[str]:
         # PETSc may have renamed options of versions before 3.24.
         for name in chosen.keys() & database().keys():
             used = ffi.new("char[8]")  # a bool of any size
-            of_petsc = ffi.new("char[]", (PREFIX + name).encode())
-            petsc("PetscOptionsUsed", ffi.NULL, of_petsc, used)
+            option = ffi.new("char[]", (PREFIX + name).encode())
+            petsc("PetscOptionsUsed", ffi.NULL, option, used)
             if not any(bytes(ffi.buffer(used))):
                 unused.append(name)
     finally:
@@ -148,19 +148,19 @@ def _require_known(newton: Newton) -> None:
         ArgumentError: An option of ``newton`` or of ``PETSC_OPTIONS`` has no effect, or PETSc
             refuses its value.
     """
-    given = database()
-    chosen = {**given, **newton.petsc}
+    stored = database()
+    chosen = {**stored, **newton.petsc}
     if not chosen:
         return
     snes, ksp = PETSc.SNES().create(MPI.COMM_SELF), PETSc.KSP().create(MPI.COMM_SELF)
     try:
-        for one in (snes, ksp):
-            one.setOptionsPrefix(PREFIX)
+        for x in (snes, ksp):
+            x.setOptionsPrefix(PREFIX)
         snes.setType("newtonls")
         ksp.setType("preonly")
         ksp.getPC().setType("python")
         snes.setKSP(ksp)
-        unused = take_options(snes, chosen)
+        unused = apply_options(snes, chosen)
     except PETSc.Error as error:
         spelt = (f"-{PREFIX}{k}" + ("" if v is None else f" {v}") for k, v in chosen.items())
         raise ArgumentError(f"PETSc refuses the options {' '.join(spelt)}: {error}") from None
@@ -174,8 +174,8 @@ def _require_known(newton: Newton) -> None:
             continue
         else:
             where = "PETSC_OPTIONS"
-        near = [PREFIX + other for other in get_close_matches(name, USUAL, n=3)]
-        hint = f"; did you mean {' or '.join(near)}?" if near else "; leave it out"
+        matches = [PREFIX + match for match in get_close_matches(name, USUAL, n=3)]
+        hint = f"; did you mean {' or '.join(matches)}?" if matches else "; leave it out"
         if name in WHILE_SOLVING:
-            hint = "; such options must stand in PETSC_OPTIONS"
-        raise ArgumentError(f"{where}: PETSc has no use for the option {PREFIX}{name}{hint}")
+            hint = "; such options must be in PETSC_OPTIONS"
+        raise ArgumentError(f"{where}: PETSc does not use the option {PREFIX}{name}{hint}")

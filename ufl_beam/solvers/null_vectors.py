@@ -28,16 +28,16 @@ ROUNDS = 40
 """Largest number of scaling passes."""
 
 
-def free_matrix(share: Share, A: Csr, held: Index) -> tuple[csc_array, Index]:
+def free_matrix(share: Share, A: Csr, constrained: Index) -> tuple[csc_array, Index]:
     """Assemble the tangent of the dofs that no support holds; return it and their global numbers.
 
-    All processes call it together, each with its part ``A`` and local numbers of ``held`` dofs.
+    All processes call it together, each with its part ``A`` and its ``constrained`` local dofs.
     """
-    here = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs[held])
-    parts = share.comm.allgather(here) if not share.alone else [here]
-    rows, columns, data, of_all = (np.concatenate(x) for x in zip(*parts, strict=True))
+    local = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs[constrained])
+    parts = share.comm.allgather(local) if not share.alone else [local]
+    rows, columns, data, fixed = (np.concatenate(x) for x in zip(*parts, strict=True))
     n = share.grid.size
-    free = np.setdiff1d(np.arange(n), of_all)
+    free = np.setdiff1d(np.arange(n), fixed)
     K = coo_array((data, (rows, columns)), shape=(n, n)).tocsc()
     return csc_array(K[:, free][free]), free
 
@@ -55,9 +55,9 @@ def null_vectors(K: csc_array) -> tuple[Array, Array]:
         largest = np.array([sizes.max(axis=k).toarray().ravel() for k in (1, 0)])
         if np.all((largest == 0) | ((largest > 0.5) & (largest < 2))):
             break
-        of_rows, of_columns = 1 / np.sqrt(np.where(largest > 0, largest, 1.0))
-        scaled = csc_array(diags_array(of_rows) @ scaled @ diags_array(of_columns))
-        factors *= of_columns
+        row_factors, column_factors = 1 / np.sqrt(np.where(largest > 0, largest, 1.0))
+        scaled = csc_array(diags_array(row_factors) @ scaled @ diags_array(column_factors))
+        factors *= column_factors
     if n <= DENSE:
         _, sizes, vectors = np.linalg.svd(scaled.toarray())
         number = max(1, int(np.count_nonzero(sizes <= SINGULAR)))
@@ -80,12 +80,12 @@ If forces resist the motion after all, a smaller stiffness makes it converge fas
 stiffness reduces the motion of the mode by round-off.
 """
 
-DRIVEN = 1e-6
+FORCED = 1e-6
 """Force above which a motion is driven, not a zero-energy mode; relative to forces in the scene."""
 
 
-def hold_idle_motions(
-    stiffness: Array, share: Share, A: Csr, diagonal: Index, held: Index, forces: Array,
+def stiffen_zero_modes(
+    stiffness: Array, share: Share, A: Csr, diagonal: Index, constrained: Index, forces: Array,
     scale: float,
 ) -> bool:  # fmt: skip
     """Add stiffnesses against zero-energy modes of the latest tangent; all processes call it.
@@ -95,14 +95,14 @@ def hold_idle_motions(
         share: Subdomain of this process.
         A: Tangent of this process.
         diagonal: Positions of the diagonal entries in it.
-        held: Degrees of freedom that supports hold.
+        constrained: Degrees of freedom that supports hold.
         forces: Magnitudes of the latest residual, moments over the size of the scene; N.
         scale: Size of the forces in the scene; N.
 
     Returns:
         Whether there are new modes; false if a force drives a motion without resistance.
     """
-    grid, (K, free) = share.grid, free_matrix(share, A, held)
+    grid, (K, free) = share.grid, free_matrix(share, A, constrained)
     if not len(free) or not np.isfinite(K.data).all():
         return False
     try:
@@ -112,16 +112,16 @@ def hold_idle_motions(
     motions = grid.scales[free, None] * vectors
     # One degree of freedom for each mode, chosen so that the modes are independent there.
     pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
-    found = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
-    here = np.isin(share.dofs, found)
-    new = here & (stiffness == 0.0)
-    driven = here & (forces > DRIVEN * scale)
-    if not share.total(float(new.any())) or share.total(float(driven.any())):
+    dofs = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
+    chosen = np.isin(share.dofs, dofs)
+    new = chosen & (stiffness == 0.0)
+    forced = chosen & (forces > FORCED * scale)
+    if not share.total(float(new.any())) or share.total(float(forced.any())):
         return False
     turns, owned = np.isin(share.dofs, grid.rotations), np.arange(share.size) < share.num_owned
     owned[share.multipliers] = False
-    entries = np.abs(A.data[diagonal])
+    sizes = np.abs(A.data[diagonal])
     for alike in (turns & owned, ~turns & owned):
-        stiffest = share.largest(float(entries[alike].max(initial=0.0)))
+        stiffest = share.largest(float(sizes[alike].max(initial=0.0)))
         stiffness[new & alike] = STIFFNESS * stiffest
     return True

@@ -24,7 +24,7 @@ from ufl_beam.solvers.multifrontal import ONE_FRONT, Multifrontal
 from ufl_beam.solvers.substructuring import BAD_PIVOT, GOOD, Klu, Summed, succeeds
 
 
-def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any, ...]:
+def _interior_vertices(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any, ...]:
     """Find the vertices of the cells of one process that couple only to their two neighbours.
 
     They are found in the pattern of the matrix, so any kind of coupling is taken into account.
@@ -44,18 +44,18 @@ def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any
     # Vertex k is between the cells k and k + 1.
     around = np.hstack([start[:-1], end[:-1], end[1:]])
     inside = (end[:-1] == start[1:]).all(axis=1) & (np.diff(np.sort(around)) > 0).all(axis=1)
-    of_row, of_column = np.diff(A.indptr), np.bincount(A.indices, minlength=A.size)
-    entries = np.where(alone & (of_row == of_column), of_row, 0)
+    row_counts, column_counts = np.diff(A.indptr), np.bincount(A.indices, minlength=A.size)
+    counts = np.where(alone & (row_counts == column_counts), row_counts, 0)
 
     def has(number: int, dofs: Index) -> npt.NDArray[np.bool_]:
         """Tell which vertices have ``number`` entries in rows and columns, and successive dofs."""
-        in_turn = (np.diff(dofs, axis=1) == 1).all(axis=1)
-        return np.asarray((entries[dofs] == number).all(axis=1) & in_turn)
+        successive = (np.diff(dofs, axis=1) == 1).all(axis=1)
+        return np.asarray((counts[dofs] == number).all(axis=1) & successive)
 
     inside &= has(9, end[:-1])  # of the vertex and its two neighbours
-    first_of_vertex = np.zeros(len(inside), dtype=bool)
-    first_of_vertex[np.unique(end[:-1, 0], return_index=True)[1]] = True
-    inside &= first_of_vertex
+    is_first = np.zeros(len(inside), dtype=bool)
+    is_first[np.unique(end[:-1, 0], return_index=True)[1]] = True
+    inside &= is_first
     # Beams side by side may make an end of a chain the middle of another.
     middle = np.zeros(A.size, dtype=bool)
     middle[end[:-1][inside]] = True
@@ -77,12 +77,12 @@ def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any
     backward = dead_right & ~dead_left
     dead = dead_left | dead_right
     long = last - first + 1
-    first_of_chain = np.append(0, np.cumsum(long + dead))
-    begin = first_of_chain[:-1]
-    here = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
-    here = np.where(backward[chain], long[chain] - 1 - here, here)
-    place = begin[chain] + dead[chain] + here
-    around = np.empty((first_of_chain[-1], 3, 3), dtype=np.int32)
+    chain_begin = np.append(0, np.cumsum(long + dead))
+    begin = chain_begin[:-1]
+    position = np.arange(len(chain)) - np.append(0, np.cumsum(long))[chain]
+    position = np.where(backward[chain], long[chain] - 1 - position, position)
+    place = begin[chain] + dead[chain] + position
+    around = np.empty((chain_begin[-1], 3, 3), dtype=np.int32)
     around[place, 1] = middle_
     around[place, 0] = np.where(backward[chain, None], after, before)
     around[place, 2] = np.where(backward[chain, None], before, after)
@@ -94,7 +94,7 @@ def _chains(cell_dofs: Index, A: Csr, alone: npt.NDArray[np.bool_]) -> tuple[Any
     at = np.zeros(around.shape[:2], dtype=np.uint8)
     for column in around.reshape(-1, 9).T:
         at += around[:, :, 0] > column[:, None]
-    return around[:, 1], first_of_chain, ends, ~dead, at
+    return around[:, 1], chain_begin, ends, ~dead, at
 
 
 def _runs(mask: npt.NDArray[np.bool_]) -> tuple[Index, Index, Index]:
@@ -118,30 +118,31 @@ def _plan(
     """Find the vertices that can be eliminated, and the places of entries in the reduced matrix.
 
     Returns:
-        Degrees of freedom that remain, in the global order; the last result of :func:`_chains`;
-        ``indptr`` and ``indices`` of the reduced matrix; :data:`INDICES`.
+        Degrees of freedom that remain, in the global order; the last result of
+        :func:`_interior_vertices`; ``indptr`` and ``indices`` of the reduced matrix;
+        :data:`INDICES`.
     """
     A = Csr(np.empty(0), indices, indptr)
-    vertices, first_of_chain, ends_of, spikes, at = _chains(cell_dofs, A, alone)
+    vertices, chain_begin, chain_ends, spikes, at = _interior_vertices(cell_dofs, A, alone)
     stays = np.ones(A.size, dtype=bool)
     stays[vertices] = False
-    here = np.flatnonzero(stays)
-    here = here[np.argsort(dofs[here])]
+    remaining = np.flatnonzero(stays)
+    remaining = remaining[np.argsort(dofs[remaining])]
     number = np.full(A.size, -1, dtype=np.int32)
-    number[here] = np.arange(len(here))
-    ends, owned = number[ends_of], here[here < num_owned]
-    first, last = (vertices[k] for k in (first_of_chain[:-1], first_of_chain[1:] - 1))
+    number[remaining] = np.arange(len(remaining))
+    ends, owned = number[chain_ends], remaining[remaining < num_owned]
+    first, last = (vertices[k] for k in (chain_begin[:-1], chain_begin[1:] - 1))
     next_to = np.stack([np.where(spikes[:, None], first, last), last], axis=1)
-    of_ends = ends_of.reshape(-1, 2, 3)
-    rows = np.stack([of_ends, next_to], axis=1)[..., None]
-    columns = np.stack([next_to, of_ends], axis=1)[..., None, :]
+    end_dofs = chain_ends.reshape(-1, 2, 3)
+    rows = np.stack([end_dofs, next_to], axis=1)[..., None]
+    columns = np.stack([next_to, end_dofs], axis=1)[..., None, :]
     with_ends = A.positions(*map(np.ravel, np.broadcast_arrays(rows, columns)))
-    *structure, entry, place, places = _what_is_left(A, number, ends, len(here))
-    found = (
-        first_of_chain, spikes, vertices[:, 0], A.indptr[vertices[:, 0]], with_ends,
+    *structure, entry, place, places = _what_is_left(A, number, ends, len(remaining))
+    arrays = (
+        chain_begin, spikes, vertices[:, 0], A.indptr[vertices[:, 0]], with_ends,
         entry, place, places, owned, number[owned], ends,
     )  # fmt: skip
-    return here, at, *structure, *(np.ascontiguousarray(x, np.int32) for x in found)
+    return remaining, at, *structure, *(np.ascontiguousarray(x, np.int32) for x in arrays)
 
 
 def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index, ...]:
@@ -152,17 +153,17 @@ def _what_is_left(A: Csr, number: Index, ends: Index, size: int) -> tuple[Index,
         positions of the blocks of the ``ends`` (num_chains, 6) of the chains.
     """
     rows = np.flatnonzero(number >= 0)
-    entries = A.entries_of(rows)
+    staying = A.entries_of(rows)
     row = np.repeat(number[rows], np.diff(A.indptr)[rows])
-    stay = number[A.indices[entries]] >= 0
-    entries, row = entries[stay], row[stay]
-    keys = row.astype(np.int64) * size + number[A.indices[entries]]
-    of_ends = ends.astype(np.int64).reshape(-1, 2, 3)
-    of_chains = (of_ends[:, :, None, :, None] * size + of_ends[:, None, :, None, :]).ravel()
-    all_ = np.unique(np.concatenate([keys, of_chains]))
+    stay = number[A.indices[staying]] >= 0
+    staying, row = staying[stay], row[stay]
+    keys = row.astype(np.int64) * size + number[A.indices[staying]]
+    block = ends.astype(np.int64).reshape(-1, 2, 3)
+    chain_keys = (block[:, :, None, :, None] * size + block[:, None, :, None, :]).ravel()
+    all_ = np.unique(np.concatenate([keys, chain_keys]))
     indptr = np.searchsorted(all_, np.arange(size + 1) * size)
-    positions = (np.searchsorted(all_, of) for of in (keys, of_chains))
-    return indptr, all_ % max(size, 1), entries, *positions
+    positions = (np.searchsorted(all_, x) for x in (keys, chain_keys))
+    return indptr, all_ % max(size, 1), staying, *positions
 
 
 class Elimination:
@@ -179,17 +180,17 @@ class Elimination:
     def __init__(self, share: Share, A: Csr) -> None:
         ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
         alone = ~np.isin(share.dofs, ghosts)
-        of = share.cell_dofs, A.indptr, A.indices, alone, share.dofs, share.num_owned
-        here, at, indptr, columns, *found = _plan(*of)
-        self.numbers, self.shared = share.dofs[here], ~alone[here]
+        pattern = share.cell_dofs, A.indptr, A.indices, alone, share.dofs, share.num_owned
+        remaining, at, indptr, columns, *arrays = _plan(*pattern)
+        self.numbers, self.shared = share.dofs[remaining], ~alone[remaining]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)
-        self.f: Array = np.zeros(len(here))
-        indices = dict(zip(INDICES, found, strict=True))
-        vertices, chains = len(indices["dof"]), len(indices["spike"])
+        self.f: Array = np.zeros(len(remaining))
+        indices = dict(zip(INDICES, arrays, strict=True))
+        vertices, number = len(indices["dof"]), len(indices["spike"])
         self.c = fill(
             ffi.new("chains *"),
-            chains=chains, left=len(columns), stay=len(indices["entry"]),
-            rows=len(indices["kept"]), left_size=len(here), left_data=self.left.data,
+            chains=number, left=len(columns), stay=len(indices["entry"]),
+            rows=len(indices["kept"]), left_size=len(remaining), left_data=self.left.data,
             left_f=self.f, data=A.data, swaps=ffi.new("uint8_t[]", 3 * vertices),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
             f=np.empty(share.size), at=ffi.from_buffer("uint8_t[]", at), **indices,
@@ -209,7 +210,7 @@ class Elimination:
         lib.expand(self.c, doubles(small), doubles(x))
 
 
-class ChainsFirst:
+class CondensedSolver:
     """Direct solver: condensation along the beams, then factorization of the rest.
 
     If processes share a scene, each eliminates the rest of its subdomain.  The system of shared

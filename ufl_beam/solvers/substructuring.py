@@ -46,9 +46,9 @@ class Summed:
         self._place = np.searchsorted(keys, mine)
         # Entries, right-hand side, and number of processes that have failed.
         self._sums = np.zeros(len(keys) + size + 1)
-        entries, self.f, self._failed = np.split(self._sums, [len(keys), len(keys) + size])
+        data, self.f, self._failed = np.split(self._sums, [len(keys), len(keys) + size])
         indptr = np.searchsorted(keys, np.arange(size + 1) * size)
-        self.left = Csr(entries, keys % size if size else keys, indptr)
+        self.left = Csr(data, keys % size if size else keys, indptr)
 
     def factor(self, b: Array) -> bool:
         """Eliminate on all processes; return whether the matrix is finite on each of them."""
@@ -105,8 +105,8 @@ class Klu:
 
     def drive(self, c: Any) -> None:
         """Let Newton's method in C use these factors; ``c`` is its ``equation`` of loops.h."""
-        of_petsc = self._factors, self._matrix, self._rhs, self._solution
-        c.factors, c.left, c.left_f, c.left_x = map(opaque, of_petsc)
+        objects = self._factors, self._matrix, self._rhs, self._solution
+        c.factors, c.left, c.left_f, c.left_x = map(opaque, objects)
         fill(c, found=doubles(self._solution.array_r))
 
     def factor(self, b: Array) -> bool:

@@ -43,14 +43,14 @@ def unit_vectors(vectors: Array) -> Array:
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
-def left_of(vectors: Array) -> Array:
+def normal(vectors: Array) -> Array:
     """Rotate vectors to their left by a right angle; (..., 2)."""
     return vectors[..., ::-1] * (-1.0, 1.0)
 
 
 def in_frame(points: Any, at: Any, ahead: Array) -> Array:
     """Convert coordinates along a vector and to its left, in its length, to points; (n, 2)."""
-    return np.asarray(at + np.array(points) @ np.array([ahead, left_of(ahead)]))
+    return np.asarray(at + np.array(points) @ np.array([ahead, normal(ahead)]))
 
 
 def lengths_along(line: Array) -> Array:
@@ -58,10 +58,10 @@ def lengths_along(line: Array) -> Array:
     return np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1)))
 
 
-def points_along(line: Array, parts: Any) -> Array:
+def points_along(line: Array, fractions: Any) -> Array:
     """Return points of a line at fractions of its length; (n, 2)."""
     lengths = lengths_along(line)
-    at = np.multiply(parts, lengths[-1])
+    at = np.multiply(fractions, lengths[-1])
     return np.column_stack([np.interp(at, lengths, x) for x in line.T])
 
 
@@ -73,8 +73,8 @@ def segments(line: Array) -> Array:
 def joined(lines: Iterable[Array]) -> Array:
     """Join lines with NaN between them, as one line for Matplotlib; (n, 2)."""
     gap = np.full((1, 2), np.nan)
-    chains: list[Array] = [chain for line in lines for chain in (line, gap)]
-    return np.concatenate(chains[:-1] or [np.empty((0, 2))])
+    pieces: list[Array] = [piece for line in lines for piece in (line, gap)]
+    return np.concatenate(pieces[:-1] or [np.empty((0, 2))])
 
 
 def evenly(progress: Array, count: int) -> list[int]:
@@ -86,7 +86,7 @@ def evenly(progress: Array, count: int) -> list[int]:
 # -- scenes ------------------------------------------------------------------------------------
 
 
-class Stage:
+class Canvas:
     """Scene before any run or in a solution, as pictures show it, and the size of its symbols.
 
     Displacements are multiplied by ``magnify``.  The picture shows the kept times ``shown`` of a
@@ -105,8 +105,8 @@ class Stage:
         self.magnify, self.unit, self.outside = magnify, unit, outside or unit
         self._solution = subject if isinstance(subject, States) else None
         self.scene = subject.scene if isinstance(subject, States) else subject
-        kept = 0 if self._solution is None else len(self._solution.times)
-        self._shown = range(kept) if shown is None else shown
+        number = 0 if self._solution is None else len(self._solution.times)
+        self._shown = range(number) if shown is None else shown
         self.spots = spots_of(self.scene)  # attachment points of bodies and of the ground
 
     @classmethod
@@ -116,8 +116,8 @@ class Stage:
         magnify: float,
         scale: float,
         shown: Sequence[int] | None = None,
-    ) -> Stage:
-        """Make a stage for a picture in the plane at a scale, the length of a point (m)."""
+    ) -> Canvas:
+        """Make a canvas for a picture in the plane at a scale, the length of a point (m)."""
         scene = subject.scene if isinstance(subject, States) else subject
         lengths = [math.dist(beam.start.point, beam.end.point) for beam in scene.beams]
         typical = float(np.median(lengths)) / scale if lengths else math.inf
@@ -126,31 +126,31 @@ class Stage:
         return cls(subject, magnify, unit, shown, max(unit, 0.7 * SYMBOL * scale) if few else unit)
 
     @property
-    def undeformed(self) -> Pose:
-        """Pose of the undeformed scene."""
+    def undeformed(self) -> DeformedShape:
+        """DeformedShape of the undeformed scene."""
         nodes = np.empty((0, 2)) if self._solution is None else self._solution.grid.points
-        return Pose(self, lambda anchor: np.zeros(3), nodes)
+        return DeformedShape(self, lambda place: np.zeros(3), nodes)
 
-    def pose(self, n: int) -> Pose:
-        """Return the pose at the n-th kept time of the solution, or raise ArgumentError."""
+    def shape(self, n: int) -> DeformedShape:
+        """Return the shape at the n-th kept time of the solution, or raise ArgumentError."""
         assert self._solution is not None
-        grid, kept = self._solution.grid, len(self._solution.times)
-        if not -kept <= n < kept:
+        grid, number = self._solution.grid, len(self._solution.times)
+        if not -number <= n < number:
             raise ArgumentError(
-                f"n = {n}: the solution kept {kept} times; give {-kept} to {kept - 1}"
+                f"n = {n}: the solution kept {number} times; give {-number} to {number - 1}"
             )
-        state = self._solution.part(n % kept, n % kept + 1)
+        state = self._solution.part(n % number, n % number + 1)
         nodes = grid.points + self.magnify * state.q[0, grid.dofs[:, :2]]
-        return Pose(self, lambda anchor: state.displacement(anchor)[0], nodes)
+        return DeformedShape(self, lambda place: state.displacement(place)[0], nodes)
 
-    def poses(self) -> Iterator[Pose]:
-        """Iterate over the undeformed pose and all poses in the picture."""
+    def shapes(self) -> Iterator[DeformedShape]:
+        """Iterate over the undeformed shape and all shapes in the picture."""
         yield self.undeformed
-        yield from map(self.pose, self._shown)
+        yield from map(self.shape, self._shown)
 
     def points(self) -> Array:
-        """Return all points of all poses; (n, 2); m."""
-        return np.concatenate([pose.points() for pose in self.poses()])
+        """Return all points of all shapes; (n, 2); m."""
+        return np.concatenate([shape.points() for shape in self.shapes()])
 
     @cached_property
     def travels(self) -> dict[Connector, Range]:
@@ -159,29 +159,29 @@ class Stage:
         On a rail, whose connector constrains the motion across it, the range is in positions.  On
         a guide curve it is in parameters, extended by three units at ends where the curve goes on.
         """
-        found: dict[Connector, Range] = {}
+        ranges: dict[Connector, Range] = {}
         solution, shown = self._solution, list(self._shown)
         for holder in (holder for joint in self.scene.joints for holder in joint.holders):
             if isinstance(holder.law, Guide):
-                found[holder] = self._along_guide(holder, holder.law)
+                ranges[holder] = self._along_guide(holder, holder.law)
             elif holder.motion == "sliding":
                 x, y = holder.axis
                 reached = np.array([start := float(np.dot((y, -x), holder.apart))])
                 if solution is not None:
                     turned = math.atan2(-x, y) + solution.displacement(holder.a)[shown, 2]
                     apart = solution.position(holder.b) - solution.position(holder.a)
-                    way = np.sum(apart[shown] * directions(turned), axis=1)
-                    reached = start + self.magnify * (np.append(way, start) - start)
-                found[holder] = float(reached.min()), float(reached.max())
-        return found
+                    sliding = np.sum(apart[shown] * directions(turned), axis=1)
+                    reached = start + self.magnify * (np.append(sliding, start) - start)
+                ranges[holder] = float(reached.min()), float(reached.max())
+        return ranges
 
     def _along_guide(self, holder: Connector, law: Guide) -> Range:
         """Return the used parameters of a guide curve, extended by three units if it goes on."""
-        curve, size, found = law.curve, self.scene.size, [0.0]
+        curve, size, parameters = law.curve, self.scene.size, [0.0]
         for point in () if self._solution is None else self._solution.position(holder.b):
-            step = parameter_step(curve, found[-1], size)
-            found.append(nearest(curve, point, found[-1], step, size))
-        used = [0.0, *(found[1:][n] for n in self._shown)]
+            step = parameter_step(curve, parameters[-1], size)
+            parameters.append(nearest(curve, point, parameters[-1], step, size))
+        used = [0.0, *(parameters[1:][n] for n in self._shown)]
         ends = []
         for s, more in ((np.nanmin(used), -3.0), (np.nanmax(used), 3.0)):
             slope = tangent(curve, float(s), parameter_step(curve, float(s), size))
@@ -198,14 +198,14 @@ class Stage:
         """Closed convex outlines around the centre and points of each body; (n, 2); m."""
         from scipy.spatial import ConvexHull
 
-        found, circle = {}, self.unit * directions(np.arange(48) * math.pi / 24)
+        outlines, circle = {}, self.unit * directions(np.arange(48) * math.pi / 24)
         for body in self.scene.bodies:
-            points = {body.center, *(spot.point for spot in self.spots[body])}
+            points = {body.center, *(x.point for x in self.spots[body])}
             radius = 0.75 if len(points) > 1 else 1.3
             cloud = np.concatenate([np.add(point, radius * circle) for point in points])
             corners = ConvexHull(cloud).vertices
-            found[body] = cloud[[*corners, corners[0]]]
-        return found
+            outlines[body] = cloud[[*corners, corners[0]]]
+        return outlines
 
     @cached_property
     def offsets(self) -> dict[Connector, float]:
@@ -228,42 +228,42 @@ class Stage:
 
 
 @dataclass(frozen=True, eq=False)
-class Pose:
+class DeformedShape:
     """Drawn positions of a scene at one time."""
 
-    stage: Stage
-    motion: Callable[[Anchor], Array]  # (u, v, ψ) of an anchor, not magnified; (3,); m, m, rad
+    canvas: Canvas
+    motion: Callable[[Anchor], Array]  # (u, v, ψ) of a place, not magnified; (3,); m, m, rad
     nodes: Array  # of all beams of a solution; (num_nodes, 2); m
 
-    def at(self, anchor: Anchor) -> Array:
-        """Return the coordinates of an anchor; (2,); m."""
-        return np.asarray(anchor.point + self.stage.magnify * self.motion(anchor)[:2])
+    def at(self, place: Anchor) -> Array:
+        """Return the coordinates of a place; (2,); m."""
+        return np.asarray(place.point + self.canvas.magnify * self.motion(place)[:2])
 
-    def turn(self, anchor: Anchor) -> float:
-        """Return the rotation of an anchor; rad."""
-        return float(self.motion(anchor)[2])
+    def rotation(self, place: Anchor) -> float:
+        """Return the rotation of a place; rad."""
+        return float(self.motion(place)[2])
 
-    def turned(self, x: tuple[float, float], anchor: Anchor) -> Array:
-        """Rotate a vector with an anchor; (2,)."""
-        return in_frame(x, 0.0, directions(self.turn(anchor)))
+    def turned(self, x: tuple[float, float], place: Anchor) -> Array:
+        """Rotate a vector with a place; (2,)."""
+        return in_frame(x, 0.0, directions(self.rotation(place)))
 
     def points(self) -> Array:
         """Return nodes of beams, outlines of bodies, and points of the ground; (n, 2); m."""
-        ground = np.reshape([spot.point for spot in self.stage.spots[GROUND]], (-1, 2))
-        bodies = [self.of_body(body, outline) for body, outline in self.stage.outlines.items()]
+        ground = np.reshape([point.point for point in self.canvas.spots[GROUND]], (-1, 2))
+        bodies = [self.body_points(body, outline) for body, outline in self.canvas.outlines.items()]
         return np.concatenate([self.nodes, ground, *bodies])
 
-    def of_body(self, body: Body, points: Array) -> Array:
+    def body_points(self, body: Body, points: Array) -> Array:
         """Move points of a body of the undeformed scene with it; (n, 2); m."""
         u, v, ψ = self.motion(body.middle)
         arms = points - body.center
         moved = in_frame(arms, (u, v), directions(ψ)) - arms
-        return np.asarray(points + self.stage.magnify * moved)
+        return np.asarray(points + self.canvas.magnify * moved)
 
 
 # -- labels, off lines and off each other ------------------------------------------------------
 
-GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # candidate distances of a label from its spot; points
+GAPS = (4.0, 12.0, 24.0, 40.0, 60.0)  # candidate distances of a label from its point; points
 CLEARANCE = 2.0  # clearance around a label; points
 ROUNDS = 6  # most iterations of the placement
 
@@ -272,14 +272,14 @@ LINE_COST, LABEL_COST, OUTSIDE_COST, DISTANCE_COST, RANK_COST = 8.0, 40.0, 100.0
 label, per point beyond the frame, per point of distance, and per rank in the list of spots."""
 
 CROSSING_COST = 25.0  # of a label that the leader crosses; a crossed line costs a tenth of it
-LEADER = 10.0  # distance of a label from its spot from which it has a leader line; points
+LEADER = 10.0  # distance of a label from its point from which it has a leader line; points
 
 
-class Spot(NamedTuple):
+class Candidate(NamedTuple):
     """Point that a label belongs to, and the direction from this point to the label."""
 
     at: Array  # (2,)
-    way: Array  # unit vector; (2,)
+    direction: Array  # unit vector; (2,)
     gap: float = 0.0  # least distance of the label; points
 
 
@@ -289,7 +289,7 @@ class Label(NamedTuple):
     text: str
     color: str
     rank: int  # labels of lower ranks are placed first
-    spots: tuple[Spot, ...]
+    spots: tuple[Candidate, ...]
 
 
 class Placed(NamedTuple):
@@ -298,15 +298,15 @@ class Placed(NamedTuple):
     label: Label
     center: Array  # of its box; (2,)
     half: Array  # half the width and height of its box; (2,)
-    spot: Array  # point that it belongs to; (2,)
+    target: Array  # point that it belongs to; (2,)
     overlap: float  # fraction of its box under other labels
 
     @property
     def leader(self) -> Array:
-        """Line from the spot to the box if the box is distant; (2, 2) or (0, 2)."""
-        edge = np.clip(self.spot, self.center - self.half, self.center + self.half)
-        ends = np.array([self.spot, edge])
-        return ends if np.linalg.norm(edge - self.spot) >= LEADER else ends[:0]
+        """Line from the target to the box if the box is distant; (2, 2) or (0, 2)."""
+        edge = np.clip(self.target, self.center - self.half, self.center + self.half)
+        ends = np.array([self.target, edge])
+        return ends if np.linalg.norm(edge - self.target) >= LEADER else ends[:0]
 
 
 def place(
@@ -314,17 +314,17 @@ def place(
 ) -> list[Placed]:
     """Place labels where they cover the least; iterate until their positions no longer change.
 
-    Spots, half widths and heights, segments that should stay visible, (n, 4), and the corners of a
-    frame that labels should not leave, (4,), are in points.
+    Candidates, half widths and heights, segments that should stay visible, (n, 4), and the corners
+    of a frame that labels should not leave, (4,), are in points.
     """
     order = sorted(range(len(labels)), key=lambda k: labels[k].rank)
     placed: dict[int, Placed] = {}
     for _ in range(ROUNDS):
-        before = [one.center for one in placed.values()]
+        before = [box.center for box in placed.values()]
         for k in order:
-            others = [one for j, one in placed.items() if j != k]
+            others = [box for j, box in placed.items() if j != k]
             placed[k] = _best(labels[k], np.asarray(halves[k], dtype=float), lines, others, frame)
-        if np.array_equal([one.center for one in placed.values()], before):
+        if np.array_equal([box.center for box in placed.values()], before):
             break
     return [placed[k] for k in order]
 
@@ -337,17 +337,17 @@ def _best(
     lines = np.vstack([lines, *(x.leader.reshape(-1, 4) for x in others)])
     number = np.arange(len(label.spots))
     gaps, choices = np.repeat(GAPS, len(number)), np.tile(number, len(GAPS))
-    ways = np.array([spot.way for spot in label.spots])[choices]
-    spots = np.array([spot.at + spot.gap * spot.way for spot in label.spots])[choices]
-    # At this distance the box is beyond the line through its spot, perpendicular to the direction.
+    ways = np.array([place.direction for place in label.spots])[choices]
+    spots = np.array([place.at + place.gap * place.direction for place in label.spots])[choices]
+    # At this distance the box is beyond the line through its point, perpendicular to the direction.
     centers = spots + ways * (gaps + np.abs(ways) @ half)[:, None]
     low, high = centers - half - CLEARANCE, centers + half + CLEARANCE
     # Segments near the candidate boxes.
     first, last = np.minimum(lines[:, :2], lines[:, 2:]), np.maximum(lines[:, :2], lines[:, 2:])
-    near = lines[((first <= high.max(axis=0)) & (last >= low.min(axis=0))).all(axis=1)]
+    close = lines[((first <= high.max(axis=0)) & (last >= low.min(axis=0))).all(axis=1)]
     covered = areas_covered(low, high, boxes)
     cost = DISTANCE_COST * gaps + RANK_COST * choices
-    cost += LINE_COST * lengths_inside(low, high, near) + LABEL_COST * covered
+    cost += LINE_COST * lengths_inside(low, high, close) + LABEL_COST * covered
     if frame is not None:
         beyond = np.maximum(frame[:2] - low, 0.0) + np.maximum(high - frame[2:], 0.0)
         cost += OUTSIDE_COST * beyond.sum(axis=1)
@@ -356,7 +356,7 @@ def _best(
     leads = np.linalg.norm(ends[:, 2:] - ends[:, :2], axis=1) >= LEADER
     some = np.flatnonzero(leads & (cost < cost[~leads].min(initial=np.inf)))
     diagonals = np.concatenate([boxes, boxes[:, [0, 3, 2, 1]]])
-    crossed = crossings(ends[some], diagonals) + 0.1 * crossings(ends[some], near)
+    crossed = crossings(ends[some], diagonals) + 0.1 * crossings(ends[some], close)
     cost[some] += CROSSING_COST * crossed
     best = int(np.argmin(cost))
     overlap = float(covered[best] / np.prod(high[best] - low[best]))
@@ -377,13 +377,13 @@ def crossings(first: Array, second: Array) -> Array:
 
 def lengths_inside(low: Array, high: Array, lines: Array) -> Array:
     """Measure segments (n, 4) inside each box, given by its corners (num_boxes, 2)."""
-    first, way = lines[None, :, :2], (lines[:, 2:] - lines[:, :2])[None]
-    lengths = np.linalg.norm(way[0], axis=1)
+    first, step = lines[None, :, :2], (lines[:, 2:] - lines[:, :2])[None]
+    lengths = np.linalg.norm(step[0], axis=1)
     # A segment perpendicular to an axis is either entirely inside along this axis, or outside.
-    way = np.where(way == 0.0, 1e-99, way)
-    ends = (low[:, None] - first) / way, (high[:, None] - first) / way
-    enter, leave = np.minimum(*ends).max(axis=2), np.maximum(*ends).min(axis=2)
-    return np.asarray(np.maximum(np.minimum(leave, 1.0) - np.maximum(enter, 0.0), 0.0) @ lengths)
+    step = np.where(step == 0.0, 1e-99, step)
+    ends = (low[:, None] - first) / step, (high[:, None] - first) / step
+    enter, end = np.minimum(*ends).max(axis=2), np.maximum(*ends).min(axis=2)
+    return np.asarray(np.maximum(np.minimum(end, 1.0) - np.maximum(enter, 0.0), 0.0) @ lengths)
 
 
 def areas_covered(low: Array, high: Array, boxes: Array) -> Array:

@@ -1,0 +1,388 @@
+# SPDX-License-Identifier: MIT
+"""Strokes and labels of the picture of a model, at a scale to be determined."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter, defaultdict
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+
+from ufl_beam.arrays import Array
+from ufl_beam.model.bodies import Anchor, Body, Member, Place, Velocity
+from ufl_beam.model.connectors import law_of, place_of
+from ufl_beam.model.functions import TimeFunction, steady
+from ufl_beam.model.loads import FollowerLoad, LineLoad, PointLoad
+from ufl_beam.model.scene import Scene
+from ufl_beam.model.supports import COMPONENTS, Support
+from ufl_beam.plotting import positions, symbols
+from ufl_beam.plotting.positions import Candidate, directions, normal, points_along, unit_vectors
+from ufl_beam.plotting.style import GREEN, INK, RED, TEXT, WHITE, number, with_unit
+from ufl_beam.plotting.symbols import FRONT, Stroke, disc
+
+LOADS, MOTIONS, CAPTIONS, NAMES = range(4)  # ranks of labels: labels of loads are placed first
+MOST_LABELS = 80  # number beyond which names and captions are left out
+MOST_CELLS = 300  # number of cells beyond which they are not marked
+
+HINGE = "#B0508A"  # colour of hinges
+MOVED = "#A86E00"  # colour of prescribed motions: the orange of drives, dark enough for text
+HEAD, SHAFT = 0.85, 1.9  # length of the head of an arrow in units, and width of its line in points
+
+Candidates = tuple[Candidate, ...]
+
+
+class Subject:
+    """Scene with data common to its pictures at all scales; lengths in m."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene, attached = scene, scene.attached
+        self.axes: dict[Member, Array] = {  # vertices; (n, 2)
+            beam: np.array([beam.curve(s) for s in beam.vertices(attached[beam])], float)
+            for beam in scene.beams
+        }
+        self.cells = sum(len(axis) - 1 for axis in self.axes.values())
+        self.names: dict[Member | Body, str] = {}  # equal names get their number in the scene
+        kinds: tuple[Sequence[Member | Body], ...] = (scene.beams, scene.bodies)
+        for objects in kinds:
+            known = Counter(member.name for member in objects)
+            for k, member in enumerate(objects):
+                self.names[member] = f"{member.name} {k}" if known[member.name] > 1 else member.name
+        forces = [x.force for x in scene.loads if isinstance(x, PointLoad | FollowerLoad)]
+        lines = [x.force for x in scene.loads if isinstance(x, LineLoad)]
+        speeds = [
+            velocity.at(*at)[:2]
+            for velocity in scene.initial
+            for member in velocity.beams
+            for at in self.velocity_points(member)
+        ]
+        self.force, self.line_load, self.speed = (  # the largest ones; N, N/m, m/s
+            max((math.hypot(*x) for x in vectors), default=0.0) or 1.0
+            for vectors in (forces, lines, speeds)
+        )
+        ends = [(x[0], x[1], x[-1], x[-2]) for x in self.axes.values()]
+        self._ends: Array = np.reshape(ends, (-1, 2, 2))
+
+    def directions_at(self, place: Anchor) -> Array:
+        """Return the directions in which beams leave a place; (n, 2)."""
+        close = np.abs(self._ends[:, 0] - place.point).max(axis=1) < 1e-7 * self.scene.size
+        pairs = [*self._ends[close]]
+        if isinstance(place, Place) and 0.0 < place.s < 1.0:
+            axis = self.axes[place.beam]
+            k = int(np.argmin(np.linalg.norm(axis - place.point, axis=1)))
+            pairs += [axis[[k, j]] for j in (k - 1, k + 1) if 0 <= j < len(axis)]
+        start, end = np.reshape(pairs, (-1, 2, 2)).swapaxes(0, 1)
+        return unit_vectors(end - start)
+
+    def velocity_points(self, member: Member | Body) -> Array:
+        """Return the points at which velocities are shown: ends and middle of a beam; (n, 2)."""
+        if isinstance(member, Body):
+            return np.array([member.center])
+        return points_along(self.axes[member], [0.0, 0.5, 1.0])
+
+
+class Drawing:
+    """Strokes of a picture by groups, and its labels; lengths in m."""
+
+    def __init__(self, subject: Subject, scale: float) -> None:
+        self.subject, self.scale = subject, scale  # the scale is the length of a point
+        self.shape = positions.Canvas.at_scale(subject.scene, 1.0, scale).undeformed
+        self.unit, self.outside = self.shape.canvas.unit, self.shape.canvas.outside
+        self.strokes: defaultdict[str, list[Stroke]] = defaultdict(list)
+        self.labels: list[positions.Label] = []
+        self.stacks: defaultdict[object, float] = defaultdict(float)
+        """Heights of the symbols at a place in a direction."""
+
+    def write(self, text: str, color: str, rank: int, spots: Iterable[Candidate]) -> None:
+        """Add a label with its candidate positions."""
+        self.labels.append(positions.Label(text, color, rank, tuple(spots)))
+
+    def stack(self, key: object, height: float) -> float:
+        """Stack a symbol onto the others at a place; return the height at which it begins."""
+        self.stacks[key] += height
+        return self.stacks[key] - height
+
+    def around(self, at: Array, radius: float) -> Candidates:
+        """List spots of a label on all sides of a symbol."""
+        ways = directions(np.radians([0, 180, 90, 270, 45, 135, 315, 225]))
+        return tuple(Candidate(at, x, radius / self.scale) for x in ways)
+
+    def along(self, axis: Array, distance: float) -> Candidates:
+        """List spots of a label on both sides of a beam, at least a distance away."""
+        gap = distance / self.scale
+        return tuple(
+            Candidate(at, s * left, gap) for at, left in _normals(axis) for s in (1.0, -1.0)
+        )
+
+
+def _normals(axis: Array) -> list[tuple[Array, Array]]:
+    """Return points along a line and unit vectors to its left, from the middle outwards."""
+    fractions = np.array([0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8, 0.1, 0.9])
+    steps = points_along(axis, fractions + 0.01) - points_along(axis, fractions - 0.01)
+    return list(zip(points_along(axis, fractions), normal(unit_vectors(steps)), strict=True))
+
+
+def draw(subject: Subject, scale: float) -> Drawing:
+    """Draw all objects of a scene; the length of a point is ``scale`` (m)."""
+    scene, drawing = subject.scene, Drawing(subject, scale)
+    _draw_beams(drawing)
+    for group, strokes in symbols.in_plane(drawing.shape).items():
+        drawing.strokes[group] += strokes
+    _name_bodies_and_connectors(drawing)
+    for support in scene.supports:
+        _draw_prescribed(drawing, support)
+    for mass in scene.masses:
+        spots = drawing.around(np.array(mass.place.point), 0.45 * drawing.unit)
+        drawing.write(f"{mass.mass:.4g} kg", INK, CAPTIONS, spots)
+    # Line loads come first, so that forces are stacked above them.
+    for load in sorted(scene.loads, key=lambda load: not isinstance(load, LineLoad)):
+        if isinstance(load, LineLoad):
+            _draw_line_load(drawing, load)
+        elif isinstance(load, PointLoad | FollowerLoad):
+            _draw_point_load(drawing, load)
+    for velocity in scene.initial:
+        _draw_velocity(drawing, velocity)
+    return drawing
+
+
+def _draw_beams(drawing: Drawing) -> None:
+    """Draw axes, names and hinges; if few, also marks between cells and of possible hinges."""
+    subject, scale, unit = drawing.subject, drawing.scale, drawing.unit
+    weight = 2.8 * unit / scale / positions.SYMBOL
+    drawing.strokes["beams"] += (Stroke(x, INK, weight, layer=4.0) for x in subject.axes.values())
+    for beam, axis in subject.axes.items():
+        if subject.cells <= MOST_CELLS:
+            steps = np.diff(axis, axis=0)
+            if len(steps) > 1 and np.linalg.norm(steps, axis=1).min() > 7.0 * scale:
+                left = 3.2 * scale * normal(unit_vectors(steps[1:] + steps[:-1]))
+                marks = np.stack([axis[1:-1] - left, axis[1:-1] + left], axis=1)
+                drawing.strokes["cells"] += (Stroke(ends, INK, 1.0, layer=4.0) for ends in marks)
+            if beam.section.hinge is not None and beam.section.hinge.opens:
+                middles = (axis[1:] + axis[:-1]) / 2
+                drawing.strokes["hinges"] += (
+                    disc(x, 0.14 * unit, HINGE, HINGE, 4.1) for x in middles
+                )
+        if len(subject.axes) <= MOST_LABELS:
+            drawing.write(subject.names[beam], TEXT, NAMES, drawing.along(axis, 2.5 * scale))
+    for hinge in subject.scene.hinges:
+        place, r = place_of(hinge), 0.25 * unit
+        axis, at = subject.axes[place.beam], np.array(place.point)
+        if place.s in (0.0, 1.0):  # beside the symbol at the end of the beam
+            end, inner = axis[:2] if place.s == 0.0 else axis[:-3:-1]
+            at = at + 0.7 * unit * unit_vectors(inner - end)
+        drawing.strokes["hinges"] += [disc(at, r, HINGE, HINGE, 5.2)]
+        if place.s in place.beam.hinges:
+            words = f"hinge {with_unit(float(law_of(hinge).limit), 'N m')}"
+            drawing.write(words, HINGE, CAPTIONS, drawing.around(at, r))
+
+
+def _name_bodies_and_connectors(drawing: Drawing) -> None:
+    """Write names and masses of bodies, kinds and sizes of connectors."""
+    scene, canvas = drawing.subject.scene, drawing.shape.canvas
+    unit, scale = drawing.unit, drawing.scale
+    for body in scene.bodies if len(scene.bodies) <= symbols.MOST_BODIES else ():
+        arms, name = (canvas.outlines[body] - body.center) / scale, drawing.subject.names[body]
+        spots = drawing.around(np.array(body.center), 0.0)
+        words = f"{name}, {body.mass:.4g} kg" if body.mass else name
+        outside = (x._replace(gap=float((arms @ x.direction).max())) for x in spots)
+        drawing.write(words, TEXT, NAMES, outside)
+    for connector in scene.connectors:
+        offset = canvas.offsets[connector]
+        a, b = symbols.connector_ends(drawing.shape, connector)
+        if connector.turns:
+            spots = drawing.around(b, (1.6 + offset + 0.8) * unit)
+        else:
+            apart = math.dist(a, b) > 0.1 * unit
+            across = normal(unit_vectors(b - a) if apart else np.array(connector.axis))
+            outwards = math.copysign(1.0, offset) * across
+            spots = tuple(
+                Candidate(a + fraction * (b - a) + offset * unit * across, side, 0.8 * unit / scale)
+                for fraction in (0.5, 0.3, 0.7)
+                for side in (outwards, -outwards)
+            )
+        units = ("N m", "rad") if connector.turns else ("N", "m")
+        words = symbols.law_symbol(connector.law).words(connector.law, *units)
+        drawing.write(words, TEXT, CAPTIONS, spots)
+
+
+# -- arrows ------------------------------------------------------------------------------------
+
+
+def _arrow(
+    line: Array, color: str, unit: float, *, hollow: bool = False, size: float = 1.0
+) -> list[Stroke]:
+    """Draw an arrow along a line; ``size`` is a factor on its head and the width of the line."""
+    lengths = positions.lengths_along(line)
+    head = min(size * HEAD * unit / lengths[-1], 1.0 / 3.0)
+    shaft = points_along(line, lengths / lengths[-1] * (1.0 - head))
+    tip = positions.in_frame(
+        [(0, 0), (-1, 0.36), (-1, -0.36), (0, 0)], line[-1], line[-1] - shaft[-1]
+    )
+    return [
+        Stroke(shaft, color, size * SHAFT, layer=FRONT),
+        Stroke(tip, color, 1.0, WHITE if hollow else color, FRONT),
+    ]
+
+
+def _around(center: Array, radius: float, sense: float) -> Array:
+    """Return the arc of an arrow around a point, counter-clockwise if ``sense`` > 0; (n, 2)."""
+    turns = math.copysign(1.0, sense) * np.linspace(-150.0, 120.0, 40)
+    return np.asarray(center + radius * directions(np.radians(90.0 + turns)))
+
+
+def _beside(tail: Array, tip: Array) -> Candidates:
+    """List spots of the label of an arrow: beyond its tail, and on both sides."""
+    ahead, middle = unit_vectors(tip - tail), (tail + tip) / 2
+    sides = normal(ahead), -normal(ahead)
+    aside = [Candidate(at, side) for at in (tail, middle) for side in sides]
+    oblique = (Candidate(tail, unit_vectors(side - ahead)) for side in sides)
+    return Candidate(tail, -ahead), *aside, *oblique
+
+
+def in_time(text: str, time: TimeFunction) -> str:
+    """Mark the text of a quantity that varies in time."""
+    return text if time is steady else f"{text} × f(t)"
+
+
+# -- loads -------------------------------------------------------------------------------------
+
+
+def _draw_point_load(drawing: Drawing, load: PointLoad | FollowerLoad) -> None:
+    """Draw arrows of force and moment; follower loads have hollow heads."""
+    at, unit, size = np.array(load.place.point), drawing.outside, math.hypot(*load.force)
+    hollow = isinstance(load, FollowerLoad)
+    more = ", follows" if hollow else ""
+    if size > 0.0:
+        direction = np.array(load.force) / size
+        line = _stand(drawing, load.place, direction, size / drawing.subject.force)
+        drawing.strokes["loads"] += _arrow(line, RED, unit, hollow=hollow)
+        text = in_time(with_unit(size, "N"), load.amplitude) + more
+        drawing.write(text, RED, LOADS, _beside(*line))
+    if load.moment:
+        radius = 1.7 * unit + drawing.stack((load.place.point, "moment"), 0.8 * unit)
+        drawing.strokes["loads"] += _arrow(
+            _around(at, radius, load.moment), RED, unit, hollow=hollow
+        )
+        text = in_time(with_unit(abs(load.moment), "N m"), load.amplitude) + more
+        drawing.write(text, RED, LOADS, drawing.around(at, radius))
+    if not size and not load.moment:
+        drawing.write("0 N", RED, LOADS, drawing.around(at, 0.0))
+
+
+def _stand(drawing: Drawing, place: Anchor, direction: Array, fraction: float) -> Array:
+    """Return the line of the arrow of a force, which ends at its place; (2, 2); m.
+
+    If it would lie on a beam, it begins at its place; if it still would, it is beside the beam.
+    """
+    unit = drawing.outside
+    at, length = np.array(place.point), (2.6 + 1.4 * fraction) * unit
+    if isinstance(place, Place):  # beyond a line load on the beam
+        length += drawing.stacks[(place.beam, *np.round(direction, 6))]
+    # Cosines of the angles between the force and the beams
+    along = drawing.subject.directions_at(place) @ direction
+    behind, ahead = along.min(initial=0.0) < -0.9, along.max(initial=0.0) > 0.9
+    pulls, apart = behind and not ahead, 0.3 * unit
+    start = apart + drawing.stack((place.point, *np.round(direction, 6), pulls), length + apart)
+    if behind and ahead:  # along a continuous beam: beside it
+        at = at + 0.8 * unit * normal(direction)
+    ends = np.outer((start, start + length), direction)
+    return np.asarray(at + ends if pulls else at - ends[::-1])
+
+
+def _draw_line_load(drawing: Drawing, load: LineLoad) -> None:
+    """Draw arrows that end on the beam, or are beside it if parallel to it; draw moments."""
+    axis, unit, size = drawing.subject.axes[load.beam], drawing.outside, math.hypot(*load.force)
+
+    def spaced(distance: float, *, ends: bool = False) -> Array:
+        """Return equally spaced points, about ``distance`` apart; (n, 2); m."""
+        number = max(1, round(positions.lengths_along(axis)[-1] / distance))
+        steps = np.arange(number + 1) if ends else np.arange(number) + 0.5
+        return points_along(axis, steps / number)
+
+    if size > 0.0:
+        direction, chord = np.array(load.force) / size, axis[-1] - axis[0]
+        if abs(normal(chord) @ direction) > 0.25 * np.linalg.norm(chord):
+            height = (1.3 + 1.1 * size / drawing.subject.line_load) * unit
+            begin = drawing.stack((load.beam, *np.round(direction, 6)), height + 0.35 * unit)
+            low, high = begin + 0.3 * unit, begin + 0.3 * unit + height
+            line = axis - high * direction
+            drawing.strokes["loads"] += [Stroke(line, RED, 1.2, layer=FRONT)]
+            for foot in spaced(2.0 * unit, ends=True):
+                ends = foot - np.outer((high, low), direction)
+                drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
+            outwards = [
+                (at, left if left @ direction < 0 else -left) for at, left in _normals(line)
+            ]
+            spots = [Candidate(at, side) for at, out in outwards for side in (out, -out)]
+        else:
+            aside = 0.8 * unit + drawing.stack((load.beam, "along"), 0.7 * unit)
+            left = normal(direction)
+            for at in spaced(2.4 * unit) + aside * left:
+                ends = at + np.outer((-0.9 * unit, 0.9 * unit), direction)
+                drawing.strokes["loads"] += _arrow(ends, RED, unit, size=0.62)
+            gap = (aside + 0.3 * unit) / drawing.scale
+            spots = [Candidate(at, left, gap) for at, _ in _normals(axis)]
+        drawing.write(in_time(with_unit(size, "N/m"), load.amplitude), RED, LOADS, spots)
+    if load.moment:
+        for at in spaced(3.2 * unit):
+            line = _around(at, 0.75 * unit, load.moment)
+            drawing.strokes["loads"] += _arrow(line, RED, 0.7 * unit)
+        text = in_time(with_unit(abs(load.moment), "N m/m"), load.amplitude)
+        drawing.write(text, RED, LOADS, drawing.along(axis, 0.9 * unit))
+    if not size and not load.moment:
+        drawing.write("0 N/m", RED, LOADS, drawing.along(axis, 0.0))
+
+
+# -- motions -----------------------------------------------------------------------------------
+
+
+def _draw_prescribed(drawing: Drawing, support: Support) -> None:
+    """Draw motions that a support prescribes, as hollow arrows."""
+    at, unit = np.array(support.place.point), drawing.outside
+    ways = drawing.subject.directions_at(support.place)
+    inward = ways[0] if len(ways) else np.array([0.0, 1.0])
+    for component, motion in support.moving.items():
+        name, symbol = COMPONENTS[component].replace("psi", "ψ"), ("m", "m", "rad")[component]
+        values = {float(motion(t)) for t in (0.0, 0.3, 1.0, 7.1)}
+        text = f"{name} = {with_unit(values.pop(), symbol)}" if len(values) == 1 else f"{name}(t)"
+        if component == 2:
+            radius = 1.9 * unit
+            drawing.strokes["motions"] += _arrow(_around(at, radius, 1.0), MOVED, unit, hollow=True)
+            drawing.write(text, MOVED, MOTIONS, drawing.around(at, radius))
+            continue
+        direction = directions(support.angle + component * math.pi / 2)
+        # Beside the place, on the side from which no beam comes.
+        left = normal(direction)
+        side = left if left @ inward <= 1e-9 else -left
+        line = at + 1.5 * unit * side + np.outer((0.0, 2.6 * unit), direction)
+        drawing.strokes["motions"] += _arrow(line, MOVED, unit, hollow=True)
+        tail, tip = line
+        spots = [Candidate(x, side) for x in (line.mean(axis=0), tip, tail)]
+        spots += [Candidate(tip, direction), Candidate(tail, -direction)]
+        drawing.write(text, MOVED, MOTIONS, spots)
+
+
+def _draw_velocity(drawing: Drawing, velocity: Velocity) -> None:
+    """Draw an initial velocity with its label."""
+    unit, subject = drawing.outside, drawing.subject
+    arrows: list[tuple[float, Array, Array]] = []
+    for member in velocity.beams:
+        for at in subject.velocity_points(member):
+            u, v, _ = velocity.at(*at)
+            if (speed := math.hypot(u, v)) > 0.05 * subject.speed:
+                direction = np.array([u, v]) / speed
+                tip = at + (1.6 + 2.0 * speed / subject.speed) * unit * direction
+                drawing.strokes["velocities"] += _arrow(np.array([at, tip]), GREEN, unit, size=0.8)
+                arrows.append((speed, at, tip))
+        if velocity.angular and isinstance(member, Body):
+            line = _around(np.array(member.center), 1.5 * unit, velocity.angular)
+            drawing.strokes["velocities"] += _arrow(line, GREEN, 0.8 * unit)
+    spin = f"{number(velocity.angular)} rad/s" if velocity.angular else ""
+    if arrows:
+        speed, at, tip = max(arrows, key=lambda entry: entry[0])
+        text = with_unit(speed, "m/s") + (f" ({spin})" if spin else "")
+        drawing.write(text, GREEN, MOTIONS, _beside(tip, at))
+    elif velocity.beams:
+        at = subject.velocity_points(velocity.beams[0])[0]
+        spots = drawing.around(at, 1.8 * unit if spin else 0.0)
+        drawing.write(spin or "0 m/s", GREEN, MOTIONS, spots)
