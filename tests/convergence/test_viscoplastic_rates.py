@@ -33,9 +33,7 @@ def vibration(scheme, dt, viscosity):
         masses=[ub.PointMass(beam.end, 1.0)],
         loads=[ub.PointLoad(beam.end, force=(0, 25.0), amplitude=pulse)],
     )
-    solution = ub.simulate(
-        scene, scheme, t=(0, DURATION), dt=dt, newton=ub.Newton(rtol=1e-12), progress=False
-    )
+    solution = ub.simulate(scene, scheme, t=(0, DURATION), dt=dt, newton=ub.Newton(rtol=1e-12))
     energy = solution.energy
     assert energy.worst <= 1e-9
     for lost in energy.lost.values():

@@ -79,7 +79,7 @@ class Case:
         """Run the script, with other arguments; a failed step leaves what came before it."""
         names = self.combination.make(source) if names is None else names
         arguments = {key: names[key] for key in ("t", "dt", "mesh", "newton")}
-        arguments |= {"progress": False, "comm": self.comm, **changes}
+        arguments |= {"comm": self.comm, **changes}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ub.ModelWarning)
             try:

@@ -116,7 +116,6 @@ def run(folder, *, steps=60, every=2, record=()):
     checkpoint = ub.Checkpoint(folder / "run.checkpoint", every=every)
     return ub.simulate(
         scene, ub.EnergyMomentum(0.05, 0.02), t=(0, 0.005 * steps), dt=0.005, every=3,
-        progress=False,
         record=[*files, *record], checkpoint=checkpoint,
     )  # fmt: skip
 

@@ -36,7 +36,7 @@ class Run:
             try:
                 self.solution = ub.simulate(
                     self.scene, names["scheme"], t=names["times"], dt=names["dt"],
-                    mesh=names["mesh"], progress=False,
+                    mesh=names["mesh"],
                 )  # fmt: skip
             except ub.ConvergenceError as error:
                 self.solution, self.failure = error.solution, str(error)

@@ -56,7 +56,7 @@ def everything():
 
 
 def test_checksum():
-    run = ub.simulate(everything(), ub.EnergyMomentum(0.05), t=(0, 0.3), dt=0.005, progress=False)
+    run = ub.simulate(everything(), ub.EnergyMomentum(0.05), t=(0, 0.3), dt=0.005)
     assert run.energy.worst < 1e-9
     for name, numbers in (
         ("q", run.q[-1]),

@@ -65,11 +65,7 @@ class Mechanism:
             [rod], joints=joints, bodies=bodies, connectors=connectors, loads=[ub.Gravity(tuple(g))]
         )
         run = self.run = ub.simulate(
-            self.scene,
-            ub.EnergyMomentum(0.05),
-            t=(0, STEPS * STEP * s),
-            dt=STEP * s,
-            progress=False,
+            self.scene, ub.EnergyMomentum(0.05), t=(0, STEPS * STEP * s), dt=STEP * s
         )
         back = np.array([[cos, sin], [-sin, cos]]) / m
         self.motion = np.array([run.position(p) @ back.T for p in (rod.at(0.5), slider.middle)])

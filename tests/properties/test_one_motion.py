@@ -24,7 +24,7 @@ def moves(solution, *places):
 
 
 def run(scene, scheme=None, **more):
-    return ub.simulate(scene, scheme or ub.EnergyMomentum(), progress=False, **more)
+    return ub.simulate(scene, scheme or ub.EnergyMomentum(), **more)
 
 
 # -- places ----------------------------------------------------------------------------------------

@@ -67,7 +67,7 @@ def run(case, *, reference):
     scene, scheme, times, dt, mesh = case
     newton = ub.Newton(rtol=1e-12, reference=reference)
     try:
-        return ub.simulate(scene, scheme, t=times, dt=dt, mesh=mesh, newton=newton, progress=False)
+        return ub.simulate(scene, scheme, t=times, dt=dt, mesh=mesh, newton=newton)
     except ub.ConvergenceError as error:
         return error.solution
 
@@ -192,7 +192,7 @@ def dense(A):
 @pytest.mark.parametrize("first", [False, True])
 def test_a_run_begins_where_another_one_ends(scheme, first):
     """Of either kind; internal variables and what the scheme keeps go on."""
-    options = {"dt": 2e-3, "progress": False}
+    options = {"dt": 2e-3}
     newton = {one: ub.Newton(rtol=1e-12, reference=one) for one in (False, True)}
     scene = yielding()
     begun = ub.simulate(scene, scheme, t=(0, 0.1), newton=newton[first], **options)
@@ -213,7 +213,7 @@ def test_a_guided_run_begins_where_another_one_ends(first):
     supports = [ub.Pinned(beam.start)]
     scene = ub.Scene([beam], joints=[guide], supports=supports, loads=[push])
     newton = {one: ub.Newton(rtol=1e-12, reference=one) for one in (False, True)}
-    options = {"dt": 5e-3, "progress": False}
+    options = {"dt": 5e-3}
     begun = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), newton=newton[first], **options)
     assert begun.internal["guides, 6"][0, 3] > 0.1  # rad along the circle
     one, other = (
@@ -229,7 +229,7 @@ def test_a_guided_run_begins_where_another_one_ends(first):
 
 def test_what_it_does_not_compute():
     scene, newton = yielding(), ub.Newton(reference=True)
-    times = {"t": (0, 0.1), "newton": newton, "progress": False}
+    times = {"t": (0, 0.1), "newton": newton}
     calls = {
         "adaptive steps": lambda: ub.simulate(
             scene, ub.EnergyMomentum(), dt=ub.Adaptive(1e-3), **times
@@ -253,7 +253,7 @@ def test_a_step_without_equilibrium():
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
     newton = ub.Newton(reference=True)
     with pytest.raises(ub.ConvergenceError, match="no equilibrium after t = 0") as failure:
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, newton=newton, progress=False)
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, newton=newton)
     assert 0.39 < failure.value.solution.times[-1] <= 0.48 + 1e-9  # 40 N m over 1 m to 5/6 m
 
 

@@ -63,7 +63,7 @@ def go(kind, path=None, *, steps=10**9, every=5, comm=None):
     make, scheme, end, dt = RUNS[kind]
     checkpoint = None if path is None else ub.Checkpoint(path, every=every)
     return ub.simulate(
-        make(), scheme, t=(0, end), dt=dt, every=2, record=StopAt(steps), progress=False,
+        make(), scheme, t=(0, end), dt=dt, every=2, record=StopAt(steps),
         checkpoint=checkpoint, comm=comm,
     )  # fmt: skip
 
@@ -139,7 +139,7 @@ def test_a_later_end_goes_on(shared_path):
 
     def until(end, **more):
         scheme = ub.EnergyMomentum(0.05)
-        return ub.simulate(machine(), scheme, t=(0, end), dt=0.005, progress=False, **more)
+        return ub.simulate(machine(), scheme, t=(0, end), dt=0.005, **more)
 
     checkpoint = ub.Checkpoint(path, every=100)
     until(0.1, checkpoint=checkpoint)

@@ -77,7 +77,7 @@ def failure(rank, make):
 
 
 def run(scene, **more):
-    more = {"t": (0, 0.05), "dt": 0.01, "progress": False, **more}
+    more = {"t": (0, 0.05), "dt": 0.01, **more}
     return ub.simulate(scene, more.pop("scheme", ub.EnergyMomentum()), **more)
 
 

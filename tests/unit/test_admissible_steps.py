@@ -40,7 +40,7 @@ def test_dissipation_never_falls(law, scheme, dt):
     plastic = []
     for reference in (False, True):
         newton = ub.Newton(reference=reference)
-        run = ub.simulate(shaken(law), scheme, t=(0, 0.6), dt=dt, newton=newton, progress=False)
+        run = ub.simulate(shaken(law), scheme, t=(0, 0.6), dt=dt, newton=newton)
         plastic.append(run.energy["plastic"])
         assert np.diff(plastic[-1]).min() >= -1e-12 * plastic[-1][-1]  # round-off of the sums
     assert plastic[0][-1] > 0.5
@@ -148,7 +148,7 @@ def test_no_step_is_accepted_that_gives_energy(make, place, scheme, in_python, r
     scene = controlled(scene) if in_python else scene
     newton = ub.Newton(reference=reference)
     with pytest.raises(ub.ConvergenceError, match=f"GivesEnergy of {place} has a neg") as found:
-        ub.simulate(scene, scheme, t=(0, 1), dt=0.04, newton=newton, progress=False)
+        ub.simulate(scene, scheme, t=(0, 1), dt=0.04, newton=newton)
     run = found.value.solution
     assert 0.04 < run.times[-1] < 0.5
     assert run.energy["plastic"].min() >= -1e-12 * run.energy.throughput  # round-off
@@ -160,9 +160,7 @@ def test_an_active_law_may_give_energy(reference):
     beam = ub.Beam((0, 0), (1, 0), section(axial=Swelling(1e-3)), cells=2)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Clamped(beam.end)])
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(
-        scene, ub.EnergyMomentumStatic(0.5), t=(0, 1), dt=0.25, newton=newton, progress=False
-    )
+    run = ub.simulate(scene, ub.EnergyMomentumStatic(0.5), t=(0, 1), dt=0.25, newton=newton)
     middle = 1 - 0.25 / 2  # of the last step, in which section forces act
     assert run.section_forces_at(beam.start)[-1, 0] == pytest.approx(EA * 1e-3 * middle, rel=1e-9)
     assert run.energy["plastic"][-1] == pytest.approx(-EA * 1e-6 / 2, rel=1e-9)

@@ -38,7 +38,7 @@ def cantilever(**more):
 def swing(scene=None, **more):
     return ub.simulate(
         cantilever() if scene is None else scene,
-        ub.EnergyMomentum(), t=(0, 0.5), dt=0.1, progress=False, **more,
+        ub.EnergyMomentum(), t=(0, 0.5), dt=0.1, **more,
     )  # fmt: skip
 
 
@@ -108,9 +108,7 @@ def require_same(one, other):
 
 def test_a_machine_of_everything(shared_path):
     """Beams that yield and break, fibres, bodies, joints, each law, each load, damping."""
-    solution = ub.simulate(
-        machine(), ub.EnergyMomentum(0.05, 0.02), t=(0, 0.1), dt=0.005, every=3, progress=False
-    )
+    solution = ub.simulate(machine(), ub.EnergyMomentum(0.05, 0.02), t=(0, 0.1), dt=0.005, every=3)
     loaded = saved(solution, shared_path)
     require_same(loaded, solution)
     for a, b in zip(solution.scene.joints, loaded.scene.joints, strict=True):
@@ -146,7 +144,7 @@ def test_plastic_hinges_at_places_and_an_open_ledger(shared_path):
     beam = ub.Beam((0, 0), (1, 0), section, cells=2, name="left", hinges=hinges)
     load = ub.PointLoad(beam.end, force=(0, -6), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02, progress=False)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02)
     solution.open_ledger = "the ledger is open"
     loaded = saved(solution, shared_path)
     require_same(loaded, solution)
@@ -158,7 +156,7 @@ def test_plastic_hinges_at_places_and_an_open_ledger(shared_path):
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
 def test_statics(scheme, shared_path):
-    solution = ub.simulate(bend(), scheme, t=(0, 5), dt=0.1, progress=False)
+    solution = ub.simulate(bend(), scheme, t=(0, 5), dt=0.1)
     require_same(saved(solution, shared_path), solution)
 
 
@@ -194,9 +192,7 @@ def test_curves_and_meshes(shared_path):
     beams = [arc, line, wave]
     scene = ub.Scene(beams, supports=[ub.Clamped(b.start) for b in beams], loads=[ub.Gravity()])
     mesh = ub.Mesh(refine=Fraction(2), degree=2)
-    solution = ub.simulate(
-        scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05, mesh=mesh, progress=False
-    )
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05, mesh=mesh)
     loaded = saved(solution, shared_path)
     require_same(loaded, solution)
     assert loaded.grid.mesh == mesh
@@ -220,7 +216,7 @@ def test_runs_and_modes_go_on_from_a_loaded_solution(shared_path):
     solution = swing(scene)
     loaded = saved(solution, shared_path)
     runs = [
-        ub.simulate(one.scene, ub.EnergyMomentum(), t=(0.5, 0.8), dt=0.1, start=one, progress=False)
+        ub.simulate(one.scene, ub.EnergyMomentum(), t=(0.5, 0.8), dt=0.1, start=one)
         for one in (solution, loaded)
     ]
     assert same(runs[0].q, runs[1].q)
@@ -333,7 +329,7 @@ def test_laws_of_a_user_need_the_scene_of_the_script(shared_path):
     require_same(loaded, solution)
     assert solution.energy.lost["plastic"][-1] > 0
     runs = [
-        ub.simulate(one.scene, ub.EnergyMomentum(), t=(0.5, 0.8), dt=0.1, start=one, progress=False)
+        ub.simulate(one.scene, ub.EnergyMomentum(), t=(0.5, 0.8), dt=0.1, start=one)
         for one in (solution, loaded)
     ]
     assert same(runs[0].q, runs[1].q)

@@ -74,7 +74,7 @@ def bent(beam):
     """End of a beam whose plastic hinge in the middle yields."""
     push = ub.PointLoad(beam.end, force=(0, -3.0), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     return solution.displacement(beam.end), solution.connector(scene.hinges[0]).motion
 
 

@@ -104,7 +104,7 @@ def cantilever(*laws, load=lambda t: math.sin(9 * t), axis=(0.6, 0.8)):
 
 
 def run(scene, scheme, t=(0, 0.6), dt=0.02, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+    return ub.simulate(scene, scheme, t=t, dt=dt, **more)
 
 
 # -- laws of several components ------------------------------------------------------------------

@@ -58,12 +58,7 @@ def machine():
 
 def run(scene, newton=None, scheme=None, steps=20):
     return ub.simulate(
-        scene,
-        scheme or ub.EnergyMomentum(),
-        t=(0, 0.02 * steps),
-        dt=0.02,
-        newton=newton,
-        progress=False,
+        scene, scheme or ub.EnergyMomentum(), t=(0, 0.02 * steps), dt=0.02, newton=newton
     )
 
 

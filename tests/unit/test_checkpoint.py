@@ -41,7 +41,6 @@ def run(path, frame=None, scheme=None, *, every=2, also=(), t=(0, 0.5), dt=0.1, 
         t=t,
         dt=dt,
         checkpoint=ub.Checkpoint(path, every=every, also=also),
-        progress=False,
         **more,
     )
 
@@ -112,7 +111,7 @@ def test_the_file_of_another_run(other, path):
 
 
 def test_another_start(path):
-    first = ub.simulate(scene(), ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    first = ub.simulate(scene(), ub.Static(), t=(0, 1), dt=1.0)
     run(path)
     frame = first.scene
     with pytest.raises(ub.ArgumentError, match=r"start is .*, in the file 'nothing'"):
@@ -224,7 +223,7 @@ def scene_with(frame, *connectors):
 
 
 def test_what_a_controller_remembers_goes_on(path):
-    whole = ub.simulate(steered(Telling()), ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False)
+    whole = ub.simulate(steered(Telling()), ub.EnergyMomentum(), t=(0, 1), dt=0.1)
     run(path, steered(Telling()), t=(0, 0.5))
     force = Telling()
     longer = run(path, steered(force), t=(0, 1))
@@ -323,7 +322,7 @@ def test_a_history_that_is_gone(path, on_first_rank):
 def test_by_the_clock(path, on_first_rank):
     """Each step takes longer than no minutes."""
     ub.simulate(
-        scene(), ub.EnergyMomentum(), t=(0, 0.5), dt=0.1, progress=False,
+        scene(), ub.EnergyMomentum(), t=(0, 0.5), dt=0.1,
         checkpoint=ub.Checkpoint(path, minutes=0.0), record=Stop(path, 3),
     )  # fmt: skip
     assert on_first_rank(lambda: len(read(path)["history/q"])) == 6

@@ -135,7 +135,7 @@ def carriage(law, v, mass=2.0, more=()):
 
 
 def run(scene, scheme, t=(0, 0.6), dt=0.02, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+    return ub.simulate(scene, scheme, t=t, dt=dt, **more)
 
 
 # -- the compiled law ----------------------------------------------------------------------------

@@ -31,7 +31,7 @@ def slider(sample=None, log=None, gain=GAIN, rate=RATE):
 
 
 def run(scene, t=(0.0, 0.5), dt=1e-3, **more):
-    return ub.simulate(scene, ub.EnergyMomentum(), t=t, dt=dt, progress=False, **more)
+    return ub.simulate(scene, ub.EnergyMomentum(), t=t, dt=dt, **more)
 
 
 def by_hand(sample, samples):

@@ -29,7 +29,7 @@ def scene():
 
 
 def run(*, until=0.5, **more):
-    return ub.simulate(scene(), ub.EnergyMomentum(), t=(0, until), dt=0.1, progress=False, **more)
+    return ub.simulate(scene(), ub.EnergyMomentum(), t=(0, until), dt=0.1, **more)
 
 
 class Solutions:
@@ -52,7 +52,7 @@ class Studies:
     advice = "Delete the file to compute all members, or name another"
 
     def write(self, path):
-        ub.study(self.member, [{"x": x} for x in range(3)], path=path, progress=False)
+        ub.study(self.member, [{"x": x} for x in range(3)], path=path)
 
     def member(self, x):
         return {"row": np.arange(4.0) ** x, "other": np.arange(4.0)}

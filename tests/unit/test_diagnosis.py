@@ -15,7 +15,7 @@ CODES = ("DIVERGED", "SNES", "dt = 0 s")
 
 def failure(scene, scheme=None, **more):
     """The error of a static run, whose message has no codes."""
-    arguments = {"t": (0, 7), "dt": 0.5, "progress": False} | more
+    arguments = {"t": (0, 7), "dt": 0.5} | more
     with pytest.raises(ub.ConvergenceError) as caught:
         ub.simulate(scene, scheme or ub.Static(), **arguments)
     assert [code for code in CODES if code in str(caught.value)] == []
@@ -64,7 +64,7 @@ def test_a_massless_body_between_two_hinges_that_nothing_turns():
     Rotations of 1e-4 make a nonlinearity far below the tolerance.
     """
     _, scene = node_between_hinges()
-    solution = ub.simulate(scene, ub.Static(), t=(0, 7), dt=0.5, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 7), dt=0.5)
     (left, _), node = scene.beams, scene.bodies[0]
     load, moment = 3.5, 1.0  # N, N m
     expected = -load * ((1 - 1 / 16) / (3 * 1e4) + 1 / 1e7) + moment / (2 * 1e4)
@@ -153,7 +153,7 @@ def test_perfectly_plastic_cells_in_a_row():
         failure(rod()[1], t=(0, 1), dt=0.25)
     )
     pulled, hardens = rod(isotropic=200e9 * 1e-6)
-    run = ub.simulate(hardens, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    run = ub.simulate(hardens, ub.Static(), t=(0, 1), dt=0.25)
     # N; the weakest cell bears about 300 MPa on 4 cm²
     assert 0.8 < run.reaction(pulled)[-1, 0] / 120e3 < 1.2
 

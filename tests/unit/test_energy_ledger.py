@@ -223,7 +223,7 @@ def test_a_run_says_when_round_off_opens_its_ledger():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         # The imbalance is luck: from 1e-7 to 1e-4 with this EA, as the compiler orders the sums.
-        solution = ub.simulate(stiff(1e18), ub.EnergyMomentum(), t=(0, 3), dt=0.1, progress=False)
+        solution = ub.simulate(stiff(1e18), ub.EnergyMomentum(), t=(0, 3), dt=0.1)
     # The first process says so for all.
     said = [str(one.message) for one in caught if one.category is ub.ModelWarning]
     assert said == [solution.open_ledger] * (MPI.COMM_WORLD.rank == 0)
@@ -247,7 +247,7 @@ def test_a_scene_that_turns_as_a_whole_has_no_energy_to_balance():
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
     turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: math.sin(math.pi * t))
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), turn])
-    solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.01, progress=False)
+    solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.01)
     assert solution.energy.throughput < 1e-9
     assert solution.open_ledger == ""
 
@@ -257,7 +257,7 @@ def test_schemes_that_claim_nothing_say_nothing(scheme):
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=2)
     push = ub.PointLoad(beam.end, force=(0, 20.0), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-    solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.25, progress=False)
+    solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.25)
     assert solution.energy.worst > 1e-9
     assert solution.open_ledger == ""
 
@@ -267,9 +267,7 @@ def test_energies_of_nearly_nothing_are_not_compared():
     beam = ub.Beam((0, 0), (2, 1), SECTION, cells=2)
     push = ub.PointLoad(beam.end, force=(0, 1e-158), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-    assert (
-        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False).open_ledger == ""
-    )
+    assert ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1).open_ledger == ""
 
 
 def test_small_strains_keep_their_digits():
@@ -282,7 +280,7 @@ def test_small_strains_keep_their_digits():
         beam = ub.Beam((0, 0), (1.7, 2.4), section, cells=8)
         push = ub.PointLoad(beam.end, force=(force, 0), amplitude=lambda t: min(t, 1.0))
         scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.01, progress=False)
+        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.01)
         assert solution.energy.worst < 1e-12
 
 

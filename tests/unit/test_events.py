@@ -130,7 +130,7 @@ def pushed_brake():
 @pytest.mark.parametrize("goes_on", ["checkpoint", "start"])
 def test_friction_goes_on_as_it_was(shared_path, last, goes_on):
     """Whether a place sticks depends on a limit, which is known in a run that goes on."""
-    scene, options = pushed_brake(), {"dt": 0.02, "progress": False}
+    scene, options = pushed_brake(), {"dt": 0.02}
     whole, first, rest = (ub.Events() for _ in range(3))
     ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.3), record=whole, **options)
     if goes_on == "checkpoint":

@@ -29,7 +29,6 @@ def run(folder, *more, t1=0.05):
         dt=0.01,
         record=[ub.History(folder / "run.csv", [BEAM.end]), *more],
         checkpoint=ub.Checkpoint(folder / "run.h5", every=1),
-        progress=False,
     )
 
 

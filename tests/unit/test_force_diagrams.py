@@ -15,7 +15,7 @@ SOLVED = 1e-8  # part of the largest value that the tolerance of the solver, 1e-
 
 
 def static(scene, degree=1, **options):
-    times = {"t": (0, 1), "dt": 0.25, "progress": False, **options}
+    times = {"t": (0, 1), "dt": 0.25, **options}
     return ub.simulate(scene, ub.Static(), mesh=ub.Mesh(degree=degree), **times)
 
 
@@ -140,11 +140,7 @@ def test_the_initial_state_bears_nothing():
 def test_beams_in_free_fall_bear_nothing():
     beam = ub.Beam((0, 0), (2, 0), STIFF, cells=4)
     fall = ub.simulate(
-        ub.Scene([beam], loads=[ub.Gravity()]),
-        ub.EnergyMomentum(),
-        t=(0, 1),
-        dt=0.25,
-        progress=False,
+        ub.Scene([beam], loads=[ub.Gravity()]), ub.EnergyMomentum(), t=(0, 1), dt=0.25
     )
     # Round-off of EA and EI times strains of displacements of 5 m
     assert np.abs(fall.diagram(beam)[1:]).max() < 1e-4

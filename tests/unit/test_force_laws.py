@@ -29,7 +29,7 @@ def floating(law, load=None, **more):
 
 
 def run(scene, scheme=None, **more):
-    more = {"t": (0, 1), "dt": 0.05, "progress": False, **more}
+    more = {"t": (0, 1), "dt": 0.05, **more}
     return ub.simulate(scene, scheme or ub.Static(), **more)
 
 

@@ -76,7 +76,7 @@ def test_armstrong_frederick_ratchets():
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     found = []
     for n in (200, 400):
-        run = ub.simulate(scene, MIDDLE, t=(0, 3), dt=1 / n, progress=False)
+        run = ub.simulate(scene, MIDDLE, t=(0, 3), dt=1 / n)
         u = run.displacement(beam.end)[:, 0]
         found.append(u[3 * n] - u[2 * n])
     coarse, fine = np.array(found) / exact - 1

@@ -96,7 +96,7 @@ def test_a_column_under_axial_force(reference):
     turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: 0.4 * max(t - 1.0, 0.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn], loads=[press])
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.05, newton=newton, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.05, newton=newton)
     N, _, M = run.material_at(beam.end).forces[-1]
     assert LAW.excess(N, M) == pytest.approx(0.0, abs=1e-9)
     # The force turns with the axis, by 0.2 rad in the middle.
@@ -109,7 +109,7 @@ def test_the_ledger_closes():
     load = ub.PointLoad(beam.end, force=(3.0, 8.0), amplitude=lambda t: float(t < 0.5))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     for scheme in (ub.EnergyMomentum(), ub.EnergyMomentum(0.1)):
-        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01, progress=False)
+        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01)
         assert run.energy.worst < 1e-9
         assert run.energy.lost["plastic"][-1] > 0.01 * run.energy.throughput
 

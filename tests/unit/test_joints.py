@@ -25,7 +25,7 @@ def raises(text):
 
 
 def run(scene, scheme=None, **more):
-    arguments = {"t": (0, 0.1), "dt": 0.01, "progress": False} | more
+    arguments = {"t": (0, 0.1), "dt": 0.01} | more
     return ub.simulate(scene, scheme or ub.EnergyMomentum(), **arguments)
 
 

@@ -94,7 +94,7 @@ def oscillator(*laws, v=1.5):
 
 
 def run(scene, scheme, t=(0, 3.0), dt=0.01, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+    return ub.simulate(scene, scheme, t=t, dt=dt, **more)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)

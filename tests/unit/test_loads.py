@@ -162,6 +162,6 @@ def test_work_of_follower_loads_among_many_entries():
 
     works = [ub.VirtualWork(f"wind {k}", lift) for k in range(20)]
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], works=works)
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, 0.5), dt=0.02, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, 0.5), dt=0.02)
     assert run.energy.supplied["loads"][-1] > 0.001
     assert run.energy.worst < 1e-9

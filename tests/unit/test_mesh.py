@@ -34,7 +34,7 @@ def portal(**parts):
 
 
 def bend(scene, **more):
-    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False, **more)
+    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, **more)
 
 
 @pytest.mark.parametrize(
@@ -146,7 +146,7 @@ def test_elastic_beams_of_higher_degree_may_have_hinges(degree):
     turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: 0.3 * t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
     mesh = ub.Mesh(degree=degree)
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, mesh=mesh, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, mesh=mesh)
     α, M, *_ = solution.connector(scene.hinges[0])
     assert α[-1] > 0.1
     assert M[-1] == pytest.approx(10.0 * np.exp(-2.0 * α[-1]), rel=1e-9)
@@ -190,13 +190,7 @@ def test_everything_takes_a_finer_mesh(shared_path):
     arm = scene.beams[1]
     records = [ub.XDMF(shared_path / "a.xdmf"), ub.History(shared_path / "a.csv", [arm.at(0.25)])]
     solution = ub.simulate(
-        scene,
-        ub.EnergyMomentum(),
-        t=(0, 1e-2),
-        dt=1e-3,
-        mesh=ub.Mesh(2),
-        record=records,
-        progress=False,
+        scene, ub.EnergyMomentum(), t=(0, 1e-2), dt=1e-3, mesh=ub.Mesh(2), record=records
     )
     assert len(solution.shape(arm)) == 15
     assert solution.displacement(arm.at(0.25)).shape == (11, 3)
@@ -212,7 +206,7 @@ def test_the_mesh_belongs_to_a_checkpoint(shared_path):
     def run(t1, refine):
         return ub.simulate(
             portal(), ub.EnergyMomentum(), t=(0, t1), dt=1e-3, mesh=ub.Mesh(refine),
-            checkpoint=ub.Checkpoint(path, every=2), progress=False,
+            checkpoint=ub.Checkpoint(path, every=2),
         )  # fmt: skip
 
     run(4e-3, 2)
@@ -336,13 +330,7 @@ def test_everything_takes_a_higher_degree(mesh, shared_path, on_first_rank):
         ub.Fatigue(ub.HotSpot.fibre(arm.at(0.3), y=0.1, E=1e9), ub.SNCurve(range=1e8)),
     ]  # fmt: skip
     solution = ub.simulate(
-        scene,
-        ub.EnergyMomentum(0.05),
-        t=(0, 0.1),
-        dt=0.01,
-        mesh=mesh,
-        record=records,
-        progress=False,
+        scene, ub.EnergyMomentum(0.05), t=(0, 0.1), dt=0.01, mesh=mesh, record=records
     )
     assert solution.energy.worst < 1e-9
     written = on_first_rank(lambda: (shared_path / "b.xdmf").read_text())
@@ -354,7 +342,5 @@ def test_everything_takes_a_higher_degree(mesh, shared_path, on_first_rank):
     modes = ub.modes(scene, 3, at=solution)
     ub.plot(modes)
     assert modes.grid.mesh == mesh
-    again = ub.simulate(
-        scene, ub.EnergyMomentum(0.05), t=(0.1, 0.12), dt=0.01, start=solution, progress=False
-    )
+    again = ub.simulate(scene, ub.EnergyMomentum(0.05), t=(0.1, 0.12), dt=0.01, start=solution)
     assert again.energy.worst < 1e-9

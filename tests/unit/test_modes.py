@@ -178,7 +178,7 @@ def test_what_has_yielded_answers_elastically():
     beam = ub.Beam((0, 0), (2, 0), section, cells=6)
     push = ub.PointLoad(beam.end, force=(0, 0.55), amplitude=ub.ramp(1.0))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-    bent = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    bent = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     assert bent.energy.lost["plastic"][-1] > 0
     elastic = ub.modes(cantilever(), 3).omega
     np.testing.assert_allclose(ub.modes(scene, 3, at=bent).omega, elastic, rtol=1e-2)
@@ -213,7 +213,7 @@ def test_a_rotating_frame_keeps_energy():
         loads=[frame],
         masses=[ub.PointMass(beam.end, 0.3)],
     )
-    solution = ub.simulate(thrown, ub.EnergyMomentum(), t=(0, 1.0), dt=0.02, progress=False)
+    solution = ub.simulate(thrown, ub.EnergyMomentum(), t=(0, 1.0), dt=0.02)
     assert np.ptp(solution.displacement(beam.end)[:, 1]) > 1e-3
     assert solution.energy.worst < 1e-9  # the ledger closes
 
@@ -269,7 +269,7 @@ def test_a_thrown_body_flies_straight():
     )
     errors = []
     for steps in (50, 100):
-        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=1 / steps, progress=False)
+        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=1 / steps)
         there = solution.position(body.middle)[-1]
         errors.append(np.linalg.norm(there - (math.cos(rate), -math.sin(rate))))
     assert errors[1] < 1e-3
@@ -353,7 +353,7 @@ def test_change_of_stiffness_is_its_derivative():
     change between motions are those of its matrix, to round-off.
     """
     scene = mixed()
-    loaded = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+    loaded = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     small = SmallMotions(scene, loaded, 2.0)
     simulation, random = small._simulation, np.random.default_rng(0)
     along = small._path()
@@ -380,9 +380,7 @@ def test_wrong_calls():
     scene = cantilever()
     beam = scene.beams[0]
     other = cantilever(4)
-    solution = ub.simulate(
-        cantilever(loads=[ub.Gravity()]), ub.Static(), t=(0, 1), dt=1, progress=False
-    )
+    solution = ub.simulate(cantilever(loads=[ub.Gravity()]), ub.Static(), t=(0, 1), dt=1)
     for call, message in (
         (lambda: ub.modes(scene, 0), "modes: n = 0 must be"),
         (lambda: ub.modes(beam, 2), "modes: scene = .* is not a Scene"),

@@ -91,7 +91,7 @@ LATER = {
 
 
 def run(scene, scheme, **more):
-    return ub.simulate(scene, scheme, t=(0, 1), dt=0.1, progress=False, comm=MPI.COMM_SELF, **more)
+    return ub.simulate(scene, scheme, t=(0, 1), dt=0.1, comm=MPI.COMM_SELF, **more)
 
 
 def time_in(said):
@@ -156,7 +156,7 @@ def test_a_law_without_a_value_far_away_is_met_by_shorter_steps():
     stop = ub.Slide(ub.ground(1, 0), beam.end, ub.ForceLaw(wall), axis=(0, 1))
     push = ub.PointLoad(beam.end, (0, 0.36), amplitude=lambda t: t)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=[stop])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False, comm=MPI.COMM_SELF)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, comm=MPI.COMM_SELF)
     way = solution.connector(stop).motion[-1]
     assert 0.0095 < way < 0.01
     assert solution.connector(stop).force[-1] == pytest.approx(wall(way, 0.0), rel=1e-6)

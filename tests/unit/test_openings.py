@@ -34,7 +34,7 @@ def pushed(hinge=None, *, cells=8, fibres=None):
 
 
 def run(scene, scheme, dt):
-    return ub.simulate(scene, scheme, t=(0, 1), dt=dt, progress=False)
+    return ub.simulate(scene, scheme, t=(0, 1), dt=dt)
 
 
 def in_steps(values, scheme):

@@ -35,9 +35,7 @@ def scene():
 
 def run(*record, steps=5, dt=0.1, **more):
     scheme = ub.EnergyMomentum()
-    return ub.simulate(
-        scene(), scheme, t=(0, steps * dt), dt=dt, record=record, progress=False, **more
-    )
+    return ub.simulate(scene(), scheme, t=(0, steps * dt), dt=dt, record=record, **more)
 
 
 # -- files that two outputs would write ------------------------------------------------------------
@@ -144,7 +142,7 @@ def test_the_file_of_a_study_is_not_that_of_a_member(shared_path):
         return {"x": x}
 
     with pytest.raises(RuntimeError, match=r"study and record\[0\] \(History\) would both write"):
-        ub.study(member, [{"x": 1.0}, {"x": 2.0}], path=path, progress=False)
+        ub.study(member, [{"x": 1.0}, {"x": 2.0}], path=path)
     # Afterwards it is free again
     assert not output_files._in_use
     run(ub.History(path), steps=1)

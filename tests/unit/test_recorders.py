@@ -246,7 +246,7 @@ def test_names_in_a_table_are_no_formulas(shared_path, on_first_rank):
     works = [ub.Potential(name, lambda q: q[1] ** 2) for name in names]
     pushed = ub.Scene([beam], supports=pushed.supports, works=works)
     ub.simulate(
-        pushed, ub.Static(), t=(0, 1), dt=1.0, progress=False,
+        pushed, ub.Static(), t=(0, 1), dt=1.0,
         record=ub.History(shared_path / "a.csv"),
     )  # fmt: skip
     line = on_first_rank(lambda: (shared_path / "a.csv").read_text().splitlines()[0])
@@ -448,9 +448,7 @@ def test_rows_of_displacements_follow_the_beam(degree):
     load = ub.PointLoad(beam.end, force=(0.0, -20.0), amplitude=ub.ramp(0.1))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
     extremes, mesh = ub.Extremes(), ub.Mesh(degree=degree)
-    run = ub.simulate(
-        scene, ub.EnergyMomentum(), t=(0, 0.1), dt=5e-3, record=extremes, mesh=mesh, progress=False
-    )
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=5e-3, record=extremes, mesh=mesh)
     low = extremes.displacement(beam).low
     assert len(low) == 4 * degree + 1
     for row, s in ((0, 0.0), (2 * degree, 0.5), (-1, 1.0)):

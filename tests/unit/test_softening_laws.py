@@ -149,7 +149,7 @@ def response(run, place):
 def test_moment_is_the_traction(law, place):
     """[closed] Under a growing rotation; opened, it has dissipated the integral of the traction."""
     scene = turned(law, lambda t: 2.0 * t, place)
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.025, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.025)
     M, opening, dissipated = response(run, place)
     open_ = opening > 1e-9
     assert np.count_nonzero(open_) > 30
@@ -170,7 +170,7 @@ def test_complete_opening_takes_the_energy(place, scheme):
     rho = 0.01 if scheme.dynamic else 0.0
     for law, tolerance in ((LAWS["Petersson"], 1e-10), (LAWS["kinked"], 1e-3)):
         scene = turned(law, lambda t: 2.0 * t, place, rho=rho)
-        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01, progress=False)
+        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01)
         assert run.energy.worst < 1e-9
         assert run.energy.lost["hinges"][-1] == pytest.approx(G, rel=tolerance)
         assert response(run, place)[0][-1] == pytest.approx(0.0, abs=1e-9 * T)
@@ -226,7 +226,7 @@ def test_both_solvers_agree(name, place, scheme):
     """To and fro; works and losses to 1e-9; the ledger closes."""
     runs = [
         ub.simulate(
-            scene_of(name, place), scheme, t=(0, 1), dt=1 / 10, progress=False,
+            scene_of(name, place), scheme, t=(0, 1), dt=1 / 10,
             newton=ub.Newton(rtol=1e-12, reference=reference),
         )
         for reference in (False, True)
@@ -252,7 +252,7 @@ def test_an_exponential_law_of_ones_own_is_softening(place, scheme):
     for law in (mine, ub.Softening(mine.limit, mine.fracture_energy)):
         scene = pulled(law) if place == "fibres" else turned(law, SWING, place, rho=0.01)
         newton = ub.Newton(rtol=1e-13)
-        runs.append(ub.simulate(scene, scheme, t=(0, 1), dt=0.02, newton=newton, progress=False))
+        runs.append(ub.simulate(scene, scheme, t=(0, 1), dt=0.02, newton=newton))
     one, other = runs
     assert np.abs(one.q - other.q).max() < 1e-12 * max(1.0, np.abs(one.q).max())
     lost, same = (run.energy.lost["hinges"] for run in runs)
@@ -261,7 +261,7 @@ def test_an_exponential_law_of_ones_own_is_softening(place, scheme):
 
 @pytest.mark.parametrize("place", [*PLACES, "fibres"])
 def test_a_run_that_goes_on_is_the_whole_one(place):
-    scheme, of = ub.EnergyMomentum(), {"dt": 0.02, "progress": False}
+    scheme, of = ub.EnergyMomentum(), {"dt": 0.02}
     scene = scene_of("rising", place)
     whole = ub.simulate(scene, scheme, t=(0, 1), **of)
     half = ub.simulate(scene, scheme, t=(0, 0.5), **of)
@@ -273,7 +273,7 @@ def test_a_run_that_goes_on_is_the_whole_one(place):
 @pytest.mark.parametrize("place", ["cell", "hinge"])
 def test_files_want_the_class(place, tmp_path):
     """They have numbers and no code; a checkpoint is of one run, and of one law."""
-    scene, of = scene_of("Petersson", place), {"t": (0, 1), "dt": 0.05, "progress": False}
+    scene, of = scene_of("Petersson", place), {"t": (0, 1), "dt": 0.05}
     path, checkpoint = tmp_path / "run.h5", ub.Checkpoint(tmp_path / "point.h5", every=5)
     run = ub.simulate(scene, ub.Static(), checkpoint=checkpoint, **of)
     run.save(path)
@@ -291,7 +291,7 @@ def test_modes_of_what_is_left(place):
     found = []
     for law in (Petersson(T, G), Exponential(T, G), ub.LinearSoftening(T, G)):
         scene = turned(law, lambda t: 5.0 * t, place, rho=1.0)
-        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, progress=False)
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01)
         found.append(ub.modes(scene, 2, at=run).frequencies)
     assert found[0] == pytest.approx(found[2], rel=1e-6)
     assert found[1] == pytest.approx(found[2], rel=1e-6)
@@ -302,7 +302,7 @@ def test_a_spring_that_never_breaks(reference):
     """[closed] A spring and a beam of the same stiffness bear half of what one would."""
     scene = turned(ub.Softening(np.inf, 1.0), lambda t: 0.1 * t, "spring")
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton)
     assert run.connector(scene.connectors[0]).force == pytest.approx([0.0, 25.0, 50.0], rel=1e-9)
 
 
@@ -311,7 +311,7 @@ def test_events_and_pictures():
     law = LAWS["rising"]
     scene = turned(law, lambda t: 2.0 * t)
     events = ub.Events()
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, record=events, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, record=events)
     assert [event.what for event in events.found] == ["opens", "is free"]
     _, _, dissipated = response(run, "cell")
     before = run.times < events.found[-1].time
@@ -346,7 +346,7 @@ def test_jumps_where_the_traction_falls_most():
         scene = turned(law, lambda t, end=end: end * t, rho=0.01)
         with warnings.catch_warnings(record=True) as found:
             warnings.simplefilter("always")
-            run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, progress=False)
+            run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
         assert run.energy.lost["hinges"][-1] > 0
         said.append([str(one.message) for one in found])
     assert not any("did so in a jump" in one for one in said[0])
@@ -495,7 +495,7 @@ def test_a_law_that_ufl_cannot_trace_is_refused(place):
     scene = turned(OfNumPy(100.0), lambda t: t, place)
     at = rf"OfNumPy: .* UFL: .*\({__file__}, line {line_of(OfNumPy, 'np.exp')}\)"
     with pytest.raises(ub.ArgumentError, match=at):
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
 
 
 def test_numbers_are_replaced():

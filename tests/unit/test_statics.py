@@ -24,7 +24,7 @@ def cantilever(*loads, supports=(), **section):
 
 
 def run(scene, scheme, t=(0, 1), dt=0.1, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+    return ub.simulate(scene, scheme, t=t, dt=dt, **more)
 
 
 # -- loads that are there from the start ---------------------------------------------------------
@@ -234,7 +234,7 @@ def test_who_asks_for_a_velocity_is_told():
     slide = ub.Slide(ub.ground(2, 0), beam.end, brake, axis=(0, 1))
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[slide])
     with pytest.raises(ub.ArgumentError, match=r"velocity of beam.end .*the run is static"):
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     simulation = ub.Simulation(ub.Scene([beam], supports=scene.supports), ub.EnergyMomentumStatic())
     with pytest.raises(ub.ArgumentError, match="there is none"):
         simulation.velocity(beam.end)

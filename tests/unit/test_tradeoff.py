@@ -225,7 +225,7 @@ def test_the_recommendation_are_arguments_of_simulate(law):
     law(smooth)
     found = ask(tolerance=1e-4)
     assert set(found.recommended) == {"scheme", "t", "dt", "mesh", "newton"}
-    again = tradeoff.simulate(SCENE, progress=False, **found.recommended)
+    again = tradeoff.simulate(SCENE, **found.recommended)
     assert again.value == found.best.values["value"]
     said = str(found)
     assert "errors of 0.0001 of each quantity" in said
@@ -418,7 +418,7 @@ def test_statics_needs_cells_alone():
         scene, {"tip": end}, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance={"tip": 1e-3}
     )
     assert found.best.dials.dt == 0.5
-    again = ub.simulate(scene, **found.recommended, progress=False, comm=MPI.COMM_SELF)
+    again = ub.simulate(scene, **found.recommended, comm=MPI.COMM_SELF)
     fine = ub.simulate(
         scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=100), comm=MPI.COMM_SELF
     )

@@ -54,7 +54,7 @@ def flying(b=5.0, cells=4):
 
 
 def run(scene, scheme=None, **more):
-    more = {"t": (0, 2), "dt": 0.05, "progress": False, **more}
+    more = {"t": (0, 2), "dt": 0.05, **more}
     return ub.simulate(scene, scheme or ub.EnergyMomentum(), **more)
 
 

@@ -58,7 +58,6 @@ solution = ub.simulate(
     every=50,
     record=ub.History(directory / "run.csv", [b.end]),
     checkpoint=ub.Checkpoint(directory / "run.h5", every=every),
-    progress=False,
 )
 total = hashlib.sha256((directory / "run.csv").read_bytes())
 energy = solution.energy

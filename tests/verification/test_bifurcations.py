@@ -61,7 +61,7 @@ def test_buckling_against_follow(make, EA, control):
     """
     place, scene, N = make(EA, 16)
     factor = ub.buckling(scene, 1).factors[0]
-    path = ub.follow(scene, control, until=lambda now: now.t > 1.2 * factor, progress=False)
+    path = ub.follow(scene, control, until=lambda now: now.t > 1.2 * factor)
     (point,) = path.critical
     assert point.kind == "bifurcation"
     assert point.factor == pytest.approx(factor, rel=factor * N / EA + 2e-7)
@@ -92,7 +92,7 @@ def test_a_ring_under_pressure(EA, cells, control):
     ]
     water = ub.VirtualWork("water", pressure, numbers={"p": growing})
     scene = ub.Scene([arc], supports=supports, works=[water])
-    path = ub.follow(scene, control, until=lambda now: now.t >= 4, progress=False)
+    path = ub.follow(scene, control, until=lambda now: now.t >= 4)
     (point,) = path.critical
     assert point.kind == "bifurcation"
     assert point.factor == pytest.approx(3.0, abs=6.5 / cells**2 + 20 / EA)

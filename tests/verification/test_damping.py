@@ -34,7 +34,6 @@ def released(*damping, cells=8, steps=100, periods=6, force=1.0):
         t=(0, periods * PERIOD),
         dt=PERIOD / steps,
         start=pulled,
-        progress=False,
     )
 
 
@@ -88,7 +87,7 @@ def spinning(damping):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
     spin = ub.Velocity((beam,), angular=2 * math.pi, about=(0.5, 0.0))
     scene = ub.Scene([beam], initial=[spin], damping=[damping])
-    return ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, progress=False)
+    return ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
 
 
 def test_kelvin_voigt_is_objective():
@@ -122,7 +121,7 @@ def test_kelvin_voigt_in_statics_is_retarded():
             loads=[ub.PointLoad(beam.end, force=(0.01, 0))],
             damping=[ub.KelvinVoigt(creep)],
         )
-        solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=dt, progress=False)
+        solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=dt)
         assert solution.energy.worst < 1e-9
         return solution.displacement(beam.end)[-1, 0]
 
@@ -145,7 +144,7 @@ def test_a_cell_with_a_hinge_is_left_out():
         loads=[ub.PointLoad(beam.end, force=(0, 1.0), amplitude=lambda t: float(t < 0.1))],
         damping=[ub.KelvinVoigt(0.01)],
     )
-    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.005, progress=False)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.005)
     assert abs(solution.displacement(beam.end)[-1, 2]) > 0.1
     # The arm is rigid beside the hinge: its damping takes a small part of the work.
     assert solution.energy["damping"][-1] < 0.05 * solution.energy["loads"][-1]

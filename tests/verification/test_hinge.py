@@ -82,7 +82,7 @@ def turned(law, motion, scheme, *, dt, cells=1, end=1.0, rho=0.0):
     beam = Hinged(law, cells=cells, rho=rho)
     turn = ub.PrescribedDisplacement(beam.end, psi=motion)
     scene = beam.scene(supports=[ub.Clamped(beam.start), turn])
-    return beam, ub.simulate(scene, scheme, t=(0, end), dt=dt, progress=False)
+    return beam, ub.simulate(scene, scheme, t=(0, end), dt=dt)
 
 
 def assert_balanced(energy):
@@ -117,7 +117,7 @@ def test_tip_load(law, cells, h):
     δ = F * (np.sum(lengths * arms**2) / EI + LENGTH / GA) + openings * arms[0]
     push = ub.PrescribedDisplacement(beam.end, v=ub.Table([0, 1, 2, 3], [0.0, *δ]))
     scene = beam.scene(supports=[ub.Clamped(beam.start), push])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 3), dt=1 / 16, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 3), dt=1 / 16)
     at = [16, 32, 48]
     hinge = solution.material_at(beam.start)
     np.testing.assert_allclose(solution.reaction(push)[at, 1], F, rtol=1e-6)
@@ -140,7 +140,7 @@ def test_numbers_of_the_reference():
         beam.end, v=ub.Table([0, 1, 2, 3], scale * np.array([0.0, *δ]))
     )
     scene = beam.scene(supports=[ub.Clamped(beam.start), push])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 3), dt=1 / 4, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 3), dt=1 / 4)
     at = [4, 8, 12]
     F = solution.reaction(push)[at, 1] / scale
     moved = solution.displacement(beam.end)[at, 1] / scale - F * LENGTH / GA
@@ -156,7 +156,7 @@ def test_large_rotations(law):
     push = ub.PrescribedDisplacement(beam.end, v=lambda t: t)
     clamp = ub.Clamped(beam.start)
     scene = beam.scene(supports=[clamp, push])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / 64, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / 64)
     hinge = solution.material_at(beam.start)
     M = hinge.forces[:, 2]
     opens = hinge.jump > 0
@@ -280,7 +280,7 @@ def falling(law, *, dt=0.01, scheme=None, joint=False, h=0.1, end=0.5):
     scene = ub.Scene(
         beams, joints=joints, supports=[ub.Pinned(beams[0].start)], loads=[ub.Gravity()]
     )
-    solution = ub.simulate(scene, scheme or ub.EnergyMomentum(), t=(0, end), dt=dt, progress=False)
+    solution = ub.simulate(scene, scheme or ub.EnergyMomentum(), t=(0, end), dt=dt)
     assert_balanced(solution.energy)
     return solution.displacement(beams[-1].end)
 
@@ -377,12 +377,7 @@ def test_a_hinge_in_a_very_short_cell():
         initial=[ub.Velocity([arm], angular=4.0)],
     )
     solution = ub.simulate(
-        scene,
-        ub.EnergyMomentum(),
-        t=(0, 0.16),
-        dt=0.16 / 2560,
-        mesh=ub.Mesh(refine=128),
-        progress=False,
+        scene, ub.EnergyMomentum(), t=(0, 0.16), dt=0.16 / 2560, mesh=ub.Mesh(refine=128)
     )
     assert solution.parts < 1.01 * 2560
     assert solution.energy.worst < 1e-9

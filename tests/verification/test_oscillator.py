@@ -39,11 +39,7 @@ def struck(v0, steps, law=None, *, periods=4, scheme=None):
         initial=[ub.Velocity((beam,), linear=(v0, 0))],
     )
     solution = ub.simulate(
-        scene,
-        scheme or ub.EnergyMomentum(),
-        t=(0, periods * PERIOD),
-        dt=PERIOD / steps,
-        progress=False,
+        scene, scheme or ub.EnergyMomentum(), t=(0, periods * PERIOD), dt=PERIOD / steps
     )
     return solution.times / PERIOD, solution.displacement(beam.end)[:, 0] / U_Y, solution
 
@@ -129,7 +125,7 @@ def loop(law, scheme, steps=80):
     beam = bar(law)
     pull = ub.PrescribedDisplacement(beam.end, u=lambda t: U_Y * TURNS(t), v=0, psi=0)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
-    solution = ub.simulate(scene, scheme, t=(0, 5), dt=1 / steps, progress=False)
+    solution = ub.simulate(scene, scheme, t=(0, 5), dt=1 / steps)
     return (
         solution.displacement(beam.end)[:, 0] / U_Y,
         solution.section_forces_at(beam.end)[:, 0] / N_Y,

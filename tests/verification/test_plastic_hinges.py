@@ -94,7 +94,7 @@ def turned(law, motion, scheme, *, dt, end=1.0, s=0.0, rho=0.0, cells=2):
     scene = ub.Scene(
         [beam], supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, psi=motion)]
     )
-    return scene, ub.simulate(scene, scheme, t=(0, end), dt=dt, progress=False)
+    return scene, ub.simulate(scene, scheme, t=(0, end), dt=dt)
 
 
 def resistance(law, slip, rate=0.0):
@@ -176,7 +176,7 @@ def test_a_limit_that_is_not_reached_changes_nothing(law):
         )
 
     beam, scene = cantilever({})
-    run = {"t": (0.0, 1.0), "dt": 0.01, "progress": False}
+    run = {"t": (0.0, 1.0), "dt": 0.01}
     plain = ub.simulate(scene, ub.EnergyMomentum(), **run)
     moment = np.abs(plain.reaction(scene.supports[0])[1:, 2]).max()
     factor = 1.001 * moment / LIMIT
@@ -203,7 +203,7 @@ def falling(hinge, scheme):
     scene = ub.Scene(
         beams, joints=joints, supports=[ub.Pinned(beams[0].start)], loads=[ub.Gravity()]
     )
-    solution = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.01, progress=False)
+    solution = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.01)
     assert solution.energy.worst < 1e-9
     return solution.displacement(beams[-1].end)
 
@@ -330,9 +330,7 @@ def frame(angle=0.0, length=1.0, force=1.0, reverse=False):
         supports=[ub.Clamped(post.start), ub.PrescribedDisplacement(far, psi=0)],
         loads=[ub.PointLoad(far, force=(x, y), amplitude=push)],
     )
-    solution = ub.simulate(
-        scene, ub.EnergyMomentum(0.02, 0.02), t=(0, 0.8), dt=0.005, progress=False
-    )
+    solution = ub.simulate(scene, ub.EnergyMomentum(0.02, 0.02), t=(0, 0.8), dt=0.005)
     u = solution.displacement(far)[:, :2] / length
     c, s = math.cos(angle), math.sin(angle)
     lost = solution.energy.lost["hinges"] / moment
@@ -379,7 +377,7 @@ def test_a_block_that_slips():
     )
     ω, errors = math.sqrt(H / m), []
     for n in (60, 120, 240):
-        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1.0), dt=1 / n, progress=False)
+        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1.0), dt=1 / n)
         τ = np.maximum(solution.times - 1 / 3, 0.0)
         x = 3 / H * (τ - np.sin(ω * τ) / ω)
         errors.append(np.abs(solution.displacement(block.middle)[:, 0] - x).max())
@@ -416,7 +414,7 @@ def test_a_moment_at_a_free_end_acts_on_the_member(given, recwarn):
     turn = ub.PointLoad(beam.end, moment=0.5)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[turn])
     assert len(scene.hinges) == 1  # that at the clamp
-    ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+    ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     said = [str(one.message) for one in recwarn if one.category is ub.ModelWarning]
     assert len(said) == (given == "law")
     assert all("arm: the hinge at s = 1 has nothing beyond" in one for one in said)
@@ -434,7 +432,7 @@ def test_limits_down_to_nothing_and_up_to_everything(limit):
         beam = ub.Beam((0, 0), (1, 0), section, cells=2, hinges=hinges)
         push = ub.PointLoad(beam.end, force=(0.0, 1.0))
         scene = ub.Scene([beam], supports=[held(beam.start)], loads=[push])
-        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.01, progress=False)
+        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=0.01)
         ends.append(solution.displacement(beam.end))
     # A moment of 1e-12 changes the motion by as much.
     assert np.abs(ends[0] - ends[1]).max() < 1e-10

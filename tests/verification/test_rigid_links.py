@@ -37,7 +37,7 @@ def hung(cells):
 
 @lru_cache
 def run(cells=4, dt=1e-3, end=0.7):
-    return ub.simulate(hung(cells), ub.EnergyMomentum(), t=(0, end), dt=dt, progress=False)
+    return ub.simulate(hung(cells), ub.EnergyMomentum(), t=(0, end), dt=dt)
 
 
 def row(solution, t):
@@ -134,7 +134,7 @@ def test_adaptive_steps_meet_the_table():
 
     def adaptive(cells, tolerance):
         steps = ub.Adaptive(tolerance, stops=stops)
-        return ub.simulate(hung(cells), ub.EnergyMomentum(), t=(0, 0.64), dt=steps, progress=False)
+        return ub.simulate(hung(cells), ub.EnergyMomentum(), t=(0, 0.64), dt=steps)
 
     coarse, fine, exact = adaptive(16, 5e-7), adaptive(32, 5e-7), motion_of(adaptive(16, 1e-8))
     limit = extrapolated(motion_of(coarse), motion_of(fine))
@@ -181,7 +181,7 @@ def outrigger(scheme, *, load, how, cells=4, arm=0.5):
     scene = ub.Scene(
         [beam], joints=joints, bodies=bodies, supports=[ub.Clamped(beam.start)], loads=loads
     )
-    solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.1, progress=False)
+    solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.1)
     return solution, beam
 
 
@@ -247,7 +247,7 @@ def with_arm(ratio):
         beams, joints=[joint], bodies=bodies, masses=masses,
         supports=[ub.Clamped(beam.start)], loads=loads,
     )  # fmt: skip
-    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, progress=False)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
     assert solution.energy.worst < 1e-9
     return solution.displacement(beam.end)[-1]
 
@@ -267,7 +267,7 @@ def test_stiff_links_become_links():
     errors = []
     for ratio in (1e-2, 1e-1, 1.0):
         scene = swing(cells=4, rigidity=ratio)
-        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.6), dt=1e-3, progress=False)
+        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.6), dt=1e-3)
         moved = solution.displacement(scene.beams[0].at(0.5))[-1, :2]
         errors.append(np.abs(moved - exact).max())
     assert errors[1] < errors[0] / 8

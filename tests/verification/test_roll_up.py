@@ -33,7 +33,7 @@ def rolled(length, section, cells, turns=1.0):
     scene = cantilever(
         section, length=length, cells=cells, moment=turns * 2 * math.pi * section.EI / length
     )
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
     return turns * 2 * math.pi * solution.times, solution.displacement(scene.beams[0].end)
 
 

@@ -36,9 +36,7 @@ SOFT = ub.Section(EA=400.0, GA=400.0, EI=20.0, rhoA=1.0, rhoI=0.05)
 
 def go(scene, scheme, end, steps, **more):
     newton = ub.Newton(rtol=1e-12)
-    return ub.simulate(
-        scene, scheme, t=(0, end), dt=end / steps, newton=newton, progress=False, **more
-    )
+    return ub.simulate(scene, scheme, t=(0, end), dt=end / steps, newton=newton, **more)
 
 
 # -- order -------------------------------------------------------------------------------------
@@ -94,7 +92,7 @@ def test_adaptive_steps_keep_to_their_tolerance(scheme):
 
     def error(tolerance):
         dt = ub.Adaptive(tolerance)
-        solution = ub.simulate(shaken(), scheme, t=(0, 0.5), dt=dt, progress=False)
+        solution = ub.simulate(shaken(), scheme, t=(0, 0.5), dt=dt)
         return np.abs(solution.q[-1] - exact()[0]).max(), solution.time_error
 
     (coarse, said), (fine, said_fine) = error(1e-5), error(1e-7)
@@ -262,7 +260,7 @@ def test_newmark_survives_the_snap_of_the_swing_but_not_its_energy():
     not what there was, and the ledger says so; the decaying scheme accounts for what it takes.
     """
     runs = [
-        ub.simulate(swing(), scheme, t=(0, 2), dt=1e-3, progress=False)
+        ub.simulate(swing(), scheme, t=(0, 2), dt=1e-3)
         for scheme in (ub.Newmark(), ub.EnergyMomentumDecaying())
     ]
     newmark, decaying = (run.energy for run in runs)
@@ -281,7 +279,7 @@ def test_accelerations_carry_on(scheme):
     whole = go(scene, scheme, 0.5, 100)
     first = go(scene, scheme, 0.25, 50)
     second = ub.simulate(
-        scene, scheme, t=(0.25, 0.5), dt=0.005, start=first, progress=False, newton=ub.Newton(1e-12)
+        scene, scheme, t=(0.25, 0.5), dt=0.005, start=first, newton=ub.Newton(1e-12)
     )
     # The guess of the first step differs, and with it what Newton's method leaves
     assert np.abs(second.q - whole.q[50:]).max() < 1e-10

@@ -93,7 +93,7 @@ def rigid():
 
 @lru_cache
 def run(make=flexible, dt=5e-3, **more):
-    solution = ub.simulate(make(**more), ub.EnergyMomentum(), t=(0, 3), dt=dt, progress=False)
+    solution = ub.simulate(make(**more), ub.EnergyMomentum(), t=(0, 3), dt=dt)
     if make is rigid:
         crank, rod = solution.scene.bodies
         return solution, crank.middle, rod.at(CRANK + ROD, 0)

@@ -29,7 +29,7 @@ LENGTH, OMEGA = 10.0, 6.0
 def deflection(cells, dt):
     """Times, and (u, v) of the tip in the axes that turn with the hub."""
     scene = spin_up(cells=cells)
-    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 20), dt=dt, progress=False)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 20), dt=dt)
     x, y = solution.position(scene.beams[0].end).T
     angle = np.array([spin_up_angle(t) for t in solution.times])
     u, v = np.cos(angle) * x + np.sin(angle) * y - LENGTH, np.cos(angle) * y - np.sin(angle) * x

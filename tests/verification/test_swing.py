@@ -25,7 +25,7 @@ CONVERGED = np.loadtxt(Path(__file__).parents[1] / "data/swing.csv", delimiter="
 @lru_cache
 def run(*, cells=4, dt=1e-3, alpha=0.0, end=2.5, rigidity=1e4):
     scene = swing(cells=cells, rigidity=rigidity)
-    return ub.simulate(scene, ub.EnergyMomentum(alpha, alpha), t=(0, end), dt=dt, progress=False)
+    return ub.simulate(scene, ub.EnergyMomentum(alpha, alpha), t=(0, end), dt=dt)
 
 
 def row(solution, t):

@@ -32,7 +32,7 @@ def turned(bending, T=1.0, *, cells=2, scheme=None, steps=20):
     turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: math.pi * t / T)
     scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
     scheme = scheme or ub.Static()
-    return ub.simulate(scene, scheme, t=(0, T), dt=T / steps, progress=False)
+    return ub.simulate(scene, scheme, t=(0, T), dt=T / steps)
 
 
 def moments(*args, **kwargs):

@@ -88,7 +88,6 @@ def test_a_tolerance_is_kept(make, part):
         t=times["t"],
         dt=dials.dt / 5,
         mesh=ub.Mesh(refine=2 * max(dials.mesh.refine, 8)),
-        progress=False,
     )
     error = np.abs(found.best.values["end"] - end(fine)).max()
     print(f"{make.__name__}: asked {tolerance:.2e}, got {error:.2e}")
@@ -98,7 +97,7 @@ def test_a_tolerance_is_kept(make, part):
     # The limit is known as well as it says; the reference itself errs by a part of the tolerance.
     apart = np.abs(found.limit["end"] - end(fine)).max()
     assert apart <= found.uncertainty["end"] + 0.25 * tolerance
-    again = ub.simulate(scene, **found.recommended, progress=False)
+    again = ub.simulate(scene, **found.recommended)
     assert np.array_equal(end(again), found.best.values["end"])
 
 
@@ -123,7 +122,6 @@ def test_a_tolerance_is_used_up_at_a_limited_cost(make, part):
         t=times["t"],
         dt=found.best.dials.dt / 10,
         mesh=ub.Mesh(refine=8, degree=3),
-        progress=False,
     )
     error = np.abs(found.best.values["path"] - path(fine)).max() / np.abs(path(fine)).max()
     print(f"{make.__name__}: asked {part:.2e}, got {error:.2e}, effort {found.effort:.1f}")

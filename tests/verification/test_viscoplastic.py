@@ -23,7 +23,7 @@ def struck(viscosity=None, scheme=None, *, dt=2e-3, law=ub.ElastoPlastic, cells=
         supports=[ub.Clamped(beam.start)],
         loads=[ub.PointLoad(beam.end, force=(0, 40.0), amplitude=push)],
     )
-    solution = ub.simulate(scene, scheme or ub.EnergyMomentum(), t=(0, 0.3), dt=dt, progress=False)
+    solution = ub.simulate(scene, scheme or ub.EnergyMomentum(), t=(0, 0.3), dt=dt)
     energy = solution.energy
     assert energy.worst <= 1e-9
     for lost in energy.lost.values():
