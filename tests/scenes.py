@@ -16,6 +16,15 @@ GROWING = ub.ramp(1.0)
 """Time function of static loads that are to be followed from t = 0 to 1."""
 
 
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
+"""For beams of some metres, of which a test needs no more than that they bend and move."""
+
+
+def clamped(beam, *supports, **parts):
+    """A beam clamped at its start, with other supports, and loads or other parts of a scene."""
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start), *supports], **parts)
+
+
 # -- statics -----------------------------------------------------------------------------------
 
 
@@ -38,21 +47,13 @@ def cantilever(
     """
     beam = ub.Beam((0, 0), (length, 0), section, cells=cells)
     at_end = [load(beam.end, force=force, moment=moment, amplitude=time)]
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=at_end + [further(beam) for further in loads],
-    )
+    return clamped(beam, loads=at_end + [further(beam) for further in loads])
 
 
 def quarter_circle(section=SLENDER, *, radius=1.0, cells=8, force=(0.0, 0.0), time=GROWING):
     """Arc about the origin from (radius, 0), clamped, to (0, radius), loaded."""
     beam = ub.Beam.arc((0, 0), radius, (0, math.pi / 2), section, cells=cells)
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=force, amplitude=time)],
-    )
+    return clamped(beam, loads=[ub.PointLoad(beam.end, force=force, amplitude=time)])
 
 
 def beam_on_roller(

@@ -14,6 +14,7 @@ import any_scene
 import numpy as np
 import pytest
 import random_machines
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.reference import (
@@ -250,7 +251,7 @@ def test_a_step_without_equilibrium():
     section = ub.Section(EA=1e6, GA=4e5, EI=800.0, hinge=ub.Softening(40.0, fracture_energy=15.0))
     beam = ub.Beam((0, 0), (0, 1), section, cells=3)
     push = ub.PointLoad(beam.end, force=(100.0, 0.0), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    scene = clamped(beam, loads=[push])
     newton = ub.Newton(reference=True)
     with pytest.raises(ub.ConvergenceError, match="no equilibrium after t = 0") as failure:
         ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, newton=newton)

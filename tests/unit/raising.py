@@ -34,9 +34,6 @@ class Watch(ub.Recorder):
     def __init__(self, at, action):
         self.at, self.action = at, action
 
-    def require_writable(self):
-        pass
-
     def open(self, sim):
         if self.at == "open":
             self.action()
@@ -44,9 +41,6 @@ class Watch(ub.Recorder):
     def write(self, sim):
         if self.at == "write" and sim.t > 0.02:
             self.action()
-
-    def close(self):
-        pass
 
 
 class Remembers:

@@ -18,6 +18,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.model.connector_laws import HELD
@@ -32,7 +33,7 @@ STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}
 def cantilever(**more):
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=2, name="left")
     load = ub.PointLoad(beam.end, force=(0, -3), amplitude=lambda t: math.sin(3 * t))
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
+    return clamped(beam, loads=[load], **more)
 
 
 def swing(scene=None, **more):
@@ -143,7 +144,7 @@ def test_plastic_hinges_at_places_and_an_open_ledger(shared_path):
     hinges = {0.5: ub.ElastoPlastic(yield_limit=1.0, isotropic=3.0)}
     beam = ub.Beam((0, 0), (1, 0), section, cells=2, name="left", hinges=hinges)
     load = ub.PointLoad(beam.end, force=(0, -6), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02)
     solution.open_ledger = "the ledger is open"
     loaded = saved(solution, shared_path)
@@ -163,11 +164,7 @@ def test_statics(scheme, shared_path):
 def test_a_path_with_its_critical_points(shared_path):
     """Euler's column, from which a branch is followed after it was loaded."""
     beam = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4, name="column")
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)],
-    )
+    scene = clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)])
     path = ub.follow(scene, ub.LoadControl(0.5), steps=8)
     loaded = saved(path, shared_path)
     require_same(loaded, path)
@@ -355,7 +352,7 @@ def test_a_path_is_loaded_with_the_scene_of_the_script(shared_path):
     """As other solutions are, to follow a branch with functions of the script."""
     beam = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4, name="column")
     load = ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     path = ub.follow(scene, ub.LoadControl(0.5), steps=8)
     path.save(shared_path / "a.h5")
     loaded = ub.Solution.load(shared_path / "a.h5", scene=scene)

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.discretization.dof_numbering import Grid
@@ -73,7 +74,7 @@ def test_polyline_goes_by_length():
 def bent(beam):
     """End of a beam whose plastic hinge in the middle yields."""
     push = ub.PointLoad(beam.end, force=(0, -3.0), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    scene = clamped(beam, loads=[push])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     return solution.displacement(beam.end), solution.connector(scene.hinges[0]).motion
 

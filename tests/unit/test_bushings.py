@@ -4,11 +4,14 @@
 import math
 import re
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import pytest
+from helpers import AfterEachStep
 from law_runs import require_reference, require_restart
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import doubles, lib
@@ -99,12 +102,11 @@ def cantilever(*laws, load=lambda t: math.sin(9 * t), axis=(0.6, 0.8)):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
     links = [ub.Bushing(ub.ground(1, 0), beam.end, law, axis=axis) for law in laws]
     push = ub.PointLoad(beam.end, force=(0.7, 1.0), moment=0.4, amplitude=load)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=links)
+    scene = clamped(beam, loads=[push], connectors=links)
     return beam.end, links, scene
 
 
-def run(scene, scheme, t=(0, 0.6), dt=0.02, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, **more)
+run = partial(ub.simulate, t=(0, 0.6), dt=0.02)
 
 
 # -- laws of several components ------------------------------------------------------------------
@@ -209,18 +211,9 @@ def test_tables_and_live_values(shared_path, on_first_rank):
     _, (link,), scene = cantilever(LAWS["rough hole"])
     path, live = shared_path / "run.csv", []
 
-    class Watching(ub.Recorder):
-        by_itself, files = False, ()
-
-        def open(self, simulation):
-            pass
-
-        def write(self, simulation):
-            live.append(simulation.connector(link))
-
-    solution = run(
-        scene, ub.EnergyMomentum(), record=[ub.History(path, connectors=[link]), Watching()]
-    )
+    watching = AfterEachStep(lambda now: live.append(now.connector(link)))
+    record = [ub.History(path, connectors=[link]), watching]
+    solution = run(scene, ub.EnergyMomentum(), record=record)
     history = solution.connector(link)
     for name in history._fields:
         of_run = np.array([getattr(one, name) for one in live])

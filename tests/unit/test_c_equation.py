@@ -7,11 +7,10 @@ from petsc4py import PETSc
 
 import numpy as np
 import pytest
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
-
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 
 def elastic():
@@ -20,7 +19,7 @@ def elastic():
         ub.PointLoad(beam.end, force=(3.0, 5.0)),
         ub.FollowerLoad(beam.at(0.5), force=(0.0, 2.0), amplitude=lambda t: t),
     ]
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads)
+    return clamped(beam, loads=loads)
 
 
 def inelastic():
@@ -86,11 +85,7 @@ def test_what_python_raises_in_the_middle_arrives():
 
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
     law = ub.ForceLaw(force)
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        connectors=[ub.Stretch(ub.ground(1.0, 1.0), beam.end, law)],
-    )
+    scene = clamped(beam, connectors=[ub.Stretch(ub.ground(1.0, 1.0), beam.end, law)])
     with pytest.raises(ZeroDivisionError, match="of the user"):
         run(scene)
 

@@ -9,6 +9,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import ufl
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import ffi
@@ -51,14 +52,14 @@ def compiled(monkeypatch):
 
 def make(**more):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], **more)
+    return clamped(beam, **more)
 
 
 def everything():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start), ub.Roller(beam.end, along=(1, 1))],
+    return clamped(
+        beam,
+        ub.Roller(beam.end, along=(1, 1)),
         loads=[ub.Gravity(), ub.FollowerLoad(beam.end, force=(1, 0)), ub.LineLoad(beam)],
         masses=[ub.PointMass(beam.end, 1.0, 1.0)],
     )
@@ -225,7 +226,7 @@ def test_an_elastic_scene_has_no_points(no_points, scheme):
     """Nor one with hinges that never open."""
     section = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, hinge=ub.Softening(math.inf, 1.0))
     beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.1: ub.Softening(math.inf, 2.0)})
-    never = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    never = clamped(beam, loads=[ub.Gravity()])
     for scene in (everything(), never):
         solution = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.1)
         solution.section_forces(scene.beams[0])
@@ -241,7 +242,7 @@ def test_no_points_can_fail(no_points):
     section = ub.Section(EA=60.0, GA=40.0, EI=30.0, bending=ub.ElastoPlastic(1.0))
     beam = ub.Beam((0, 0), (1, 0), section, cells=4)
     with pytest.raises(AssertionError, match="elastic"):
-        ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Static())
+        ub.Simulation(clamped(beam), ub.Static())
 
 
 def test_changing_alpha_compiles_no_other_code(compiled):
@@ -333,7 +334,7 @@ def test_forms_are_compiled_once_in_a_process(compiled):
         section = ub.Section(EA=60.0 * n, GA=40.0, EI=30.0, rhoA=2.0, hinge=ub.Softening(limit, 1))
         hinges = {0.0: ub.Softening(limit, 2.0), 1.0: ub.ElastoPlastic(limit, 0.1 * n)}
         beam = ub.Beam((0, 0), (n, 1), section, cells=n, hinges=hinges)
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Clamped(beam.end)])
+        scene = clamped(beam, ub.Clamped(beam.end))
         ub.Simulation(scene, ub.EnergyMomentum())
         if n == 3:
             before = len(compiled)
@@ -353,7 +354,7 @@ def test_matrix_entries_that_do_not_exist_are_refused():
 @pytest.mark.parametrize("degree", [1, 2, 3])
 def test_energies_share_the_values_of_the_force(degree):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=5)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    scene = clamped(beam, loads=[ub.Gravity()])
     mesh = ub.Mesh(degree=degree)
     simulation = ub.Simulation(scene, scheme := ub.EnergyMomentum(alpha=0.1), mesh=mesh)
     (beams,) = simulation.beams

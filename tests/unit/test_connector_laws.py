@@ -9,11 +9,13 @@ import subprocess
 import sys
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import pytest
 from law_runs import require_reference, require_restart
+from scenes import clamped
 from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
@@ -134,8 +136,7 @@ def carriage(law, v, mass=2.0, more=()):
     return body.middle, link, scene
 
 
-def run(scene, scheme, t=(0, 0.6), dt=0.02, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, **more)
+run = partial(ub.simulate, t=(0, 0.6), dt=0.02)
 
 
 # -- the compiled law ----------------------------------------------------------------------------
@@ -330,9 +331,7 @@ def test_motions_of_all_kinds():
     turn = ub.Turn(ub.ground(1, 0), beam.end, Cubic(2.0, 30.0))
     stretch = ub.Stretch(ub.ground(1, 1), beam.end, Drag(50.0, 9.0))
     push = ub.PointLoad(beam.end, force=(0, 1.0), amplitude=lambda t: math.sin(9 * t))
-    scene = ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=[turn, stretch]
-    )
+    scene = clamped(beam, loads=[push], connectors=[turn, stretch])
     found, reference = (
         run(scene, ub.EnergyMomentum(), newton=ub.Newton(rtol=1e-12, reference=one))
         for one in (False, True)

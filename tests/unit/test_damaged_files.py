@@ -12,6 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.output import output_files
@@ -25,7 +26,7 @@ SECTION = ub.Section(
 def scene():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="left")
     load = ub.PointLoad(beam.end, force=(0, -3), amplitude=lambda t: math.sin(3 * t))
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    return clamped(beam, loads=[load])
 
 
 def run(*, until=0.5, **more):

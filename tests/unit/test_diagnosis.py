@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from scenes import clamped
 from scipy.sparse import csc_array, diags_array
 
 import ufl_beam as ub
@@ -112,7 +113,7 @@ def test_a_plastic_mechanism_names_the_cell():
 def test_too_few_iterations_in_words():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e7, GA=1e7, EI=1e4), cells=2)
     load = ub.PointLoad(beam.end, force=(0, -1e4), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     error = failure(scene, newton=ub.Newton(max_iterations=1, rtol=1e-14))
     assert "Newton's method did not converge after 1 iterations; residual" in str(error)
     assert "singular" not in str(error)
@@ -147,7 +148,7 @@ def test_perfectly_plastic_cells_in_a_row():
         beam = ub.Beam((0, 0), (1, 0), section, cells=4)
         held = [ub.PrescribedDisplacement(beam.at(k / 4), v=0.0, psi=0.0) for k in range(1, 4)]
         pulled = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.008 * t, v=0.0, psi=0.0)
-        return pulled, ub.Scene([beam], supports=[ub.Clamped(beam.start), pulled, *held])
+        return pulled, clamped(beam, pulled, *held)
 
     assert "if they are in a row, nothing tells which of them flows" in str(
         failure(rod()[1], t=(0, 1), dt=0.25)
@@ -199,6 +200,6 @@ def test_what_is_far_from_a_limit_load_is_not_called_one():
     """A single iteration is too little for a large deflection."""
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4)
     load = ub.PointLoad(beam.end, force=(0, 1e5), amplitude=lambda t: 1.0)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     error = failure(scene, t=(0, 1), dt=0.5, newton=ub.Newton(max_iterations=1))
     assert "limit load or a bifurcation is near" not in str(error)

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -97,7 +98,7 @@ class OneSided(Stiffening):
 def bent(law, scheme, reference=False, dt=0.05):
     one = beam(bending=law)
     load = ub.PointLoad(one.end, (0, 1.0), amplitude=lambda t: t)
-    scene = ub.Scene([one], supports=[ub.Clamped(one.start)], loads=[load])
+    scene = clamped(one, loads=[load])
     newton = ub.Newton(reference=reference)
     return ub.simulate(scene, scheme, t=(0, 1), dt=dt, newton=newton).energy
 

@@ -2,9 +2,11 @@
 """What a run says where it goes wrong on the way, and that nothing is lost then."""
 
 import math
+from functools import partial
 
 import numpy as np
 import pytest
+from helpers import run
 
 import ufl_beam as ub
 
@@ -20,8 +22,7 @@ def cantilever(*, time=GROWING, connect=lambda beam: (), hold=ub.Clamped):
     return ub.Scene([beam], supports=[hold(beam.start)], connectors=connect(beam), loads=[load])
 
 
-def run(scene, scheme=None, t=(0.0, 0.1), dt=0.01):
-    return ub.simulate(scene, scheme or ub.EnergyMomentum(), t=t, dt=dt)
+run = partial(run, t=(0.0, 0.1), dt=0.01)
 
 
 def late(value):

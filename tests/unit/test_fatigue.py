@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.output import fatigue
@@ -142,7 +143,7 @@ def test_mean_stress():
 def mast(*loads, cells=4):
     """A cantilever upright from (0, 0), 4 m; push it at its end."""
     beam = ub.Beam((0, 0), (0, 4), SECTION, cells=cells, name="mast")
-    return beam, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[f(beam) for f in loads])
+    return beam, clamped(beam, loads=[f(beam) for f in loads])
 
 
 def to_and_fro(beam):

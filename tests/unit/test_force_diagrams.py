@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.errors import ArgumentError
@@ -64,7 +65,7 @@ def test_moments_are_in_equilibrium_when_beams_turn(degree):
     """A cantilever that bends by a right angle: M = P (x_end - x), with displaced points."""
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0), cells=6)
     push = ub.PointLoad(beam.end, force=(0.0, 8.0), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    scene = clamped(beam, loads=[push])
     solution = static(scene, degree)
     x = solution.shape(beam)[:, 0]
     exact = 8.0 * (x[-1] - x)
@@ -76,7 +77,7 @@ def test_moments_are_in_equilibrium_when_beams_turn(degree):
 def test_large_rotations_under_weight():
     """A hanging beam, degree 1: between vertices, too, all parts are in equilibrium."""
     beam = ub.Beam((0, 0), (1, 0.3), SOFT, cells=5)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    scene = clamped(beam, loads=[ub.Gravity()])
     solution = static(scene)
     s, N, V, M = solution.diagram(beam, points=3)
     q = solution.displacement(beam.start)[-1]
@@ -98,7 +99,7 @@ def test_continuous_in_a_rotating_frame(degree):
     [closed] N = rhoA Ω² (r_end² - r²)/2 but for the stretch, 1e-4.
     """
     beam = ub.Beam((0.2, 0), (1.2, 0), STIFF, cells=4)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.RotatingFrame(rate=8.0)])
+    scene = clamped(beam, loads=[ub.RotatingFrame(rate=8.0)])
     s, N, _, _ = static(scene, degree).diagram(beam)
     close(N, 100.0 * 64.0 * (1.2**2 - (0.2 + s) ** 2) / 2, 1e-6)
 
@@ -111,7 +112,7 @@ def test_curved_beam():
     angle, radius, force = np.pi / 2, 2.0, 1e3
     ring = ub.Beam.arc((0, 0), radius, (0.0, angle), STIFF, cells=16)
     load = ub.PointLoad(ring.end, force=(0, -force))
-    scene = ub.Scene([ring], supports=[ub.Clamped(ring.start)], loads=[load])
+    scene = clamped(ring, loads=[load])
     s, N, V, M = static(scene).diagram(ring)
     φ = angle * (1 - s)
     close(N, -force * np.sin(φ), 1.3e-3)
@@ -125,7 +126,7 @@ def test_corners_stay():
     section = ub.Section(EA=1e10, GA=1e10, EI=1e9)
     bent = ub.Beam.polyline([(0, 0), (0, 2), (2, 2)], section, cells=4)
     load = ub.PointLoad(bent.end, force=(0, -1e3))
-    scene = ub.Scene([bent], supports=[ub.Clamped(bent.start)], loads=[load])
+    scene = clamped(bent, loads=[load])
     s, N, V, _ = static(scene).diagram(bent)
     post = np.arange(len(s)) < 18
     close(N, np.where(post, -1e3, 0.0), 1e-4)

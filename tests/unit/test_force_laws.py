@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 from scipy.integrate import quad
 from scipy.optimize import brentq
 
@@ -89,7 +90,7 @@ def test_several_steep_laws_on_a_beam():
     places = [beam.at(s) for s in (1 / 3, 2 / 3, 1.0)]
     props = [ub.Slide(ub.ground(*p.point), p, power_law(5), axis=(0, 1)) for p in places]
     push = ub.PointLoad(beam.at(0.5), force=(0, 1.0), amplitude=lambda t: math.sin(2 * math.pi * t))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=props)
+    scene = clamped(beam, loads=[push], connectors=props)
     solution = run(scene)
     # Last digits decide whether a step is cut: all laws have infinite slopes at t = 1/2.
     assert solution.parts - (len(solution.times) - 1) in (0, 1, 2)

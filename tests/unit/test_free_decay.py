@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Damping from a history: peaks, logarithmic decrement, and which law their decay follows."""
 
-import re
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers import raises
 
 from ufl_beam.analysis.free_decay import (
     damping,
@@ -14,15 +14,9 @@ from ufl_beam.analysis.free_decay import (
     logarithmic_decrement,
     peaks,
 )
-from ufl_beam.errors import ArgumentError
 
 OMEGA = 2 * np.pi
 """A period of one second."""
-
-
-def raises(*parts):
-    """`pytest.raises` for a ArgumentError whose message has all `parts`, in this order."""
-    return pytest.raises(ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
 def viscous(t, decrement, phase=-1.0):

@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from bars import LENGTH, Bars, C
+from scenes import clamped
 from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
@@ -73,7 +74,7 @@ def test_armstrong_frederick_ratchets():
     load = ub.PointLoad(
         beam.end, force=(1.0, 0.0), amplitude=ub.Table([0, 0.5, *np.linspace(1, 3, 9)], stresses)
     )
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     found = []
     for n in (200, 400):
         run = ub.simulate(scene, MIDDLE, t=(0, 3), dt=1 / n)

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.model.fibres import Layout
@@ -94,7 +95,7 @@ def test_a_column_under_axial_force(reference):
     beam = ub.Beam((0, 0), (1, 0), section(interaction=LAW), cells=1)
     press = ub.PointLoad(beam.end, force=(-0.6 * NP, 0.0), amplitude=lambda t: min(t, 1.0))
     turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: 0.4 * max(t - 1.0, 0.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn], loads=[press])
+    scene = clamped(beam, turn, loads=[press])
     newton = ub.Newton(reference=reference)
     run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.05, newton=newton)
     N, _, M = run.material_at(beam.end).forces[-1]
@@ -107,7 +108,7 @@ def test_the_ledger_closes():
     """Of a beam that is thrown and yields in tension and bending."""
     beam = ub.Beam((0, 0), (2, 0), section(interaction=LAW), cells=4)
     load = ub.PointLoad(beam.end, force=(3.0, 8.0), amplitude=lambda t: float(t < 0.5))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     for scheme in (ub.EnergyMomentum(), ub.EnergyMomentum(0.1)):
         run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01)
         assert run.energy.worst < 1e-9

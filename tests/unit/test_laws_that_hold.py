@@ -4,6 +4,7 @@
 import math
 import re
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
@@ -93,8 +94,7 @@ def oscillator(*laws, v=1.5):
     return mass.middle, links, scene
 
 
-def run(scene, scheme, t=(0, 3.0), dt=0.01, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, **more)
+run = partial(ub.simulate, t=(0, 3.0), dt=0.01)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
@@ -200,7 +200,9 @@ def test_iterations_do_not_decide_what_breaks_loose(dt):
     def go(until, since=0.0, scene=None, **more):
         newton = ub.Newton(rtol=1e-12, reference=more.pop("reference", False))
         mesh = ub.Mesh(degree=3, lumped=True)
-        return run(scene, ub.EnergyMomentum(), (since, until), dt, mesh=mesh, newton=newton, **more)
+        return run(
+            scene, ub.EnergyMomentum(), t=(since, until), dt=dt, mesh=mesh, newton=newton, **more
+        )
 
     brake, made = scene()
     whole = go(0.15, scene=made)

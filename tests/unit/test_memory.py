@@ -8,7 +8,7 @@ from pathlib import Path
 from petsc4py import PETSc
 
 import pytest
-from scenes import swing
+from scenes import clamped, swing
 
 import ufl_beam as ub
 from ufl_beam.compiled import jit
@@ -41,9 +41,6 @@ class Watch(ub.Recorder):
     def __init__(self, at):
         self.at, self.step, self.memory, self.objects = at, 0, {}, {}
 
-    def require_writable(self):
-        pass
-
     def open(self, simulation):
         pass
 
@@ -53,9 +50,6 @@ class Watch(ub.Recorder):
             gc.collect()
             self.memory[self.step] = resident()
             self.objects[self.step] = petsc_objects()
-
-    def close(self):
-        pass
 
 
 @unsanitized
@@ -130,7 +124,7 @@ def test_memory_does_not_grow_with_the_members_of_a_study():
         law = ub.Softening(limit=5.0 + 1e-3 * number, fracture_energy=1.0)
         beam = ub.Beam((0, 0), (1 + 1e-4 * number, 0), section, cells=4, hinges={0.0: law})
         load = ub.PointLoad(beam.end, force=(0, -10.0))
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        scene = clamped(beam, loads=[load])
         solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2e-3), dt=1e-3)
         if number in (200, 999):
             gc.collect()

@@ -11,6 +11,8 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from helpers import raises
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -33,10 +35,6 @@ def begin(*beams, scheme=None, **parts):
 def warns(*parts):
     """`pytest.warns` for a ModelWarning whose message has all `parts`, in this order."""
     return pytest.warns(ub.ModelWarning, match=".*".join(map(re.escape, parts)))
-
-
-def raises(*parts):
-    return pytest.raises(ub.ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
 def test_warnings_point_at_the_line_of_the_user():
@@ -339,7 +337,7 @@ def test_motions_that_jump_at_the_start():
 def test_a_run_that_begins_where_the_motion_is():
     one = beam()
     held = ub.PrescribedDisplacement(one.end, v=0.01)
-    scene = ub.Scene([one], supports=[ub.Clamped(one.start), held])
+    scene = clamped(one, held)
     statics = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, comm=MPI.COMM_SELF)
     ub.Simulation(scene, ub.EnergyMomentum(), t0=1.0, start=statics, comm=MPI.COMM_SELF).close()
 

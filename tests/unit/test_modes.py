@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
@@ -17,7 +18,7 @@ SECTION = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3)
 
 def cantilever(cells=6, **more):
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=cells, name="beam")
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], **more)
+    return clamped(beam, **more)
 
 
 def mechanism(m=1.0, s=1.0, kg=1.0, angle=0.0, *, damped=True):
@@ -72,7 +73,7 @@ def test_a_roller_at_an_angle():
         end = (2 * math.cos(angle), 2 * math.sin(angle))
         beam = ub.Beam((0, 0), end, SECTION, cells=6)
         roller = ub.Roller(beam.end, along=end)
-        return ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start), roller]), 4).omega
+        return ub.modes(clamped(beam, roller), 4).omega
 
     np.testing.assert_allclose(omega(0.6), omega(0.0), rtol=1e-9)
 
@@ -177,7 +178,7 @@ def test_what_has_yielded_answers_elastically():
     section = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3, bending=law)
     beam = ub.Beam((0, 0), (2, 0), section, cells=6)
     push = ub.PointLoad(beam.end, force=(0, 0.55), amplitude=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    scene = clamped(beam, loads=[push])
     bent = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     assert bent.energy.lost["plastic"][-1] > 0
     elastic = ub.modes(cantilever(), 3).omega
@@ -188,7 +189,7 @@ def test_a_hinge_that_bears_nothing_is_a_joint():
     """In the cell of the hinge the rest is elastic: a joint between two cells is h/2 away."""
     cells = 40
     open_ = ub.Beam((0, 0), (2, 0), SECTION, cells=cells, hinges={0.5: ub.Softening(0.0, 1.0)})
-    scene = ub.Scene([open_], supports=[ub.Clamped(open_.start), ub.Pinned(open_.end)])
+    scene = clamped(open_, ub.Pinned(open_.end))
     one = ub.Beam((0, 0), (1, 0), SECTION, cells=cells // 2)
     two = ub.Beam((1, 0), (2, 0), SECTION, cells=cells // 2)
     joint = ub.Revolute(one.end, two.start)
@@ -237,14 +238,14 @@ def test_what_acts_in_the_undeformed_scene_is_named():
     }
     for name, more in others.items():
         with pytest.warns(ub.ModelWarning, match=f"{name}.*no equilibrium.*give at=simulate"):
-            ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)], **more), 1)
+            ub.modes(clamped(beam, **more), 1)
     held = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, u=0.001)]
     with pytest.warns(ub.ModelWarning, match="PrescribedDisplacement at .* no equilibrium"):
         ub.modes(ub.Scene([beam], supports=held), 1)
     # What balances, a load of the undeformed scene, and a work without a force there: no warning.
     bed = ub.Potential("bed", lambda q, axis: 5 * q[1] ** 2)
     pull = ub.PointLoad(beam.end, force=(1, 0))
-    ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[pull], works=[bed]), 1)
+    ub.modes(clamped(beam, loads=[pull], works=[bed]), 1)
 
 
 def test_modes_of_what_its_weight_holds():
@@ -405,7 +406,7 @@ def test_no_mass():
     section = ub.Section(EA=1e4, GA=4e3, EI=20.0)
     beam = ub.Beam((0, 0), (2, 0), section, cells=2)
     with pytest.raises(ub.ArgumentError, match="nothing that can move has mass"):
-        ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), 1)
+        ub.modes(clamped(beam), 1)
 
 
 def test_a_lone_body_seen_from_a_rotating_frame():

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -63,7 +64,7 @@ def test_a_cantilever_that_yields_in_many_cells(kinematic):
     section = ub.Section(EA=1e6, GA=GA, EI=EI, bending=ub.ElastoPlastic(My, kinematic=kinematic))
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
     load = ub.PointLoad(beam.end, force=(0, 2 * My), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     P, b = 2 * My, 0.5
     plastic = (P * (1 - b**3) / 3 - My * (1 - b**2) / 2) / kinematic

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -155,7 +156,7 @@ def test_a_law_without_a_value_far_away_is_met_by_shorter_steps():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
     stop = ub.Slide(ub.ground(1, 0), beam.end, ub.ForceLaw(wall), axis=(0, 1))
     push = ub.PointLoad(beam.end, (0, 0.36), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=[stop])
+    scene = clamped(beam, loads=[push], connectors=[stop])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, comm=MPI.COMM_SELF)
     way = solution.connector(stop).motion[-1]
     assert 0.0095 < way < 0.01

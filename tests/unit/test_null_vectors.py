@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers import run
 
 import ufl_beam as ub
 from ufl_beam.discretization.state_io import Memory
@@ -28,10 +29,6 @@ def star(number, *, hinge=None, joint=ub.Rigid, moment=0.0):
     clamped = [ub.Clamped(member.start) for member in members]
     ends = [member.end for member in members]
     return ub.Scene(members, joints=[joint(*ends)], supports=clamped, loads=forces)
-
-
-def run(scene, scheme):
-    return ub.simulate(scene, scheme, t=(0, 1), dt=0.1)
 
 
 @pytest.mark.parametrize("scheme", [*DYNAMIC, *STATIC], ids=str)

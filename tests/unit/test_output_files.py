@@ -15,6 +15,7 @@ from mpi4py import MPI
 import h5py
 import numpy as np
 import pytest
+from scenes import SECTION, clamped
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
@@ -23,14 +24,10 @@ from ufl_beam.output.output_files import OutputFile, read, require_writable
 from ufl_beam.output.paraview_files import PAGE, Lines, VtkhdfWriter, XdmfWriter
 from ufl_beam.simulation.checkpoint import FORMAT
 
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
-
 
 def scene():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="left")
-    return ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], loads=[ub.PointLoad(beam.end, force=(0, -3))]
-    )
+    return clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, -3))])
 
 
 def run(*record, steps=5, dt=0.1, **more):
@@ -51,16 +48,10 @@ class Notes(ub.Recorder):
     def files(self):
         return (self.path,)
 
-    def require_writable(self):
-        pass
-
     def open(self, simulation):
         pass
 
     def write(self, simulation):
-        pass
-
-    def close(self):
         pass
 
 
@@ -195,9 +186,7 @@ def test_a_step_costs_the_same_at_any_time(recorder, tmp_path):
     factor of 3 for that as well.  A file that grew with the steps took 30 ms for the thousandth.
     """
     beam = ub.Beam((0, 0), (4, 0), SECTION, cells=8)
-    simulation = ub.Simulation(
-        ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.EnergyMomentum()
-    )
+    simulation = ub.Simulation(clamped(beam), ub.EnergyMomentum())
     file = recorder(tmp_path / f"a{recorder.ending}")
     file.open(simulation)
 

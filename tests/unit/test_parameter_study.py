@@ -4,7 +4,6 @@
 import json
 import math
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -14,21 +13,18 @@ from mpi4py import MPI
 import h5py
 import numpy as np
 import pytest
+from helpers import raises
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
 from ufl_beam.parallel import active_comm
 
 COMM = MPI.COMM_WORLD
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 
 def post(force=1.0):
     beam = ub.Beam((0, 0), (0, 2), SECTION, cells=3)
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(force, 0))],
-    )
+    return clamped(beam, loads=[ub.PointLoad(beam.end, force=(force, 0))])
 
 
 def pushed(force, record=()):
@@ -53,10 +49,6 @@ def numbers(*x):
 
 def bits(study):
     return {name: (x.shape, x.tobytes()) for name, x in study.results.items()}
-
-
-def raises(*parts, kind=ub.ArgumentError):
-    return pytest.raises(kind, match=".*".join(map(re.escape, parts)))
 
 
 @pytest.fixture

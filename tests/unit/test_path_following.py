@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ufl
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.analysis.critical_points import Candidate
@@ -429,7 +430,7 @@ def test_events_of_a_path(law):
     section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
     beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.0: law(10.0, 5.0)})
     load = ub.PointLoad(beam.end, force=(0, 10.0), amplitude=growing)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     events = ub.Events()
     ub.follow(scene, ub.DissipationControl(0.5), steps=30, record=events)
     assert events.found

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import doubles, ffi, lib
@@ -14,7 +15,7 @@ from ufl_beam.simulation.stepper import Prediction
 def prediction_of(scheme):
     """One of a single beam, and the number of its degrees of freedom."""
     beam = ub.Beam((0, 0), (2, 0), ub.Section(EA=1, GA=1, EI=1, rhoA=1, rhoI=1), cells=2)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+    scene = clamped(beam)
     simulation = ub.Simulation(scene, scheme)
     simulation.close()
     return simulation.prediction, simulation.share.size

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme
@@ -12,7 +13,7 @@ from ufl_beam.model.records import members
 from ufl_beam.simulation import step_equation
 
 BEAM = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0), cells=2)
-SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
+SCENE = clamped(BEAM)
 
 
 @pytest.fixture(autouse=True)

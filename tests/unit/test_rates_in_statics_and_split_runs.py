@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from laws_of_ones_own import Dashpot
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -130,9 +131,7 @@ def test_the_work_of_a_support_in_two_damped_runs_is_that_of_one(scheme):
     """As above; forces of damping are a part of its reaction."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
     moving = ub.PrescribedDisplacement(beam.end, v=lambda t: -0.05 * math.sin(t) ** 2)
-    scene = ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start), moving], damping=[ub.KelvinVoigt(0.5)]
-    )
+    scene = clamped(beam, moving, damping=[ub.KelvinVoigt(0.5)])
     entries, throughput = split(scene, scheme)
     assert entries["damping"][0] > 0.1 * throughput
     for whole, sum_of_parts in entries.values():

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import SECTION, clamped
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
@@ -15,8 +16,6 @@ import ufl_beam as ub
 MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))
 FORCE = (("force", "N"), ("work", "J"))
 TURNING = (("motion", "rad"), ("force", "N m"), ("work", "J"))
-
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 
 def scene():
@@ -446,7 +445,7 @@ def test_rows_of_displacements_follow_the_beam(degree):
     )
     beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges=hinges)
     load = ub.PointLoad(beam.end, force=(0.0, -20.0), amplitude=ub.ramp(0.1))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     extremes, mesh = ub.Extremes(), ub.Mesh(degree=degree)
     run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=5e-3, record=extremes, mesh=mesh)
     low = extremes.displacement(beam).low

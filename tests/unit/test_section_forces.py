@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -458,7 +459,7 @@ def test_extremes_of_any_number_of_cells(cells, degree):
     """Batches that are full and not, and more cells than C takes in at once."""
     beam = ub.Beam.arc((0, 0), 2.0, (0.0, 1.0), SECTION, cells=cells)
     load = ub.LineLoad(beam, force=(1.0, -3.0), moment=0.2, amplitude=lambda t: math.sin(9 * t))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load, ub.Gravity()])
+    scene = clamped(beam, loads=[load, ub.Gravity()])
     require_extremes(scene, ub.EnergyMomentum(), 3, mesh=ub.Mesh(degree=degree))
     require_extremes(scene, ub.Static(), 2, mesh=ub.Mesh(degree=degree))
 

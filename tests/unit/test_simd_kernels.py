@@ -6,6 +6,7 @@ from copy import copy
 import numpy as np
 import pytest
 import ufl
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
 from ufl_beam.compiled import code_cache, jit, simd_kernels
@@ -13,8 +14,6 @@ from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.simd_kernels import in_batches
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
-
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 
 def pointwise(expression, values, *, several=False):
@@ -232,7 +231,7 @@ def scene(damping=(), **section):
     frame = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0, **section)
     beam = ub.Beam((1, 2), (4, 6), frame, cells=19)  # of which some fill no batch
     loads = [ub.PointLoad(beam.end, force=(30.0, -20.0), moment=40.0)]
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads, damping=damping)
+    return clamped(beam, loads=loads, damping=damping)
 
 
 def hub(spokes):

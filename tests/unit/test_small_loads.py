@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -72,7 +73,7 @@ def test_an_elastic_strain_keeps_its_digits():
     bar = ub.Beam((0, 0), (3, 4), ub.Section(EA=E, GA=E, EI=E), cells=3)
     for force in (1.0, 1e-12, 1e-100):
         load = ub.PointLoad(bar.end, force=tuple(force * along))
-        scene = ub.Scene([bar], supports=[ub.Clamped(bar.start)], loads=[load])
+        scene = clamped(bar, loads=[load])
         run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
         # Linear but for strains of 1e-9
         assert run.section_forces(bar)[:, 0] == pytest.approx([force] * 3, rel=1e-8)
@@ -149,7 +150,7 @@ def test_small_motions_of_a_drive():
         jack = ub.Stretch(
             ub.ground(2, 0), beam.end, ub.PrescribedMotion(lambda t, size=size: size * t)
         )
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[jack])
+        scene = clamped(beam, connectors=[jack])
         run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
         # The jack stands upright; turning it matters to the square of the motion over its length.
         assert run.connector(jack).motion[-1] == pytest.approx(size, rel=1e-9)
@@ -167,7 +168,7 @@ def test_a_small_load_beside_a_large_one(part):
     beam = ub.Beam((0, 0), (1, 0), section, cells=8)
     push = ub.PointLoad(beam.end, force=(-part * math.pi**2 / 4, 0), amplitude=ub.ramp(1.0))
     side = ub.PointLoad(beam.end, force=(0, 1e-9), amplitude=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push, side])
+    scene = clamped(beam, loads=[push, side])
     found, expected = (
         ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, newton=newton)
         for dt, newton in ((0.1, None), (1.0, ub.Newton(rtol=1e-15)))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from bars import LENGTH, Bars
 from laws_of_ones_own import Exponential, Fading, Kinked, Petersson, Rising
+from scenes import clamped
 from scipy.integrate import quad
 
 import ufl_beam as ub
@@ -121,7 +122,7 @@ def turned(law, motion, place="cell", rho=0.0):
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**whole, hinge=hinge), cells=1, hinges=hinges)
     supports = [ub.PrescribedDisplacement(beam.end, psi=motion)]
     if place in ("cell", "hinge"):
-        return ub.Scene([beam], supports=[ub.Clamped(beam.start), *supports])
+        return clamped(beam, *supports)
     of_link = ub.RigidPlastic(law) if place == "connector" else ub.Spring(1e3, softening=law)
     link = ub.Turn(ub.ground(0, 0), beam.start, of_link)
     return ub.Scene([beam], supports=[ub.Pinned(beam.start), *supports], connectors=[link])
@@ -189,7 +190,7 @@ def pulled(law):
             beam.end, u=lambda t: 5e-3 * SWING(t), psi=lambda t: 0.02 * SWING(t)
         )
     ]
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start), *ends])
+    return clamped(beam, *ends)
 
 
 CRACKS = {

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import run
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -21,10 +23,6 @@ def cantilever(*loads, supports=(), **section):
         supports=[clamp, *(make(beam) for make in supports)],
         loads=[make(beam) for make in loads],
     )
-
-
-def run(scene, scheme, t=(0, 1), dt=0.1, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, **more)
 
 
 # -- loads that are there from the start ---------------------------------------------------------
@@ -232,7 +230,7 @@ def test_who_asks_for_a_velocity_is_told():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0), cells=2)
     brake = ub.Controller(lambda now: -0.1 * now.velocity(beam.end)[1])
     slide = ub.Slide(ub.ground(2, 0), beam.end, brake, axis=(0, 1))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[slide])
+    scene = clamped(beam, connectors=[slide])
     with pytest.raises(ub.ArgumentError, match=r"velocity of beam.end .*the run is static"):
         ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     simulation = ub.Simulation(ub.Scene([beam], supports=scene.supports), ub.EnergyMomentumStatic())

@@ -7,11 +7,11 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
 
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 SCHEMES = [
     ub.EnergyMomentum(),
     ub.EnergyMomentum(0.1, 0.05),
@@ -362,7 +362,7 @@ def test_what_a_load_raises_ends_the_run():
         return 1.0 if t < 0.1 else "much"
 
     load = ub.PointLoad(beam.end, force=(0.0, 1.0), amplitude=force)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     with pytest.raises(ub.ArgumentError, match="time function") as caught:
         ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
     assert 8 < len(caught.value.solution) < 13
@@ -412,7 +412,7 @@ def test_a_slender_beam_rolls_up_in_a_few_iterations():
     """Two full turns in one load step, where forces of displacements alone need a hundred."""
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e7, GA=5e6, EI=100.0), cells=32)
     turns = ub.PointLoad(beam.end, moment=4 * np.pi * 100.0, amplitude=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[turns])
+    scene = clamped(beam, loads=[turns])
     simulation = ub.Simulation(scene, ub.Static())
     simulation.step_to(1.0)
     assert simulation.parts == 1
@@ -430,9 +430,7 @@ def test_slender_beams_yield_in_a_few_iterations():
     section = ub.Section.rectangle(b=0.02, h=0.01, E=210e9, nu=0.3, fibres=steel)
     beam = ub.Beam((0, 0), (1, 0), section, cells=12)
     load = ub.PointLoad(beam.end, force=(0.0, 360.0), amplitude=ub.ramp(1.0))
-    simulation = ub.Simulation(
-        ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), ub.Static()
-    )
+    simulation = ub.Simulation(clamped(beam, loads=[load]), ub.Static())
     end(simulation, 20, 0.05)
     assert simulation.parts == 20
     assert simulation.iterations <= 80

@@ -2,7 +2,6 @@
 """Trade-offs: of runs whose errors and times are laws, and of small scenes."""
 
 import math
-import re
 from types import SimpleNamespace
 
 from mpi4py import MPI
@@ -10,6 +9,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import scenes
+from helpers import raises
 
 import ufl_beam as ub
 from ufl_beam.analysis import tradeoff
@@ -20,10 +20,6 @@ CELLS, STEP, SECONDS, BUILDING = 1e-2, 1e-1, 1e-4, 0.1
 EFFORT = 14
 """Of the steps of all runs, of a scene without surprises, see `test_a_tolerance_is_met`."""
 LINEAR, STRICT = ub.Mesh(), ub.Newton()  # nothing else is tried
-
-
-def raises(*parts, kind=ub.ArgumentError):
-    return pytest.raises(kind, match="(?s)" + ".*".join(map(re.escape, parts)))
 
 
 @pytest.fixture

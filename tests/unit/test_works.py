@@ -3,6 +3,7 @@
 
 import math
 import re
+from functools import partial
 from pathlib import Path
 
 from mpi4py import MPI
@@ -10,6 +11,8 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import ufl
+from helpers import raises, run
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.discretization.compiled_forms import prepared
@@ -53,9 +56,7 @@ def flying(b=5.0, cells=4):
     )
 
 
-def run(scene, scheme=None, **more):
-    more = {"t": (0, 2), "dt": 0.05, **more}
-    return ub.simulate(scene, scheme or ub.EnergyMomentum(), **more)
+run = partial(run, t=(0, 2), dt=0.05)
 
 
 # -- ledger ------------------------------------------------------------------------------------
@@ -225,7 +226,7 @@ def test_buckling_by_a_field():
 
     def critical(b):
         field = ub.Potential("field", lambda q, b: b * ufl.cos(q[2]), numbers={"b": b})
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], works=[field])
+        scene = clamped(beam, loads=[push], works=[field])
         return ub.buckling(scene, 1, mesh=ub.Mesh(degree=3)).factors[0]
 
     # The force P that is left beside the field m b: EI ψ'' + (m b + P) sin ψ = 0 for both.
@@ -317,7 +318,7 @@ def test_restart(scheme, shared_path):
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
 def test_restart_in_statics(scheme, shared_path):
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], works=works(b=lambda t: 5 + t))
+    scene = clamped(beam, works=works(b=lambda t: 5 + t))
     whole = run(scene, scheme, dt=0.2)
     file = ub.Checkpoint(shared_path / "run.checkpoint", every=3)
     run(scene, scheme, t=(0, 1), dt=0.2, checkpoint=file)
@@ -330,7 +331,7 @@ def test_a_continued_run():
     """It takes the state as one that works have led to: nothing grows a second time."""
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
     work = ub.VirtualWork("load", lambda w, q: 30.0 * (1 + q[1]) * w[1])
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], works=[work])
+    scene = clamped(beam, works=[work])
     first = run(scene, ub.Static(), t=(0, 1), dt=0.5)
     second = run(scene, ub.Static(), t=(1, 2), dt=0.5, start=first)
     np.testing.assert_allclose(second.q, first.q[-1][None].repeat(3, 0), atol=1e-9)
@@ -368,7 +369,7 @@ def test_the_blocks_of_the_page_run(capsys):
     # Hetényi's deflection to the error of 32 cells, λ² h²/12 = 1e-3
     assert sunk == pytest.approx(-1.350e-5, rel=1e-3)
     assert field < 0 > in_time
-    wired = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], works=[names["wire"]])
+    wired = clamped(BEAM, works=[names["wire"]])
     assert run(wired, t=(0, 0.1)).energy["current"][-1] > 0
 
 
@@ -377,10 +378,6 @@ def test_the_blocks_of_the_page_run(capsys):
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
 BODY = ub.Body((0, 0), mass=1.0, inertia=1.0)
 STRAY = ub.Beam((0, 1), (1, 1), SECTION, cells=2, name="stray")
-
-
-def raises(*parts):
-    return pytest.raises(ub.ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
 @pytest.mark.parametrize(
@@ -493,7 +490,7 @@ def test_a_number_that_fails_later_is_named():
     work = ub.VirtualWork(
         "gust", lambda w, c: c * w[1], numbers={"c": lambda t: 1.0 if t < 0.1 else None}
     )
-    scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], works=[work])
+    scene = clamped(BEAM, works=[work])
     with raises("VirtualWork 'gust': the time function returned None at t = "):
         run(scene, t=(0, 1))
 
@@ -502,6 +499,6 @@ def test_a_work_that_is_no_number_ends_the_run():
     """The square root has no derivative at rest; the message names the beam."""
     still = ub.VirtualWork("drag", lambda v, w: -ufl.sqrt(v[1] ** 2) * v[1] * w[1])
     push = ub.PointLoad(BEAM.end, force=(0.0, 1.0))
-    scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[push], works=[still])
+    scene = clamped(BEAM, loads=[push], works=[still])
     with pytest.raises(ub.ConvergenceError, match="girder"):
         run(scene, t=(0, 1))

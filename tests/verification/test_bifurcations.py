@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import ufl
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -37,7 +38,7 @@ def column(EA, cells):
     """A column at 53 degrees, so that round-off of its axial force moves it sideways."""
     beam = ub.Beam((0, 0), (0.6, 0.8), ub.Section(EA=EA, GA=EA, EI=1.0), cells=cells)
     load = ub.PointLoad(beam.end, force=(-0.6, -0.8), amplitude=growing)
-    return beam.end, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), 1.0
+    return beam.end, clamped(beam, loads=[load]), 1.0
 
 
 def portal(EA, cells):

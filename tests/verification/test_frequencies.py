@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from convergence.study import extrapolated, romberg
 from numpy.polynomial import Legendre
+from scenes import clamped
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
@@ -71,7 +72,7 @@ def test_the_first_frequency_of_a_slender_cantilever_keeps_its_digits(cells):
     """
     section = ub.Section(EA=1e9, GA=1e9, EI=1.0, rhoA=1.0)
     beam = beam_of(cells, section)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+    scene = clamped(beam)
     found = ub.modes(scene, 1, mesh=ub.Mesh(degree=3)).omega[0]
     np.testing.assert_allclose(found, 1.875104**2, rtol=2 * 0.5e-6 / 1.875104)
 
@@ -150,7 +151,7 @@ def test_becks_column():
     for part in (0.995, 1.005):
         beam = beam_of(80)
         load = ub.FollowerLoad(beam.end, force=(-20.0509 * part, 0))
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        scene = clamped(beam, loads=[load])
         state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
         growth.append(-ub.modes(scene, 2, at=state).damping.min())
     assert abs(growth[0]) < 1e-5  # both are near: to the root of round-off
@@ -373,7 +374,7 @@ def test_rotating_beam(rate):
     for cells in (10, 20, 40):
         beam = beam_of(cells)
         frame = ub.RotatingFrame(rate)
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[frame])
+        scene = clamped(beam, loads=[frame])
         steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
         runs.append(ub.modes(scene, 3, at=steady).omega)
     np.testing.assert_allclose(romberg(*runs), ritz(rate, 3), rtol=1e-4)

@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -106,7 +107,7 @@ def test_line_load(end, factor):
 
     def scene(time):
         load = ub.LineLoad(beam, force=(0, -M_P), amplitude=time)
-        return ub.Scene([beam], supports=[ub.Clamped(beam.start), end(beam.end)], loads=[load])
+        return clamped(beam, end(beam.end), loads=[load])
 
     assert loaded(scene, factor) == pytest.approx(1, rel=5e-3)
 
@@ -170,7 +171,7 @@ def test_cantilever_that_breaks():
     law = ub.LinearSoftening(a["M_u"], a["M_u"] ** 2 / (2 * a["K_s"]))
     beam = ub.Beam((0, 0), (l, 0), section, cells=20, corners=(h / l,), hinges={0.0: law})
     push = ub.PrescribedDisplacement(beam.end, v=lambda t: 0.12 * t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), push])
+    scene = clamped(beam, push)
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.005)
     F = solution.reaction(push)[1:, 1]
     M = solution.section_forces_at(beam.start)[:, 2]

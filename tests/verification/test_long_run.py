@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -25,7 +26,7 @@ def test_damage_of_cycles_of_one_size():
     beam = ub.Beam((0, 0), (2, 0), section, cells=2)
     F, W, n = 20e3, 0.1 * 0.2**2 / 6, 20
     push = ub.PointLoad(beam.end, force=(0, F), amplitude=lambda t: math.sin(2 * math.pi * t))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    scene = clamped(beam, loads=[push])
     spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
     curve = ub.SNCurve(range=71e6, cycles=2e6, slope=3.0)
     fatigue = ub.Fatigue(spot, curve, resolution=1e3)

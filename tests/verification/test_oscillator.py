@@ -11,6 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers import assert_balanced
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -32,9 +34,9 @@ def bar(law):
 def struck(v0, steps, law=None, *, periods=4, scheme=None):
     """Times over the period, displacements over u_y, and the solution."""
     beam = bar(law or ub.ElastoPlastic(N_Y))
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=0, psi=0)],
+    scene = clamped(
+        beam,
+        ub.PrescribedDisplacement(beam.end, v=0, psi=0),
         masses=[ub.PointMass(beam.end, MASS)],
         initial=[ub.Velocity((beam,), linear=(v0, 0))],
     )
@@ -42,12 +44,6 @@ def struck(v0, steps, law=None, *, periods=4, scheme=None):
         scene, scheme or ub.EnergyMomentum(), t=(0, periods * PERIOD), dt=PERIOD / steps
     )
     return solution.times / PERIOD, solution.displacement(beam.end)[:, 0] / U_Y, solution
-
-
-def assert_balanced(energy):
-    assert energy.worst <= 1e-9
-    for lost in energy.lost.values():
-        assert np.diff(lost).min() >= -1e-12 * energy.throughput
 
 
 def ductility(v0, kt=0.0):
@@ -124,7 +120,7 @@ def loop(law, scheme, steps=80):
     """Elongations over u_y and forces over N_y."""
     beam = bar(law)
     pull = ub.PrescribedDisplacement(beam.end, u=lambda t: U_Y * TURNS(t), v=0, psi=0)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
+    scene = clamped(beam, pull)
     solution = ub.simulate(scene, scheme, t=(0, 5), dt=1 / steps)
     return (
         solution.displacement(beam.end)[:, 0] / U_Y,

@@ -11,6 +11,7 @@ import math
 import numpy as np
 import pytest
 from convergence.study import extrapolated
+from scenes import clamped
 from verification.test_euler_column import TABLE, closed_form
 
 import ufl_beam as ub
@@ -95,9 +96,9 @@ def test_deep_arch():
         angles = (math.pi / 2 + half, math.pi / 2 - half)
         arch = ub.Beam.arc((0, 0), 100.0, angles, section, cells=cells)
         apex = arch.at(0.5)
-        scene = ub.Scene(
-            [arch],
-            supports=[ub.Clamped(arch.start), ub.Pinned(arch.end)],
+        scene = clamped(
+            arch,
+            ub.Pinned(arch.end),
             loads=[ub.PointLoad(apex, force=(0, -1000), amplitude=growing)],
         )
         path = ub.follow(scene, ub.ArcLength(0.04), until=two_critical_points)
@@ -116,7 +117,7 @@ def column(cells, section, P):
     """A perfect column of unit length, clamped at its foot, loaded along its axis."""
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
     load = ub.PointLoad(beam.end, force=(-P, 0), amplitude=growing)
-    return beam, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    return beam, clamped(beam, loads=[load])
 
 
 @pytest.mark.parametrize("cells", [4, 32])
@@ -185,7 +186,7 @@ def test_hinge_snap_back(law, steepness):
         hinges={0.0: law(SCALE * M_U, SCALE**2 * energy)},
     )  # fmt: skip
     load = ub.PointLoad(beam.end, force=(0, SCALE * M_U / LENGTH), amplitude=growing)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     control = ub.DissipationControl(SCALE**2 * energy / 16, ub.ArcLength(0.2))
     spent = SCALE**2 * energy * 0.9
     path = ub.follow(scene, control, until=lambda now: now.ledger.lost["hinges"] > spent)

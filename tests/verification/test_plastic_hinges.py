@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -70,9 +71,9 @@ def test_collapse_of_a_portal(by, cells):
 def test_collapse_of_a_fixed_ended_beam(law):
     """[plastic theory] 16 M/L² under a line load, hinges at both ends and at mid-span; 0.2 %."""
     beam = ub.Beam((0, 0), (LENGTH, 0), ELASTIC, cells=8, hinges={0.0: law, 0.5: law, 1.0: law})
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=0, psi=0)],
+    scene = clamped(
+        beam,
+        ub.PrescribedDisplacement(beam.end, v=0, psi=0),
         loads=[ub.LineLoad(beam, force=(0.0, -1.0), amplitude=growing)],
     )
     middle = beam.at(0.5)
@@ -91,9 +92,7 @@ def turned(law, motion, scheme, *, dt, end=1.0, s=0.0, rho=0.0, cells=2):
     """Beam clamped at its start, whose end is turned as given: one moment along all of it."""
     section = ub.Section(EA=1e6, GA=1e6, EI=EI, rhoA=rho, rhoI=1e-3 * rho)
     beam = ub.Beam((0, 0), (LENGTH, 0), section, cells=cells, hinges={s: law})
-    scene = ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, psi=motion)]
-    )
+    scene = clamped(beam, ub.PrescribedDisplacement(beam.end, psi=motion))
     return scene, ub.simulate(scene, scheme, t=(0, end), dt=dt)
 
 
@@ -169,11 +168,7 @@ def test_a_limit_that_is_not_reached_changes_nothing(law):
 
     def cantilever(hinges):
         beam = ub.Beam((0, 0), (LENGTH, 0), MOVING, cells=4, hinges=hinges)
-        return beam, ub.Scene(
-            [beam],
-            supports=[ub.Clamped(beam.start)],
-            loads=[ub.PointLoad(beam.end, force=(0.0, -1.0))],
-        )
+        return beam, clamped(beam, loads=[ub.PointLoad(beam.end, force=(0.0, -1.0))])
 
     beam, scene = cantilever({})
     run = {"t": (0.0, 1.0), "dt": 0.01}
@@ -224,7 +219,7 @@ def test_vibration_of_what_a_broken_hinge_leaves():
     section = ub.Section(EA=1e6, GA=1e6, EI=EI, rhoA=1.0, rhoI=1e-3)
     hinged = ub.Beam((0, 0), (2, 0), section, cells=8, hinges={0.5: ub.Softening(0.0, 1.0)})
     one, two = (ub.Beam((x, 0), (x + 1, 0), section, cells=4) for x in (0, 1))
-    whole = ub.Scene([hinged], supports=[ub.Clamped(hinged.start), ub.Pinned(hinged.end)])
+    whole = clamped(hinged, ub.Pinned(hinged.end))
     parts = ub.Scene(
         [one, two], joints=[ub.Revolute(one.end, two.start)],
         supports=[ub.Clamped(one.start), ub.Pinned(two.end)],
@@ -412,7 +407,7 @@ def test_a_moment_at_a_free_end_acts_on_the_member(given, recwarn):
     hinges = {} if given is None else {1.0: at_end[given]}
     beam = ub.Beam((0, 0), (1, 0), section, cells=4, name="arm", hinges=hinges)
     turn = ub.PointLoad(beam.end, moment=0.5)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[turn])
+    scene = clamped(beam, loads=[turn])
     assert len(scene.hinges) == 1  # that at the clamp
     ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     said = [str(one.message) for one in recwarn if one.category is ub.ModelWarning]

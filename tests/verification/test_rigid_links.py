@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from convergence.study import extrapolated
-from scenes import SWING_PULSE, swing
+from scenes import SWING_PULSE, clamped, swing
 
 import ufl_beam as ub
 
@@ -178,9 +178,7 @@ def outrigger(scheme, *, load, how, cells=4, arm=0.5):
     x, y = load
     moment = -arm * x if how == "statically" else 0.0
     loads = [ub.PointLoad(at, force=(x, y), moment=moment, amplitude=ub.ramp(1.0))]
-    scene = ub.Scene(
-        [beam], joints=joints, bodies=bodies, supports=[ub.Clamped(beam.start)], loads=loads
-    )
+    scene = clamped(beam, joints=joints, bodies=bodies, loads=loads)
     solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.1)
     return solution, beam
 

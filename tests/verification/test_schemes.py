@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scenes import flying_beam, swing
+from scenes import clamped, flying_beam, swing
 
 import ufl_beam as ub
 
@@ -47,7 +47,7 @@ def shaken():
     beam = ub.Beam((0, 0), (1, 0), SOFT, cells=4)
     push = ub.PointLoad(beam.end, force=(0, 10), amplitude=lambda t: math.sin(3 * t))
     damping = [ub.Rayleigh(mass=1.0, stiffness=0.01)]
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], damping=damping)
+    return clamped(beam, loads=[push], damping=damping)
 
 
 @lru_cache
@@ -112,9 +112,9 @@ OMEGA = math.sqrt(3 * EA / (DENSITY * LENGTH**2))
 def bar():
     section = ub.Section(EA=EA, GA=EA, EI=EA, rhoA=DENSITY, rhoI=1.0)
     beam = ub.Beam((0, 0), (LENGTH, 0), section, cells=1)
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=0, psi=0)],
+    return clamped(
+        beam,
+        ub.PrescribedDisplacement(beam.end, v=0, psi=0),
         initial=[ub.Velocity([beam], linear=(0.1, 0))],
     )
 

@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 from convergence.study import extrapolated, orders, romberg
-from scenes import beam_on_roller, cantilever, quarter_circle
+from scenes import beam_on_roller, cantilever, clamped, quarter_circle
 from scipy.special import ellipeinc, ellipj, ellipk
 
 import ufl_beam as ub
@@ -217,7 +217,7 @@ def test_polyline_is_two_beams_rigidly_joined():
     def load(beam):
         return [ub.PointLoad(beam.end, force=(-1, -3), amplitude=ub.ramp(1.0))]
 
-    one = ub.Scene([stick], supports=[ub.Clamped(stick.start)], loads=load(stick))
+    one = clamped(stick, loads=load(stick))
     two = ub.Scene(
         [arm, post],
         joints=[ub.Rigid(post.end, arm.start)],

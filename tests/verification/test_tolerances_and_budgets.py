@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pytest
 import scenes
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -50,11 +51,7 @@ def softening_cantilever():
     section = ub.Section.rectangle(b=0.05, h=0.1, **steel)
     beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges={0.0: ub.Softening(20e3, 2e3)})
     push = ub.Table([0, 0.01, 0.02], [0, 1, 0])
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(0, 40e3), amplitude=push)],
-    )
+    scene = clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, 40e3), amplitude=push)])
     return scene, beam.end, {"t": (0.0, 0.05), "dt": 1e-3}
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import ufl
 from convergence.study import orders
+from scenes import clamped
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
@@ -160,7 +161,7 @@ def cantilever(b, **more):
     section = ub.Section(EA=1e7, GA=1e7, EI=1.0, rhoA=1.0, rhoI=1e-3)
     beam = ub.Beam((0, 0), (1, 0), section, cells=1)
     works = [magnetised(beam, b)]
-    return beam, ub.Scene([beam], supports=[ub.Clamped(beam.start)], works=works, **more)
+    return beam, clamped(beam, works=works, **more)
 
 
 @pytest.mark.parametrize(("degree", "cells"), [(1, (8, 16)), (2, (4, 8)), (3, (8, 16))])
