@@ -20,7 +20,7 @@ from combination_case import (
     results,
 )  # fmt: skip
 from helpers import stop_after
-from own_parts import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
+from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
 
 import ufl_beam as ub
 from ufl_beam import parallel

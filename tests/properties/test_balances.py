@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from random_scenes import DRAWS, Built, draw, relative
+from elastic_scenes import DRAWS, Built, draw, relative
 
 import ufl_beam as ub
 

@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from random_scenes import Units
+from elastic_scenes import Units
 
 import ufl_beam as ub
 

@@ -5,7 +5,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from random_scenes import DRAWS, Built, Units, difference, draw
+from elastic_scenes import DRAWS, Built, Units, difference, draw
 
 import ufl_beam as ub
 

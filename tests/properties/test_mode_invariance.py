@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from random_scenes import Built, Units, draw
+from elastic_scenes import Built, Units, draw
 
 import ufl_beam as ub
 

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: MIT
 """200 random scenes, each stated in six ways: one motion, constraints kept, a ledger that closes.
 
-`any_scene.py` draws the scenes, `statements.py` states them as given, turned, with beams that run
-the other way, a kilometre away, in mm, t and ms, and in another order.  A scene that fails prints
-the script of the statement as given; `python3 tests/properties/test_random_scenes.py SEED` prints
-all of them with their differences.
+`random_scenes.py` draws the scenes, `scene_statements.py` states them as given, turned, with beams
+that run the other way, a kilometre away, in mm, t and ms, and in another order.  A scene that fails
+prints the script of the statement as given; `python3 tests/properties/test_random_scenes.py SEED`
+prints all of them with their differences.
 """
 
 import math
 import sys
 
 import pytest
-from any_scene import script
-from constraints_checked import largest_gap
-from restated import Run, changed_statements, difference, perturbed
-from statements import EPS
+from constraint_gaps import largest_gap
+from random_scenes import script
+from scene_statements import EPS
+from statement_runs import Run, changed_statements, difference, perturbed
 
 import ufl_beam as ub
 
@@ -141,7 +141,7 @@ def test_all_scenes():
 
 
 if __name__ == "__main__":
-    from statements import AS_GIVEN
+    from scene_statements import AS_GIVEN
 
     number = int(sys.argv[1])
     for one in (AS_GIVEN, *changed_statements(number)):

@@ -10,10 +10,10 @@ import math
 
 from mpi4py import MPI
 
-import any_scene
 import numpy as np
 import pytest
 import random_machines
+import random_scenes
 from scenes import clamped
 
 import ufl_beam as ub
@@ -31,7 +31,7 @@ WANDERING = (9, 19, 22, 25, 26, 32, 35, 36, 38, 42, 43, 45, 60, 79, 83, 86, 99, 
 """Scenes in whose steps Newton's method wanders, so that round-off decides where a step is cut."""
 
 SEEDS = [*(seed for seed in range(120) if seed not in WANDERING), 165]
-"""Scenes that have, between them, every object, law and scheme that `any_scene` draws."""
+"""Scenes that have, between them, every object, law and scheme that `random_scenes` draws."""
 
 MACHINES = [0, 1, 5, 6, 8, 10, 11, *range(14, 21), 22, 23, *range(25, 32), 33, 34, 35, 37, 38]
 """Random machines, whose parts are up to 1e9 times as stiff as others.
@@ -122,7 +122,7 @@ def require_same(case):
 
 @pytest.mark.parametrize("seed", SEEDS)
 def test_scenes(seed):
-    require_same(made(any_scene.script(seed), any_scene.STEPS))
+    require_same(made(random_scenes.script(seed), random_scenes.STEPS))
 
 
 @pytest.mark.parametrize("seed", MACHINES)
@@ -134,7 +134,7 @@ def test_the_scenes_have_everything():
     """The seeds above leave out nothing that hundreds of scenes have."""
 
     def names(seeds):
-        words = " ".join(any_scene.script(seed) for seed in seeds).split("ub.")[1:]
+        words = " ".join(random_scenes.script(seed) for seed in seeds).split("ub.")[1:]
         return {word.split("(")[0] for word in words}
 
     assert names(SEEDS) == names(range(200))
@@ -143,7 +143,7 @@ def test_the_scenes_have_everything():
 @pytest.mark.parametrize("seed", SEEDS[:40])
 def test_residuals_and_tangents(seed):
     """Somewhere off equilibrium, so that nothing hides behind a converged solution."""
-    scene, scheme, (t0, _), dt, mesh = made(any_scene.script(seed), any_scene.STEPS)
+    scene, scheme, (t0, _), dt, mesh = made(random_scenes.script(seed), random_scenes.STEPS)
     newton = ub.Newton(rtol=1e-12)
     simulation = ub.Simulation(scene, scheme, mesh=mesh, newton=newton, comm=MPI.COMM_SELF)
     equation, supports = simulation.equation, simulation.supports

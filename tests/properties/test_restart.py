@@ -14,12 +14,12 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 from helpers import stop_after
-from restarted import arrays_of, bend, machine, run
+from restart_scenes import arrays_of, bend, machine, run
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
 
-SCRIPT = Path(__file__).with_name("restarted.py")
+SCRIPT = Path(__file__).with_name("restart_scenes.py")
 
 RUNS = {
     "midpoint": (machine, ub.EnergyMomentum(0.05, 0.02), 0.2, 0.005),

@@ -5,8 +5,8 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from any_scene import script
-from statements import AS_GIVEN, Statement
+from random_scenes import script
+from scene_statements import AS_GIVEN, Statement
 
 import ufl_beam as ub
 from ufl_beam import memory

@@ -3,9 +3,9 @@
 
 import numpy as np
 import pytest
-from bars import Bars
-from laws_of_ones_own import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, TwoRoots
 from scenes import clamped
+from uniaxial_points import Bars
+from user_laws import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, TwoRoots
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib

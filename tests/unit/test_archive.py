@@ -25,7 +25,7 @@ from ufl_beam.model.connector_laws import HELD
 from ufl_beam.output.serialization import RECORDS, from_data, to_data
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "properties"))
-from restarted import bend, machine
+from restart_scenes import bend, machine
 
 STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}
 

@@ -9,8 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from helpers import AfterEachStep
-from law_runs import require_reference, require_restart
+from helpers import AfterEachStep, require_reference, require_restart
 from scenes import clamped
 
 import ufl_beam as ub

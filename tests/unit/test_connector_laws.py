@@ -4,9 +4,6 @@
 import math
 import os
 import re
-import shutil
-import subprocess
-import sys
 import warnings
 from dataclasses import dataclass
 from functools import partial
@@ -14,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from law_runs import require_reference, require_restart
+from helpers import needs_mpirun, on_two_processes, require_reference, require_restart
 from scenes import clamped
 from scipy.integrate import solve_ivp
 
@@ -340,11 +337,6 @@ def test_motions_of_all_kinds():
     assert found.energy.worst < 1e-12
 
 
-MPIRUN = {
-    "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_mpi_yield_when_idle": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-}  # fmt: skip
-
 SHARED = """
 import sys
 sys.path[:0] = [{here!r}, {tests!r}]
@@ -359,15 +351,11 @@ t.ub.print_once(repr([float(x[-1]) for x in solution.energy.values()]))
 
 
 @pytest.mark.serial
-@pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
+@needs_mpirun
 def test_two_processes_share_a_scene():
     here = os.path.dirname(os.path.abspath(__file__))
     code = SHARED.format(here=here, tests=os.path.dirname(here))
-    command = ["mpirun", "-n", "2", sys.executable, "-c", code]
-    environment = {**os.environ, **MPIRUN}
-    found = subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=300, check=False
-    )
+    found = on_two_processes("-c", code)
     assert found.returncode == 0, found.stderr
     forces, energies = map(eval, found.stdout.splitlines()[-2:])
     _, links, scene = all_laws()

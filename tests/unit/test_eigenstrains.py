@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars, C, histories
-from laws_of_ones_own import Eigenstrain, YieldingEigenstrain
+from uniaxial_points import LENGTH, Bars, C, histories
+from user_laws import Eigenstrain, YieldingEigenstrain
 
 import ufl_beam as ub
 

@@ -5,9 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars, C
 from scenes import clamped
 from scipy.integrate import solve_ivp
+from uniaxial_points import LENGTH, Bars, C
 
 import ufl_beam as ub
 

@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from law_runs import require_reference, require_restart
+from helpers import require_reference, require_restart
 
 import ufl_beam as ub
 from ufl_beam.model.material_law import initial_state

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars, C, histories
+from uniaxial_points import LENGTH, Bars, C, histories
 
 import ufl_beam as ub
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars, C, histories
-from laws_of_ones_own import Dashpot, PowerLaw, SameHardening, Stiffening
+from uniaxial_points import LENGTH, Bars, C, histories
+from user_laws import Dashpot, PowerLaw, SameHardening, Stiffening
 
 import ufl_beam as ub
 

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from laws_of_ones_own import Dashpot
 from scenes import clamped
+from user_laws import Dashpot
 
 import ufl_beam as ub
 

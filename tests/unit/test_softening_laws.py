@@ -8,10 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars
-from laws_of_ones_own import Exponential, Fading, Kinked, Petersson, Rising
 from scenes import clamped
 from scipy.integrate import quad
+from uniaxial_points import LENGTH, Bars
+from user_laws import Exponential, Fading, Kinked, Petersson, Rising
 
 import ufl_beam as ub
 from ufl_beam.model.softening_laws import SMALL

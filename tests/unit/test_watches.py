@@ -9,8 +9,8 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from laws_of_ones_own import Dashpot, PowerLaw
 from scenes import clamped
+from user_laws import Dashpot, PowerLaw
 
 import ufl_beam as ub
 from ufl_beam.model.material_law import has_quadratic_energies, judges_dissipation

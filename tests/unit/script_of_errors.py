@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Functions of a user that raise on one process or on all; run by test_collective_errors.py.
 
-`mpirun -n 2 python3 raising.py` prints a line for each case: its name, the exceptions of all
-processes; `mpirun -n 2 python3 raising.py CASE RANK` lets one process fail where nobody agrees.
+`mpirun -n 2 python3 script_of_errors.py` prints a line for each case: its name, the exceptions of
+all processes; with the arguments CASE and RANK one process fails where processes do not agree.
 """
 
 import math

@@ -4,8 +4,8 @@
 import warnings
 
 import numpy as np
-from any_scene import script
-from statements import AS_GIVEN, Statement, changed_statements
+from random_scenes import script
+from scene_statements import AS_GIVEN, Statement, changed_statements
 
 import ufl_beam as ub
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from bars import Bars, C
-from laws_of_ones_own import Dashpot, PowerLaw, SameHardening, Stiffening
 from scenes import clamped
+from uniaxial_points import Bars, C
+from user_laws import Dashpot, PowerLaw, SameHardening, Stiffening
 
 import ufl_beam as ub
 from ufl_beam.model.fibres import Fibres

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Random laws of sections and connectors, written as Python source; see any_scene.py."""
+"""Random laws of sections and connectors, written as Python source; see random_scenes.py."""
 
 import math
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A scene of all that remembers something, and a run of it that can be killed and run again.
 
-As a script: ``python3 restarted.py FOLDER`` runs or goes on, and writes the solution at the end.
+``python3 restart_scenes.py FOLDER`` runs or goes on, and writes the solution at the end.
 """
 
 import sys
