@@ -2,8 +2,8 @@
 """Random scenes as plain numbers, and the ways to state one scene that must not matter.
 
 A draw is a tree of one to four beams, each joined to an earlier one, with supports, loads and
-masses.  `build` states it in other units, turned, with its beams in another order or with beams cut
-in two; the answers to questions about its places must then be the same, scaled and turned.
+masses.  `Built` states it in other units, turned, or with beams cut in two; results at its places
+must then be the same, scaled and turned.
 """
 
 import math
@@ -131,7 +131,7 @@ class Built:
         supports: Its supports in the order of the draw.
     """
 
-    def __init__(self, draw, *, units=Units(), angle=0.0, order=None, cut=()):  # noqa: B008
+    def __init__(self, draw, *, units=Units(), angle=0.0, cut=()):  # noqa: B008
         self.draw, self.units = draw, units
         self._cos, self._sin = math.cos(angle), math.sin(angle)
         self._cut = set(cut)
@@ -160,8 +160,6 @@ class Built:
             else:
                 self._beams[i] = [ub.Beam(*ends, section, cells=cells, name=name)]
             pieces += self._beams[i]
-        if order is not None:
-            pieces = [pieces[k] for k in order]
         for kind, one, other in draw.joints:
             joints.append(getattr(ub, kind)(self.place(one), self.place(other)))
         self.supports = []

@@ -55,7 +55,7 @@ def everything():
     )
 
 
-def test_checksum():
+def test_results_have_their_digits_on_any_number_of_processes():
     run = ub.simulate(everything(), ub.EnergyMomentum(0.05), t=(0, 0.3), dt=0.005)
     assert run.energy.worst < 1e-9
     for name, numbers in (

@@ -121,12 +121,12 @@ def require_same(case):
 
 
 @pytest.mark.parametrize("seed", SEEDS)
-def test_scenes(seed):
+def test_random_scenes_have_the_results_of_the_reference(seed):
     require_same(made(random_scenes.script(seed), random_scenes.STEPS))
 
 
 @pytest.mark.parametrize("seed", MACHINES)
-def test_machines(seed):
+def test_random_machines_have_the_results_of_the_reference(seed):
     require_same(made(random_machines.script(seed), random_machines.STEPS))
 
 
@@ -384,7 +384,7 @@ def compiled(case):
     return run(case, reference=False)
 
 
-def test_everything_yields(case, compiled):
+def test_hinges_and_plastic_strains_dissipate(case, compiled):
     """That the mistakes below can show."""
     lost = compiled.energy.lost
     assert lost["plastic"][-1] > 1.0

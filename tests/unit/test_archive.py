@@ -156,7 +156,7 @@ def test_plastic_hinges_at_places_and_an_open_ledger(shared_path):
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
-def test_statics(scheme, shared_path):
+def test_a_static_solution_is_saved_whole(scheme, shared_path):
     solution = ub.simulate(bend(), scheme, t=(0, 5), dt=0.1)
     require_same(saved(solution, shared_path), solution)
 
@@ -402,7 +402,7 @@ def test_paths_that_cannot_be_written(shared_path):
 # -- version ---------------------------------------------------------------------------------------
 
 
-def test_version():
+def test_the_version_is_the_one_of_the_project():
     project = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
     (stated,) = re.findall(r'^version = "([^"]+)"', project, re.MULTILINE)
     assert ub.__version__ == stated

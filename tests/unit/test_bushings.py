@@ -164,7 +164,7 @@ def test_springs_in_one_law_are_springs(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 @pytest.mark.parametrize("name", LAWS)
-def test_reference(name, scheme):
+def test_the_reference_finds_the_same(name, scheme):
     _, (link,), scene = cantilever(LAWS[name])
     require_reference(run, scene, link, scheme)
 
@@ -398,7 +398,7 @@ def law_of(**members):
         (lambda a, b: ub.Stretch(a, b, ub.Stop(1.0, high=0.1)), "Clearance(...)) for a pin"),
     ],
 )  # fmt: skip
-def test_refusals(make, message):
+def test_wrong_bushings_are_refused(make, message):
     beam = ub.Beam((0, 0), (1, 0), SECTION)
     with pytest.raises(ub.ArgumentError, match=re.escape(message)):
         make(ub.ground(1, 0), beam.end)
@@ -433,7 +433,7 @@ def test_a_path_has_no_time_for_friction():
     )
 
 
-def test_pictures(tmp_path):
+def test_bushings_have_pictures(tmp_path):
     _, _, scene = cantilever(LAWS["rough hole"])
     ub.plot(scene).savefig(tmp_path / "model.png")
     ub.plot(run(scene, ub.Static())).savefig(tmp_path / "solution.png")

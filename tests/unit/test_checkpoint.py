@@ -63,7 +63,7 @@ def path(shared_path):
         ({"every": 1, "also": [3]}, r"also\[0\] = 3 has no state"),
     ],
 )
-def test_bad_choices(arguments, message):
+def test_bad_intervals_of_checkpoints_are_refused(arguments, message):
     with pytest.raises(ub.ArgumentError, match=message):
         ub.Checkpoint("run.checkpoint", **arguments)
 
@@ -111,7 +111,7 @@ def test_the_file_of_another_run(other, path):
     assert "Delete the file to begin anew, or name another" in str(refused.value)
 
 
-def test_another_start(path):
+def test_another_start_is_refused(path):
     first = ub.simulate(scene(), ub.Static(), t=(0, 1), dt=1.0)
     run(path)
     frame = first.scene

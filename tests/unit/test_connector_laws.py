@@ -191,7 +191,7 @@ def test_small_steps_keep_the_digits_of_the_force():
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 @pytest.mark.parametrize("name", LAWS)
-def test_reference(name, scheme):
+def test_the_reference_finds_the_same(name, scheme):
     _, (link,), scene = cantilever(LAWS[name])
     found = require_reference(run, scene, link, scheme)
     mine = found.connector(link)
@@ -253,7 +253,7 @@ def test_an_end_of_equilibrium_is_at_rest():
     [(ub.Static(), 1), (ub.EnergyMomentumStatic(), 1), (ub.EnergyMomentumStatic(0.5), 2)],
     ids=str,
 )
-def test_relaxation(scheme, order):
+def test_a_maxwell_element_relaxes(scheme, order):
     """A Maxwell element moved at a rate v: F = η v (1 - exp(-k t/η)), then held [closed]."""
     k, eta = 200.0, 100.0
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=1)
@@ -412,7 +412,7 @@ def test_buckling_on_a_spring_of_ones_own():
     assert factors[0] == pytest.approx(factors[1], rel=1e-6)
 
 
-def test_follow():
+def test_on_a_path_rates_vanish():
     """Rates vanish on a path, and Maxwell elements are relaxed [closed]."""
     at, _, scene = cantilever(Cubic(100.0, 1e5), Drag(50.0, 9.0), Maxwell(200.0, 9.0),
                                        load=lambda t: t)  # fmt: skip
@@ -438,7 +438,7 @@ def test_follow():
 
 
 @pytest.mark.parametrize(("damping", "v"), [(0.5, 0.3), (2.0, 0.3), (2.0, 3.0), (100.0, 1.0)])
-def test_restitution(damping, v):
+def test_a_damped_stop_takes_a_part_of_the_velocity(damping, v):
     """The velocity after a contact against the ordinary differential equation [independent]."""
     k, m = 2e4, 2.0
 

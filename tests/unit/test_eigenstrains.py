@@ -29,7 +29,7 @@ def scene(supports, section=CURVED, **more):
 @pytest.mark.parametrize("reference", [False, True])
 @pytest.mark.parametrize("dt", [1.0, 0.25])
 @pytest.mark.parametrize("scheme", STATICS, ids=str)
-def test_beams(scheme, dt, reference):
+def test_eigenstrains_bend_a_free_beam_and_load_a_clamped_one(scheme, dt, reference):
     """[closed] The simple beam bends to e0 and bears nothing; the clamped one bears -EI e0."""
     newton = ub.Newton(reference=reference)
     beam, simple = scene(SIMPLE)
@@ -120,7 +120,7 @@ def test_of_interacting_resultants():
     [ub.EnergyMomentum(), ub.EnergyMomentum(0.05), ub.EnergyMomentumDecaying(), ub.Newmark()],
     ids=repr,
 )
-def test_dynamics(scheme):
+def test_a_beam_vibrates_about_its_static_state(scheme):
     """From the undeformed scene it vibrates about the static solution; from that it stays there."""
     beam, simple = scene(SIMPLE)
     run = ub.simulate(simple, scheme, t=(0, 0.5), dt=2e-3)

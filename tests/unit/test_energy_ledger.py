@@ -57,7 +57,7 @@ def test_throughput_counts_work_both_ways():
     assert off.worst == 4 / (9 + 5)
 
 
-def test_nothing_happens():
+def test_a_ledger_of_zeros_has_no_throughput():
     nothing = ub.Energy({"stored": np.zeros(3)}, {}, {})
     assert nothing.throughput == 0
     assert nothing.worst == 0
@@ -153,7 +153,7 @@ def busy():
     ],
     ids=str,
 )
-def test_dynamics_closes(scheme, dt):
+def test_the_ledger_of_dynamics_closes(scheme, dt):
     # 40 steps, or the time of the slowest motion
     solution = ub.simulate(busy(), scheme, t=(0, min(40 * dt, 2.0)), dt=dt)
     energy = solution.energy

@@ -104,7 +104,7 @@ def test_continuous_in_a_rotating_frame(degree):
     close(N, 100.0 * 64.0 * (1.2**2 - (0.2 + s) ** 2) / 2, 1e-6)
 
 
-def test_curved_beam():
+def test_diagrams_of_a_quarter_ring():
     """[closed] A quarter of a ring, φ from its end: N = -P sin φ, V = P cos φ, size of M P r sin φ.
 
     Chords of 1/16 of a right angle: N and V are exact to the square of their angle, 0.1²/8.
@@ -121,7 +121,7 @@ def test_curved_beam():
     close(np.abs(M), force * radius * np.sin(φ), 2e-3)
 
 
-def test_corners_stay():
+def test_forces_jump_at_corners():
     """An L of one beam: N and V change places at its corner."""
     section = ub.Section(EA=1e10, GA=1e10, EI=1e9)
     bent = ub.Beam.polyline([(0, 0), (0, 2), (2, 2)], section, cells=4)
@@ -169,7 +169,7 @@ def test_yielding_beams_and_hinges(shared_path):
     assert np.array_equal(loaded.diagram(loaded.scene["prop"]), diagram)
 
 
-def test_refused():
+def test_wrong_points_and_beams_are_refused():
     scene, beam = supported(2, lambda b: ub.Gravity())
     solution = static(scene)
     with pytest.raises(ArgumentError, match=r"diagram: points = 1 "):

@@ -248,7 +248,7 @@ def machine():
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.Newmark()])
-def test_restart(scheme, shared_path):
+def test_a_run_goes_on_from_a_checkpoint(scheme, shared_path):
     scene = machine()
     whole = run(scene, scheme, t=(0, 2), dt=0.01)
     file = ub.Checkpoint(shared_path / "run.checkpoint", every=30)
@@ -307,7 +307,7 @@ def test_the_reference_path():
         ),
     ],
 )
-def test_bad_laws(make, says):
+def test_bad_laws_are_refused(make, says):
     with pytest.raises(ub.ArgumentError, match=re.escape(says)):
         make()
 

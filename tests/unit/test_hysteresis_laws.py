@@ -32,7 +32,7 @@ def follow(law, strains, scheme=MIDDLE):
     return np.array(stresses), one
 
 
-def test_ramberg_osgood():
+def test_a_ramberg_osgood_law_follows_its_power():
     """[closed] strain = stress/C + offset (stress/limit)^n, then elastic; in one step or many."""
     law = LAWS["Ramberg-Osgood"]
     for σ in (0.5, 2.0, 3.7):
@@ -117,7 +117,7 @@ def test_bouc_wen_against_integration(law):
 
 @each_law
 @pytest.mark.parametrize("scheme", SCHEMES[1:], ids=str)
-def test_energies(law, scheme):
+def test_work_is_stored_or_dissipated(law, scheme):
     """Work is stored, dissipated or lost; over small steps nothing comes back from dissipation."""
     one, stored = Bars(1, LAWS[law], None, scheme), 0.0
     for strain in 0.05 * np.sin(np.linspace(0, 9, 400)[1:]):

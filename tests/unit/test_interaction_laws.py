@@ -67,7 +67,7 @@ def test_resultants_lie_within_the_surface(scheme):
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_tangents(scheme):
+def test_tangents_are_derivatives(scheme):
     """Against central differences, coupled in N and M."""
     cells = Cells(300, scheme)
     *before, last = histories(300, 4)
@@ -82,7 +82,7 @@ def test_tangents(scheme):
         assert np.mean(np.abs(D[:, :, k] - central).max(axis=1) > 1e-3 * EA) < 0.02
 
 
-def test_pure_resultants():
+def test_pure_resultants_reach_their_limits():
     """[closed] N = Np without curvature, M = Mp without strain, far beyond the elastic range."""
     strain = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 1.0], [-0.1, 0.0, 0.0], [0.0, 0.0, -1.0]])
     r = Cells(4, ub.Static()).step(strain)
@@ -130,6 +130,6 @@ def test_the_ledger_closes():
         (lambda: ub.AxialBending(0.0, 1.0), "AxialBending: axial"),
     ],
 )
-def test_refusals(make, says):
+def test_bad_interaction_laws_are_refused(make, says):
     with pytest.raises(ub.ArgumentError, match=says):
         make()

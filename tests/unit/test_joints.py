@@ -72,12 +72,12 @@ BAD = {
 
 
 @pytest.mark.parametrize(("build", "text"), BAD.values(), ids=BAD)
-def test_records(build, text):
+def test_wrong_records_are_refused(build, text):
     with raises(text):
         build()
 
 
-def test_scenes():
+def test_wrong_scenes_are_refused():
     one, other = body(name="one"), body(1.0, name="other")
     with raises("Scene: no beams and no bodies"):
         ub.Scene()

@@ -235,7 +235,7 @@ def lost_over(way):
 
 
 @CASES
-def test_reference(name, scheme):
+def test_the_reference_finds_the_same(name, scheme):
     _, (link,), scene = oscillator(LAWS[name])
     require_reference(run, scene, link, scheme, t=(0, 1))
 
@@ -266,7 +266,7 @@ def law_of(**members):
         ({"limit": lambda s, z: 1.0, "sliding": lambda s, e, r, z, dt: e / 0}, "Mine.sliding"),
     ],
 )
-def test_refusals(members, message):
+def test_wrong_limits_are_refused(members, message):
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e5, GA=1e5, EI=3.0))
     with pytest.raises(ub.ArgumentError, match=re.escape(message)):
         ub.Turn(ub.ground(1, 0), beam.end, law_of(**members))

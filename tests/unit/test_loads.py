@@ -38,7 +38,7 @@ def test_equal_tables_are_equal():
     assert ub.Table([0, 1], [0, 1]) == ub.Table((0, 1), (0, 1))
 
 
-def test_ramp():
+def test_a_ramp_grows_and_stays():
     ramp = ub.ramp(4.0)
     assert [ramp(t) for t in (-1, 0, 1, 4, 5)] == [0, 0, 0.25, 1, 1]
 
@@ -58,7 +58,7 @@ def check(reaction, expected):
     assert reaction == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
 
 
-def test_point_load():
+def test_a_reaction_balances_a_point_load():
     def load(b):
         return ub.PointLoad(b.at(0.75), force=(5, -7), moment=11)
 
@@ -66,7 +66,7 @@ def test_point_load():
     check(reaction_of(load), [-5, 7, 1.5 * 7 - 11])
 
 
-def test_line_load():
+def test_a_reaction_balances_a_line_load():
     def load(b):
         return ub.LineLoad(b, force=(3, -2), moment=5)
 

@@ -105,7 +105,7 @@ def test_stress_in_the_accepted_state(law, scheme):
 
 @each_law
 @each_scheme
-def test_tangents(law, scheme):
+def test_tangents_are_derivatives(law, scheme):
     """Against central differences, from random states, elastic cells to ones far beyond limits."""
     some = bars(law, scheme)
     *before, last = histories(200, steps=6)

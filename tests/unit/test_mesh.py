@@ -121,7 +121,7 @@ def test_as_if_beams_had_more_cells():
     assert len(a.section_forces(coarse.beams[0])) == 12
 
 
-def test_second_order():
+def test_errors_go_with_the_square_of_the_cell_length():
     """Steps of Richardson's extrapolation: errors of a fine mesh go with its h² (issue 6)."""
     scene = portal()
     tip = scene.beams[1].end

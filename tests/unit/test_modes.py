@@ -280,7 +280,7 @@ def test_a_thrown_body_flies_straight():
 # -- files and pictures --------------------------------------------------------------------------
 
 
-def test_shapes(shared_path, on_first_rank):
+def test_the_largest_displacement_of_a_mode_is_one(shared_path, on_first_rank):
     """The largest displacement is one, and the file has all modes."""
     scene = cantilever()
     found = ub.modes(scene, 3)
@@ -303,7 +303,7 @@ def test_shapes(shared_path, on_first_rank):
 
 
 @pytest.mark.serial
-def test_pictures(tmp_path):
+def test_modes_have_pictures(tmp_path):
     scene = cantilever(loads=[])
     found = ub.modes(scene, 4)
     ub.plot(found).savefig(tmp_path / "modes.png")
@@ -377,7 +377,7 @@ def test_change_of_stiffness_is_its_derivative():
 # -- wrong calls ---------------------------------------------------------------------------------
 
 
-def test_wrong_calls():
+def test_wrong_calls_are_refused():
     scene = cantilever()
     beam = scene.beams[0]
     other = cantilever(4)
@@ -402,7 +402,7 @@ def test_wrong_calls():
             call()
 
 
-def test_no_mass():
+def test_a_scene_without_mass_has_no_modes():
     section = ub.Section(EA=1e4, GA=4e3, EI=20.0)
     beam = ub.Beam((0, 0), (2, 0), section, cells=2)
     with pytest.raises(ub.ArgumentError, match="nothing that can move has mass"):

@@ -49,7 +49,7 @@ def place_error(cells):
 
 @warns
 @pytest.mark.parametrize("cells", [4, 8, 12])
-def test_place_error(cells):
+def test_the_error_of_an_opened_place_is_told(cells):
     """The closed form, to 3 %: V is that of a kept time, 0.01 s of 0.5 s from the opening."""
     beam, scene = pushed(ub.Softening(LIMIT, 100.0), cells=cells)
     with pytest.warns(ub.ModelWarning, match="girder: the hinge of the section opened in 1 cell, "):

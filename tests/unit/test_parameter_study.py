@@ -303,7 +303,7 @@ def test_the_file_is_written_on_the_way(tmp_path):
         (square, numbers(1, 2, 1), ("cases[2] = {'x': 1} is there twice",)),
     ],
 )
-def test_calls(member, cases, says):
+def test_wrong_calls_are_refused(member, cases, says):
     with raises("study: ", *says):
         ub.study(member, cases)
 
@@ -336,7 +336,7 @@ def test_members_that_return_different_things(other, shared_path):
     assert len(ub.Study.load(path)) == 1
 
 
-def test_unknown_results():
+def test_unknown_results_are_named():
     with raises("no result 'cube'; there is powers, square"):
         ub.study(square, numbers(1))["cube"]
 

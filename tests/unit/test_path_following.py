@@ -54,7 +54,7 @@ def down_to(place, v):
 
 
 @pytest.mark.parametrize("factor", [4.0, 20.0])
-def test_snap_through(factor):
+def test_a_two_bar_truss_snaps_through(factor):
     """[closed] The whole curve and both limit points: one cell a bar is exact.
 
     The solver's tolerance is 1e-10 of forces of 60 kN; a limit point is located to 1e-7 of a step.
@@ -280,7 +280,7 @@ def frame(corner):
 
 
 @pytest.mark.parametrize("free", ["N", "V", "M", "NM", "VM"])
-def test_releases(free):
+def test_releases_make_no_critical_points(free):
     """An elastic frame under small loads has no critical point; Newton's method takes few steps."""
     scene = frame(lambda a, b: ub.Release(a, b, free=free))
     path = ub.follow(scene, ub.LoadControl(1.0), steps=10)

@@ -43,7 +43,7 @@ OPENS = [law for law, (_, softening) in LAWS.items() if softening is not None]
 
 @each_law
 @each_scheme
-def test_tangents(law, scheme):
+def test_tangents_are_derivatives(law, scheme):
     """Against central differences; cells at a corner of a law are left out."""
     some = Bars(300, *LAWS[law], scheme)
     *before, last = histories(300, steps=5)

@@ -188,7 +188,7 @@ def test_time_series_show_bodies_and_links(series, beams):
 @pytest.mark.parametrize(
     ("every", "kept"), [(1, [0, 1, 2, 3, 4, 5, 6]), (2, [0, 2, 4, 6]), (4, [0, 4])]
 )
-def test_every(series, every, kept):
+def test_a_series_has_every_nth_state(series, every, kept):
     make, read = series
     solution = run(scene(), make(every=every))
     found = read()

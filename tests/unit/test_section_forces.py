@@ -206,7 +206,7 @@ def test_as_in_the_reference_path(scheme):
         assert np.abs(np.subtract(one, two)).max() < 1e-7 * np.abs(one.N).max()
 
 
-def test_paths():
+def test_section_forces_along_a_path_are_in_equilibrium():
     scene, joint = two_beams("line")
     path = ub.follow(scene, ub.LoadControl(0.05), steps=4)
     require_equilibrium(path, joint, np.arange(1, len(path)))

@@ -58,14 +58,14 @@ ANGLES = np.concatenate(
 
 
 @pytest.mark.parametrize("function", [ufl.sin, ufl.cos])
-def test_angles(function):
+def test_sines_and_cosines_are_those_of_the_c_library(function):
     """Within two last digits of the C library, also relative to what is near zero."""
     one, several = both(function, ANGLES)
     assert np.all(np.abs(several - one) <= 2 * np.spacing(np.abs(one)))
 
 
 @pytest.mark.parametrize("flag", ["-O2", "-ffp-contract=off", "-U__FP_FAST_FMA"])
-def test_quotients(flag):
+def test_quotients_are_right_to_the_last_digit(flag):
     """To the last digit but rarely, and 1 for equal numbers, also where products are rounded."""
     divide = "void divide(int n, const double *a, const double *b, double *c)"
     loop = (
@@ -104,7 +104,7 @@ def test_far_angles_lose_what_they_do_not_have():
     ids=["root", "powers", "constant or not", "not or constant"],
 )
 @pytest.mark.parametrize("cells", [1, 3, 4, 9])
-def test_expressions(expression, cells):
+def test_expressions_hold_for_any_number_of_cells(expression, cells):
     """Any number of cells, also such that leave some lanes empty."""
     one, several = both(expression, np.linspace(-1.0, 2.0, cells))
     assert np.allclose(several, one, rtol=1e-14, atol=0)
@@ -145,7 +145,7 @@ CONDITIONS = {
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
-def test_logical_operators(condition):
+def test_logical_operators_choose_exactly(condition):
     """Exactly: cells choose one number or the other."""
     values, holds = np.linspace(-1.0, 2.0, 13), CONDITIONS[condition]
     one, several = both(lambda x: ufl.conditional(holds(x), x**2, -1.0), values)

@@ -82,7 +82,7 @@ def test_small_displacement_is_that_of_the_table_book():
     assert abs(u) < 1e-11
 
 
-def test_rigid_rotation():
+def test_a_stiff_beam_rotates_rigidly():
     """A stiff beam driven at its start: position, rotation and velocity on the circle."""
     stiff = ub.Section(EA=1e9, GA=1e9, EI=1e9, rhoA=1.0, rhoI=1.0)
     beam = ub.Beam((1, 1), (3, 1), stiff, cells=2)

@@ -37,7 +37,7 @@ STEADY = {
 
 @pytest.mark.parametrize("load", STEADY.values(), ids=STEADY)
 @pytest.mark.parametrize("theta", [0.5, 0.75, 1.0])
-def test_steady_loads(load, theta):
+def test_under_steady_loads_both_static_schemes_agree(load, theta):
     """`EnergyMomentumStatic` arrives where `Static` does, in the first step, with an exact ledger.
 
     The loads are applied in parts that turn no node by more than 0.02 rad: forces are in error by
@@ -264,7 +264,7 @@ def test_a_hanging_body():
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
-def test_hanging_rods(scheme):
+def test_hanging_rods_stretch_under_their_weight(scheme):
     """[closed] ∫N/EA: (3/2 + 1/2) m g l/EA, for l = 1; small strains 2e-5."""
     scene = rods((0, 0), (0, -1), (0, -2))
     run = ub.simulate(scene, scheme, t=(0, 3), dt=0.5)

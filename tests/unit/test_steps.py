@@ -333,7 +333,7 @@ def test_connectors_are_kept_in_c(scheme):
 
 
 @pytest.mark.parametrize("make", [elastic, inelastic, connected])
-def test_thinned_states(make):
+def test_every_other_state_stays_when_states_are_thinned(make):
     """Every other state stays, whatever kept them."""
     simulation, ends = ub.Simulation(make(), ub.EnergyMomentum()), np.linspace(0.0, 0.6, 31)[1:]
     simulation.keep()

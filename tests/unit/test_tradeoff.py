@@ -375,7 +375,7 @@ def test_coarse_steps_that_fail_are_left_out(law):
         ({"budget": 1.0, "mesh": [2]}, ("mesh[0] = 2 is not a Mesh",)),
     ],
 )
-def test_calls(call, says):
+def test_wrong_calls_are_refused(call, says):
     call = {"scheme": ub.Static(), "t": (0, 1), "dt": 0.5, **call}
     if call["scheme"] == ():
         call["scheme"], says = [], ("scheme is empty",)
@@ -394,7 +394,7 @@ def test_calls(call, says):
         ({"q": lambda s: 0.0}, ("quantity 'q' is zero",)),
     ],
 )
-def test_quantities(quantities, says):
+def test_wrong_quantities_are_refused(quantities, says):
     with raises(*says):
         ub.tradeoff(SCENE, quantities, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.1)
 
@@ -423,7 +423,7 @@ def test_statics_needs_cells_alone():
     assert np.abs(found.limit["tip"] - end(fine)).max() < found.uncertainty["tip"] + 1e-5
 
 
-def test_a_vibration():
+def test_cells_and_steps_of_a_vibration_are_chosen():
     """A cantilever that is let go: cells and steps; its history as an array of one shape."""
     section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-3)
     scene = scenes.cantilever(section, cells=1, force=(0, 0.1), time=lambda t: math.sin(t) ** 2)

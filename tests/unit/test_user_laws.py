@@ -62,7 +62,7 @@ def test_a_law_without_variables():
     )
 
 
-def test_relaxation():
+def test_a_dashpot_relaxes_exponentially():
     """[closed] At constant strain stress decays as exp(-t C/eta); of second order at θ = 1/2."""
     errors = []
     for n in (10, 20):

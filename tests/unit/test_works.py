@@ -303,7 +303,7 @@ def same_works(resumed, whole):
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1), ub.Newmark(), ub.GeneralizedAlpha()])
-def test_restart(scheme, shared_path):
+def test_a_run_goes_on_from_a_checkpoint(scheme, shared_path):
     scene, field = flying(lambda t: 5 + t), ("soil", "magnet", "air", "magnet in time")
     whole = run(scene, scheme)
     file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
@@ -427,7 +427,7 @@ STRAY = ub.Beam((0, 1), (1, 1), SECTION, cells=2, name="stray")
         (lambda: ub.Scene([BEAM], works=3), ("works = 3 must be a list",)),
     ],
 )
-def test_bad_works(make, says):
+def test_bad_works_are_refused(make, says):
     with raises(*says):
         make()
 

@@ -157,7 +157,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("make", "message"), BAD, ids=[message for _, message in BAD])
-def test_bad_damping(make, message):
+def test_bad_damping_is_refused(make, message):
     with pytest.raises(ub.ArgumentError) as error:
         make()
     assert message in str(error.value)

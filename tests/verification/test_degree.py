@@ -63,7 +63,7 @@ def test_elastica(degree):
 
 @pytest.mark.parametrize("slenderness", [1e2, 1e4])
 @pytest.mark.parametrize("degree", MESHES)
-def test_no_locking(degree, slenderness):
+def test_one_cell_does_not_lock(degree, slenderness):
     """[closed] One cell of a cantilever with a tip force: v = F l³/3EI + F l/GA, ψ = F l²/2EI.
 
     Two Gauss points integrate a quadratic curvature exactly, so degrees 2 and 3 are exact; one

@@ -114,7 +114,7 @@ def test_work_of_friction():
     assert np.abs(rub.force).max() <= LIMIT * (1 + 1e-10)
 
 
-def test_second_order():
+def test_the_first_peak_converges_with_second_order():
     """The first peak, with four times the steps a sixteenth of the error.
 
     Samples of its position differ from it by (way of the sample)² as well, so that the energy

@@ -203,7 +203,7 @@ def test_energy_of_a_complete_opening_in_dynamics(law, cells, steps):
 
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()])
-def test_cycles(law, scheme):
+def test_cycles_dissipate_no_more_than_the_fracture_energy(law, scheme):
     """Opened, unloaded, opened the other way and back: elastic between, never more than G_f.
 
     What one opening takes from the limit, the other direction finds taken.

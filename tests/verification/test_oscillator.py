@@ -156,7 +156,7 @@ def yields_at(u, N):
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
 @pytest.mark.parametrize("kind", ["isotropic", "kinematic"])
-def test_loops(kind, scheme):
+def test_kinematic_loops_close(kind, scheme):
     """Kinematic hardening keeps the elastic range at 2 N_y, and the loop closes (Bauschinger).
 
     Isotropic hardening lets it grow by twice the hardening.  Increments are so chosen that all

@@ -84,7 +84,7 @@ def test_lee_frame_turning_points():
 # -- S7: deep arch -----------------------------------------------------------------------------
 
 
-def test_deep_arch():
+def test_a_deep_arch_has_its_two_limit_loads():
     """[calc] 897.287, which [pub] DaDeppo and Schmidt 1975 give as 897; the minimum after it.
 
     The cells are chords of the arc.  v of a maximum that is flat has two digits less than P.

@@ -345,7 +345,7 @@ def test_the_frame_opens_closes_and_turns_back():
     [{"angle": 2.3}, {"length": 1e3, "force": 1e-6}, {"reverse": True}],
     ids=["rotated", "units", "reversed"],
 )
-def test_invariance(change):
+def test_the_motion_does_not_depend_on_the_statement(change):
     """Turned, in other units, with a beam given from its other end: the same motion.
 
     To 1e-8 of the motion: 160 steps of a tolerance of 1e-10.

@@ -67,7 +67,7 @@ def rates(scheme, steps=(50, 100, 200)):
 
 
 @pytest.mark.parametrize("scheme", SECOND_ORDER, ids=str)
-def test_second_order(scheme):
+def test_errors_are_of_second_order(scheme):
     """What is measured against has a hundredth of the error of the finest run, so 1 % off 4."""
     orders, runs = rates(scheme)
     assert orders.min() > 1.7  # annihilating needs shorter steps until only the leading term counts
@@ -82,7 +82,7 @@ def test_second_order(scheme):
 
 
 @pytest.mark.parametrize("scheme", FIRST_ORDER, ids=str)
-def test_first_order(scheme):
+def test_errors_are_of_first_order(scheme):
     orders, _ = rates(scheme)
     assert orders[-1] == pytest.approx(1, abs=0.2)
 
@@ -358,7 +358,7 @@ TURNING = one_beam(loads=lambda beam: ub.RotatingFrame(1.0))
         (ub.GeneralizedAlpha(), TURNING, "RotatingFrame.* needs the mean velocity"),
     ],
 )
-def test_refused(scheme, scene, message):
+def test_wrong_schemes_are_refused(scheme, scene, message):
     with pytest.raises(ub.ArgumentError, match=message):
         ub.simulate(scene, scheme, t=(0, 1), dt=0.1)
 

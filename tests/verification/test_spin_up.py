@@ -65,7 +65,7 @@ def limit():
     return after, np.abs(after - before)
 
 
-def test_tip(limit):
+def test_the_tip_follows_the_table(limit):
     """[calc] Table of (u, v), to 1e-5 of the largest deflection.
 
     Our limit is good to 4e-7 (asserted), and the last digit of the table is not: the limit has

@@ -81,7 +81,7 @@ def test_loss_of_energy():
 
 @pytest.mark.parametrize("alpha", [0.0, 0.01])
 @pytest.mark.parametrize("rigidity", [1e2, 1e3, 1e4])
-def test_ledger(rigidity, alpha):
+def test_the_ledger_closes(rigidity, alpha):
     """The ledger closes to 1e-9 of the work over 2.5 s, also with links near round-off.
 
     Links 10⁴ times as stiff as the beam know their force to ε EA = 8e-7 N only.

@@ -118,7 +118,7 @@ def test_exact_statics(eta, T, cells):
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
 @pytest.mark.parametrize("law", [perzyna, duvaut_lions])
-def test_limits(law, scheme):
+def test_limits_of_viscosity_are_the_plastic_and_the_elastic_law(law, scheme):
     """No viscosity is the plastic law, and infinite viscosity the elastic one, to round-off."""
     plastic, elastic = (moments(b, scheme=scheme) for b in (ub.ElastoPlastic(M_Y, K * I), None))
     np.testing.assert_allclose(moments(law(0.0), scheme=scheme), plastic, rtol=1e-12)

@@ -39,7 +39,7 @@ def test_two_names_of_one_law(tau, scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES)
 @pytest.mark.parametrize("law", [ub.Perzyna, ub.DuvautLions])
-def test_limits(law, scheme):
+def test_limits_of_viscosity_are_the_plastic_and_the_elastic_law(law, scheme):
     """Infinite viscosity is elastic, none rate-independent; both reached in proportion.
 
     A tenth of the distance with a tenth of the viscosity, or of its inverse: to 5 %, which the
