@@ -12,16 +12,12 @@ import ufl
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.compiled.c_library import ffi
-from ufl_beam.compiled.simd_kernels import LANES
 from ufl_beam.discretization import compiled_forms
-from ufl_beam.discretization.compiled_forms import patterns
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import DolfinxFields, Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, strain
-from ufl_beam.terms.beam_forces import elastic_forms
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 
@@ -348,41 +344,3 @@ def test_matrix_entries_that_do_not_exist_are_refused():
     for beyond in (-1, matrix.size):
         with pytest.raises(ValueError, match="no such entry"):
             matrix.positions(np.array([beyond]), np.array([0]))
-
-
-@pytest.mark.serial
-@pytest.mark.parametrize("degree", [1, 2, 3])
-def test_energies_share_the_values_of_the_force(degree):
-    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=5)
-    scene = clamped(beam, loads=[ub.Gravity()])
-    mesh = ub.Mesh(degree=degree)
-    simulation = ub.Simulation(scene, scheme := ub.EnergyMomentum(alpha=0.1), mesh=mesh)
-    (beams,) = simulation.beams
-    energies = beams._stored, *beams._losses
-    assert all(np.shares_memory(x._packed, beams._force._packed) for x in energies)
-    simulation.step_to(0.01)
-    fields = Fields(simulation.share)
-    own = fields.kernel(elastic_forms(fields.element, scheme).stored, beams._q1)
-    assert beams._stored.value(simulation.q) == pytest.approx(own.value(simulation.q), rel=1e-13)
-
-
-@pytest.mark.serial
-def test_batches_alike_have_one_pattern():
-    """A beam has those of both ends and of what is between, in rows but for the free end."""
-    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=1000)
-    other = ub.Beam((1, 0), (2, 0), SECTION, cells=3)
-    scene = ub.Scene([beam, other], joints=[ub.Revolute(beam.end, other.start)])
-    simulation = ub.Simulation(scene, ub.EnergyMomentum())
-    A, dofs = simulation.equation.A, simulation.share.cell_dofs
-    places = A.blocks(np.ascontiguousarray(dofs), LANES)
-    found = patterns(places)
-    pattern = np.frombuffer(ffi.buffer(found["pattern"]), dtype=np.uint8)
-    pattern = pattern.reshape(-1, *places.shape[1:])
-    assert np.array_equal(pattern[found["has"]], places)
-    assert len(pattern) <= 5
-    of_nodes = pattern.reshape(-1, 6, 6, LANES)[:, :, [0, 2, 4, 1, 3, 5]]
-    in_rows = (np.diff(of_nodes.astype(int), axis=2) == 1).all(axis=(1, 2, 3))
-    assert in_rows.tolist() == [True] * found["in_rows"] + [False] * (
-        len(pattern) - found["in_rows"]
-    )
-    assert 0 < found["in_rows"] < len(pattern)

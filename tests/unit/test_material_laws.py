@@ -10,7 +10,6 @@ from scipy.integrate import quad
 
 import ufl_beam as ub
 from ufl_beam.model.fibres import Layout
-from ufl_beam.model.law_functions import positive, sign
 from ufl_beam.model.material_law import State
 
 C, LIMIT, H, B, ETA = 200.0, 3.0, 20.0, 10.0, 0.5
@@ -170,13 +169,6 @@ def test_energies_of_a_step_are_those_of_the_law():
     assert law.hardening_energy(state(0.3, 0.6))[0] == pytest.approx((B * 0.09 + H * 0.36) / 2)
     change = state(-0.3, 0.3)
     assert law.dissipation(0.5, state(), change, 0.1)[0] == pytest.approx((LIMIT + ETA * 3) * 0.3)
-
-
-def test_brackets():
-    x = np.array([-2.0, 0.0, 3.0])
-    assert list(sign(x)) == [-1, 1, 1]
-    assert list(positive(x)) == [0, 0, 3]
-    assert list(positive(x[[0, 2]] + 1j)) == [0, 3 + 1j]
 
 
 # -- softening ---------------------------------------------------------------------------------

@@ -122,7 +122,7 @@ def test_xdmf_and_a_checkpoint_of_one_stem(shared_path, on_first_rank):
 
 
 def test_devices_may_be_shared():
-    run(ub.History("/dev/null"), ub.History("/dev/null"))
+    run(ub.History("/dev/null"), ub.History("/dev/null"))  # is not refused
 
 
 def test_the_file_of_a_study_is_not_that_of_a_member(shared_path):
