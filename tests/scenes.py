@@ -6,6 +6,7 @@ Sources are named where a scene is somebody's; lengths in m, SI units, unless a 
 """
 
 import math
+from itertools import pairwise
 
 import ufl_beam as ub
 
@@ -23,6 +24,12 @@ SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 def clamped(beam, *supports, **parts):
     """A beam clamped at its start, with other supports, and loads or other parts of a scene."""
     return ub.Scene([beam], supports=[ub.Clamped(beam.start), *supports], **parts)
+
+
+def rigid_chain(beams, joints=(), **parts):
+    """Beams joined rigidly, each start to the end before; other joints, and parts of a scene."""
+    corners = [ub.Rigid(one.end, other.start) for one, other in pairwise(beams)]
+    return ub.Scene(beams, joints=[*corners, *joints], **parts)
 
 
 # -- statics -----------------------------------------------------------------------------------
@@ -76,9 +83,8 @@ def portal(*, cells=4, H=20e3, V=-40e3, time=GROWING, feet=ub.Clamped):
     left = ub.Beam((0, 0), (0, 4), column, cells=cells, name="left")
     roof = ub.Beam((0, 4), (6, 4), girder, cells=2 * cells, name="roof")
     right = ub.Beam((6, 4), (6, 0), column, cells=cells, name="right")
-    return ub.Scene(
+    return rigid_chain(
         [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[feet(left.start), feet(right.end)],
         loads=[
             ub.PointLoad(left.end, force=(H, 0), amplitude=time),
@@ -101,9 +107,8 @@ def struck_portal(*, hinges=None):
     roof = ub.Beam((0, 3), (4, 3), section, cells=4)
     right = ub.Beam((4, 3), (4, 0), section, cells=3)
     blow = ub.Table([0, 0.01, 0.02], [0, 1, 0])
-    return ub.Scene(
+    return rigid_chain(
         [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
         loads=[ub.PointLoad(left.end, force=(200e3, 0), amplitude=blow)],
     )

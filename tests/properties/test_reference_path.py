@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 import random_machines
 import random_scenes
-from scenes import clamped
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 from ufl_beam.reference import (
@@ -363,9 +363,8 @@ def yielding():
         hinges={0.5: ub.Softening(20.0, fracture_energy=5.0)},
     )  # fmt: skip
     spring = ub.Spring(3e3, law=ub.ElastoPlastic(40.0, isotropic=100.0))
-    return ub.Scene(
+    return rigid_chain(
         [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
         connectors=[ub.Stretch(left.start, roof.end, spring)],
         loads=[ub.PointLoad(roof.at(1 / 3), force=(900.0, -700.0), amplitude=ub.ramp(0.1))],

@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 import numpy as np
 import pytest
-from scenes import SECTION, clamped
+from scenes import SECTION, clamped, rigid_chain
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
@@ -28,9 +28,8 @@ def inelastic():
     soft = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0, bending=law)
     left = ub.Beam((0, 0), (0, 3), soft, cells=4)
     roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4, hinges=hinge)
-    return ub.Scene(
+    return rigid_chain(
         [left, roof],
-        joints=[ub.Rigid(left.end, roof.start)],
         supports=[ub.Clamped(left.start), ub.Pinned(roof.end)],
         loads=[ub.PointLoad(left.end, force=(40.0, -10.0), amplitude=lambda t: min(t, 0.2))],
         damping=[ub.Rayleigh(mass=0.1, stiffness=1e-3)],

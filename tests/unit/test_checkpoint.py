@@ -12,7 +12,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from scenes import clamped
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 from ufl_beam.discretization.state_io import Memory
@@ -429,9 +429,8 @@ def test_the_last_step_of_cells_that_the_first_process_does_not_have():
     yielding = ub.Section(**numbers, bending=ub.ElastoPlastic(50.0))
     first = ub.Beam((0, 0), (1, 0), yielding, cells=4)
     last = ub.Beam((1, 0), (2, 0), ub.Section(**numbers), cells=4)
-    scene = ub.Scene(
+    scene = rigid_chain(
         [first, last],
-        joints=[ub.Rigid(first.end, last.start)],
         supports=[ub.Clamped(first.start)],
         loads=[ub.PointLoad(last.end, force=(0, -5.0))],
     )

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from scenes import clamped
+from scenes import clamped, rigid_chain
 from scipy.sparse import csc_array, diags_array
 
 import ufl_beam as ub
@@ -98,9 +98,8 @@ def test_a_plastic_mechanism_names_the_cell():
     weak = ub.Section(**numbers, bending=ub.ElastoPlastic(yield_limit=1.0))
     fuse = ub.Beam((0, 0), (0.1, 0), weak, cells=1, name="fuse")
     arm = ub.Beam((0.1, 0), (1, 0), ub.Section(**numbers), cells=3, name="arm")
-    scene = ub.Scene(
+    scene = rigid_chain(
         [fuse, arm],
-        joints=[ub.Rigid(fuse.end, arm.start)],
         supports=[ub.Clamped(fuse.start)],
         loads=[ub.PointLoad(arm.end, moment=1.0, amplitude=lambda t: t)],
     )

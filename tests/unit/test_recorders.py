@@ -8,7 +8,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from scenes import SECTION, clamped
+from scenes import SECTION, clamped, rigid_chain
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
@@ -22,9 +22,8 @@ def scene():
     """Two beams at an angle; no two vertices at one point but those of the rigid corner."""
     post = ub.Beam((0, 0), (0, 2), SECTION, cells=3, name="post")
     arm = ub.Beam((0, 2), (3, 3), SECTION, cells=4, name="arm")
-    return ub.Scene(
+    return rigid_chain(
         [post, arm],
-        joints=[ub.Rigid(post.end, arm.start)],
         supports=[ub.Clamped(post.start)],
         loads=[ub.PointLoad(arm.end, force=(5, -30), amplitude=ub.ramp(1.0))],
     )

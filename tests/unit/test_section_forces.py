@@ -7,7 +7,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from scenes import clamped
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 
@@ -379,10 +379,11 @@ def test_supports_of_places_that_a_joint_puts_together():
     a = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="a")
     b = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="b")
     pin, hold = ub.Pinned(a.end), ub.PrescribedDisplacement(b.start, psi=0.0)
-    scene = ub.Scene(
-        [a, b], joints=[ub.Rigid(a.end, b.start)], supports=[ub.Pinned(a.start), pin, hold],
+    scene = rigid_chain(
+        [a, b],
+        supports=[ub.Pinned(a.start), pin, hold],
         loads=[ub.PointLoad(b.end, force=(0.0, -1.0))],
-    )  # fmt: skip
+    )
     run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
     # [closed] b is a cantilever: 1 N, 1 N m
     assert run.reaction(pin)[-1] == pytest.approx((0, 1, 0), abs=1e-6)
@@ -412,7 +413,7 @@ def test_two_supports_that_hold_the_same_are_refused(one, other, held):
     with pytest.raises(
         ub.ArgumentError, match=f"supports in conflict: .* both hold {held}; remove"
     ):
-        ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)], supports=[one(a.end), other(b.start)])
+        rigid_chain([a, b], supports=[one(a.end), other(b.start)])
 
 
 # -- extremes --------------------------------------------------------------------------------------

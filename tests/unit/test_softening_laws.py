@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import clamped
+from scenes import clamped, rigid_chain
 from scipy.integrate import quad
 from uniaxial_points import LENGTH, Bars
 from user_laws import Exponential, Fading, Kinked, Petersson, Rising
@@ -328,10 +328,11 @@ def test_of_two_members_the_one_that_may_bear_more_keeps_its_hinge():
     def hinges(*laws):
         one = ub.Beam((0, 0), (1, 0), section, hinges={1.0: laws[0]})
         two = ub.Beam((1, 0), (1, 1), section, hinges={0.0: laws[1]})
-        scene = ub.Scene(
-            [one, two], joints=[ub.Rigid(one.end, two.start)], supports=[ub.Clamped(one.start)],
+        scene = rigid_chain(
+            [one, two],
+            supports=[ub.Clamped(one.start)],
             loads=[ub.PointLoad(two.end, force=(1.0, 0.0))],
-        )  # fmt: skip
+        )
         return len(scene.hinges)
 
     strong = ub.Softening(1.2 * T, G)

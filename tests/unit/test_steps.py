@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from scenes import SECTION, clamped
+from scenes import SECTION, clamped, rigid_chain
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
@@ -31,9 +31,8 @@ def elastic():
     """Two load vectors, one with a function of Python, and a support that moves."""
     left = ub.Beam((0, 0), (0, 3), SECTION, cells=4)
     roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4)
-    return ub.Scene(
+    return rigid_chain(
         [left, roof],
-        joints=[ub.Rigid(left.end, roof.start)],
         supports=[
             ub.Clamped(left.start),
             ub.PrescribedDisplacement(roof.end, u=lambda t: 0.05 * t, v=0.0),
@@ -59,9 +58,8 @@ def inelastic():
     )
     left = ub.Beam((0, 0), (0, 3), soft, cells=4)
     roof = ub.Beam((0, 3), (4, 3), weak, cells=4)
-    return ub.Scene(
+    return rigid_chain(
         [left, roof],
-        joints=[ub.Rigid(left.end, roof.start)],
         supports=[ub.Clamped(left.start), ub.Pinned(roof.end)],
         loads=[ub.PointLoad(left.end, force=(40.0, -10.0), amplitude=ub.ramp(0.4))],
     )
@@ -130,9 +128,8 @@ def followed():
     """Loads that turn with their sections, two at one place, beside one that does not."""
     left = ub.Beam((0, 0), (0, 3), SECTION, cells=4)
     roof = ub.Beam((0, 3), (4, 3), SECTION, cells=4)
-    return ub.Scene(
+    return rigid_chain(
         [left, roof],
-        joints=[ub.Rigid(left.end, roof.start)],
         supports=[ub.Clamped(left.start)],
         loads=[
             ub.FollowerLoad(roof.end, force=(-3.0, 1.0), amplitude=lambda t: np.sin(3.0 * t)),

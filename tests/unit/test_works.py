@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import ufl
 from helpers import raises, run
-from scenes import clamped
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 from ufl_beam.discretization.compiled_forms import prepared
@@ -47,9 +47,8 @@ def flying(b=5.0, cells=4):
     first = ub.Beam((0, 0), (2, 0.5), SECTION, cells=cells)
     second = ub.Beam((2, 0.5), (3, 0), SECTION, cells=cells // 2)
     spin = ub.Velocity((first, second), linear=(1.0, 2.0), angular=3.0)
-    return ub.Scene(
+    return rigid_chain(
         [first, second],
-        joints=[ub.Rigid(first.end, second.start)],
         initial=[spin],
         loads=[ub.PointLoad(first.start, force=(0, 3))],
         works=works(second, b),

@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import ufl
-from scenes import clamped
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 
@@ -28,9 +28,7 @@ def a_frame(EA, cells):
     right = ub.Beam((1, 1), (2, 0), section, cells=cells)
     load = ub.PointLoad(right.start, force=(0, -8), amplitude=growing)
     supports = [ub.Clamped(left.start), ub.Clamped(right.end)]
-    scene = ub.Scene(
-        [left, right], joints=[ub.Rigid(left.end, right.start)], supports=supports, loads=[load]
-    )
+    scene = rigid_chain([left, right], supports=supports, loads=[load])
     return right.start, scene, 8 / 2**0.5
 
 
@@ -143,12 +141,7 @@ def test_a_frame_of_roorda_has_a_limit_point():
         girder = ub.Beam((0, 1), (1, 1), section, cells=16)
         load = ub.PointLoad(post.end, force=(0, -1), amplitude=growing)
         supports = [ub.Pinned(post.start), ub.Pinned(girder.end)]
-        scene = ub.Scene(
-            [post, girder],
-            joints=[ub.Rigid(post.end, girder.start)],
-            supports=supports,
-            loads=[load],
-        )
+        scene = rigid_chain([post, girder], supports=supports, loads=[load])
         path = ub.follow(
             scene, ub.ArcLength(0.02, factor=5), until=lambda now: bool(now.solution.critical)
         )

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from scenes import clamped
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 
@@ -48,9 +48,8 @@ def softening_portal():
     roof = ub.Beam((0, 4), (6, 4), section, cells=2, name="roof")
     right = ub.Beam((6, 4), (6, 0), section, cells=2, name="right", hinges={0.75: law})
     shake = ub.PointLoad(left.end, force=(20e3, 0.0), amplitude=lambda t: math.sin(8 * t))
-    return ub.Scene(
+    return rigid_chain(
         [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
         damping=[ub.Rayleigh(mass=2.0)],
         loads=[shake],
