@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from dataclasses import dataclass
 
 from mpi4py import MPI
 
@@ -23,6 +24,13 @@ def run(scene, scheme=None, t=(0, 1), dt=0.1, **options):
 def raises(*parts, kind=ub.ArgumentError):
     """`pytest.raises` for an error whose message has all `parts`, in this order."""
     return pytest.raises(kind, match="(?s)" + ".*".join(map(re.escape, parts)))
+
+
+def law_of(fields=None, **members):
+    """A connector law of a user, with numbers as `fields`, and other members."""
+    names = dict.fromkeys(fields or {}, float)
+    kind = type("Mine", (ub.ConnectorLaw,), {"__annotations__": names, **members})
+    return dataclass(frozen=True)(kind)(**(fields or {}))
 
 
 def require_no_gain(energy):

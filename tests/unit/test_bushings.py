@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from helpers import AfterEachStep, require_reference, require_restart
+from helpers import AfterEachStep, law_of, require_reference, require_restart
 from scenes import clamped
 
 import ufl_beam as ub
@@ -369,11 +369,6 @@ def test_a_pin_that_is_held_by_friction_rests():
 
 
 # -- what is refused -----------------------------------------------------------------------------
-
-
-def law_of(**members):
-    kind = type("Mine", (ub.ConnectorLaw,), {"__annotations__": {}, **members})
-    return dataclass(frozen=True)(kind)()
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,13 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from helpers import needs_mpirun, on_two_processes, require_reference, require_restart
+from helpers import (
+    law_of,
+    needs_mpirun,
+    on_two_processes,
+    require_reference,
+    require_restart,
+)
 from scenes import clamped
 from scipy.integrate import solve_ivp
 
@@ -473,15 +479,6 @@ def test_a_stop_without_damping_has_no_entry():
 
 
 # -- what is refused -----------------------------------------------------------------------------
-
-
-def law_of(**members):
-    """A law with fields and methods of a test."""
-    fields = members.pop("fields", {})
-    kind = type(
-        "Mine", (ub.ConnectorLaw,), {"__annotations__": dict.fromkeys(fields, float), **members}
-    )
-    return dataclass(frozen=True)(kind)(**fields)
 
 
 def quadratic(self, motion, state):

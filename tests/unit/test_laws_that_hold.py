@@ -9,7 +9,7 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from helpers import require_reference, require_restart
+from helpers import law_of, require_reference, require_restart
 
 import ufl_beam as ub
 from ufl_beam.model.material_law import initial_state
@@ -244,11 +244,6 @@ def test_the_reference_finds_the_same(name, scheme):
 def test_restart_and_start(scheme, shared_path):
     _, links, scene = oscillator(*LAWS.values())
     require_restart(run, scene, links, scheme, shared_path, until=1.0)
-
-
-def law_of(**members):
-    kind = type("Mine", (ub.ConnectorLaw,), {"__annotations__": {}, **members})
-    return dataclass(frozen=True)(kind)()
 
 
 @pytest.mark.parametrize(

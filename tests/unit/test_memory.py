@@ -12,6 +12,7 @@ from scenes import clamped, rigid_chain, swing
 
 import ufl_beam as ub
 from ufl_beam.compiled import jit
+from ufl_beam.memory import no_garbage_collection
 
 unsanitized = pytest.mark.skipif(
     bool(jit.EXTRA), reason="the address sanitizer keeps what is freed for a while"
@@ -132,3 +133,21 @@ def test_memory_does_not_grow_with_the_members_of_a_study():
     assert len(set(study["end"][:, 1])) == 1000
     # Records of a member take 1 kB; what a simulation holds, some 100 kB, would be 80 MB
     assert memory[999] - memory[200] < 4 * MEBIBYTE
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_garbage_collection_is_as_it_was(enabled):
+    try:
+        if not enabled:
+            gc.disable()
+        with pytest.raises(KeyError), no_garbage_collection(), no_garbage_collection():
+            raise KeyError if not gc.isenabled() else ValueError
+        assert gc.isenabled() == enabled
+    finally:
+        gc.enable()
+
+
+def test_a_refused_scene_leaves_garbage_collection_on():
+    with pytest.raises(ub.ArgumentError, match="no beams"):
+        ub.Scene()
+    assert gc.isenabled()

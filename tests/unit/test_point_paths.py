@@ -19,6 +19,10 @@ LAWS = {
     "softening": (ub.ElastoPlastic(math.inf), SOFTENS),
     "linear": (ub.ElastoPlastic(math.inf), ub.LinearSoftening(4.0, 0.3)),
     "both": (ub.ElastoPlastic(2.0, 30.0), SOFTENS),
+    "viscous both": (
+        ub.ElastoPlastic(2.0, 5.0, 5.0, ub.Perzyna(0.5)),
+        ub.LinearSoftening(4.0, 0.3),
+    ),
     "joint": (ub.ElastoPlastic(math.inf), ub.Softening(0.0, 1.0)),
     "power": (PowerLaw(3.0, 0.01, 5.0), None),
     "power, softening": (PowerLaw(2.5, 0.01, 5.0), SOFTENS),

@@ -11,7 +11,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import ufl
-from helpers import raises, run
+from helpers import raises, require_restart, run
 from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
@@ -296,21 +296,9 @@ def test_any_number_of_processes(scheme):
         np.testing.assert_allclose(together.energy[name], alone.energy[name], atol=1e-8)
 
 
-def same_works(resumed, whole):
-    """To the last bit on one process; several add their parts in another order."""
-    np.testing.assert_allclose(resumed, whole, rtol=0, atol=1e-13 * (MPI.COMM_WORLD.size > 1))
-
-
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1), ub.Newmark(), ub.GeneralizedAlpha()])
 def test_a_run_goes_on_from_a_checkpoint(scheme, shared_path):
-    scene, field = flying(lambda t: 5 + t), ("soil", "magnet", "air", "magnet in time")
-    whole = run(scene, scheme)
-    file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
-    run(scene, scheme, t=(0, 1), dt=0.05, checkpoint=file)
-    resumed = run(scene, scheme, checkpoint=file)
-    assert np.array_equal(resumed.q, whole.q)
-    for name in field:
-        same_works(resumed.energy[name], whole.energy[name])
+    require_restart(run, flying(lambda t: 5 + t), (), scheme, shared_path, until=2)
 
 
 @pytest.mark.filterwarnings("ignore:.*takes v:ufl_beam.ModelWarning")  # motion in time is meant
@@ -318,12 +306,7 @@ def test_a_run_goes_on_from_a_checkpoint(scheme, shared_path):
 def test_restart_in_statics(scheme, shared_path):
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
     scene = clamped(beam, works=works(b=lambda t: 5 + t))
-    whole = run(scene, scheme, dt=0.2)
-    file = ub.Checkpoint(shared_path / "run.checkpoint", every=3)
-    run(scene, scheme, t=(0, 1), dt=0.2, checkpoint=file)
-    resumed = run(scene, scheme, dt=0.2, checkpoint=file)
-    assert np.array_equal(resumed.q, whole.q)
-    same_works(resumed.energy["air"], whole.energy["air"])
+    require_restart(partial(run, dt=0.2), scene, (), scheme, shared_path, until=2)
 
 
 def test_a_continued_run():
