@@ -87,22 +87,6 @@ class _Writer(Laws):
 
     # -- draws ---------------------------------------------------------------------------------
 
-    def _chance(self, part):
-        return self._random.random() < part
-
-    def _integer(self, low, high):
-        return int(self._random.integers(low, high + 1))
-
-    def _some(self, low, high):
-        return float(self._random.uniform(low, high))
-
-    def _size(self, low, high):
-        """A size whose decimal logarithm is uniform."""
-        return 10 ** self._some(low, high)
-
-    def _one(self, choices):
-        return choices[self._integer(0, len(choices) - 1)]
-
     def _polar(self, size):
         angle = self._some(-math.pi, math.pi)
         return size * math.cos(angle), size * math.sin(angle)
