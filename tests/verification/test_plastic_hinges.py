@@ -292,67 +292,6 @@ def test_no_hinge_where_no_moment_is():
     assert corner(WEAK, WEAK, joint=ub.Revolute).hinges == ()
 
 
-# -- properties ----------------------------------------------------------------------------------
-
-
-def frame(angle=0.0, length=1.0, force=1.0, reverse=False):
-    """A two-bar frame whose hinges open and close; in other units and directions, reversed."""
-
-    def at(x, y):
-        c, s = math.cos(angle), math.sin(angle)
-        return length * (c * x - s * y), length * (s * x + c * y)
-
-    section = ub.Section(
-        EA=1e5 * force, GA=1e5 * force, EI=100.0 * force * length**2,
-        rhoA=force / length**2, rhoI=1e-3 * force,
-    )  # fmt: skip
-    moment = force * length
-    soft = ub.Softening(2.0 * moment, 0.5 * moment)
-    hard = ub.ElastoPlastic(3.0 * moment, isotropic=5.0 * moment, kinematic=2.0 * moment)
-    post = ub.Beam(at(0, 0), at(0, 1), section, cells=4, hinges={0.0: soft})
-    ends = [at(0, 1), at(1.5, 1)]
-    hinges = {0.25: hard, 1.0: soft}
-    if reverse:
-        ends.reverse()
-        hinges = {1 - s: law for s, law in hinges.items()}
-    arm = ub.Beam(*ends, section, cells=8, hinges=hinges)
-    near, far = (arm.end, arm.start) if reverse else (arm.start, arm.end)
-    push = ub.Table([0, 0.2, 0.4, 0.6], [0, 1, -1, 0.5])
-    x, y = at(2.0 * force / length, -6.0 * force / length)
-    scene = ub.Scene(
-        [post, arm],
-        joints=[ub.Rigid(post.end, near)],
-        supports=[ub.Clamped(post.start), ub.PrescribedDisplacement(far, psi=0)],
-        loads=[ub.PointLoad(far, force=(x, y), amplitude=push)],
-    )
-    solution = ub.simulate(scene, ub.EnergyMomentum(0.02, 0.02), t=(0, 0.8), dt=0.005)
-    u = solution.displacement(far)[:, :2] / length
-    c, s = math.cos(angle), math.sin(angle)
-    lost = solution.energy.lost["hinges"] / moment
-    jumps = [solution.connector(hinge).motion for hinge in scene.hinges]
-    return np.column_stack([c * u[:, 0] + s * u[:, 1], -s * u[:, 0] + c * u[:, 1], lost]), jumps
-
-
-def test_the_frame_opens_closes_and_turns_back():
-    """All three hinges move, one of them both ways."""
-    _, jumps = frame()
-    assert all(np.abs(jump).max() > 1e-3 for jump in jumps)
-    assert any(np.diff(jump).min() < 0 < np.diff(jump).max() for jump in jumps)
-
-
-@pytest.mark.parametrize(
-    "change",
-    [{"angle": 2.3}, {"length": 1e3, "force": 1e-6}, {"reverse": True}],
-    ids=["rotated", "units", "reversed"],
-)
-def test_the_motion_does_not_depend_on_the_statement(change):
-    """Turned, in other units, with a beam given from its other end: the same motion.
-
-    To 1e-8 of the motion: 160 steps of a tolerance of 1e-10.
-    """
-    np.testing.assert_allclose(frame(**change)[0], frame()[0], rtol=0, atol=1e-8)
-
-
 # -- rigid-plastic connectors --------------------------------------------------------------------
 
 
