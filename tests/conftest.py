@@ -32,6 +32,12 @@ def _no_garbage():
     gc.freeze()
 
 
+def pytest_collection_finish(session):
+    """What exists before the first test stays; collections then look at what tests made only."""
+    gc.collect()
+    gc.freeze()
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_pyfunc_call():
     """Skip tests of the reference solver on several ranks, which it refuses by name."""

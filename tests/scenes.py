@@ -6,6 +6,7 @@ Sources are named where a scene is somebody's; lengths in m, SI units, unless a 
 """
 
 import math
+from itertools import pairwise
 
 import ufl_beam as ub
 
@@ -14,6 +15,21 @@ SLENDER = ub.Section(EA=1e8, GA=1e8, EI=1.0)
 
 GROWING = ub.ramp(1.0)
 """Time function of static loads that are to be followed from t = 0 to 1."""
+
+
+SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
+"""For beams of some metres, of which a test needs no more than that they bend and move."""
+
+
+def clamped(beam, *supports, **parts):
+    """A beam clamped at its start, with other supports, and loads or other parts of a scene."""
+    return ub.Scene([beam], supports=[ub.Clamped(beam.start), *supports], **parts)
+
+
+def rigid_chain(beams, joints=(), **parts):
+    """Beams joined rigidly, each start to the end before; other joints, and parts of a scene."""
+    corners = [ub.Rigid(one.end, other.start) for one, other in pairwise(beams)]
+    return ub.Scene(beams, joints=[*corners, *joints], **parts)
 
 
 # -- statics -----------------------------------------------------------------------------------
@@ -38,21 +54,13 @@ def cantilever(
     """
     beam = ub.Beam((0, 0), (length, 0), section, cells=cells)
     at_end = [load(beam.end, force=force, moment=moment, amplitude=time)]
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=at_end + [further(beam) for further in loads],
-    )
+    return clamped(beam, loads=at_end + [further(beam) for further in loads])
 
 
 def quarter_circle(section=SLENDER, *, radius=1.0, cells=8, force=(0.0, 0.0), time=GROWING):
     """Arc about the origin from (radius, 0), clamped, to (0, radius), loaded."""
     beam = ub.Beam.arc((0, 0), radius, (0, math.pi / 2), section, cells=cells)
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=force, amplitude=time)],
-    )
+    return clamped(beam, loads=[ub.PointLoad(beam.end, force=force, amplitude=time)])
 
 
 def beam_on_roller(
@@ -75,9 +83,8 @@ def portal(*, cells=4, H=20e3, V=-40e3, time=GROWING, feet=ub.Clamped):
     left = ub.Beam((0, 0), (0, 4), column, cells=cells, name="left")
     roof = ub.Beam((0, 4), (6, 4), girder, cells=2 * cells, name="roof")
     right = ub.Beam((6, 4), (6, 0), column, cells=cells, name="right")
-    return ub.Scene(
+    return rigid_chain(
         [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[feet(left.start), feet(right.end)],
         loads=[
             ub.PointLoad(left.end, force=(H, 0), amplitude=time),
@@ -100,9 +107,8 @@ def struck_portal(*, hinges=None):
     roof = ub.Beam((0, 3), (4, 3), section, cells=4)
     right = ub.Beam((4, 3), (4, 0), section, cells=3)
     blow = ub.Table([0, 0.01, 0.02], [0, 1, 0])
-    return ub.Scene(
+    return rigid_chain(
         [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
         loads=[ub.PointLoad(left.end, force=(200e3, 0), amplitude=blow)],
     )

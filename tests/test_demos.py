@@ -12,7 +12,7 @@ DEMOS = sorted((Path(__file__).parents[1] / "demos").glob("demo_*.py"))
 @pytest.mark.slow
 @pytest.mark.demo
 @pytest.mark.parametrize("demo", DEMOS, ids=lambda path: path.stem)
-def test_demo(demo, tmp_path, monkeypatch):
+def test_each_demo_runs_to_its_end(demo, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(demo))
     assert list((tmp_path / "output").glob("*.png"))

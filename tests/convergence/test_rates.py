@@ -26,13 +26,7 @@ def end_state(scene, dt, *, end, alpha=0.0, beta=0.0):
     """(displacement, velocity) of both ends and the middle of the first beam; each (3, 3)."""
     tight = ub.Newton(rtol=1e-13)
     solution = ub.simulate(
-        scene,
-        ub.EnergyMomentum(alpha, beta),
-        t=(0, end),
-        dt=dt,
-        newton=tight,
-        every=10**9,
-        progress=False,
+        scene, ub.EnergyMomentum(alpha, beta), t=(0, end), dt=dt, newton=tight, every=10**9
     )
     beam = scene.beams[0]
     places = (beam.start, beam.at(0.5), beam.end)
@@ -82,7 +76,7 @@ def test_second_order_of_statics(load):
 
     def bent(cells):
         scene = cantilever(cells=cells, force=(0, 5.0), load=load)
-        solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, progress=False)
+        solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
         return solution.displacement(scene.beams[0].end)[-1]
 
     runs = [bent(8 * 2**k) for k in range(6)]

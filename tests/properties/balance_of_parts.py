@@ -123,7 +123,7 @@ class Balance:
         return self.solution.grid.cells[self.solution.grid.cells_of(beam)][k]
 
     def _of_works(self, beam, place, ends, length):
-        """Force and moment per length of the works of own_parts.py."""
+        """Force and moment per length of the works of user_classes.py."""
         total = np.zeros(3)
         u = self.solution.displacement(place)[-1]
         for work in self.scene.works:

@@ -37,27 +37,6 @@ def only(condition, reason):
         raise NotApplicable(reason)
 
 
-class StopAt(ub.Recorder):
-    """Interrupts a run after so many steps."""
-
-    def __init__(self, steps):
-        self.steps = steps
-
-    def open(self, simulation):
-        pass
-
-    def write(self, simulation):
-        self.steps -= 1
-        if self.steps == 0:
-            raise KeyboardInterrupt
-
-    def state(self):
-        return {}
-
-    def resume(self, simulation, state):
-        pass
-
-
 @dataclass
 class Run:
     """Names of a script, and the solution of its scene; `failure` if a step failed."""
@@ -79,7 +58,7 @@ class Case:
         """Run the script, with other arguments; a failed step leaves what came before it."""
         names = self.combination.make(source) if names is None else names
         arguments = {key: names[key] for key in ("t", "dt", "mesh", "newton")}
-        arguments |= {"progress": False, "comm": self.comm, **changes}
+        arguments |= {"comm": self.comm, **changes}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", ub.ModelWarning)
             try:

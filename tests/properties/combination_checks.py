@@ -11,7 +11,6 @@ import numpy as np
 from combination_case import (
     DIGITS,
     SAME,
-    StopAt,
     assert_near,
     assert_same_bits,
     check,
@@ -20,7 +19,8 @@ from combination_case import (
     only,
     results,
 )  # fmt: skip
-from own_parts import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
+from helpers import stop_after
+from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING, LargestCurvature
 
 import ufl_beam as ub
 from ufl_beam import parallel
@@ -119,7 +119,7 @@ def resumed(case):
     def go(folder, stop, **more):
         names = case.combination.make()
         written = recorders_of(case, names, folder)
-        return case.run(names=names, record=[*written, StopAt(stop)], **more), written
+        return case.run(names=names, record=[*written, stop_after(stop)], **more), written
 
     with contextlib.suppress(KeyboardInterrupt):
         go("resumed", case.steps // 2 + 1, checkpoint=checkpoint)

@@ -16,7 +16,7 @@ from functools import cached_property
 import features_of_forces  # noqa: F401 - adds its features
 import numpy as np
 from features import FEATURES, PLAIN, Feature
-from own_parts import CONNECTOR_LAWS, LAWS, SOFTENING
+from user_classes import CONNECTOR_LAWS, LAWS, SOFTENING
 
 STATICS = ("Static()", "EnergyMomentumStatic()", "Static()", "EnergyMomentumStatic(0.7)")
 DYNAMICS = (
@@ -46,7 +46,7 @@ STIFF = "EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=0.01"
 
 HEAD = """import math
 import ufl_beam as ub
-from own_parts import *
+from user_classes import *
 """
 
 

@@ -183,7 +183,7 @@ def modes(case):
     if creep:  # until nothing moves
         t1 = t0 + 1000 * max(creep)
         state = ub.simulate(
-            still, ub.Static(), t=(t0, t1), dt=(t1 - t0) / 10, start=state, progress=False,
+            still, ub.Static(), t=(t0, t1), dt=(t1 - t0) / 10, start=state,
             comm=case.comm, newton=ub.Newton(rtol=DIGITS), mesh=names["mesh"],
         )  # fmt: skip
         t0 = t1
@@ -194,7 +194,7 @@ def modes(case):
     push = ub.PointLoad(place, force=1e-5 * 100 * np.array([0.6, 0.8]), amplitude=lambda t: 1.0)
     arguments = {"t": (t0, t0 + 4 * period), "dt": period / 40, "mesh": names["mesh"]}
     run = ub.simulate(
-        replace(still, loads=[*held, push]), ub.EnergyMomentum(), start=state, progress=False,
+        replace(still, loads=[*held, push]), ub.EnergyMomentum(), start=state,
         comm=case.comm, newton=ub.Newton(rtol=DIGITS), **arguments,
     )  # fmt: skip
     moved = run.displacement(place)[:, :2]
@@ -236,7 +236,7 @@ def path(case):
         found = ub.follow(
             names["scene"], ub.LoadControl(step), steps=len(expected) - 1, mesh=names["mesh"],
             until=lambda now: now.t > end - step / 2, newton=ub.Newton(rtol=DIGITS),
-            progress=False, comm=case.comm,
+            comm=case.comm,
         )  # fmt: skip
     except ub.ConvergenceError as error:
         only("nothing moves with the load factor" not in str(error), "loads stay as they are")
@@ -272,7 +272,7 @@ def buckles(case):
     scene, mesh = names["scene"], names["mesh"]
     factor = ub.buckling(scene, 1, mesh=mesh).factors[0]
     path = ub.follow(
-        scene, ub.LoadControl(factor / 8.3), steps=11, mesh=mesh, comm=case.comm, progress=False,
+        scene, ub.LoadControl(factor / 8.3), steps=11, mesh=mesh, comm=case.comm,
         until=lambda now: now.t > 1.1 * factor,
     )  # fmt: skip
     assert path.critical, f"none up to {path.factor[-1]:.6g}; buckling at {factor:.6g}"

@@ -10,6 +10,7 @@ joints and schemes are drawn from short lists, for each kind compiles forms of i
 import math
 
 import numpy as np
+from random_laws import Draws
 
 STEPS = 10
 """Steps of a run."""
@@ -23,7 +24,7 @@ def script(seed):
     return "\n".join(_Writer(seed).lines) + "\n"
 
 
-class _Writer:
+class _Writer(Draws):
     """Draws a machine and writes it down.
 
     Attributes:
@@ -53,22 +54,6 @@ class _Writer:
         self._end()
 
     # -- draws ---------------------------------------------------------------------------------
-
-    def _chance(self, part):
-        return self._random.random() < part
-
-    def _integer(self, low, high):
-        return int(self._random.integers(low, high + 1))
-
-    def _some(self, low, high):
-        return float(self._random.uniform(low, high))
-
-    def _size(self, low, high):
-        """A size whose decimal logarithm is uniform."""
-        return 10 ** self._some(low, high)
-
-    def _one(self, choices):
-        return choices[self._integer(0, len(choices) - 1)]
 
     def _vector(self, size):
         angle = self._some(-math.pi, math.pi)

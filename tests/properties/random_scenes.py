@@ -1,292 +1,466 @@
 # SPDX-License-Identifier: MIT
-"""Random scenes as plain numbers, and the ways to state one scene that must not matter.
+"""Random scenes of all public objects and schemes, each a script that anybody can run.
 
-A draw is a tree of one to four beams, each joined to an earlier one, with supports, loads and
-masses.  `build` states it in other units, turned, with its beams in another order or with beams cut
-in two; the answers to questions about its places must then be the same, scaled and turned.
+`script(seed, statement)` writes Python that makes `scene`, `scheme`, `times`, `dt` and `mesh`.  All
+draws are those of the seed; the statement decides only how the scene is stated.  Sizes follow from
+what the first beam makes natural: its length L, EI/L², its period.  They make motions that are
+large and yet regular: a scene whose motion depends on its last digits would show nothing.
+
+Scattered limits depend on where beams begin and end, to the last digit.  Scenes that have them can
+be compared in another order only.
 """
 
 import math
-from dataclasses import dataclass, field
+from itertools import pairwise
 
 import numpy as np
+from random_laws import Laws
+from scene_statements import AS_GIVEN, Numbers
 
-import ufl_beam as ub
+STEPS = 15
+"""Steps of a run of equal ones."""
 
-DRAWS = range(12)
-"""Seeds of the default run."""
+SPOTS = (0.0, 0.25, 1 / 3, 0.5, 1.0)
+"""Where things are attached to beams."""
 
-NODES = (0.0, 0.25, 0.5, 0.75, 1.0)
-"""Where things are attached: at vertices of all cell counts, 4 and 8, also of beams cut at 0.5."""
-
-STEP, STEPS = 0.02, 15
-"""Size and number of time steps; s.  The lowest periods of the scenes are of the order of 1 s."""
-
-
-@dataclass(frozen=True)
-class Units:
-    """What a metre, a kilogram and a second are called in other units."""
-
-    metre: float = 1.0
-    kilogram: float = 1.0
-    second: float = 1.0
-
-    @property
-    def newton(self):
-        return self.kilogram * self.metre / self.second**2
-
-    @property
-    def joule(self):
-        return self.newton * self.metre
+PARTS = (
+    "beams", "bodies", "joints", "supports", "connectors", "loads", "masses", "damping", "initial",
+)  # fmt: skip
 
 
-@dataclass
-class Draw:
-    """The numbers of a scene, in SI.
+def script(seed, statement=AS_GIVEN):
+    """Python source of a random scene."""
+    return _Writer(seed, statement).source() + "\n"
+
+
+class _Anchor:
+    """A place on a beam, a point of a body or of the ground.
 
     Attributes:
-        beams: (start, end, section, cells) of each.
-        joints: (kind, place, place); a place is (beam, s).
-        supports: (kind, place, direction in rad).
-        forces: (kind, place, force, moment, duration of the ramp).
-        lines: (beam, force).
-        masses: (place, mass, inertia).
-        gravity: (g_x, g_y), or None.
-        throw: (linear, angular), or None: a rigid motion of the whole scene.
+        text: As it is written.
+        point: Where it is in the first statement; m.
+        part: Of which beam, body or the ground it is.
+        is_end: Whether it is an end of a beam.
     """
 
-    beams: list = field(default_factory=list)
-    joints: list = field(default_factory=list)
-    supports: list = field(default_factory=list)
-    forces: list = field(default_factory=list)
-    lines: list = field(default_factory=list)
-    masses: list = field(default_factory=list)
-    gravity: tuple | None = None
-    throw: tuple | None = None
+    def __init__(self, text, point, part, is_end=False):
+        self.text, self.point, self.part, self.is_end = text, point, part, is_end
+
+    def __str__(self):
+        return self.text
 
 
-def draw(seed, *, free=False, fixed=False, dead=False):
-    """A random scene.
+class _Writer(Laws):
+    """Draws a scene and writes it down."""
 
-    Args:
-        free: Without supports.
-        fixed: One that cannot move without strain, for statics: the tree is clamped at its root.
-        dead: Without follower loads.
-    """
-    random = np.random.default_rng(seed)
+    def __init__(self, seed, statement):
+        self._random = np.random.default_rng(seed)
+        self._others = np.random.default_rng([seed, 1])
+        self._scattered = self._chance(0.1)
+        self._say = Numbers(statement, places_stay=self._scattered)
+        self._lists = {name: [] for name in PARTS}
+        self._lines = [
+            f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}",
+            "import math",
+            "import ufl_beam as ub",
+            "",
+        ]
+        self._statement, self._parts, self._anchors = statement, [], []
+        self._flips = np.random.default_rng(statement.backwards)
+        self._order = np.random.default_rng(statement.shuffled)
+        self._scales()
+        self._scheme()
+        self._elastic = self._chance(0.3) and not self._scattered
+        self._beam(None)
+        for _ in range(self._integer(0, 3)):
+            self._part()
+        self._root()
+        self._second_support()
+        for _ in range(self._integer(0, 2)):
+            self._connector()
+        for _ in range(self._integer(1, 3)):
+            self._load()
+        self._mass()
+        self._damp()
+        self._frame()
+        self._mesh()
 
-    def some(low, high):
-        return float(random.uniform(low, high))
+    # -- draws ---------------------------------------------------------------------------------
 
-    scene = Draw()
-    for i in range(random.integers(1, 5)):
-        if i == 0:
-            start = (some(-1, 1), some(-1, 1))
+    def _polar(self, size):
+        angle = self._some(-math.pi, math.pi)
+        return size * math.cos(angle), size * math.sin(angle)
+
+    # -- sizes and schemes ---------------------------------------------------------------------
+
+    def _scales(self):
+        self._static = self._chance(0.25)
+        self._L = self._size(-1, 1)
+        self._slender = self._size(1, 2)
+        self._EI, self._rhoA = self._size(-1, 5), self._size(-1, 1)
+        self._F, self._M = self._EI / self._L**2, self._EI / self._L
+        self._EA = self._EI * (self._slender / self._L) ** 2
+        self._T = 2 * math.pi / 3.5 * self._L**2 * math.sqrt(self._rhoA / self._EI)
+        self._dt = self._T * self._size(-2, -0.7)
+        self._end = STEPS * self._dt
+
+    def _scheme(self):
+        a, b = self._some(0.01, 0.5), self._some(0, 0.5)
+        if self._static:
+            theta = f"EnergyMomentumStatic({self._some(0.5, 1):.2f})"
+            names = ["Static()", "Static()", "EnergyMomentumStatic()", theta]
         else:
-            parent, s = int(random.integers(0, i)), float(random.choice(NODES))
-            (ax, ay), (bx, by), *_ = scene.beams[parent]
-            start = (ax * (1 - s) + bx * s, ay * (1 - s) + by * s)
-            hinge = random.random() < 0.5 and not fixed
-            scene.joints.append(("Revolute" if hinge else "Rigid", (parent, s), (i, 0.0)))
-        length, angle = some(0.5, 2.0), some(-math.pi, math.pi)
-        end = (start[0] + length * math.cos(angle), start[1] + length * math.sin(angle))
-        section = {
-            "EA": some(1e3, 1e4),
-            "GA": some(1e3, 1e4),
-            "EI": some(10, 100),
-            "rhoA": some(0.5, 2.0),
-            "rhoI": some(0.01, 0.1),
+            names = [
+                "EnergyMomentum()", "EnergyMomentum()", "EnergyMomentum()",
+                f"EnergyMomentum({a:.2f}, {b:.2f})",
+                f"EnergyMomentumDecaying({self._some(0.34, 1):.2f})", "EnergyMomentumPrinted()",
+                "Newmark()", "Newmark(0.6, 0.35)", f"GeneralizedAlpha({self._some(0, 0.9):.2f})",
+            ]  # fmt: skip
+        self._name = self._one(names)
+        at_end = self._name.startswith(("Newmark", "Generalized"))
+        self._rubs = not at_end and not self._static
+        self._may_hold = self._name != "Newmark()"
+        # Nothing bounds the energy of undamped Newmark, which steps that adapt would follow.
+        adapts = self._chance(0.2) and not self._static and self._name != "Newmark()"
+        self._step = self._say.number(self._dt, "s")
+        if adapts:
+            stops = ", ".join(self._say.number(self._end * k / 4, "s") for k in (1, 2, 3))
+            self._step = f"ub.Adaptive({self._size(-4, -2.5):.3g}, stops=[{stops}])"
+
+    def _time(self):
+        """A function of time, at most some ones large."""
+        t, say = self._end, self._say
+        ω = say.number(self._some(1, 6) / t, "1/s")
+        first, last = (say.number(x, "s") for x in (t * self._some(0.2, 0.6), t))
+        kinds = [
+            f"ub.ramp({say.number(t * self._some(0.1, 1), 's')})",
+            f"ub.Table([0.0, {first}, {last}], [0.0, {self._some(-1, 1)!r}, 1.0])",
+            f"lambda t: math.sin({ω} * t)",
+        ]
+        if not self._static:
+            kinds += ["lambda t: 1.0", f"lambda t: 1.0 - math.cos({ω} * t)"]
+        return self._one(kinds)
+
+    # -- beams and bodies ----------------------------------------------------------------------
+
+    def _beam(self, parent):
+        """A beam, joined to an anchor if there is one."""
+        i = sum(part.startswith("beam") for part in self._parts)
+        name = f"beam{i}"
+        _, hinges = self._section(i)
+        joint, gap = self._kind_of_joint(parent)
+        start = (0.0, 0.0) if parent is None else tuple(np.add(parent.point, gap))
+        L, cells = self._L * self._some(0.5, 1.5), self._integer(1, 6)
+        shape = self._one(["straight", "straight", "arc", "arc", "polyline", "along"])
+        backwards = self._statement.backwards is not None
+        backwards = backwards and (i == 0 or self._flips.random() < 0.7)
+        axis, text = getattr(self, f"_{shape}")(start, L, backwards)
+        more = f"section{i}, cells={cells}, name='{name}'"
+        if backwards and self._asymmetric:
+            more = more.replace(f"section{i}", f"section{i}_upside_down")
+        if shape == "straight" and hinges:
+            laws = {1 - s if backwards else s: law for s, law in hinges.items()}
+            more += f", hinges={{{', '.join(f'{s!r}: {law}' for s, law in laws.items())}}}"
+        way = f"  # {name} runs backwards" if backwards else ""
+        self._lines.append(f"{name} = ub.Beam{text}, {more}){way}")
+        self._parts.append(name)
+        self._lists["beams"].append(name)
+
+        def at(s):
+            place = f"{name}.at({1 - s if backwards else s!r})"
+            return _Anchor(place, axis(s), name, is_end=s in (0.0, 1.0))
+
+        if parent is not None:
+            self._join(joint, parent, at(0.0))
+        else:
+            self._start = at(0.0)
+        self._last = at(1.0)
+        self._anchors += [at(s) for s in SPOTS]
+
+    def _ends(self, points, backwards):
+        return [self._say.point(p) for p in (points[::-1] if backwards else points)]
+
+    def _straight(self, start, L, backwards):
+        end = tuple(np.add(start, self._polar(L)))
+        text = ", ".join(self._ends([start, end], backwards))
+        return lambda s: tuple(np.add(start, s * np.subtract(end, start))), f"({text}"
+
+    def _arc(self, start, L, backwards):
+        sweep, first = self._one([-1, 1]) * self._some(0.5, 3), self._some(-math.pi, math.pi)
+        radius = L / abs(sweep)
+        x, y = start[0] - radius * math.cos(first), start[1] - radius * math.sin(first)
+        angles = [self._say.direction(a) for a in (first, first + sweep)]
+        a, b = angles[::-1] if backwards else angles
+
+        def axis(s):
+            angle = first + s * sweep
+            return x + radius * math.cos(angle), y + radius * math.sin(angle)
+
+        center, size = self._say.point((x, y)), self._say.number(radius, "m")
+        return axis, f".arc({center}, {size}, ({a}, {b})"
+
+    def _polyline(self, start, L, backwards):
+        points = [start]
+        angle = self._some(-math.pi, math.pi)
+        for _ in range(self._integer(2, 3)):
+            angle += self._some(-1.5, 1.5)
+            way = L / 2 * np.array([math.cos(angle), math.sin(angle)])
+            points.append(tuple(np.add(points[-1], way * self._some(0.4, 1))))
+        lengths = [math.dist(p, q) for p, q in pairwise(points)]
+        at = np.concatenate([[0], np.cumsum(lengths)]) / sum(lengths)
+
+        def axis(s):
+            return tuple(float(np.interp(s, at, [p[k] for p in points])) for k in (0, 1))
+
+        return axis, f".polyline([{', '.join(self._ends(points, backwards))}]"
+
+    def _along(self, start, L, backwards):
+        """A Bézier curve."""
+        points = [start]
+        for _ in range(3):
+            points.append(tuple(np.add(points[-1], self._polar(L / 2))))
+        points[3] = tuple(np.add(start, self._polar(L)))
+
+        def axis(s):
+            b = [(1 - s) ** 3, 3 * s * (1 - s) ** 2, 3 * s**2 * (1 - s), s**3]
+            return tuple(sum(w * p[k] for w, p in zip(b, points, strict=True)) for k in (0, 1))
+
+        a, b, c, d = self._ends(points, backwards)
+        lines = (
+            f"lambda s, p=({a}, {b}, {c}, {d}): tuple((1 - s)**3 * p[0][k] + "
+            "3 * s * (1 - s)**2 * p[1][k] + 3 * s**2 * (1 - s) * p[2][k] + s**3 * p[3][k] "
+            "for k in (0, 1))"
+        )
+        return axis, f".along({lines}"
+
+    def _part(self):
+        parent = self._one(self._anchors)
+        if self._chance(0.65):
+            self._beam(parent)
+        else:
+            self._body(parent)
+
+    def _body(self, parent):
+        i = sum(part.startswith("body") for part in self._parts)
+        name, say = f"body{i}", self._say
+        mass = self._rhoA * self._L * self._size(-0.5, 1)
+        inertia = mass * self._L**2 * self._size(-1.5, -0.5)
+        joint = self._one(["Rigid", "Rigid", "Revolute", "RigidLink"])
+        if self._static and joint == "Revolute":
+            joint = "Rigid"
+        away = tuple(self._L * self._some(-0.3, 0.3) for _ in range(2))
+        if self._chance(0.3) or not self._may_hold:
+            away = (0.0, 0.0)
+        middle = tuple(np.add(parent.point, away))
+        self._lines.append(
+            f"{name} = ub.Body({say.point(middle)}, mass={say.number(mass, 'kg')}, "
+            f"inertia={say.number(inertia, 'kg m2')}, name='{name}')"
+        )
+        self._parts.append(name)
+        self._lists["bodies"].append(name)
+        center = _Anchor(f"{name}.middle", middle, name)
+
+        def at(point):
+            return _Anchor(f"{name}.at(*{say.point(point)})", point, name)
+
+        if away == (0.0, 0.0):
+            self._join("Rigid" if joint == "RigidLink" else joint, parent, center)
+        else:
+            self._join(joint, parent, center if joint == "RigidLink" else at(parent.point))
+        self._anchors.append(center)
+        if self._may_hold:
+            self._anchors.append(at(tuple(np.add(middle, (self._L / 5, self._L / 7)))))
+
+    # -- joints --------------------------------------------------------------------------------
+
+    def _kind_of_joint(self, parent):
+        """Kind, and how far apart its places are."""
+        kinds = ["Rigid", "Rigid", "Rigid", "Revolute"]
+        if self._may_hold:
+            kinds += ["Prismatic", "RigidLink", "Release"]
+            kinds += [] if self._static else ["Link", "Prismatic", "Revolute"]
+        kind = self._one(kinds)
+        gap = self._polar(self._L * self._some(0.1, 0.3))
+        return kind, gap if kind in ("Link", "RigidLink") else (0.0, 0.0)
+
+    def _join(self, kind, a, b):
+        """A joint; in statics springs hold what it leaves free."""
+        name = f"joint{len(self._lists['joints'])}"
+        measured = self._chance(0.4) and self._may_hold and kind in ("Rigid", "Revolute")
+        more, axis = ", multipliers=True" if measured else "", self._polar(1.0)
+        along, free = self._say.vector(axis), self._one(["N", "V", "M", "NM"])
+        turning = self._chance(0.3)
+        held = self._some(0, 1)
+        first, second = (b, a) if kind == "Release" else (a, b)
+        if kind == "Prismatic":
+            more = f", axis={along}" + (", turning=True" if turning else "")
+        if kind == "Release":
+            free = free[0] if self._static else free
+            more = f", free='{free}'"
+        both = [first, second]
+        if kind in ("Rigid", "Revolute", "Link", "RigidLink"):
+            self._shuffle(both)
+        self._lines.append(f"{name} = ub.{kind}({both[0]}, {both[1]}{more})")
+        self._lists["joints"].append(name)
+        turns = kind == "Revolute" or (kind == "Prismatic" and turning)
+        turns |= kind == "Release" and "M" in free
+        slides = kind == "Prismatic" or (kind == "Release" and free[0] in "NV")
+        if turns and (self._static or held < 0.6):
+            self._turn(a, b, name if measured else None)
+        if slides and (self._static or held > 0.4):
+            self._slide(a, b, along, name)
+
+    def _shuffle(self, records):
+        """Another order, where the statement wants one."""
+        if self._statement.shuffled is not None:
+            self._order.shuffle(records)
+
+    # -- supports ------------------------------------------------------------------------------
+
+    def _root(self):
+        """What holds the first beam at its start."""
+        place, say = self._start, self._say
+        x, y = self._polar(self._L * self._size(-2, -0.7))
+        ground = f"ub.ground(*{say.point(place.point)})"
+        far = tuple(np.add(place.point, self._polar(self._L / 3)))
+        turn, along = self._some(0.1, 1.5), self._some(-math.pi, math.pi)
+        ω = say.number(self._some(1, 6) / self._end, "1/s")
+        way = f"lambda t: {{}} * (1.0 - math.cos({ω} * t))"
+        to = tuple(float(v) for v in self._statement.turned(x, y))
+        u, v = (way.format(repr(c * self._statement.unit("m"))) for c in to)
+        psi = f"psi={way.format(repr(turn))}"
+        supports = {
+            "Clamped": f"ub.Clamped({place})",
+            "PrescribedDisplacement": f"ub.PrescribedDisplacement({place}, u={u}, v={v}, psi=0)",
+            "Turned": f"ub.PrescribedDisplacement({place}, u=0, v=0, {psi})",
+            "Pinned": f"ub.Pinned({place})",
+            "Roller": f"ub.Roller({place}, along={say.vector((math.cos(along), math.sin(along)))})",
         }
-        scene.beams.append((start, end, section, int(random.choice([4, 8]))))
-    last = len(scene.beams) - 1
-    if fixed:
-        scene.supports.append(("Clamped", (0, 0.0), 0.0))
-    elif not free:
-        kind = str(random.choice(["Clamped", "Pinned", "Roller"]))
-        scene.supports.append((kind, (0, 0.0), some(-math.pi, math.pi)))
-        if random.random() < 0.5:
-            scene.supports.append(("Roller", (last, 1.0), some(-math.pi, math.pi)))
-    for _ in range(random.integers(1, 4)):
-        kind = "PointLoad" if dead or random.random() < 0.7 else "FollowerLoad"
-        place = (int(random.integers(0, last + 1)), float(random.choice(NODES)))
-        force = (some(-20, 20), some(-20, 20))
-        scene.forces.append((kind, place, force, some(-5, 5), some(0.05, 0.5)))
-    if random.random() < 0.5:
-        scene.lines.append((int(random.integers(0, last + 1)), (some(-5, 5), some(-5, 5))))
-    if random.random() < 0.5:
-        place = (int(random.integers(0, last + 1)), float(random.choice(NODES)))
-        scene.masses.append((place, some(0.1, 3.0), some(0.0, 0.5)))
-    if random.random() < 0.5 and not free:
-        scene.gravity = (some(-10, 10), some(-10, 10))
-    if free:
-        scene.throw = ((some(-2, 2), some(-2, 2)), some(-3, 3))
-    return scene
-
-
-class Built:
-    """A draw as a scene.
-
-    Attributes:
-        scene: The scene.
-        supports: Its supports in the order of the draw.
-    """
-
-    def __init__(self, draw, *, units=Units(), angle=0.0, order=None, cut=()):  # noqa: B008
-        self.draw, self.units = draw, units
-        self._cos, self._sin = math.cos(angle), math.sin(angle)
-        self._cut = set(cut)
-        metre, kilogram, second = units.metre, units.kilogram, units.second
-        newton, joule = units.newton, units.joule
-        self._beams = {}
-        pieces, joints = [], []
-        for i, (a, b, numbers, cells) in enumerate(draw.beams):
-            section = ub.Section(
-                EA=numbers["EA"] * newton,
-                GA=numbers["GA"] * newton,
-                EI=numbers["EI"] * joule * metre,
-                rhoA=numbers["rhoA"] * kilogram / metre,
-                rhoI=numbers["rhoI"] * kilogram * metre,
+        kinds = ["Clamped", "Clamped", "Clamped"]
+        if self._may_hold:
+            kinds += ["PrescribedDisplacement", "Turned", "Rigid", "RigidLink"]
+        if not self._static:
+            kinds += ["Pinned", "Pinned", "Roller", "free", "free"]
+            if self._may_hold:
+                kinds += ["Revolute", "Prismatic", "Guided", "Link"]
+        kind = self._held_by = self._one(kinds)
+        throw = self._chance(0.6)
+        linear = self._polar(self._L / self._T * self._size(-1, 0))
+        angular = self._some(-1, 1) / self._T
+        if kind in supports:
+            self._lists["supports"].append(supports[kind])
+        elif kind in ("RigidLink", "Link"):
+            self._join(kind, _Anchor(f"ub.ground(*{say.point(far)})", far, "ground"), place)
+        elif kind == "Guided":
+            self._guide(place)
+        elif kind != "free":
+            self._join(kind, _Anchor(ground, place.point, "ground"), place)
+        if throw and kind in ("free", "Pinned"):
+            moving = list(self._lists["beams"] + self._lists["bodies"])
+            self._shuffle(moving)
+            linear = say.vector(linear, "m/s") if kind == "free" else "(0.0, 0.0)"
+            self._lists["initial"].append(
+                f"ub.Velocity([{', '.join(moving)}], linear={linear}, "
+                f"angular={say.number(angular, '1/s')}, about={say.point(place.point)})"
             )
-            ends = [self._turn(p, metre) for p in (a, b)]
-            name = f"beam{i}"
-            if i in self._cut:
-                middle = tuple((np.array(ends[0]) + ends[1]) / 2)
-                self._beams[i] = [
-                    ub.Beam(ends[0], middle, section, cells=cells // 2, name=f"{name}a"),
-                    ub.Beam(middle, ends[1], section, cells=cells // 2, name=f"{name}b"),
-                ]
-                first, second_half = self._beams[i]
-                joints.append(ub.Rigid(first.end, second_half.start))
-            else:
-                self._beams[i] = [ub.Beam(*ends, section, cells=cells, name=name)]
-            pieces += self._beams[i]
-        if order is not None:
-            pieces = [pieces[k] for k in order]
-        for kind, one, other in draw.joints:
-            joints.append(getattr(ub, kind)(self.place(one), self.place(other)))
-        self.supports = []
-        for kind, place, direction in draw.supports:
-            along = self._turn((math.cos(direction), math.sin(direction)))
-            more = {"along": along} if kind == "Roller" else {}
-            self.supports.append(getattr(ub, kind)(self.place(place), **more))
-        loads = [
-            getattr(ub, kind)(
-                self.place(place),
-                force=self._turn(force, newton),
-                moment=moment * joule,
-                amplitude=ub.ramp(duration * second),
-            )
-            for kind, place, force, moment, duration in draw.forces
-        ]
-        loads += [
-            ub.LineLoad(piece, force=self._turn(force, newton / metre))
-            for i, force in draw.lines
-            for piece in self._beams[i]
-        ]
-        if draw.gravity:
-            loads.append(ub.Gravity(self._turn(draw.gravity, metre / second**2)))
-        masses = [
-            ub.PointMass(self.place(place), mass * kilogram, inertia * kilogram * metre**2)
-            for place, mass, inertia in draw.masses
-        ]
-        initial = []
-        if draw.throw:
-            linear, angular = draw.throw
-            initial.append(
-                ub.Velocity(
-                    pieces,
-                    linear=self._turn(linear, metre / second),
-                    angular=angular / second,
-                    about=(0.0, 0.0),
-                )
-            )
-        self.scene = ub.Scene(
-            pieces,
-            joints=joints,
-            supports=self.supports,
-            loads=loads,
-            masses=masses,
-            initial=initial,
+
+    def _second_support(self):
+        """Often the end of the last beam is held, too."""
+        place, chance = self._last, self._some(0, 1)
+        along = self._say.vector(self._polar(1.0))
+        if self._held_by == "free" or self._lists["initial"]:
+            return
+        if chance < 0.25:
+            self._lists["supports"].append(f"ub.Roller({place}, along={along})")
+        elif chance < 0.35:
+            self._lists["supports"].append(f"ub.Pinned({place})")
+        elif chance < 0.45 and self._may_hold:
+            self._guide(place)
+
+    def _guide(self, place):
+        """A parabola through a place; its parameter is a length."""
+        angle, bend = self._some(-math.pi, math.pi), self._some(-0.5, 0.5) / self._L
+        t = self._say.vector((math.cos(angle), math.sin(angle)))
+        n = self._say.vector((-math.sin(angle), math.cos(angle)))
+        self._lists["joints"].append(
+            f"ub.Guided({place}, lambda s, p={self._say.point(place.point)}, t={t}, n={n}: tuple("
+            f"p[k] + s * t[k] + {self._say.number(bend, '1/m')} * s**2 * n[k] for k in (0, 1)))"
         )
 
-    def _turn(self, vector, unit=1.0):
-        x, y = vector
-        return (self._cos * x - self._sin * y) * unit, (self._sin * x + self._cos * y) * unit
+    # -- loads, masses, damping ----------------------------------------------------------------
 
-    def place(self, place):
-        """The place (beam, s) of the draw."""
-        i, s = place
-        pieces = self._beams[i]
-        if len(pieces) == 1:
-            return pieces[0].at(s)
-        return pieces[0].at(2 * s) if s <= 0.5 else pieces[1].at(2 * s - 1)
-
-    def run(self, scheme, *, steps=STEPS, step=STEP, **more):
-        """Simulate `steps` steps of `step` seconds."""
-        self.solution = ub.simulate(
-            self.scene,
-            scheme,
-            t=(0.0, steps * step * self.units.second),
-            dt=step * self.units.second,
-            **more,
-        )
-        return self
-
-    def _turned_back(self, rows, unit, moment_unit):
-        x, y, turn = rows.T
-        c, s = self._cos, self._sin
-        return np.column_stack([(c * x + s * y) / unit, (c * y - s * x) / unit, turn / moment_unit])
-
-    def motion(self):
-        """(u, v, ψ) of the nodes of all beams in all steps, in SI and the axes of the draw."""
-        return np.array(
-            [
-                self._turned_back(
-                    self.solution.displacement(self.place((i, s))), self.units.metre, 1.0
-                )
-                for i in self._beams
-                for s in NODES
-            ]
-        )
-
-    def reactions(self):
-        """(F_x, F_y, M) of the supports after the first step, in SI and the axes of the draw."""
-        rows = [
-            self._turned_back(self.solution.reaction(s)[1:], self.units.newton, self.units.joule)
-            for s in self.supports
+    def _load(self):
+        size, say = self._F * self._size(-1.3, 0), self._say
+        place, beam = self._one(self._anchors), self._one(self._lists["beams"])
+        force, moment = say.vector(self._polar(size), "N"), self._some(-1, 1) * size * self._L
+        line, more = self._polar(size / self._L), self._some(-0.3, 0.3) * size
+        weight, time = self._polar(size / self._rhoA / self._L), self._time()
+        if place.is_end and not self._elastic:
+            moment = 0.0  # it would turn what lies beyond a hinge there, which nothing resists
+        moment = say.number(moment, "N m")
+        at = f"{place}, force={force}, moment={moment}, amplitude={time}"
+        kinds = [
+            f"ub.PointLoad({at})",
+            f"ub.PointLoad({at})",
+            f"ub.LineLoad({beam}, force={say.vector(line, 'N/m')}, "
+            f"moment={say.number(more, 'N')}, amplitude={time})",
+            f"ub.Gravity({say.vector(weight, 'm/s2')}, amplitude={time})",
         ]
-        return np.array(rows).reshape(len(rows), -1, 3)
+        if place.part.startswith("beam") or place.text.endswith("middle"):
+            kinds.append(f"ub.FollowerLoad({at})")
+        self._lists["loads"].append(self._one(kinds))
 
-    def section_forces(self):
-        """(N, V, M) of all cells at the end, in SI."""
-        rows = [self.solution.section_forces(p) for i in self._beams for p in self._beams[i]]
-        return np.concatenate(rows) / [self.units.newton, self.units.newton, self.units.joule]
+    def _mass(self):
+        mass = self._rhoA * self._L * self._size(-1, 1)
+        inertia = self._one([0.0, mass * self._L**2 * self._size(-2, -1)])
+        place, say = self._one([a for a in self._anchors if a.part.startswith("beam")]), self._say
+        if self._chance(0.3):
+            self._lists["masses"].append(
+                f"ub.PointMass({place}, {say.number(mass, 'kg')}, {say.number(inertia, 'kg m2')})"
+            )
 
-    def energies(self):
-        """The ledger in SI, by name."""
-        energy = self.solution.energy
-        groups = {**energy.state, **energy.supplied, **energy.lost}
-        return {name: values / self.units.joule for name, values in groups.items()}
+    def _damp(self):
+        mass, stiffness = self._size(-3, -1) / self._T, self._size(-4, -2) * self._T
+        beams = list(self._lists["beams"][:1])
+        viscous = self._say.number(self._size(-4, -1) * self._T, "s")
+        kind = self._one(["", "", "Rayleigh", "KelvinVoigt", "both"])
+        if kind in ("Rayleigh", "both") and not self._static:
+            self._lists["damping"].append(
+                f"ub.Rayleigh(mass={self._say.number(mass, '1/s')}, "
+                f"stiffness={self._say.number(stiffness, 's')})"
+            )
+        if kind == "KelvinVoigt":
+            self._lists["damping"].append(f"ub.KelvinVoigt({viscous})")
+        if kind == "both":
+            self._lists["damping"].append(f"ub.KelvinVoigt({viscous}, beams=[{', '.join(beams)}])")
 
+    def _frame(self):
+        """A frame that turns, with so much centrifugal force as other loads."""
+        rate, about = self._some(-1, 1) / self._T, self._polar(self._L)
+        turns = self._chance(0.15)
+        if turns and (self._rubs or self._name == "Static()"):
+            self._lists["loads"].append(
+                f"ub.RotatingFrame({self._say.number(rate, '1/s')}, about={self._say.point(about)})"
+            )
 
-def difference(one, other):
-    """Largest difference of two results, each kind as a part of its largest value.
+    def _mesh(self):
+        refine, degree = self._one([1, 1, 1, 2]), self._one([1, 1, 2, 3])
+        lumped = self._chance(0.2)
+        self._lines.append(
+            f"mesh = ub.Mesh({refine}, degree={degree if self._elastic else 1}, lumped={lumped})"
+        )
 
-    Rotations are compared with the larger of a radian and the largest rotation, and so on: parts of
-    1 are what a result of the order of the scene is.
-    """
-    parts = [relative(one.motion(), other.motion())]
-    if len(one.supports):
-        parts.append(relative(one.reactions(), other.reactions()))
-    parts.append(relative(one.section_forces(), other.section_forces()))
-    first, second = one.energies(), other.energies()
-    assert first.keys() == second.keys()
-    throughput = one.solution.energy.throughput / one.units.joule
-    parts += [float(np.abs(first[n] - second[n]).max()) / throughput for n in first]
-    return max(parts)
+    # -- the end -------------------------------------------------------------------------------
 
-
-def relative(one, other):
-    """Largest difference as a part of the largest value."""
-    assert one.shape == other.shape
-    return float(np.abs(one - other).max() / np.abs(one).max())
+    def source(self):
+        """The script."""
+        lines = [*self._lines, "scene = ub.Scene("]
+        for name, records in self._lists.items():
+            if records:
+                self._shuffle(records)
+                lines += [f"    {name}=[", *(f"        {record}," for record in records), "    ],"]
+        lines += [
+            ")", f"scheme = ub.{self._name}",
+            f"times = (0.0, {self._say.number(self._end, 's')})", f"dt = {self._step}",
+        ]  # fmt: skip
+        return "\n".join(lines)

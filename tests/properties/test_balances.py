@@ -3,7 +3,7 @@
 
 import numpy as np
 import pytest
-from random_scenes import DRAWS, Built, draw, relative
+from elastic_scenes import DRAWS, Built, draw, relative
 
 import ufl_beam as ub
 
@@ -17,7 +17,7 @@ CLOSED = 1e-9
 
 
 @pytest.mark.parametrize("step", SIZES)
-def test_energy(seed, step):
+def test_work_is_the_increment_of_energy(seed, step):
     """Work is the increment of kinetic and stored energy."""
     energy = Built(draw(seed)).run(ub.EnergyMomentum(), step=step).solution.energy
     assert energy.lost == {}
@@ -33,7 +33,7 @@ def test_energy(seed, step):
     [ub.EnergyMomentum(0.1, 0.0), ub.EnergyMomentum(0.0, 0.1), ub.EnergyMomentum(0.2, 0.5)],
     ids=str,
 )
-def test_numerical_loss(seed, step, scheme):
+def test_numerical_loss_closes_the_ledger(seed, step, scheme):
     """It closes the ledger, and never gives anything back."""
     energy = Built(draw(seed)).run(scheme, step=step).solution.energy
     assert energy.worst < CLOSED
@@ -71,7 +71,7 @@ def test_momenta_of_free_flight(seed, step, scheme):
     [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.2), ub.EnergyMomentum(beta=0.2)],
     ids=str,
 )
-def test_impulses(seed, step, scheme):
+def test_momentum_grows_by_the_impulses(seed, step, scheme):
     """Momentum grows by the impulse, angular momentum by its moment unless `beta` > 0."""
     numbers = draw(seed, free=True, dead=True)
     numbers.lines = []

@@ -90,7 +90,7 @@ def test_every_feature_and_scheme_is_drawn():
     "seed",
     [*FEW, *(pytest.param(n, marks=pytest.mark.slow, id=f"all-{n}") for n in range(NUMBER))],
 )
-def test_combination(seed, tmp_path):
+def test_all_checks_of_a_combination_pass(seed, tmp_path):
     combination = draw(seed)
     found = outcome_of(combination, tmp_path, CHECKS)
     flags = {name: words for name, words in found.items() if words not in KNOWN}

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""One scene stated in two ways gives one result: units, axes, cuts, order, ranks."""
+"""One elastic scene stated in two ways gives one result: units, axes, cuts, processes."""
 
 from mpi4py import MPI
 
 import numpy as np
 import pytest
-from random_scenes import DRAWS, Built, Units, difference, draw
+from elastic_scenes import DRAWS, Built, Units, difference, draw
 
 import ufl_beam as ub
 
@@ -21,7 +21,7 @@ pytestmark = pytest.mark.parametrize("seed", DRAWS)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_units(seed, scheme):
+def test_results_do_not_depend_on_units(seed, scheme):
     """No number in the package has a dimension."""
     numbers = draw(seed)
     random = np.random.default_rng(1000 + seed)
@@ -32,7 +32,7 @@ def test_units(seed, scheme):
     assert one.solution.parts == other.solution.parts
 
 
-def test_units_in_statics(seed):
+def test_static_results_do_not_depend_on_units(seed):
     numbers = draw(seed, fixed=True)
     random = np.random.default_rng(2000 + seed)
     units = Units(*(float(x) for x in 10 ** random.uniform(-4, 4, 3)))
@@ -47,7 +47,7 @@ def test_units_in_statics(seed):
         assert abs(one.solution.iterations - other.solution.iterations) <= 1
 
 
-def test_axes(seed):
+def test_results_turn_with_the_axes(seed):
     """Objectivity: the whole scene turned by any angle."""
     numbers = draw(seed)
     angle = float(np.random.default_rng(3000 + seed).uniform(-np.pi, np.pi))
@@ -55,14 +55,14 @@ def test_axes(seed):
     assert difference(one, other) < SAME
 
 
-def test_axes_in_statics(seed):
+def test_static_results_turn_with_the_axes(seed):
     numbers = draw(seed, fixed=True)
     angle = float(np.random.default_rng(4000 + seed).uniform(-np.pi, np.pi))
     one, other = (Built(numbers, angle=a).run(ub.Static(), steps=5, step=0.1) for a in (0.0, angle))
     assert difference(one, other) < SAME
 
 
-def test_cuts(seed):
+def test_a_beam_cut_in_two_is_the_same_beam(seed):
     """A beam cut in two by a rigid joint is the same beam."""
     numbers = draw(seed)
     one = Built(numbers).run(SCHEME)
@@ -72,23 +72,14 @@ def test_cuts(seed):
     assert difference(one, other) < SAME
 
 
-def test_cuts_in_statics(seed):
+def test_in_statics_a_beam_cut_in_two_is_the_same_beam(seed):
     numbers = draw(seed, fixed=True)
     one = Built(numbers).run(ub.Static(), steps=5, step=0.1)
     other = Built(numbers, cut=[0]).run(ub.Static(), steps=5, step=0.1)
     assert difference(one, other) < SAME
 
 
-def test_order(seed):
-    """The order of the beams in the scene."""
-    numbers = draw(seed)
-    one = Built(numbers).run(SCHEME)
-    order = np.random.default_rng(5000 + seed).permutation(len(numbers.beams))
-    other = Built(numbers, order=order[::-1]).run(SCHEME)
-    assert difference(one, other) < SAME
-
-
-def test_ranks(seed):
+def test_processes_find_the_result_of_one(seed):
     """The number of processes: against each process alone.  On one rank: a run can be repeated."""
     numbers = draw(seed)
     for scheme in SCHEMES:
@@ -102,7 +93,7 @@ def test_ranks(seed):
             assert (one.motion() == other.motion()).all()
 
 
-def test_ranks_in_statics(seed):
+def test_in_statics_processes_find_the_result_of_one(seed):
     numbers = draw(seed, fixed=True)
     one, other = (
         Built(numbers).run(ub.Static(), steps=5, step=0.1, comm=comm)
@@ -111,7 +102,7 @@ def test_ranks_in_statics(seed):
     assert difference(one, other) < SAME
 
 
-def test_something_happens(seed):
+def test_scenes_move_by_a_part_of_their_size(seed):
     """The scenes are no trivial ones: they move by a good part of their size, and turn."""
     motion = Built(draw(seed)).run(ub.EnergyMomentum()).motion()
     assert np.abs(motion).max() > 1e-3
@@ -124,7 +115,7 @@ def run_adaptive(built, **more):
     return built
 
 
-def test_adaptive_steps(seed):
+def test_adaptive_steps_do_not_depend_on_the_statement(seed):
     """The steps themselves, in other units, turned, on other numbers of processes.
 
     Their lengths come from differences of accelerations, which have a few digits less.

@@ -89,14 +89,14 @@ def check(seed):
 
 
 @pytest.mark.parametrize("seed", SAMPLE)
-def test_machine(seed):
+def test_a_machine_has_a_closed_ledger_or_a_clear_error(seed):
     """A closed ledger, or a clear error."""
     check(seed)
 
 
 @pytest.mark.slow
 @pytest.mark.serial
-def test_all_machines():
+def test_nearly_all_machines_have_closed_ledgers():
     """The same of all; few are errors, and nearly all of the others close as is promised."""
     found = {seed: check(seed) for seed in ALL}
     exact = [i for seed, i in found.items() if "ub.Static()" not in script(seed) and i is not None]

@@ -1,20 +1,20 @@
 # SPDX-License-Identifier: MIT
-"""200 random scenes, each stated in six ways: one motion, constraints kept, a ledger that closes.
+"""200 random scenes, each stated in six ways: one result, constraints kept, a ledger that closes.
 
-`any_scene.py` draws the scenes, `statements.py` states them as given, turned, with beams that run
-the other way, a kilometre away, in mm, t and ms, and in another order.  A scene that fails prints
-the script of the statement as given; `python3 tests/properties/test_random_scenes.py SEED` prints
-all of them with their differences.
+`random_scenes.py` draws the scenes, `scene_statements.py` states them as given, turned, with beams
+that run the other way, a kilometre away, in mm, t and ms, and in another order.  A scene that fails
+prints the script of the statement as given; `python3 tests/properties/test_random_scenes.py SEED`
+prints all of them with their differences.
 """
 
 import math
 import sys
 
 import pytest
-from any_scene import script
-from constraints_checked import largest_gap
-from restated import Run, changed_statements, difference, perturbed
-from statements import EPS
+from constraint_gaps import largest_gap
+from random_scenes import script
+from scene_statements import EPS
+from statement_runs import Run, changed_statements, difference, perturbed
 
 import ufl_beam as ub
 
@@ -24,7 +24,7 @@ SAMPLE = range(25)
 ALL = range(200)
 
 SAME = 1e-12
-"""Part of the size of the scene, or rad, that nobody needs to explain.
+"""Part of the size of the scene, or rad, that needs no reason; see `difference` for the rest.
 
 It is some thousand times the last digit: what a few hundred operations in each of 15 steps lose.
 """
@@ -99,7 +99,7 @@ def check(seed):
     for name, found in differences.items():
         allowed = max(SAME, FACTOR * sensitivities.get(name, 0.0))
         assert found <= allowed, (
-            f"{name}: the motion differs by {found:.1e}, other last digits make "
+            f"{name}: the result differs by {found:.1e}, other last digits make "
             f"{sensitivities[name]:.1e}\n{given.source}"
         )
     if given.failure is not None:
@@ -127,21 +127,21 @@ def check_ledger(run):
 
 @pytest.mark.serial
 @pytest.mark.parametrize("seed", SAMPLE)
-def test_scene(seed):
-    """One motion; what processes share is compared in test_invariance.py."""
+def test_all_statements_of_a_scene_give_one_result(seed):
+    """What processes share is compared in test_invariance.py."""
     check(seed)
 
 
 @pytest.mark.slow
 @pytest.mark.serial
-def test_all_scenes():
+def test_nearly_all_scenes_are_regular():
     """The same of all; nearly all are regular, so that comparing them shows something."""
     sensitivities = {seed: check(seed) for seed in ALL}
     assert sum(found > CHAOTIC for found in sensitivities.values()) <= 0.05 * len(ALL)
 
 
 if __name__ == "__main__":
-    from statements import AS_GIVEN
+    from scene_statements import AS_GIVEN
 
     number = int(sys.argv[1])
     for one in (AS_GIVEN, *changed_statements(number)):

@@ -13,12 +13,13 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from restarted import arrays_of, bend, machine, run
+from helpers import stop_after
+from restart_scenes import arrays_of, bend, machine, run
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
 
-SCRIPT = Path(__file__).with_name("restarted.py")
+SCRIPT = Path(__file__).with_name("restart_scenes.py")
 
 RUNS = {
     "midpoint": (machine, ub.EnergyMomentum(0.05, 0.02), 0.2, 0.005),
@@ -31,39 +32,12 @@ RUNS = {
 }
 
 
-class StopAt(ub.Recorder):
-    """Stops a run after so many steps."""
-
-    def __init__(self, steps):
-        self.steps = steps
-
-    def require_writable(self):
-        pass
-
-    def open(self, simulation):
-        pass
-
-    def write(self, simulation):
-        self.steps -= 1
-        if self.steps == 0:
-            raise KeyboardInterrupt
-
-    def close(self):
-        pass
-
-    def state(self):
-        return {}
-
-    def resume(self, simulation, state):
-        pass
-
-
 def go(kind, path=None, *, steps=10**9, every=5, comm=None):
     """A run, perhaps stopped after some steps."""
     make, scheme, end, dt = RUNS[kind]
     checkpoint = None if path is None else ub.Checkpoint(path, every=every)
     return ub.simulate(
-        make(), scheme, t=(0, end), dt=dt, every=2, record=StopAt(steps), progress=False,
+        make(), scheme, t=(0, end), dt=dt, every=2, record=stop_after(steps),
         checkpoint=checkpoint, comm=comm,
     )  # fmt: skip
 
@@ -139,7 +113,7 @@ def test_a_later_end_goes_on(shared_path):
 
     def until(end, **more):
         scheme = ub.EnergyMomentum(0.05)
-        return ub.simulate(machine(), scheme, t=(0, end), dt=0.005, progress=False, **more)
+        return ub.simulate(machine(), scheme, t=(0, end), dt=0.005, **more)
 
     checkpoint = ub.Checkpoint(path, every=100)
     until(0.1, checkpoint=checkpoint)
@@ -166,11 +140,11 @@ def test_files_go_on(tmp_path):
     whole, parts = tmp_path / "whole", tmp_path / "parts"
     for folder in (whole, parts):
         folder.mkdir()
-    run(whole, steps=40, every=7, record=[StopAt(10**9)])
+    run(whole, steps=40, every=7, record=[stop_after(10**9)])
     for steps in (11, 15, 8):
         with pytest.raises(KeyboardInterrupt):
-            run(parts, steps=40, every=7, record=[StopAt(steps)])
-    run(parts, steps=40, every=7, record=[StopAt(10**9)])
+            run(parts, steps=40, every=7, record=[stop_after(steps)])
+    run(parts, steps=40, every=7, record=[stop_after(10**9)])
     assert_same_files(whole, parts)
     assert len(read_xdmf(parts / "run.xdmf").times) == 6
 

@@ -3,8 +3,9 @@
 
 import numpy as np
 import pytest
-from bars import Bars
-from laws_of_ones_own import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, TwoRoots
+from scenes import clamped
+from uniaxial_points import Bars
+from user_laws import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, TwoRoots
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
@@ -22,7 +23,7 @@ def shaken(law):
     """A cantilever, thrown up to many times its elastic range."""
     beam = ub.Beam((0, 0), (1, 0), section(interaction=law), cells=2)
     load = ub.PointLoad(beam.end, (3.0, 3.0), amplitude=lambda t: np.sin(9 * t))
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    return clamped(beam, loads=[load])
 
 
 @pytest.mark.parametrize("law", [ub.AxialBending(NP, MP), TwoRoots(NP, MP)], ids=repr)
@@ -40,7 +41,7 @@ def test_dissipation_never_falls(law, scheme, dt):
     plastic = []
     for reference in (False, True):
         newton = ub.Newton(reference=reference)
-        run = ub.simulate(shaken(law), scheme, t=(0, 0.6), dt=dt, newton=newton, progress=False)
+        run = ub.simulate(shaken(law), scheme, t=(0, 0.6), dt=dt, newton=newton)
         plastic.append(run.energy["plastic"])
         assert np.diff(plastic[-1]).min() >= -1e-12 * plastic[-1][-1]  # round-off of the sums
     assert plastic[0][-1] > 0.5
@@ -114,7 +115,7 @@ def held(law):
     """A bar that is pulled by its end, of a law for its axial force."""
     beam = ub.Beam((0, 0), (1, 0), section(axial=law), cells=2, name="bar")
     pull = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.01 * t)
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
+    return clamped(beam, pull)
 
 
 def sprung(law):
@@ -148,7 +149,7 @@ def test_no_step_is_accepted_that_gives_energy(make, place, scheme, in_python, r
     scene = controlled(scene) if in_python else scene
     newton = ub.Newton(reference=reference)
     with pytest.raises(ub.ConvergenceError, match=f"GivesEnergy of {place} has a neg") as found:
-        ub.simulate(scene, scheme, t=(0, 1), dt=0.04, newton=newton, progress=False)
+        ub.simulate(scene, scheme, t=(0, 1), dt=0.04, newton=newton)
     run = found.value.solution
     assert 0.04 < run.times[-1] < 0.5
     assert run.energy["plastic"].min() >= -1e-12 * run.energy.throughput  # round-off
@@ -158,11 +159,9 @@ def test_no_step_is_accepted_that_gives_energy(make, place, scheme, in_python, r
 def test_an_active_law_may_give_energy(reference):
     """[closed] A held bar that shrinks by e has the force EA e, and has given EA e²/2."""
     beam = ub.Beam((0, 0), (1, 0), section(axial=Swelling(1e-3)), cells=2)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Clamped(beam.end)])
+    scene = clamped(beam, ub.Clamped(beam.end))
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(
-        scene, ub.EnergyMomentumStatic(0.5), t=(0, 1), dt=0.25, newton=newton, progress=False
-    )
+    run = ub.simulate(scene, ub.EnergyMomentumStatic(0.5), t=(0, 1), dt=0.25, newton=newton)
     middle = 1 - 0.25 / 2  # of the last step, in which section forces act
     assert run.section_forces_at(beam.start)[-1, 0] == pytest.approx(EA * 1e-3 * middle, rel=1e-9)
     assert run.energy["plastic"][-1] == pytest.approx(-EA * 1e-6 / 2, rel=1e-9)

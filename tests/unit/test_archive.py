@@ -18,13 +18,14 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.model.connector_laws import HELD
 from ufl_beam.output.serialization import RECORDS, from_data, to_data
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "properties"))
-from restarted import bend, machine
+from restart_scenes import bend, machine
 
 STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}
 
@@ -32,13 +33,13 @@ STEEL = {"EA": 1e4, "GA": 1e4, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.1}
 def cantilever(**more):
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=2, name="left")
     load = ub.PointLoad(beam.end, force=(0, -3), amplitude=lambda t: math.sin(3 * t))
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
+    return clamped(beam, loads=[load], **more)
 
 
 def swing(scene=None, **more):
     return ub.simulate(
         cantilever() if scene is None else scene,
-        ub.EnergyMomentum(), t=(0, 0.5), dt=0.1, progress=False, **more,
+        ub.EnergyMomentum(), t=(0, 0.5), dt=0.1, **more,
     )  # fmt: skip
 
 
@@ -108,9 +109,7 @@ def require_same(one, other):
 
 def test_a_machine_of_everything(shared_path):
     """Beams that yield and break, fibres, bodies, joints, each law, each load, damping."""
-    solution = ub.simulate(
-        machine(), ub.EnergyMomentum(0.05, 0.02), t=(0, 0.1), dt=0.005, every=3, progress=False
-    )
+    solution = ub.simulate(machine(), ub.EnergyMomentum(0.05, 0.02), t=(0, 0.1), dt=0.005, every=3)
     loaded = saved(solution, shared_path)
     require_same(loaded, solution)
     for a, b in zip(solution.scene.joints, loaded.scene.joints, strict=True):
@@ -145,8 +144,8 @@ def test_plastic_hinges_at_places_and_an_open_ledger(shared_path):
     hinges = {0.5: ub.ElastoPlastic(yield_limit=1.0, isotropic=3.0)}
     beam = ub.Beam((0, 0), (1, 0), section, cells=2, name="left", hinges=hinges)
     load = ub.PointLoad(beam.end, force=(0, -6), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02, progress=False)
+    scene = clamped(beam, loads=[load])
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.02)
     solution.open_ledger = "the ledger is open"
     loaded = saved(solution, shared_path)
     require_same(loaded, solution)
@@ -157,19 +156,15 @@ def test_plastic_hinges_at_places_and_an_open_ledger(shared_path):
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
-def test_statics(scheme, shared_path):
-    solution = ub.simulate(bend(), scheme, t=(0, 5), dt=0.1, progress=False)
+def test_a_static_solution_is_saved_whole(scheme, shared_path):
+    solution = ub.simulate(bend(), scheme, t=(0, 5), dt=0.1)
     require_same(saved(solution, shared_path), solution)
 
 
 def test_a_path_with_its_critical_points(shared_path):
     """Euler's column, from which a branch is followed after it was loaded."""
     beam = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4, name="column")
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)],
-    )
+    scene = clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)])
     path = ub.follow(scene, ub.LoadControl(0.5), steps=8)
     loaded = saved(path, shared_path)
     require_same(loaded, path)
@@ -194,9 +189,7 @@ def test_curves_and_meshes(shared_path):
     beams = [arc, line, wave]
     scene = ub.Scene(beams, supports=[ub.Clamped(b.start) for b in beams], loads=[ub.Gravity()])
     mesh = ub.Mesh(refine=Fraction(2), degree=2)
-    solution = ub.simulate(
-        scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05, mesh=mesh, progress=False
-    )
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05, mesh=mesh)
     loaded = saved(solution, shared_path)
     require_same(loaded, solution)
     assert loaded.grid.mesh == mesh
@@ -220,7 +213,7 @@ def test_runs_and_modes_go_on_from_a_loaded_solution(shared_path):
     solution = swing(scene)
     loaded = saved(solution, shared_path)
     runs = [
-        ub.simulate(one.scene, ub.EnergyMomentum(), t=(0.5, 0.8), dt=0.1, start=one, progress=False)
+        ub.simulate(one.scene, ub.EnergyMomentum(), t=(0.5, 0.8), dt=0.1, start=one)
         for one in (solution, loaded)
     ]
     assert same(runs[0].q, runs[1].q)
@@ -333,7 +326,7 @@ def test_laws_of_a_user_need_the_scene_of_the_script(shared_path):
     require_same(loaded, solution)
     assert solution.energy.lost["plastic"][-1] > 0
     runs = [
-        ub.simulate(one.scene, ub.EnergyMomentum(), t=(0.5, 0.8), dt=0.1, start=one, progress=False)
+        ub.simulate(one.scene, ub.EnergyMomentum(), t=(0.5, 0.8), dt=0.1, start=one)
         for one in (solution, loaded)
     ]
     assert same(runs[0].q, runs[1].q)
@@ -359,7 +352,7 @@ def test_a_path_is_loaded_with_the_scene_of_the_script(shared_path):
     """As other solutions are, to follow a branch with functions of the script."""
     beam = ub.Beam((0, 0), (0, 1), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4, name="column")
     load = ub.PointLoad(beam.end, force=(0, -1), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     path = ub.follow(scene, ub.LoadControl(0.5), steps=8)
     path.save(shared_path / "a.h5")
     loaded = ub.Solution.load(shared_path / "a.h5", scene=scene)
@@ -409,7 +402,7 @@ def test_paths_that_cannot_be_written(shared_path):
 # -- version ---------------------------------------------------------------------------------------
 
 
-def test_version():
+def test_the_version_is_the_one_of_the_project():
     project = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
     (stated,) = re.findall(r'^version = "([^"]+)"', project, re.MULTILINE)
     assert ub.__version__ == stated

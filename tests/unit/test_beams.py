@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.discretization.dof_numbering import Grid
@@ -41,7 +42,7 @@ def test_a_place_says_where_it_is():
     assert str(beam.at(0.5)) == "strut.at(0.5) (2.5, 4)"
 
 
-def test_arc():
+def test_an_arc_goes_from_angle_to_angle():
     beam = ub.Beam.arc((1, 1), 2.0, (0, math.pi / 2), SECTION, cells=3)
     assert beam.ends[0] == pytest.approx((3, 1))
     assert beam.ends[1] == pytest.approx((1, 3))
@@ -49,7 +50,7 @@ def test_arc():
     assert beam.at(0.5).point == pytest.approx((half, half))
 
 
-def test_arc_clockwise():
+def test_an_arc_may_run_clockwise():
     beam = ub.Beam.arc((0, 0), 1.0, (math.pi / 2, 0), SECTION)
     assert beam.start.point == pytest.approx((0, 1))
     assert beam.at(1 / 3).point == pytest.approx((0.5, math.sqrt(3) / 2))
@@ -73,8 +74,8 @@ def test_polyline_goes_by_length():
 def bent(beam):
     """End of a beam whose plastic hinge in the middle yields."""
     push = ub.PointLoad(beam.end, force=(0, -3.0), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    scene = clamped(beam, loads=[push])
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     return solution.displacement(beam.end), solution.connector(scene.hinges[0]).motion
 
 
@@ -117,7 +118,7 @@ def test_corners_are_vertices():
     )
 
 
-def test_any_curve():
+def test_a_beam_may_follow_any_curve():
     beam = ub.Beam.along(lambda s: (2 * s, s**2), SECTION, cells=4)
     assert beam.ends == ((0, 0), (2, 1))
     assert Grid(ub.Scene([beam])).points[:, 1] == pytest.approx([0, 1 / 16, 1 / 4, 9 / 16, 1])

@@ -4,11 +4,13 @@
 import math
 import re
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import pytest
-from law_runs import require_reference, require_restart
+from helpers import AfterEachStep, law_of, require_reference, require_restart
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import doubles, lib
@@ -99,12 +101,11 @@ def cantilever(*laws, load=lambda t: math.sin(9 * t), axis=(0.6, 0.8)):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
     links = [ub.Bushing(ub.ground(1, 0), beam.end, law, axis=axis) for law in laws]
     push = ub.PointLoad(beam.end, force=(0.7, 1.0), moment=0.4, amplitude=load)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=links)
+    scene = clamped(beam, loads=[push], connectors=links)
     return beam.end, links, scene
 
 
-def run(scene, scheme, t=(0, 0.6), dt=0.02, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+run = partial(ub.simulate, t=(0, 0.6), dt=0.02)
 
 
 # -- laws of several components ------------------------------------------------------------------
@@ -163,7 +164,7 @@ def test_springs_in_one_law_are_springs(scheme):
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 @pytest.mark.parametrize("name", LAWS)
-def test_reference(name, scheme):
+def test_the_reference_finds_the_same(name, scheme):
     _, (link,), scene = cantilever(LAWS[name])
     require_reference(run, scene, link, scheme)
 
@@ -209,18 +210,9 @@ def test_tables_and_live_values(shared_path, on_first_rank):
     _, (link,), scene = cantilever(LAWS["rough hole"])
     path, live = shared_path / "run.csv", []
 
-    class Watching(ub.Recorder):
-        by_itself, files = False, ()
-
-        def open(self, simulation):
-            pass
-
-        def write(self, simulation):
-            live.append(simulation.connector(link))
-
-    solution = run(
-        scene, ub.EnergyMomentum(), record=[ub.History(path, connectors=[link]), Watching()]
-    )
+    watching = AfterEachStep(lambda now: live.append(now.connector(link)))
+    record = [ub.History(path, connectors=[link]), watching]
+    solution = run(scene, ub.EnergyMomentum(), record=record)
     history = solution.connector(link)
     for name in history._fields:
         of_run = np.array([getattr(one, name) for one in live])
@@ -379,11 +371,6 @@ def test_a_pin_that_is_held_by_friction_rests():
 # -- what is refused -----------------------------------------------------------------------------
 
 
-def law_of(**members):
-    kind = type("Mine", (ub.ConnectorLaw,), {"__annotations__": {}, **members})
-    return dataclass(frozen=True)(kind)()
-
-
 @pytest.mark.parametrize(
     ("make", "message"),
     [
@@ -406,7 +393,7 @@ def law_of(**members):
         (lambda a, b: ub.Stretch(a, b, ub.Stop(1.0, high=0.1)), "Clearance(...)) for a pin"),
     ],
 )  # fmt: skip
-def test_refusals(make, message):
+def test_wrong_bushings_are_refused(make, message):
     beam = ub.Beam((0, 0), (1, 0), SECTION)
     with pytest.raises(ub.ArgumentError, match=re.escape(message)):
         make(ub.ground(1, 0), beam.end)
@@ -441,7 +428,8 @@ def test_a_path_has_no_time_for_friction():
     )
 
 
-def test_pictures(tmp_path):
+def test_bushings_have_pictures(tmp_path):
     _, _, scene = cantilever(LAWS["rough hole"])
-    ub.plot(scene).savefig(tmp_path / "model.png")
-    ub.plot(run(scene, ub.Static())).savefig(tmp_path / "solution.png")
+    for name, drawn in ("model.png", scene), ("solution.png", run(scene, ub.Static())):
+        ub.plot(drawn).savefig(tmp_path / name)
+        assert (tmp_path / name).stat().st_size > 1000

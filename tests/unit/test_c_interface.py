@@ -152,7 +152,7 @@ def test_versions_after_the_last_are_said(monkeypatch):
 
 
 @pytest.mark.parametrize("version", ["0.9.0", "0.10.0.post4", "0.11.0"])
-def test_known_versions(monkeypatch, recwarn, version):
+def test_known_versions_do_not_warn(monkeypatch, recwarn, version):
     monkeypatch.setattr(dolfinx, "__version__", version)
     imported()
     assert not recwarn

@@ -12,6 +12,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 from ufl_beam.discretization.state_io import Memory
@@ -31,7 +32,7 @@ def scene(EI=100.0, time=lambda t: math.sin(3 * t), x=1.0, **more):
     section = ub.Section(**{**STEEL, "EI": EI})
     beam = ub.Beam((0, 0), (x, 0), section, cells=2, name="left")
     load = ub.PointLoad(beam.end, force=(0, -3), amplitude=time)
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
+    return clamped(beam, loads=[load], **more)
 
 
 def run(path, frame=None, scheme=None, *, every=2, also=(), t=(0, 0.5), dt=0.1, **more):
@@ -41,7 +42,6 @@ def run(path, frame=None, scheme=None, *, every=2, also=(), t=(0, 0.5), dt=0.1, 
         t=t,
         dt=dt,
         checkpoint=ub.Checkpoint(path, every=every, also=also),
-        progress=False,
         **more,
     )
 
@@ -63,7 +63,7 @@ def path(shared_path):
         ({"every": 1, "also": [3]}, r"also\[0\] = 3 has no state"),
     ],
 )
-def test_bad_choices(arguments, message):
+def test_bad_intervals_of_checkpoints_are_refused(arguments, message):
     with pytest.raises(ub.ArgumentError, match=message):
         ub.Checkpoint("run.checkpoint", **arguments)
 
@@ -111,8 +111,8 @@ def test_the_file_of_another_run(other, path):
     assert "Delete the file to begin anew, or name another" in str(refused.value)
 
 
-def test_another_start(path):
-    first = ub.simulate(scene(), ub.Static(), t=(0, 1), dt=1.0, progress=False)
+def test_another_start_is_refused(path):
+    first = ub.simulate(scene(), ub.Static(), t=(0, 1), dt=1.0)
     run(path)
     frame = first.scene
     with pytest.raises(ub.ArgumentError, match=r"start is .*, in the file 'nothing'"):
@@ -159,7 +159,7 @@ def test_a_file_that_cannot_grow(path):
 
 FULL = """
 import ctypes, os, sys
-sys.path.insert(0, sys.argv[2])
+sys.path[:0] = sys.argv[2:]
 libc = ctypes.CDLL(None, use_errno=True)
 folder = sys.argv[1]
 if libc.mount(b"tmpfs", folder.encode(), b"tmpfs", 0, b"size=200k"):
@@ -180,8 +180,8 @@ except OSError as error:
 
 @pytest.mark.serial
 def test_a_full_disk(tmp_path):
-    here = str(Path(__file__).parent)
-    command = ["unshare", "-rm", sys.executable, "-c", FULL, str(tmp_path), here]
+    folders = map(str, Path(__file__).parents[:2])
+    command = ["unshare", "-rm", sys.executable, "-c", FULL, str(tmp_path), *folders]
     try:
         done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     except FileNotFoundError:
@@ -224,7 +224,7 @@ def scene_with(frame, *connectors):
 
 
 def test_what_a_controller_remembers_goes_on(path):
-    whole = ub.simulate(steered(Telling()), ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False)
+    whole = ub.simulate(steered(Telling()), ub.EnergyMomentum(), t=(0, 1), dt=0.1)
     run(path, steered(Telling()), t=(0, 0.5))
     force = Telling()
     longer = run(path, steered(force), t=(0, 1))
@@ -292,16 +292,10 @@ def test_a_state_must_be_plain(path):
 
 
 class Deaf(ub.Recorder):
-    def require_writable(self):
-        pass
-
     def open(self, simulation):
         pass
 
     def write(self, simulation):
-        pass
-
-    def close(self):
         pass
 
 
@@ -321,7 +315,7 @@ def test_a_history_that_is_gone(path, on_first_rank):
 def test_by_the_clock(path, on_first_rank):
     """Each step takes longer than no minutes."""
     ub.simulate(
-        scene(), ub.EnergyMomentum(), t=(0, 0.5), dt=0.1, progress=False,
+        scene(), ub.EnergyMomentum(), t=(0, 0.5), dt=0.1,
         checkpoint=ub.Checkpoint(path, minutes=0.0), record=Stop(path, 3),
     )  # fmt: skip
     assert on_first_rank(lambda: len(read(path)["history/q"])) == 6
@@ -433,9 +427,8 @@ def test_the_last_step_of_cells_that_the_first_process_does_not_have():
     yielding = ub.Section(**numbers, bending=ub.ElastoPlastic(50.0))
     first = ub.Beam((0, 0), (1, 0), yielding, cells=4)
     last = ub.Beam((1, 0), (2, 0), ub.Section(**numbers), cells=4)
-    scene = ub.Scene(
+    scene = rigid_chain(
         [first, last],
-        joints=[ub.Rigid(first.end, last.start)],
         supports=[ub.Clamped(first.start)],
         loads=[ub.PointLoad(last.end, force=(0, -5.0))],
     )

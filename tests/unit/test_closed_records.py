@@ -4,6 +4,7 @@
 from dataclasses import dataclass
 
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.model.connector_laws import Law
@@ -47,9 +48,9 @@ def test_a_subclass_of_hardening_is_followed(more, reference):
     section = ub.Section(EA=1e3, GA=1e3, EI=1.0, axial=Saturating(1.0, more=more))
     beam = ub.Beam((0, 0), (1, 0), section, cells=2)
     pull = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.01 * t, v=0.0, psi=0.0)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
+    scene = clamped(beam, pull)
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, newton=newton, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, newton=newton)
     force = 1.0 + 1e3 * more / (1e3 + more) * (0.01 - 0.001)
     assert run.section_forces_at(beam.start)[-1, 0] == pytest.approx(force, rel=1e-9)
 

@@ -1,55 +1,28 @@
 # SPDX-License-Identifier: MIT
 """Exceptions in functions of users under `mpirun`: raised by all processes, or the end of all."""
 
-import os
 import pickle
 import re
-import shutil
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 from mpi4py import MPI
 
 import pytest
+from helpers import needs_mpirun, on_two_processes
 
 from ufl_beam.errors import StepFailed
 from ufl_beam.parallel import Agreement, portable
 
 COMM = MPI.COMM_WORLD
-SCRIPT = Path(__file__).with_name("raising.py")
-
-MPIRUN = {
-    "OMPI_ALLOW_RUN_AS_ROOT": "1",
-    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_mpi_yield_when_idle": "1",
-    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-}
-"""Root may run it, on any number of cores."""
-
-needs_mpirun = pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
-
-
-def on_two(*arguments, timeout):
-    """Output and status of the script on two processes; a hang is a failure."""
-    command = ["mpirun", "-n", "2", sys.executable, str(SCRIPT), *map(str, arguments)]
-    return subprocess.run(
-        command,
-        env={**os.environ, **MPIRUN},
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=timeout,
-        check=False,
-    )
+SCRIPT = Path(__file__).with_name("script_of_errors.py")
 
 
 @pytest.mark.serial
 @needs_mpirun
 def test_all_processes_raise_together(tmp_path):
     """Each function of a user, on all processes and on each alone; then the same script goes on."""
-    run = on_two(tmp_path / "run.h5", timeout=300)
+    run = on_two_processes(SCRIPT, tmp_path / "run.h5", timeout=300)
     assert run.returncode == 0, run.stderr
     *lines, end = run.stdout.splitlines()
     assert end == "end"
@@ -73,7 +46,7 @@ def test_all_processes_raise_together(tmp_path):
 @needs_mpirun
 @pytest.mark.parametrize(("case", "rank"), [("alone", 1), ("asked", 0), ("own", 1)])
 def test_a_process_that_fails_alone_ends_all(case, rank):
-    run = on_two(case, rank, timeout=100)
+    run = on_two_processes(SCRIPT, case, rank, timeout=100)
     end = time.time()
     # Imports are not counted, which take long beside other tests. A hang would be for ever.
     assert end - max(map(float, re.findall(r"begun at ([\d.]+)", run.stderr))) < 10
@@ -86,7 +59,7 @@ def test_a_process_that_fails_alone_ends_all(case, rank):
 @pytest.mark.serial
 @needs_mpirun
 def test_processes_that_fail_alike_end_without_an_abort():
-    run = on_two("alone", -1, timeout=100)
+    run = on_two_processes(SCRIPT, "alone", -1, timeout=100)
     assert run.returncode != 0
     assert run.stderr.count("RuntimeError: user, alone") == 2
     assert "are ended" not in run.stderr

@@ -9,18 +9,15 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import ufl
+from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.compiled.c_library import ffi
-from ufl_beam.compiled.simd_kernels import LANES
 from ufl_beam.discretization import compiled_forms
-from ufl_beam.discretization.compiled_forms import patterns
 from ufl_beam.discretization.dof_numbering import Grid
 from ufl_beam.discretization.function_spaces import DolfinxFields, Fields
 from ufl_beam.discretization.partition import Share
 from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, strain
-from ufl_beam.terms.beam_forces import elastic_forms
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 
@@ -51,14 +48,14 @@ def compiled(monkeypatch):
 
 def make(**more):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], **more)
+    return clamped(beam, **more)
 
 
 def everything():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start), ub.Roller(beam.end, along=(1, 1))],
+    return clamped(
+        beam,
+        ub.Roller(beam.end, along=(1, 1)),
         loads=[ub.Gravity(), ub.FollowerLoad(beam.end, force=(1, 0)), ub.LineLoad(beam)],
         masses=[ub.PointMass(beam.end, 1.0, 1.0)],
     )
@@ -225,7 +222,7 @@ def test_an_elastic_scene_has_no_points(no_points, scheme):
     """Nor one with hinges that never open."""
     section = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, hinge=ub.Softening(math.inf, 1.0))
     beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.1: ub.Softening(math.inf, 2.0)})
-    never = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    never = clamped(beam, loads=[ub.Gravity()])
     for scene in (everything(), never):
         solution = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.1)
         solution.section_forces(scene.beams[0])
@@ -241,7 +238,7 @@ def test_no_points_can_fail(no_points):
     section = ub.Section(EA=60.0, GA=40.0, EI=30.0, bending=ub.ElastoPlastic(1.0))
     beam = ub.Beam((0, 0), (1, 0), section, cells=4)
     with pytest.raises(AssertionError, match="elastic"):
-        ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Static())
+        ub.Simulation(clamped(beam), ub.Static())
 
 
 def test_changing_alpha_compiles_no_other_code(compiled):
@@ -333,7 +330,7 @@ def test_forms_are_compiled_once_in_a_process(compiled):
         section = ub.Section(EA=60.0 * n, GA=40.0, EI=30.0, rhoA=2.0, hinge=ub.Softening(limit, 1))
         hinges = {0.0: ub.Softening(limit, 2.0), 1.0: ub.ElastoPlastic(limit, 0.1 * n)}
         beam = ub.Beam((0, 0), (n, 1), section, cells=n, hinges=hinges)
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Clamped(beam.end)])
+        scene = clamped(beam, ub.Clamped(beam.end))
         ub.Simulation(scene, ub.EnergyMomentum())
         if n == 3:
             before = len(compiled)
@@ -347,41 +344,3 @@ def test_matrix_entries_that_do_not_exist_are_refused():
     for beyond in (-1, matrix.size):
         with pytest.raises(ValueError, match="no such entry"):
             matrix.positions(np.array([beyond]), np.array([0]))
-
-
-@pytest.mark.serial
-@pytest.mark.parametrize("degree", [1, 2, 3])
-def test_energies_share_the_values_of_the_force(degree):
-    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=5)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
-    mesh = ub.Mesh(degree=degree)
-    simulation = ub.Simulation(scene, scheme := ub.EnergyMomentum(alpha=0.1), mesh=mesh)
-    (beams,) = simulation.beams
-    energies = beams._stored, *beams._losses
-    assert all(np.shares_memory(x._packed, beams._force._packed) for x in energies)
-    simulation.step_to(0.01)
-    fields = Fields(simulation.share)
-    own = fields.kernel(elastic_forms(fields.element, scheme).stored, beams._q1)
-    assert beams._stored.value(simulation.q) == pytest.approx(own.value(simulation.q), rel=1e-13)
-
-
-@pytest.mark.serial
-def test_batches_alike_have_one_pattern():
-    """A beam has those of both ends and of what is between, in rows but for the free end."""
-    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=1000)
-    other = ub.Beam((1, 0), (2, 0), SECTION, cells=3)
-    scene = ub.Scene([beam, other], joints=[ub.Revolute(beam.end, other.start)])
-    simulation = ub.Simulation(scene, ub.EnergyMomentum())
-    A, dofs = simulation.equation.A, simulation.share.cell_dofs
-    places = A.blocks(np.ascontiguousarray(dofs), LANES)
-    found = patterns(places)
-    pattern = np.frombuffer(ffi.buffer(found["pattern"]), dtype=np.uint8)
-    pattern = pattern.reshape(-1, *places.shape[1:])
-    assert np.array_equal(pattern[found["has"]], places)
-    assert len(pattern) <= 5
-    of_nodes = pattern.reshape(-1, 6, 6, LANES)[:, :, [0, 2, 4, 1, 3, 5]]
-    in_rows = (np.diff(of_nodes.astype(int), axis=2) == 1).all(axis=(1, 2, 3))
-    assert in_rows.tolist() == [True] * found["in_rows"] + [False] * (
-        len(pattern) - found["in_rows"]
-    )
-    assert 0 < found["in_rows"] < len(pattern)

@@ -4,16 +4,21 @@
 import math
 import os
 import re
-import shutil
-import subprocess
-import sys
 import warnings
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import pytest
-from law_runs import require_reference, require_restart
+from helpers import (
+    law_of,
+    needs_mpirun,
+    on_two_processes,
+    require_reference,
+    require_restart,
+)
+from scenes import clamped
 from scipy.integrate import solve_ivp
 
 import ufl_beam as ub
@@ -134,8 +139,7 @@ def carriage(law, v, mass=2.0, more=()):
     return body.middle, link, scene
 
 
-def run(scene, scheme, t=(0, 0.6), dt=0.02, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+run = partial(ub.simulate, t=(0, 0.6), dt=0.02)
 
 
 # -- the compiled law ----------------------------------------------------------------------------
@@ -193,7 +197,7 @@ def test_small_steps_keep_the_digits_of_the_force():
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 @pytest.mark.parametrize("name", LAWS)
-def test_reference(name, scheme):
+def test_the_reference_finds_the_same(name, scheme):
     _, (link,), scene = cantilever(LAWS[name])
     found = require_reference(run, scene, link, scheme)
     mine = found.connector(link)
@@ -255,7 +259,7 @@ def test_an_end_of_equilibrium_is_at_rest():
     [(ub.Static(), 1), (ub.EnergyMomentumStatic(), 1), (ub.EnergyMomentumStatic(0.5), 2)],
     ids=str,
 )
-def test_relaxation(scheme, order):
+def test_a_maxwell_element_relaxes(scheme, order):
     """A Maxwell element moved at a rate v: F = η v (1 - exp(-k t/η)), then held [closed]."""
     k, eta = 200.0, 100.0
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=1)
@@ -330,9 +334,7 @@ def test_motions_of_all_kinds():
     turn = ub.Turn(ub.ground(1, 0), beam.end, Cubic(2.0, 30.0))
     stretch = ub.Stretch(ub.ground(1, 1), beam.end, Drag(50.0, 9.0))
     push = ub.PointLoad(beam.end, force=(0, 1.0), amplitude=lambda t: math.sin(9 * t))
-    scene = ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], loads=[push], connectors=[turn, stretch]
-    )
+    scene = clamped(beam, loads=[push], connectors=[turn, stretch])
     found, reference = (
         run(scene, ub.EnergyMomentum(), newton=ub.Newton(rtol=1e-12, reference=one))
         for one in (False, True)
@@ -340,11 +342,6 @@ def test_motions_of_all_kinds():
     np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * np.abs(found.q).max())
     assert found.energy.worst < 1e-12
 
-
-MPIRUN = {
-    "OMPI_ALLOW_RUN_AS_ROOT": "1", "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
-    "OMPI_MCA_mpi_yield_when_idle": "1", "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
-}  # fmt: skip
 
 SHARED = """
 import sys
@@ -360,15 +357,11 @@ t.ub.print_once(repr([float(x[-1]) for x in solution.energy.values()]))
 
 
 @pytest.mark.serial
-@pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
+@needs_mpirun
 def test_two_processes_share_a_scene():
     here = os.path.dirname(os.path.abspath(__file__))
     code = SHARED.format(here=here, tests=os.path.dirname(here))
-    command = ["mpirun", "-n", "2", sys.executable, "-c", code]
-    environment = {**os.environ, **MPIRUN}
-    found = subprocess.run(
-        command, env=environment, capture_output=True, text=True, timeout=300, check=False
-    )
+    found = on_two_processes("-c", code)
     assert found.returncode == 0, found.stderr
     forces, energies = map(eval, found.stdout.splitlines()[-2:])
     _, links, scene = all_laws()
@@ -425,7 +418,7 @@ def test_buckling_on_a_spring_of_ones_own():
     assert factors[0] == pytest.approx(factors[1], rel=1e-6)
 
 
-def test_follow():
+def test_on_a_path_rates_vanish():
     """Rates vanish on a path, and Maxwell elements are relaxed [closed]."""
     at, _, scene = cantilever(Cubic(100.0, 1e5), Drag(50.0, 9.0), Maxwell(200.0, 9.0),
                                        load=lambda t: t)  # fmt: skip
@@ -451,7 +444,7 @@ def test_follow():
 
 
 @pytest.mark.parametrize(("damping", "v"), [(0.5, 0.3), (2.0, 0.3), (2.0, 3.0), (100.0, 1.0)])
-def test_restitution(damping, v):
+def test_a_damped_stop_takes_a_part_of_the_velocity(damping, v):
     """The velocity after a contact against the ordinary differential equation [independent]."""
     k, m = 2e4, 2.0
 
@@ -486,15 +479,6 @@ def test_a_stop_without_damping_has_no_entry():
 
 
 # -- what is refused -----------------------------------------------------------------------------
-
-
-def law_of(**members):
-    """A law with fields and methods of a test."""
-    fields = members.pop("fields", {})
-    kind = type(
-        "Mine", (ub.ConnectorLaw,), {"__annotations__": dict.fromkeys(fields, float), **members}
-    )
-    return dataclass(frozen=True)(kind)(**fields)
 
 
 def quadratic(self, motion, state):

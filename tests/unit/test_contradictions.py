@@ -161,7 +161,7 @@ TABLE = {
 
 
 @pytest.mark.parametrize("case", TABLE)
-def test_the_table(case):
+def test_contradictions_name_all_holders_and_a_remedy(case):
     """All holders are named, and one reason and remedy; no step is tried."""
     make, words = TABLE[case]
     with pytest.raises(ub.ArgumentError) as refused:

@@ -12,6 +12,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.output import output_files
@@ -25,11 +26,11 @@ SECTION = ub.Section(
 def scene():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="left")
     load = ub.PointLoad(beam.end, force=(0, -3), amplitude=lambda t: math.sin(3 * t))
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    return clamped(beam, loads=[load])
 
 
 def run(*, until=0.5, **more):
-    return ub.simulate(scene(), ub.EnergyMomentum(), t=(0, until), dt=0.1, progress=False, **more)
+    return ub.simulate(scene(), ub.EnergyMomentum(), t=(0, until), dt=0.1, **more)
 
 
 class Solutions:
@@ -52,7 +53,7 @@ class Studies:
     advice = "Delete the file to compute all members, or name another"
 
     def write(self, path):
-        ub.study(self.member, [{"x": x} for x in range(3)], path=path, progress=False)
+        ub.study(self.member, [{"x": x} for x in range(3)], path=path)
 
     def member(self, x):
         return {"row": np.arange(4.0) ** x, "other": np.arange(4.0)}

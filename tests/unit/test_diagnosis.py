@@ -5,6 +5,7 @@ import re
 
 import numpy as np
 import pytest
+from scenes import clamped, rigid_chain
 from scipy.sparse import csc_array, diags_array
 
 import ufl_beam as ub
@@ -15,7 +16,7 @@ CODES = ("DIVERGED", "SNES", "dt = 0 s")
 
 def failure(scene, scheme=None, **more):
     """The error of a static run, whose message has no codes."""
-    arguments = {"t": (0, 7), "dt": 0.5, "progress": False} | more
+    arguments = {"t": (0, 7), "dt": 0.5} | more
     with pytest.raises(ub.ConvergenceError) as caught:
         ub.simulate(scene, scheme or ub.Static(), **arguments)
     assert [code for code in CODES if code in str(caught.value)] == []
@@ -64,7 +65,7 @@ def test_a_massless_body_between_two_hinges_that_nothing_turns():
     Rotations of 1e-4 make a nonlinearity far below the tolerance.
     """
     _, scene = node_between_hinges()
-    solution = ub.simulate(scene, ub.Static(), t=(0, 7), dt=0.5, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 7), dt=0.5)
     (left, _), node = scene.beams, scene.bodies[0]
     load, moment = 3.5, 1.0  # N, N m
     expected = -load * ((1 - 1 / 16) / (3 * 1e4) + 1 / 1e7) + moment / (2 * 1e4)
@@ -97,9 +98,8 @@ def test_a_plastic_mechanism_names_the_cell():
     weak = ub.Section(**numbers, bending=ub.ElastoPlastic(yield_limit=1.0))
     fuse = ub.Beam((0, 0), (0.1, 0), weak, cells=1, name="fuse")
     arm = ub.Beam((0.1, 0), (1, 0), ub.Section(**numbers), cells=3, name="arm")
-    scene = ub.Scene(
+    scene = rigid_chain(
         [fuse, arm],
-        joints=[ub.Rigid(fuse.end, arm.start)],
         supports=[ub.Clamped(fuse.start)],
         loads=[ub.PointLoad(arm.end, moment=1.0, amplitude=lambda t: t)],
     )
@@ -112,7 +112,7 @@ def test_a_plastic_mechanism_names_the_cell():
 def test_too_few_iterations_in_words():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e7, GA=1e7, EI=1e4), cells=2)
     load = ub.PointLoad(beam.end, force=(0, -1e4), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     error = failure(scene, newton=ub.Newton(max_iterations=1, rtol=1e-14))
     assert "Newton's method did not converge after 1 iterations; residual" in str(error)
     assert "singular" not in str(error)
@@ -147,13 +147,13 @@ def test_perfectly_plastic_cells_in_a_row():
         beam = ub.Beam((0, 0), (1, 0), section, cells=4)
         held = [ub.PrescribedDisplacement(beam.at(k / 4), v=0.0, psi=0.0) for k in range(1, 4)]
         pulled = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.008 * t, v=0.0, psi=0.0)
-        return pulled, ub.Scene([beam], supports=[ub.Clamped(beam.start), pulled, *held])
+        return pulled, clamped(beam, pulled, *held)
 
     assert "if they are in a row, nothing tells which of them flows" in str(
         failure(rod()[1], t=(0, 1), dt=0.25)
     )
     pulled, hardens = rod(isotropic=200e9 * 1e-6)
-    run = ub.simulate(hardens, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    run = ub.simulate(hardens, ub.Static(), t=(0, 1), dt=0.25)
     # N; the weakest cell bears about 300 MPa on 4 cm²
     assert 0.8 < run.reaction(pulled)[-1, 0] / 120e3 < 1.2
 
@@ -199,6 +199,6 @@ def test_what_is_far_from_a_limit_load_is_not_called_one():
     """A single iteration is too little for a large deflection."""
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e6, GA=1e6, EI=1.0), cells=4)
     load = ub.PointLoad(beam.end, force=(0, 1e5), amplitude=lambda t: 1.0)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     error = failure(scene, t=(0, 1), dt=0.5, newton=ub.Newton(max_iterations=1))
     assert "limit load or a bifurcation is near" not in str(error)

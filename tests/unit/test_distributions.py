@@ -43,7 +43,7 @@ def expected(distribution):
 
 
 @pytest.mark.parametrize("distribution", ALL, ids=lambda d: type(d).__name__)
-def test_moments(distribution):
+def test_samples_have_the_mean_and_deviation(distribution):
     """Four standard errors of the mean, and as many of the deviation of a normal distribution."""
     values, (mean, deviation) = sample(distribution), expected(distribution)
     assert values.shape == (MANY,)
@@ -53,7 +53,7 @@ def test_moments(distribution):
 
 
 @pytest.mark.parametrize("distribution", ALL, ids=lambda d: type(d).__name__)
-def test_shapes(distribution):
+def test_samples_have_the_distribution(distribution):
     """The distribution of Kolmogorov and Smirnov's test: a chance of 1e-3 of a false alarm."""
     law = {
         ub.Normal: stats.norm(MEAN, DEVIATION),
@@ -86,7 +86,7 @@ def test_none_is_negative(kind):
 
 
 @pytest.mark.parametrize("distribution", ALL, ids=lambda d: type(d).__name__)
-def test_streams(distribution):
+def test_each_place_has_its_own_sample(distribution):
     values = sample(distribution, 50, (1, 2))
     assert (values == sample(distribution, 50, (1, 2))).all()
     for other in ((2, 1), (1, 3), (0, 2)):

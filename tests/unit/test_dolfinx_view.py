@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 import ufl
 from dolfinx import fem, has_adios2
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 from ufl_beam import parallel
@@ -22,7 +23,7 @@ def test_total_is_that_of_the_scene_on_any_processes(monkeypatch, least):
     monkeypatch.setattr(parallel, "SMALLEST_SHARE", least)
     beam = ub.Beam((0, 0), (3, 0), ub.Section(**STEEL), cells=12)
     load = ub.PointLoad(beam.end, force=(10.0, 30.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     simulation = moved(scene, ub.EnergyMomentum(), comm=MPI.COMM_WORLD)
     assert simulation.share.comm.size == (MPI.COMM_WORLD.size if least == 1 else 1)
     view = simulation.dolfinx
@@ -73,9 +74,8 @@ def frame():
     roof = ub.Beam(
         (0, 1), (1, 1.2), ub.Section(**STEEL), cells=4, hinges={0.5: ub.Softening(20, 5)}
     )
-    return ub.Scene(
+    return rigid_chain(
         [left, roof],
-        joints=[ub.Rigid(left.end, roof.start)],
         supports=[ub.Clamped(left.start), ub.Pinned(roof.end)],
         loads=[ub.PointLoad(roof.at(0.25), force=(900.0, -700.0), amplitude=ub.ramp(0.1))],
     )
@@ -175,7 +175,7 @@ def test_an_own_form(degree):
     """The length of a beam by a load of 1 N/m, and the load of the scene by internal forces."""
     beam = ub.Beam((0, 0), (2, 0.3), ub.Section(**STEEL), cells=4)
     down = ub.PointLoad(beam.at(0.5), force=(0, -30.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), ub.Pinned(beam.end)], loads=[down])
+    scene = clamped(beam, ub.Pinned(beam.end), loads=[down])
     simulation = moved(scene, ub.EnergyMomentumStatic(), mesh=ub.Mesh(degree=degree))
     view = simulation.dolfinx
     w = ufl.TestFunction(view.function_space)
@@ -211,7 +211,7 @@ def test_each_process_has_its_cells():
 
 def test_what_a_scene_does_not_have():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=2)
-    simulation = ub.Simulation(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.Static())
+    simulation = ub.Simulation(clamped(beam), ub.Static())
     with pytest.raises(
         ub.ArgumentError, match=r"dolfinx\.jump: no beam of the scene has a hinge; give"
     ):
@@ -309,7 +309,7 @@ class Monitored(ub.Recorder):
 def test_a_monitor_of_a_path():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**STEEL), cells=4)
     down = ub.PointLoad(beam.end, force=(0, -100.0), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[down])
+    scene = clamped(beam, loads=[down])
     watch = Monitored()
     ub.follow(scene, ub.ArcLength(0.1), steps=3, record=watch)
     assert len([iteration for iteration in watch.seen if iteration]) == watch.iterations > 0

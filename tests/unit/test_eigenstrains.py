@@ -8,8 +8,8 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars, C, histories
-from laws_of_ones_own import Eigenstrain, YieldingEigenstrain
+from uniaxial_points import LENGTH, Bars, C, histories
+from user_laws import Eigenstrain, YieldingEigenstrain
 
 import ufl_beam as ub
 
@@ -29,17 +29,17 @@ def scene(supports, section=CURVED, **more):
 @pytest.mark.parametrize("reference", [False, True])
 @pytest.mark.parametrize("dt", [1.0, 0.25])
 @pytest.mark.parametrize("scheme", STATICS, ids=str)
-def test_beams(scheme, dt, reference):
+def test_eigenstrains_bend_a_free_beam_and_load_a_clamped_one(scheme, dt, reference):
     """[closed] The simple beam bends to e0 and bears nothing; the clamped one bears -EI e0."""
     newton = ub.Newton(reference=reference)
     beam, simple = scene(SIMPLE)
-    run = ub.simulate(simple, scheme, t=(0, 1), dt=dt, newton=newton, progress=False)
+    run = ub.simulate(simple, scheme, t=(0, 1), dt=dt, newton=newton)
     # An arc of the angle 8e-4: its rise differs by the square of that.
     rise = (1 - math.cos(E0 * L / 2)) / E0
     assert -run.displacement(beam.at(0.5))[-1, 1] == pytest.approx(rise, rel=1e-6)
     assert np.abs(run.diagram(beam).M).max() < 1e-9 * EI * E0
     beam, clamped = scene(CLAMPED)
-    run = ub.simulate(clamped, scheme, t=(0, 1), dt=dt, newton=newton, progress=False)
+    run = ub.simulate(clamped, scheme, t=(0, 1), dt=dt, newton=newton)
     assert np.abs(run.displacement(beam.at(0.5))).max() < 1e-15 * L
     assert np.abs(run.diagram(beam).M + EI * E0).max() < 1e-9 * EI * E0
     assert run.energy.worst < 1e-12
@@ -58,12 +58,12 @@ def test_a_load_beside_it(reference):
     newton = ub.Newton(reference=reference)
     both, plain = map(pressed, (CURVED, ub.Section(**STIFF)))
     (beam,) = both.beams
-    run = ub.simulate(both, ub.Static(), t=(0, 1), dt=0.1, newton=newton, progress=False)
+    run = ub.simulate(both, ub.Static(), t=(0, 1), dt=0.1, newton=newton)
     y = run.displacement(beam.at(0.5))[:, 1]
-    added = ub.simulate(plain, ub.Static(), t=(0, 1), dt=0.1, progress=False)
+    added = ub.simulate(plain, ub.Static(), t=(0, 1), dt=0.1)
     added = added.displacement(plain.beams[0].at(0.5))[:, 1]
     assert y[1:] - y[1] == pytest.approx(added[1:] - added[1], rel=1e-5)  # (e0 L)², with dy
-    path = ub.follow(both, ub.LoadControl(0.1), steps=10, progress=False)
+    path = ub.follow(both, ub.LoadControl(0.1), steps=10)
     assert path.displacement(beam.at(0.5))[0, 1] == pytest.approx(y[-1] - (y[-1] - y[1]) / 0.9)
     assert path.displacement(beam.at(0.5))[-1, 1] == pytest.approx(y[-1], rel=1e-6)
     assert path.energy.worst < 1e-7  # of the trapezoidal rule, (curvature L)²
@@ -80,7 +80,7 @@ def test_a_spring_that_is_too_long(reference):
     guide = [ub.Roller(beam.start), ub.Roller(beam.end)]
     held = ub.Scene([beam], supports=guide, connectors=springs)
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(held, ub.Static(), t=(0, 1), dt=0.5, newton=newton, progress=False)
+    run = ub.simulate(held, ub.Static(), t=(0, 1), dt=0.5, newton=newton)
     assert run.displacement(beam.start)[-1, 0] == pytest.approx(0.02 / 4, rel=1e-5)  # of EA
     with pytest.raises(ub.ArgumentError, match=r"modes: Eigenstrain of Stretch\(.*at no strain"):
         ub.modes(held, 1)
@@ -109,7 +109,7 @@ def test_of_interacting_resultants():
     """[closed] A cantilever grows by the axial one, and its end turns by the other times L."""
     section = ub.Section(**STIFF, interaction=Both(1e-3, E0))
     beam, cantilever = scene(CLAMPED[:1], section)
-    run = ub.simulate(cantilever, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    run = ub.simulate(cantilever, ub.Static(), t=(0, 1), dt=1.0)
     assert run.displacement(beam.end)[-1, 2] == pytest.approx(E0 * L, rel=1e-9)
     assert run.displacement(beam.end)[-1, 0] == pytest.approx(1e-3 * L, rel=1e-3)  # less the arc's
     assert np.abs(run.section_forces_at(beam.start)[-1, 0]) < 1e-9 * 1e9 * 1e-3
@@ -120,21 +120,21 @@ def test_of_interacting_resultants():
     [ub.EnergyMomentum(), ub.EnergyMomentum(0.05), ub.EnergyMomentumDecaying(), ub.Newmark()],
     ids=repr,
 )
-def test_dynamics(scheme):
+def test_a_beam_vibrates_about_its_static_state(scheme):
     """From the undeformed scene it vibrates about the static solution; from that it stays there."""
     beam, simple = scene(SIMPLE)
-    run = ub.simulate(simple, scheme, t=(0, 0.5), dt=2e-3, progress=False)
+    run = ub.simulate(simple, scheme, t=(0, 0.5), dt=2e-3)
     y, rise = -run.displacement(beam.at(0.5))[:, 1], E0 * L**2 / 8
     # The first mode has 32/(π³) of it, and is 0.04 s long: means over 12 periods
     assert y.mean() == pytest.approx(rise, rel=0.03)
     assert y.max() == pytest.approx(2 * rise, rel=0.1)
     if not isinstance(scheme, ub.Newmark):
         assert run.energy.worst < 1e-9
-    still = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    still = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0)
     # Midpoint rules say in a warning how many digits the energies of a scene at rest have.
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", ub.ModelWarning)
-        run = ub.simulate(simple, scheme, t=(1, 1.1), dt=2e-3, start=still, progress=False)
+        run = ub.simulate(simple, scheme, t=(1, 1.1), dt=2e-3, start=still)
     assert np.ptp(run.displacement(beam.at(0.5))[:, 1]) < 1e-9 * rise
 
 
@@ -152,13 +152,11 @@ def test_analyses_about_the_undeformed_scene_are_refused():
     with pytest.raises(
         ub.ArgumentError, match=r"EnergyMomentumStatic\(theta=0.5\): Eigenstrain of girder"
     ):
-        ub.simulate(simple, ub.EnergyMomentumStatic(0.5), t=(0, 1), dt=0.5, progress=False)
-    at = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+        ub.simulate(simple, ub.EnergyMomentumStatic(0.5), t=(0, 1), dt=0.5)
+    at = ub.simulate(simple, ub.Static(), t=(0, 1), dt=1.0)
     with warnings.catch_warnings():  # see above
         warnings.simplefilter("ignore", ub.ModelWarning)
-        held = ub.simulate(
-            simple, ub.EnergyMomentumStatic(0.5), t=(1, 2), dt=0.5, start=at, progress=False
-        )
+        held = ub.simulate(simple, ub.EnergyMomentumStatic(0.5), t=(1, 2), dt=0.5, start=at)
     y = held.displacement(beam.at(0.5))[:, 1]
     assert y == pytest.approx(np.full(3, at.displacement(beam.at(0.5))[-1, 1]), rel=1e-9)
     omega = ub.modes(elastic, 1).omega
@@ -203,5 +201,5 @@ def test_round_off_of_dissipation_turns_no_path(law):
         beam, _ = scene(SIMPLE, section)
         load = ub.PointLoad(beam.at(0.5), force=(0, -1e5), amplitude=lambda t: t)
         loaded = ub.Scene([beam], supports=[make(beam) for make in SIMPLE], loads=[load])
-        paths.append(ub.follow(loaded, ub.ArcLength(0.01), steps=20, progress=False).times)
+        paths.append(ub.follow(loaded, ub.ArcLength(0.01), steps=20).times)
     assert paths[1] == pytest.approx(paths[0], rel=1e-9)

@@ -13,7 +13,7 @@ SIMULATION = """
 import ufl_beam as ub
 beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0, rhoA=1.0), cells=2)
 scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
-ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, progress=False)
+ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1)
 """
 
 LINES = """

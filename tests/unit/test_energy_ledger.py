@@ -9,10 +9,9 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
-
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 CLOSED = 1e-9
 """Largest imbalance of a ledger as a part of its throughput."""
@@ -58,7 +57,7 @@ def test_throughput_counts_work_both_ways():
     assert off.worst == 4 / (9 + 5)
 
 
-def test_nothing_happens():
+def test_a_ledger_of_zeros_has_no_throughput():
     nothing = ub.Energy({"stored": np.zeros(3)}, {}, {})
     assert nothing.throughput == 0
     assert nothing.worst == 0
@@ -80,7 +79,7 @@ def test_stored_energy_of_uniform_states():
     # EI κ² L / 2 with κ = M / EI: an end moment of 50 N m on 2 m
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
     moment = ub.PointLoad(beam.end, moment=50.0, amplitude=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[moment])
+    scene = clamped(beam, loads=[moment])
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     expected = 50.0**2 * 2 / (2 * 100.0) * solution.times**2
     # Newton's method ends below 1e-10 of the forces, and energy is quadratic in what is left
@@ -109,7 +108,7 @@ def test_work_of_a_support_that_moves():
     # Static stretch of 1 % of 2 m: EA ε² L / 2
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=3)
     pull = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.02 * t, v=0, psi=0)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
+    scene = clamped(beam, pull)
     solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     assert solution.energy["supports"][-1] == pytest.approx(1e4 * 0.01**2, rel=1e-10)
     assert solution.energy["stored"][-1] == pytest.approx(1e4 * 0.01**2, rel=1e-10)
@@ -154,7 +153,7 @@ def busy():
     ],
     ids=str,
 )
-def test_dynamics_closes(scheme, dt):
+def test_the_ledger_of_dynamics_closes(scheme, dt):
     # 40 steps, or the time of the slowest motion
     solution = ub.simulate(busy(), scheme, t=(0, min(40 * dt, 2.0)), dt=dt)
     energy = solution.energy
@@ -172,7 +171,7 @@ def test_statics_closes_to_the_order_of_its_steps():
     """Works are trapezoidal there: second order, unless forces grow in proportion to motions."""
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
     loads = [ub.PointLoad(beam.end, force=(20, -80), amplitude=ub.ramp(1.0))]
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads)
+    scene = clamped(beam, loads=loads)
     worst = [
         ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt).energy.worst for dt in (0.1, 0.05, 0.025)
     ]
@@ -223,7 +222,7 @@ def test_a_run_says_when_round_off_opens_its_ledger():
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         # The imbalance is luck: from 1e-7 to 1e-4 with this EA, as the compiler orders the sums.
-        solution = ub.simulate(stiff(1e18), ub.EnergyMomentum(), t=(0, 3), dt=0.1, progress=False)
+        solution = ub.simulate(stiff(1e18), ub.EnergyMomentum(), t=(0, 3), dt=0.1)
     # The first process says so for all.
     said = [str(one.message) for one in caught if one.category is ub.ModelWarning]
     assert said == [solution.open_ledger] * (MPI.COMM_WORLD.rank == 0)
@@ -247,7 +246,7 @@ def test_a_scene_that_turns_as_a_whole_has_no_energy_to_balance():
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
     turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: math.sin(math.pi * t))
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), turn])
-    solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.01, progress=False)
+    solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.01)
     assert solution.energy.throughput < 1e-9
     assert solution.open_ledger == ""
 
@@ -256,8 +255,8 @@ def test_a_scene_that_turns_as_a_whole_has_no_energy_to_balance():
 def test_schemes_that_claim_nothing_say_nothing(scheme):
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=2)
     push = ub.PointLoad(beam.end, force=(0, 20.0), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-    solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.25, progress=False)
+    scene = clamped(beam, loads=[push])
+    solution = ub.simulate(scene, scheme, t=(0, 1), dt=0.25)
     assert solution.energy.worst > 1e-9
     assert solution.open_ledger == ""
 
@@ -266,10 +265,8 @@ def test_energies_of_nearly_nothing_are_not_compared():
     """Squares of motions of 1e-160 m have lost their digits, and nobody would miss them."""
     beam = ub.Beam((0, 0), (2, 1), SECTION, cells=2)
     push = ub.PointLoad(beam.end, force=(0, 1e-158), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-    assert (
-        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False).open_ledger == ""
-    )
+    scene = clamped(beam, loads=[push])
+    assert ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1).open_ledger == ""
 
 
 def test_small_strains_keep_their_digits():
@@ -281,8 +278,8 @@ def test_small_strains_keep_their_digits():
     for force in (1.0, 1e-9, 1e-12):
         beam = ub.Beam((0, 0), (1.7, 2.4), section, cells=8)
         push = ub.PointLoad(beam.end, force=(force, 0), amplitude=lambda t: min(t, 1.0))
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.01, progress=False)
+        scene = clamped(beam, loads=[push])
+        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.5), dt=0.01)
         assert solution.energy.worst < 1e-12
 
 

@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
-QUIET = {"progress": False}
 EXACT = [
     ub.EnergyMomentum(),
     ub.EnergyMomentum(0.1, 0.1),
@@ -45,7 +45,7 @@ def test_a_work_may_not_have_the_name_of_a_column(tmp_path):
     scene = ub.Scene([one], supports=held, connectors=[spring], works=[wind])
     table = ub.History(tmp_path / "run.csv", connectors=[spring])
     with pytest.raises(ub.ArgumentError, match="would be a column of a connector"):
-        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, record=table, **QUIET)
+        ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, record=table)
 
 
 def test_a_scene_is_in_one_frame():
@@ -98,9 +98,9 @@ class OneSided(Stiffening):
 def bent(law, scheme, reference=False, dt=0.05):
     one = beam(bending=law)
     load = ub.PointLoad(one.end, (0, 1.0), amplitude=lambda t: t)
-    scene = ub.Scene([one], supports=[ub.Clamped(one.start)], loads=[load])
+    scene = clamped(one, loads=[load])
     newton = ub.Newton(reference=reference)
-    return ub.simulate(scene, scheme, t=(0, 1), dt=dt, newton=newton, **QUIET).energy
+    return ub.simulate(scene, scheme, t=(0, 1), dt=dt, newton=newton).energy
 
 
 @pytest.mark.parametrize("reference", [False, True])

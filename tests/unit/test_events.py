@@ -4,6 +4,7 @@
 import math
 
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -13,9 +14,7 @@ ELASTIC = ub.Section(EA=1e6, GA=1e6, EI=1e3, rhoA=1.0, rhoI=1e-3)
 def cantilever(section, motion, **more):
     """A beam of 1 m, clamped, whose end rotates as `motion` says."""
     beam = ub.Beam((0, 0), (1, 0), section, cells=2, name="arm", **more)
-    return ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, psi=motion)]
-    )
+    return clamped(beam, ub.PrescribedDisplacement(beam.end, psi=motion))
 
 
 def run(scene, scheme, *, t=1.0, dt=0.05):
@@ -130,7 +129,7 @@ def pushed_brake():
 @pytest.mark.parametrize("goes_on", ["checkpoint", "start"])
 def test_friction_goes_on_as_it_was(shared_path, last, goes_on):
     """Whether a place sticks depends on a limit, which is known in a run that goes on."""
-    scene, options = pushed_brake(), {"dt": 0.02, "progress": False}
+    scene, options = pushed_brake(), {"dt": 0.02}
     whole, first, rest = (ub.Events() for _ in range(3))
     ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.3), record=whole, **options)
     if goes_on == "checkpoint":

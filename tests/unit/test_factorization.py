@@ -42,7 +42,7 @@ def test_sign_of_the_determinant(seed):
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_solutions(seed):
+def test_factors_solve_to_round_off(seed):
     """One refinement leaves residuals of round-off: 1e-13 of sums of 17 terms of size one."""
     A = saddle(seed)
     b = np.random.default_rng(9).normal(size=len(A))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.output import fatigue
@@ -120,12 +121,12 @@ def test_the_curve_of_the_eurocode():
     assert CURVE.endurance(knee / 1.5) == pytest.approx(5e6 * 1.5**5, rel=1e-12)
 
 
-def test_one_slope():
+def test_a_curve_of_one_slope_is_a_power():
     curve = ub.SNCurve(range=100e6, cycles=1e6, slope=4.0)
     assert curve.endurance([10e6, 200e6]) == pytest.approx([1e10, 62500.0], rel=1e-12)
 
 
-def test_mean_stress():
+def test_mean_stresses_enlarge_ranges():
     sizes, means = np.array([100e6] * 4), np.array([0.0, 250e6, -250e6, 500e6])
     goodman, gerber = ub.Goodman(500e6), ub.Gerber(500e6)
     assert goodman(sizes, means).tolist() == [100e6, 200e6, 100e6, math.inf]
@@ -142,7 +143,7 @@ def test_mean_stress():
 def mast(*loads, cells=4):
     """A cantilever upright from (0, 0), 4 m; push it at its end."""
     beam = ub.Beam((0, 0), (0, 4), SECTION, cells=cells, name="mast")
-    return beam, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[f(beam) for f in loads])
+    return beam, clamped(beam, loads=[f(beam) for f in loads])
 
 
 def to_and_fro(beam):
@@ -343,7 +344,7 @@ PLACE = ub.Beam((0, 0), (1, 0), SECTION, name="arm").end
         (lambda: ub.Extremes().section_forces(PLACE.beam), "Extremes: nothing was run"),
     ],
 )
-def test_bad_input(make, message):
+def test_bad_input_is_refused(make, message):
     with pytest.raises(ub.ArgumentError, match=message):
         make()
 
@@ -367,7 +368,7 @@ def test_bad_input_of_a_run():
 # -- pictures ----------------------------------------------------------------------------------
 
 
-def test_pictures():
+def test_fatigue_and_extremes_have_pictures():
     beam, scene = mast(to_and_fro)
     spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
     recorder, extremes = ub.Fatigue(spot, CURVE), ub.Extremes()

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -138,7 +139,7 @@ def bent(fibres):
         section = ub.Section(section.EA, section.GA, section.EI, section.rhoA, section.rhoI)
     beam = ub.Beam.arc((0, 0), 5.0, (0, 1.5), section, cells=5)
     load = ub.PointLoad(beam.end, force=(3e5, -2e5), moment=1e5, amplitude=ub.ramp(0.1))
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    return clamped(beam, loads=[load])
 
 
 @pytest.mark.parametrize(
@@ -183,7 +184,7 @@ def moment(times, *, number, limit=LIMIT, softening=None, **more):
     beam = ub.Beam((0, 0), (length, 0), section, cells=1)
     turns = [0.0, *(x * YIELD_CURVATURE * length for x in times)]
     turn = ub.PrescribedDisplacement(beam.end, u=0, psi=ub.Table(range(len(turns)), turns))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
+    scene = clamped(beam, turn)
     solution = ub.simulate(scene, ub.Static(), t=(0, len(times)), dt=0.1)
     return solution.material_at(beam.at(0.5)).forces[::10, 2][1:] / YIELD_MOMENT, solution
 

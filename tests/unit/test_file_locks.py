@@ -12,14 +12,15 @@ from pathlib import Path
 from mpi4py import MPI
 
 import pytest
+from helpers import at_step
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
 from ufl_beam.file_system import Lock, locked
 
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
 LOAD = ub.PointLoad(BEAM.end, force=(0.0, -1.0))
-SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[LOAD])
+SCENE = clamped(BEAM, loads=[LOAD])
 
 
 def run(folder, *more, t1=0.05):
@@ -29,7 +30,6 @@ def run(folder, *more, t1=0.05):
         dt=0.01,
         record=[ub.History(folder / "run.csv", [BEAM.end]), *more],
         checkpoint=ub.Checkpoint(folder / "run.h5", every=1),
-        progress=False,
     )
 
 
@@ -39,33 +39,6 @@ def is_free(folder):
     free = not (folder / "run.h5.lock").exists()
     MPI.COMM_WORLD.barrier()  # before one of them runs again
     return free
-
-
-class Within(ub.Recorder):
-    """Does something at the third step."""
-
-    def __init__(self, action):
-        self.action, self.steps = action, 0
-
-    def require_writable(self):
-        pass
-
-    def open(self, simulation):
-        pass
-
-    def write(self, simulation):
-        self.steps += 1
-        if self.steps == 3:
-            self.action()
-
-    def close(self):
-        pass
-
-    def state(self):
-        return {}
-
-    def resume(self, simulation, state):
-        pass
 
 
 def test_a_second_run_is_refused_before_it_touches_a_file(shared_path):
@@ -98,9 +71,9 @@ def test_a_run_that_fails_lets_go(shared_path, error):
         raise error
 
     with pytest.raises(error):
-        run(shared_path, Within(fail))
+        run(shared_path, at_step(3, fail))
     assert is_free(shared_path)
-    run(shared_path, Within(lambda: None))
+    run(shared_path, at_step(3, lambda: None))
     assert is_free(shared_path)
 
 
@@ -109,7 +82,7 @@ def test_a_run_that_is_refused_lets_go(shared_path):
     with pytest.raises(ub.ArgumentError, match="beyond the end"):
         run(shared_path, t1=0.03)
     with pytest.raises(ub.ArgumentError, match="of another run"):
-        run(shared_path, Within(lambda: None))
+        run(shared_path, at_step(3, lambda: None))
     assert is_free(shared_path)
     run(shared_path)
 
@@ -139,9 +112,9 @@ import sys
 import threading
 import time
 from pathlib import Path
-sys.path.insert(0, sys.argv[2])
+sys.path[:0] = sys.argv[2:]
 import test_file_locks
-test_file_locks.run(Path(sys.argv[1]), test_file_locks.Within(lambda: None))
+test_file_locks.run(Path(sys.argv[1]), test_file_locks.at_step(3, lambda: None))
 """
 
 
@@ -152,11 +125,12 @@ def test_a_script_that_is_started_again_while_it_runs(tmp_path):
 
     def start_again():
         before = (tmp_path / "run.csv").read_bytes()
-        command = [sys.executable, "-c", SECOND, str(tmp_path), str(Path(__file__).parent)]
+        folders = map(str, Path(__file__).parents[:2])
+        command = [sys.executable, "-c", SECOND, str(tmp_path), *folders]
         found.append(subprocess.run(command, capture_output=True, text=True, timeout=60))
         assert (tmp_path / "run.csv").read_bytes() == before
 
-    run(tmp_path, Within(start_again))
+    run(tmp_path, at_step(3, start_again))
     (second,) = found
     assert second.returncode != 0
     assert re.search(r"run\.h5 is in use: process \d+ on .* writes it", second.stderr)

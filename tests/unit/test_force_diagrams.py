@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.errors import ArgumentError
@@ -15,7 +16,7 @@ SOLVED = 1e-8  # part of the largest value that the tolerance of the solver, 1e-
 
 
 def static(scene, degree=1, **options):
-    times = {"t": (0, 1), "dt": 0.25, "progress": False, **options}
+    times = {"t": (0, 1), "dt": 0.25, **options}
     return ub.simulate(scene, ub.Static(), mesh=ub.Mesh(degree=degree), **times)
 
 
@@ -64,7 +65,7 @@ def test_moments_are_in_equilibrium_when_beams_turn(degree):
     """A cantilever that bends by a right angle: M = P (x_end - x), with displaced points."""
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0), cells=6)
     push = ub.PointLoad(beam.end, force=(0.0, 8.0), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    scene = clamped(beam, loads=[push])
     solution = static(scene, degree)
     x = solution.shape(beam)[:, 0]
     exact = 8.0 * (x[-1] - x)
@@ -76,7 +77,7 @@ def test_moments_are_in_equilibrium_when_beams_turn(degree):
 def test_large_rotations_under_weight():
     """A hanging beam, degree 1: between vertices, too, all parts are in equilibrium."""
     beam = ub.Beam((0, 0), (1, 0.3), SOFT, cells=5)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.Gravity()])
+    scene = clamped(beam, loads=[ub.Gravity()])
     solution = static(scene)
     s, N, V, M = solution.diagram(beam, points=3)
     q = solution.displacement(beam.start)[-1]
@@ -98,12 +99,12 @@ def test_continuous_in_a_rotating_frame(degree):
     [closed] N = rhoA Ω² (r_end² - r²)/2 but for the stretch, 1e-4.
     """
     beam = ub.Beam((0.2, 0), (1.2, 0), STIFF, cells=4)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[ub.RotatingFrame(rate=8.0)])
+    scene = clamped(beam, loads=[ub.RotatingFrame(rate=8.0)])
     s, N, _, _ = static(scene, degree).diagram(beam)
     close(N, 100.0 * 64.0 * (1.2**2 - (0.2 + s) ** 2) / 2, 1e-6)
 
 
-def test_curved_beam():
+def test_diagrams_of_a_quarter_ring():
     """[closed] A quarter of a ring, φ from its end: N = -P sin φ, V = P cos φ, size of M P r sin φ.
 
     Chords of 1/16 of a right angle: N and V are exact to the square of their angle, 0.1²/8.
@@ -111,7 +112,7 @@ def test_curved_beam():
     angle, radius, force = np.pi / 2, 2.0, 1e3
     ring = ub.Beam.arc((0, 0), radius, (0.0, angle), STIFF, cells=16)
     load = ub.PointLoad(ring.end, force=(0, -force))
-    scene = ub.Scene([ring], supports=[ub.Clamped(ring.start)], loads=[load])
+    scene = clamped(ring, loads=[load])
     s, N, V, M = static(scene).diagram(ring)
     φ = angle * (1 - s)
     close(N, -force * np.sin(φ), 1.3e-3)
@@ -120,12 +121,12 @@ def test_curved_beam():
     close(np.abs(M), force * radius * np.sin(φ), 2e-3)
 
 
-def test_corners_stay():
+def test_forces_jump_at_corners():
     """An L of one beam: N and V change places at its corner."""
     section = ub.Section(EA=1e10, GA=1e10, EI=1e9)
     bent = ub.Beam.polyline([(0, 0), (0, 2), (2, 2)], section, cells=4)
     load = ub.PointLoad(bent.end, force=(0, -1e3))
-    scene = ub.Scene([bent], supports=[ub.Clamped(bent.start)], loads=[load])
+    scene = clamped(bent, loads=[load])
     s, N, V, _ = static(scene).diagram(bent)
     post = np.arange(len(s)) < 18
     close(N, np.where(post, -1e3, 0.0), 1e-4)
@@ -140,11 +141,7 @@ def test_the_initial_state_bears_nothing():
 def test_beams_in_free_fall_bear_nothing():
     beam = ub.Beam((0, 0), (2, 0), STIFF, cells=4)
     fall = ub.simulate(
-        ub.Scene([beam], loads=[ub.Gravity()]),
-        ub.EnergyMomentum(),
-        t=(0, 1),
-        dt=0.25,
-        progress=False,
+        ub.Scene([beam], loads=[ub.Gravity()]), ub.EnergyMomentum(), t=(0, 1), dt=0.25
     )
     # Round-off of EA and EI times strains of displacements of 5 m
     assert np.abs(fall.diagram(beam)[1:]).max() < 1e-4
@@ -172,7 +169,7 @@ def test_yielding_beams_and_hinges(shared_path):
     assert np.array_equal(loaded.diagram(loaded.scene["prop"]), diagram)
 
 
-def test_refused():
+def test_wrong_points_and_beams_are_refused():
     scene, beam = supported(2, lambda b: ub.Gravity())
     solution = static(scene)
     with pytest.raises(ArgumentError, match=r"diagram: points = 1 "):

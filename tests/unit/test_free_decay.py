@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
 """Damping from a history: peaks, logarithmic decrement, and which law their decay follows."""
 
-import re
 from itertools import pairwise
 
 import numpy as np
 import pytest
+from helpers import raises
 
 from ufl_beam.analysis.free_decay import (
     damping,
@@ -14,15 +14,9 @@ from ufl_beam.analysis.free_decay import (
     logarithmic_decrement,
     peaks,
 )
-from ufl_beam.errors import ArgumentError
 
 OMEGA = 2 * np.pi
 """A period of one second."""
-
-
-def raises(*parts):
-    """`pytest.raises` for a ArgumentError whose message has all `parts`, in this order."""
-    return pytest.raises(ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
 def viscous(t, decrement, phase=-1.0):
@@ -51,7 +45,7 @@ def test_a_parabola_is_found_exactly_whatever_the_steps():
 
 
 @pytest.mark.parametrize(("top", "time"), [([1, 1], 2.5), ([1, 1, 1], 3.0), ([1, 1, 1, 1], 3.0)])
-def test_flat_tops(top, time):
+def test_a_flat_top_is_one_peak(top, time):
     # In the middle; of four equal samples at the lower of the middle ones
     x = [0, 0.5, *top, 0.5, 0]
     times, amplitudes = peaks(np.arange(len(x)), x)
@@ -73,7 +67,7 @@ def test_one_period_apart_even_if_the_equilibrium_is_wrong():
     assert np.diff(right) == pytest.approx(np.ones(7), abs=1e-10)
 
 
-def test_minima():
+def test_minima_have_the_decrement_of_maxima():
     t = np.linspace(0, 8, 801)
     upper, lower = damping(t, viscous(t, 0.1)), damping(t, -viscous(t, 0.1))
     assert lower.times[0] - upper.times[0] == pytest.approx(0.5, abs=1e-6)  # both parabolas
@@ -157,7 +151,7 @@ def test_ratios_of_the_first_decrements_of_table_2(δ, ζ):
 
 
 @pytest.mark.parametrize("row", ["horizontal", "vertical"])
-def test_table_2(row):
+def test_damping_ratios_of_table_2(row):
     δ = {
         "horizontal": [0.077, 0.062, 0.038, 0.025, 0.017, 0.013, 0.006, 0.003],
         "vertical": [0.076, 0.061, 0.038, 0.025, 0.017, 0.013, 0.006, 0.003],
@@ -251,7 +245,7 @@ def test_noise_on_the_history():
     assert inside / 200 == pytest.approx(0.95, abs=0.046)
 
 
-def test_no_damping():
+def test_constant_amplitudes_have_no_damping():
     decay = fit_decay(np.arange(5), np.ones(5))
     assert decay.decrement == decay.ratio == 0
     assert decay.linear.rate == 0
@@ -287,7 +281,7 @@ def test_units_do_not_matter(second, metre):
         assert b.rms == pytest.approx(metre * a.rms, **same)
 
 
-def test_offset():
+def test_offsets_of_time_and_value_do_not_matter():
     t = np.linspace(0, 10, 1001)
     one, other = damping(t, viscous(t, 0.1)), damping(t + 100, viscous(t, 0.1) - 3, about=-3)
     assert other.times == pytest.approx(one.times + 100, abs=1e-10)
@@ -322,13 +316,13 @@ def test_it_can_be_read():
         ([0, 1, 2], None, ("peaks: x = None must be numbers",)),
     ],
 )
-def test_bad_histories(t, x, says):
+def test_bad_histories_are_refused(t, x, says):
     for call in (peaks, damping):
         with raises(*says):
             call(t, x)
 
 
-def test_bad_numbers():
+def test_bad_numbers_are_refused():
     with raises("about = nan is not finite"):
         damping([0, 1], [0, 1], about=np.nan)
     with raises("prominence = -1 must be at least 0"):
@@ -336,7 +330,7 @@ def test_bad_numbers():
 
 
 @pytest.mark.parametrize(("seconds", "found"), [(1.5, 2), (0.1, 0)])
-def test_few_peaks(seconds, found):
+def test_too_few_peaks_are_refused(seconds, found):
     t = np.arange(0, seconds, 0.01)
     with raises(f"peaks found: {found}, needed: 3", "longer history", "prominence = 0.05"):
         damping(t, viscous(t, 0.1))
@@ -357,7 +351,7 @@ def test_amplitudes_that_have_no_logarithm():
         damping(t, viscous(t, 0.1), about=0.7)  # exp(-0.1 · 3.16) = 0.73, next 0.66
 
 
-def test_bad_amplitudes():
+def test_bad_amplitudes_are_refused():
     with raises("amplitudes given: 1, needed: 2"):
         logarithmic_decrement([1.0])
     with raises("amplitudes given: 2, needed: 3"):

@@ -8,6 +8,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import ufl
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.discretization.function_spaces import DolfinxFields, Element, dofs_of_cells
@@ -118,13 +119,7 @@ SECTION = ub.Section(EA=6e3, GA=4e3, EI=300.0, rhoA=2.0, rhoI=1.0, hinge=ub.Soft
 def pushed(section, turn=0.3):
     """A cantilever whose end is turned, at equilibrium; every process computes all of it."""
     beam = ub.Beam((0, 0), (1, 2), section, cells=3)
-    scene = ub.Scene(
-        [beam],
-        supports=[
-            ub.Clamped(beam.start),
-            ub.PrescribedDisplacement(beam.end, psi=lambda t: turn * t),
-        ],
-    )
+    scene = clamped(beam, ub.PrescribedDisplacement(beam.end, psi=lambda t: turn * t))
     simulation = ub.Simulation(scene, ub.Static(), comm=MPI.COMM_SELF)
     for t in np.linspace(0.05, 1, 20):
         simulation.step_to(float(t))

@@ -27,7 +27,7 @@ def wave(s):
 
 
 def run(guided):
-    return ub.simulate(guided, ub.EnergyMomentum(), t=(0, 0.4), dt=0.01, progress=False)
+    return ub.simulate(guided, ub.EnergyMomentum(), t=(0, 0.4), dt=0.01)
 
 
 def stepped(curve, steps=40, scheme=None):

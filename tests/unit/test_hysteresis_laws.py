@@ -5,8 +5,9 @@ import math
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars, C
+from scenes import clamped
 from scipy.integrate import solve_ivp
+from uniaxial_points import LENGTH, Bars, C
 
 import ufl_beam as ub
 
@@ -31,7 +32,7 @@ def follow(law, strains, scheme=MIDDLE):
     return np.array(stresses), one
 
 
-def test_ramberg_osgood():
+def test_a_ramberg_osgood_law_follows_its_power():
     """[closed] strain = stress/C + offset (stress/limit)^n, then elastic; in one step or many."""
     law = LAWS["Ramberg-Osgood"]
     for σ in (0.5, 2.0, 3.7):
@@ -73,10 +74,10 @@ def test_armstrong_frederick_ratchets():
     load = ub.PointLoad(
         beam.end, force=(1.0, 0.0), amplitude=ub.Table([0, 0.5, *np.linspace(1, 3, 9)], stresses)
     )
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     found = []
     for n in (200, 400):
-        run = ub.simulate(scene, MIDDLE, t=(0, 3), dt=1 / n, progress=False)
+        run = ub.simulate(scene, MIDDLE, t=(0, 3), dt=1 / n)
         u = run.displacement(beam.end)[:, 0]
         found.append(u[3 * n] - u[2 * n])
     coarse, fine = np.array(found) / exact - 1
@@ -116,7 +117,7 @@ def test_bouc_wen_against_integration(law):
 
 @each_law
 @pytest.mark.parametrize("scheme", SCHEMES[1:], ids=str)
-def test_energies(law, scheme):
+def test_work_is_stored_or_dissipated(law, scheme):
     """Work is stored, dissipated or lost; over small steps nothing comes back from dissipation."""
     one, stored = Bars(1, LAWS[law], None, scheme), 0.0
     for strain in 0.05 * np.sin(np.linspace(0, 9, 400)[1:]):

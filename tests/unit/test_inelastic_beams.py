@@ -6,6 +6,7 @@ import math
 import numpy as np
 import pytest
 from failing_steps import let_fail
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.discretization.dof_numbering import Grid
@@ -22,9 +23,7 @@ def cantilever(kind, tip=0.4, cells=5):
     section = ub.Section(**ELASTIC, **LAWS[kind])
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
     lift = ub.Table([0, 0.5, 1], [0, tip, tip / 4])
-    return ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=lift)]
-    )
+    return clamped(beam, ub.PrescribedDisplacement(beam.end, v=lift))
 
 
 class CutSteps(ub.Simulation):
@@ -106,7 +105,7 @@ def test_a_failure_keeps_the_results_so_far():
     section = ub.Section(**ELASTIC, bending=ub.ElastoPlastic(5.0), axial=ub.ElastoPlastic(10.0))
     beam = ub.Beam((0, 0), (1, 0), section, cells=4)
     pull = ub.PointLoad(beam.end, force=(20.0, 0.0), amplitude=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[pull])
+    scene = clamped(beam, loads=[pull])
     with pytest.raises(ub.ConvergenceError) as failure:
         ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.125)
     solution = failure.value.solution
@@ -129,7 +128,7 @@ def test_one_hinge_among_fifty_cells():
     law = ub.Softening(5.0, 10.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=50, hinges={0.503: law})
     lift = ub.PrescribedDisplacement(beam.end, psi=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), lift])
+    scene = clamped(beam, lift)
     simulation = ub.Simulation(scene, ub.EnergyMomentumStatic())
     assert not simulation.inelastic
     simulation.step_to(1.0)
@@ -169,7 +168,7 @@ def test_cracks_of_fibres_are_no_rotations():
     section = ub.Section.rectangle(0.1, 0.2, E=1e9, nu=0.3, fibres=fibres)
     beam = ub.Beam((0, 0), (1, 0), section, cells=2)
     turn = ub.PrescribedDisplacement(beam.end, u=0, psi=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
+    scene = clamped(beam, turn)
     solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 0.1), dt=0.01)
     assert solution.energy["hinges"][-1] > 0
     assert (solution.material(beam).jump == 0).all()

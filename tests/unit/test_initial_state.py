@@ -5,18 +5,16 @@ import math
 
 import numpy as np
 import pytest
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
-
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 
 def bent(load=ub.PointLoad):
     """A cantilever with a steady force that bends it by some 0.5 rad, and gravity."""
     beam = ub.Beam((0, 0), (2, 1), SECTION, cells=4)
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
+    return clamped(
+        beam,
         loads=[load(beam.end, force=(5, -30)), ub.Gravity()],
         masses=[ub.PointMass(beam.at(0.5), 1.0)],
     )
@@ -74,7 +72,7 @@ def test_forces_of_moving_supports_carry_on(scheme):
     """The work of the first step takes the mean of the force before and after it."""
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=2)
     moved = ub.PrescribedDisplacement(beam.end, v=lambda t: 0.1 * t**2)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), moved])
+    scene = clamped(beam, moved)
     whole = ub.simulate(scene, scheme, t=(0, 1), dt=0.05)
     first = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.05)
     second = ub.simulate(scene, scheme, t=(0.5, 1), dt=0.05, start=first)
@@ -103,7 +101,7 @@ def test_other_supports_and_loads_may_follow():
     scene = bent()
     beam = scene.beams[0]
     held = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
-    free = ub.Scene([beam], supports=[ub.Clamped(beam.start)], masses=scene.masses)
+    free = clamped(beam, masses=scene.masses)
     solution = ub.simulate(free, ub.EnergyMomentum(), t=(0, 2), dt=0.02, start=held)
     assert solution.energy.total[0] == pytest.approx(held.energy["stored"][-1], rel=1e-14)
     # Nothing comes in and nothing goes out

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.model.fibres import Layout
@@ -66,7 +67,7 @@ def test_resultants_lie_within_the_surface(scheme):
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_tangents(scheme):
+def test_tangents_are_derivatives(scheme):
     """Against central differences, coupled in N and M."""
     cells = Cells(300, scheme)
     *before, last = histories(300, 4)
@@ -81,7 +82,7 @@ def test_tangents(scheme):
         assert np.mean(np.abs(D[:, :, k] - central).max(axis=1) > 1e-3 * EA) < 0.02
 
 
-def test_pure_resultants():
+def test_pure_resultants_reach_their_limits():
     """[closed] N = Np without curvature, M = Mp without strain, far beyond the elastic range."""
     strain = np.array([[0.1, 0.0, 0.0], [0.0, 0.0, 1.0], [-0.1, 0.0, 0.0], [0.0, 0.0, -1.0]])
     r = Cells(4, ub.Static()).step(strain)
@@ -94,9 +95,9 @@ def test_a_column_under_axial_force(reference):
     beam = ub.Beam((0, 0), (1, 0), section(interaction=LAW), cells=1)
     press = ub.PointLoad(beam.end, force=(-0.6 * NP, 0.0), amplitude=lambda t: min(t, 1.0))
     turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: 0.4 * max(t - 1.0, 0.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn], loads=[press])
+    scene = clamped(beam, turn, loads=[press])
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.05, newton=newton, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 2), dt=0.05, newton=newton)
     N, _, M = run.material_at(beam.end).forces[-1]
     assert LAW.excess(N, M) == pytest.approx(0.0, abs=1e-9)
     # The force turns with the axis, by 0.2 rad in the middle.
@@ -107,9 +108,9 @@ def test_the_ledger_closes():
     """Of a beam that is thrown and yields in tension and bending."""
     beam = ub.Beam((0, 0), (2, 0), section(interaction=LAW), cells=4)
     load = ub.PointLoad(beam.end, force=(3.0, 8.0), amplitude=lambda t: float(t < 0.5))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     for scheme in (ub.EnergyMomentum(), ub.EnergyMomentum(0.1)):
-        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01, progress=False)
+        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01)
         assert run.energy.worst < 1e-9
         assert run.energy.lost["plastic"][-1] > 0.01 * run.energy.throughput
 
@@ -129,6 +130,6 @@ def test_the_ledger_closes():
         (lambda: ub.AxialBending(0.0, 1.0), "AxialBending: axial"),
     ],
 )
-def test_refusals(make, says):
+def test_bad_interaction_laws_are_refused(make, says):
     with pytest.raises(ub.ArgumentError, match=says):
         make()

@@ -59,7 +59,7 @@ def lanes_source():
     [(lambda: c_library._SOURCE, ["-O3"]), (lanes_source, ["-O2", "-march=native"])],
     ids=["loops", "lanes"],
 )
-def test_no_warnings(tmp_path, source, flags):
+def test_the_compiler_warns_of_nothing(tmp_path, source, flags):
     """The compiler finds nothing to warn of, at the level of optimisation of each library."""
     file = tmp_path / "source.c"
     file.write_text(source())
@@ -79,7 +79,7 @@ def test_no_warnings(tmp_path, source, flags):
         ("double *x = n == 4 ? 0 : &y; y = *x;", "null pointer"),
     ],
 )
-def test_sanitizers_report(tmp_path, fault, report):
+def test_sanitizers_report_a_fault(tmp_path, fault, report):
     """A small program with a fault ends with a report."""
     source, program = tmp_path / "fault.c", tmp_path / "fault"
     source.write_text(

@@ -2,10 +2,11 @@
 """Bodies, joints and connectors: what is refused, what is shared, what solutions say."""
 
 import math
-import re
+from functools import partial
 
 import numpy as np
 import pytest
+from helpers import raises, run
 
 import ufl_beam as ub
 
@@ -20,13 +21,7 @@ def beam(a=(0, 0), b=(1, 0), name="beam", cells=2):
     return ub.Beam(a, b, SECTION, cells=cells, name=name)
 
 
-def raises(text):
-    return pytest.raises(ub.ArgumentError, match=re.escape(text))
-
-
-def run(scene, scheme=None, **more):
-    arguments = {"t": (0, 0.1), "dt": 0.01, "progress": False} | more
-    return ub.simulate(scene, scheme or ub.EnergyMomentum(), **arguments)
+run = partial(run, t=(0, 0.1), dt=0.01)
 
 
 # -- bad input -----------------------------------------------------------------------------------
@@ -77,12 +72,12 @@ BAD = {
 
 
 @pytest.mark.parametrize(("build", "text"), BAD.values(), ids=BAD)
-def test_records(build, text):
+def test_wrong_records_are_refused(build, text):
     with raises(text):
         build()
 
 
-def test_scenes():
+def test_wrong_scenes_are_refused():
     one, other = body(name="one"), body(1.0, name="other")
     with raises("Scene: no beams and no bodies"):
         ub.Scene()

@@ -121,7 +121,7 @@ def of_step(cells, q0, q1, w):
 
 
 @pytest.mark.parametrize("turn", [0.0, 1e-12, 1e-6, 0.03, 0.1, 1.0, 2.5])
-def test_increment_identity(cells, turn):
+def test_work_of_resultants_is_the_increment_of_energy(cells, turn):
     """What makes the work of the resultants the increment of stored energy."""
     # Between nodes a polynomial of degree 3 may turn half as far again as at any of them.
     turn = min(turn, math.pi / 2) if len(cells.axis.nodes) > 2 else turn
@@ -189,7 +189,7 @@ def test_two_nodes_are_a_case_of_many():
 
 
 @pytest.mark.parametrize("x", [1e-300, 1e-9, 1e-4, 9e-3, 1e-2 * (1 - 1e-12), 1e-2, 1.1e-2, 1.3])
-def test_over_tan(x):
+def test_both_branches_of_x_over_tan_x_agree(x):
     """Both branches are x / tan x to the last digits, so there is no jump between them."""
     for sign in (1, -1):
         value = kinematics.over_tan(ufl.as_ufl(sign * x))(())

@@ -4,11 +4,12 @@
 import math
 import re
 from dataclasses import dataclass
+from functools import partial
 from typing import ClassVar
 
 import numpy as np
 import pytest
-from law_runs import require_reference, require_restart
+from helpers import law_of, require_reference, require_restart
 
 import ufl_beam as ub
 from ufl_beam.model.material_law import initial_state
@@ -93,8 +94,7 @@ def oscillator(*laws, v=1.5):
     return mass.middle, links, scene
 
 
-def run(scene, scheme, t=(0, 3.0), dt=0.01, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
+run = partial(ub.simulate, t=(0, 3.0), dt=0.01)
 
 
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
@@ -200,7 +200,9 @@ def test_iterations_do_not_decide_what_breaks_loose(dt):
     def go(until, since=0.0, scene=None, **more):
         newton = ub.Newton(rtol=1e-12, reference=more.pop("reference", False))
         mesh = ub.Mesh(degree=3, lumped=True)
-        return run(scene, ub.EnergyMomentum(), (since, until), dt, mesh=mesh, newton=newton, **more)
+        return run(
+            scene, ub.EnergyMomentum(), t=(since, until), dt=dt, mesh=mesh, newton=newton, **more
+        )
 
     brake, made = scene()
     whole = go(0.15, scene=made)
@@ -233,7 +235,7 @@ def lost_over(way):
 
 
 @CASES
-def test_reference(name, scheme):
+def test_the_reference_finds_the_same(name, scheme):
     _, (link,), scene = oscillator(LAWS[name])
     require_reference(run, scene, link, scheme, t=(0, 1))
 
@@ -242,11 +244,6 @@ def test_reference(name, scheme):
 def test_restart_and_start(scheme, shared_path):
     _, links, scene = oscillator(*LAWS.values())
     require_restart(run, scene, links, scheme, shared_path, until=1.0)
-
-
-def law_of(**members):
-    kind = type("Mine", (ub.ConnectorLaw,), {"__annotations__": {}, **members})
-    return dataclass(frozen=True)(kind)()
 
 
 @pytest.mark.parametrize(
@@ -264,7 +261,7 @@ def law_of(**members):
         ({"limit": lambda s, z: 1.0, "sliding": lambda s, e, r, z, dt: e / 0}, "Mine.sliding"),
     ],
 )
-def test_refusals(members, message):
+def test_wrong_limits_are_refused(members, message):
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e5, GA=1e5, EI=3.0))
     with pytest.raises(ub.ArgumentError, match=re.escape(message)):
         ub.Turn(ub.ground(1, 0), beam.end, law_of(**members))

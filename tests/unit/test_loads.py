@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -37,7 +38,7 @@ def test_equal_tables_are_equal():
     assert ub.Table([0, 1], [0, 1]) == ub.Table((0, 1), (0, 1))
 
 
-def test_ramp():
+def test_a_ramp_grows_and_stays():
     ramp = ub.ramp(4.0)
     assert [ramp(t) for t in (-1, 0, 1, 4, 5)] == [0, 0, 0.25, 1, 1]
 
@@ -45,11 +46,8 @@ def test_ramp():
 def reaction_of(*loads, masses=(), section=STIFF, at=1.0):
     """(F_x, F_y, M) of a clamp at the origin that holds a beam of 2 m along x."""
     beam = ub.Beam((0, 0), (2, 0), section, cells=4)
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[load(beam) for load in loads],
-        masses=[mass(beam) for mass in masses],
+    scene = clamped(
+        beam, loads=[load(beam) for load in loads], masses=[mass(beam) for mass in masses]
     )
     solution = ub.simulate(scene, ub.Static(), t=(0, at), dt=at)
     return solution.reaction(scene.supports[0])[-1]
@@ -60,7 +58,7 @@ def check(reaction, expected):
     assert reaction == pytest.approx(expected, abs=1e-7 * np.abs(expected).max())
 
 
-def test_point_load():
+def test_a_reaction_balances_a_point_load():
     def load(b):
         return ub.PointLoad(b.at(0.75), force=(5, -7), moment=11)
 
@@ -68,7 +66,7 @@ def test_point_load():
     check(reaction_of(load), [-5, 7, 1.5 * 7 - 11])
 
 
-def test_line_load():
+def test_a_reaction_balances_a_line_load():
     def load(b):
         return ub.LineLoad(b, force=(3, -2), moment=5)
 
@@ -161,7 +159,7 @@ def test_work_of_follower_loads_among_many_entries():
         return 0.01 * w[1]
 
     works = [ub.VirtualWork(f"wind {k}", lift) for k in range(20)]
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], works=works)
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, 0.5), dt=0.02, progress=False)
+    scene = clamped(beam, loads=[load], works=works)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0.0, 0.5), dt=0.02)
     assert run.energy.supplied["loads"][-1] > 0.001
     assert run.energy.worst < 1e-9

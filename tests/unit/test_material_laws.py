@@ -10,7 +10,6 @@ from scipy.integrate import quad
 
 import ufl_beam as ub
 from ufl_beam.model.fibres import Layout
-from ufl_beam.model.law_functions import positive, sign
 from ufl_beam.model.material_law import State
 
 C, LIMIT, H, B, ETA = 200.0, 3.0, 20.0, 10.0, 0.5
@@ -59,7 +58,7 @@ def test_flow_fulfils_the_law_at_theta(strain, p, ξ, θ):
         assert abs(relative) == pytest.approx(LIMIT + H * ξ_θ + ETA * abs(dp) / dt, rel=1e-13)
 
 
-def test_monotonic_loading():
+def test_monotonic_loading_follows_the_bilinear_law():
     """[closed] Bilinear law: slope C (H + B)/(C + H + B) beyond the limit, in any steps."""
     law, tangent = bulk(eta=0), C * (H + B) / (C + H + B)
     p = ξ = 0.0
@@ -93,7 +92,7 @@ def test_no_viscosity_is_rate_independent(θ):
     assert flow(law, 0.1, θ=θ, dt=1e-9) == flow(law, 0.1, θ=θ, dt=1e9) > 0
 
 
-def test_vanishing_viscosity():
+def test_without_viscosity_a_law_is_rate_independent():
     """η → 0 in proportion to η/Δt: 1e-12 of 230 here."""
     assert flow(bulk(eta=1e-13), 0.1) == pytest.approx(flow(bulk(eta=0), 0.1), rel=1e-14)
 
@@ -118,7 +117,7 @@ def test_no_limit_flows_at_once():
     assert flow(law, 0.0) == 0
 
 
-def test_relaxation():
+def test_overstress_relaxes_exponentially():
     """[closed] At constant strain the overstress decays as exp(-t/τ), second order at θ = 1/2."""
     τ, strain = 0.3, 0.1
     eta = ub.DuvautLions(τ).coefficient(np.array([C + H + B]))[0]
@@ -163,20 +162,13 @@ def test_derivative_of_flow(strain, θ):
     assert (exact > 0) == (abs(strain) > LIMIT / C)
 
 
-def test_energies():
+def test_energies_of_a_step_are_those_of_the_law():
     """[closed] C e²/2, (B p² + H ξ²)/2, (limit + η γ/Δt) γ."""
     law = bulk()
     assert law.elastic_energy(0.5, state(0.2))[0] == pytest.approx(C * 0.09 / 2)
     assert law.hardening_energy(state(0.3, 0.6))[0] == pytest.approx((B * 0.09 + H * 0.36) / 2)
     change = state(-0.3, 0.3)
     assert law.dissipation(0.5, state(), change, 0.1)[0] == pytest.approx((LIMIT + ETA * 3) * 0.3)
-
-
-def test_brackets():
-    x = np.array([-2.0, 0.0, 3.0])
-    assert list(sign(x)) == [-1, 1, 1]
-    assert list(positive(x)) == [0, 0, 3]
-    assert list(positive(x[[0, 2]] + 1j)) == [0, 3 + 1j]
 
 
 # -- softening ---------------------------------------------------------------------------------

@@ -8,10 +8,11 @@ from pathlib import Path
 from petsc4py import PETSc
 
 import pytest
-from scenes import swing
+from scenes import clamped, rigid_chain, swing
 
 import ufl_beam as ub
 from ufl_beam.compiled import jit
+from ufl_beam.memory import no_garbage_collection
 
 unsanitized = pytest.mark.skipif(
     bool(jit.EXTRA), reason="the address sanitizer keeps what is freed for a while"
@@ -41,9 +42,6 @@ class Watch(ub.Recorder):
     def __init__(self, at):
         self.at, self.step, self.memory, self.objects = at, 0, {}, {}
 
-    def require_writable(self):
-        pass
-
     def open(self, simulation):
         pass
 
@@ -53,9 +51,6 @@ class Watch(ub.Recorder):
             gc.collect()
             self.memory[self.step] = resident()
             self.objects[self.step] = petsc_objects()
-
-    def close(self):
-        pass
 
 
 @unsanitized
@@ -86,11 +81,7 @@ def test_memory_does_not_grow_with_inelastic_material():
     column = ub.Beam((0, 0), (0, 1), section, cells=4, name="column")
     girder = ub.Beam((0, 1), (1, 1), section, cells=4, name="girder")
     sway = ub.PrescribedDisplacement(girder.end, u=lambda t: 0.2 * math.sin(20 * t), v=0)
-    scene = ub.Scene(
-        [column, girder],
-        joints=[ub.Rigid(column.end, girder.start)],
-        supports=[ub.Clamped(column.start), sway],
-    )
+    scene = rigid_chain([column, girder], supports=[ub.Clamped(column.start), sway])
     watch = Watch({500, 2_000})
     scheme = ub.EnergyMomentum(alpha=0.05, beta=0.05)
     solution = ub.simulate(scene, scheme, t=(0, 2), dt=1e-3, every=2_000, record=watch)
@@ -130,7 +121,7 @@ def test_memory_does_not_grow_with_the_members_of_a_study():
         law = ub.Softening(limit=5.0 + 1e-3 * number, fracture_energy=1.0)
         beam = ub.Beam((0, 0), (1 + 1e-4 * number, 0), section, cells=4, hinges={0.0: law})
         load = ub.PointLoad(beam.end, force=(0, -10.0))
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        scene = clamped(beam, loads=[load])
         solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2e-3), dt=1e-3)
         if number in (200, 999):
             gc.collect()
@@ -142,3 +133,21 @@ def test_memory_does_not_grow_with_the_members_of_a_study():
     assert len(set(study["end"][:, 1])) == 1000
     # Records of a member take 1 kB; what a simulation holds, some 100 kB, would be 80 MB
     assert memory[999] - memory[200] < 4 * MEBIBYTE
+
+
+@pytest.mark.parametrize("enabled", [True, False])
+def test_garbage_collection_is_as_it_was(enabled):
+    try:
+        if not enabled:
+            gc.disable()
+        with pytest.raises(KeyError), no_garbage_collection(), no_garbage_collection():
+            raise KeyError if not gc.isenabled() else ValueError
+        assert gc.isenabled() == enabled
+    finally:
+        gc.enable()
+
+
+def test_a_refused_scene_leaves_garbage_collection_on():
+    with pytest.raises(ub.ArgumentError, match="no beams"):
+        ub.Scene()
+    assert gc.isenabled()

@@ -10,6 +10,7 @@ from mpi4py import MPI
 import basix.ufl
 import numpy as np
 import pytest
+from scenes import clamped
 from scipy.sparse import csr_array
 
 import ufl_beam as ub
@@ -34,7 +35,7 @@ def portal(**parts):
 
 
 def bend(scene, **more):
-    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False, **more)
+    return ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, **more)
 
 
 @pytest.mark.parametrize(
@@ -112,7 +113,7 @@ def test_as_if_beams_had_more_cells():
     def cantilever(cells):
         beam = ub.Beam.arc((0, 0), 1.0, (0.0, 1.5), STEEL, cells=cells)
         load = ub.PointLoad(beam.end, force=(-30.0, 50.0), moment=100.0)
-        return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        return clamped(beam, loads=[load])
 
     coarse, fine = cantilever(4), cantilever(12)
     a, b = bend(coarse, mesh=ub.Mesh(refine=3)), bend(fine)
@@ -120,7 +121,7 @@ def test_as_if_beams_had_more_cells():
     assert len(a.section_forces(coarse.beams[0])) == 12
 
 
-def test_second_order():
+def test_errors_go_with_the_square_of_the_cell_length():
     """Steps of Richardson's extrapolation: errors of a fine mesh go with its h² (issue 6)."""
     scene = portal()
     tip = scene.beams[1].end
@@ -144,9 +145,9 @@ def test_elastic_beams_of_higher_degree_may_have_hinges(degree):
     section = ub.Section(EA=1e6, GA=1e6, EI=100.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=2, hinges={0.5: law})
     turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: 0.3 * t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), turn])
+    scene = clamped(beam, turn)
     mesh = ub.Mesh(degree=degree)
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, mesh=mesh, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, mesh=mesh)
     α, M, *_ = solution.connector(scene.hinges[0])
     assert α[-1] > 0.1
     assert M[-1] == pytest.approx(10.0 * np.exp(-2.0 * α[-1]), rel=1e-9)
@@ -166,11 +167,7 @@ def test_runs_go_on_with_their_mesh():
 
 def test_modes_and_buckling():
     beam = ub.Beam((0, 0), (0, 2), STEEL, cells=4)
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(0.0, -1.0), amplitude=lambda t: t)],
-    )
+    scene = clamped(beam, loads=[ub.PointLoad(beam.end, force=(0.0, -1.0), amplitude=lambda t: t)])
     mesh = ub.Mesh(refine=8)
     euler = math.pi**2 * 1e3 / (4 * 2**2)  # N, with 1 N as load
     # Shear and shortening take Euler/GA and Euler/EA of it; cells err by (π h/2L)²/12: 2e-4
@@ -190,13 +187,7 @@ def test_everything_takes_a_finer_mesh(shared_path):
     arm = scene.beams[1]
     records = [ub.XDMF(shared_path / "a.xdmf"), ub.History(shared_path / "a.csv", [arm.at(0.25)])]
     solution = ub.simulate(
-        scene,
-        ub.EnergyMomentum(),
-        t=(0, 1e-2),
-        dt=1e-3,
-        mesh=ub.Mesh(2),
-        record=records,
-        progress=False,
+        scene, ub.EnergyMomentum(), t=(0, 1e-2), dt=1e-3, mesh=ub.Mesh(2), record=records
     )
     assert len(solution.shape(arm)) == 15
     assert solution.displacement(arm.at(0.25)).shape == (11, 3)
@@ -212,7 +203,7 @@ def test_the_mesh_belongs_to_a_checkpoint(shared_path):
     def run(t1, refine):
         return ub.simulate(
             portal(), ub.EnergyMomentum(), t=(0, t1), dt=1e-3, mesh=ub.Mesh(refine),
-            checkpoint=ub.Checkpoint(path, every=2), progress=False,
+            checkpoint=ub.Checkpoint(path, every=2),
         )  # fmt: skip
 
     run(4e-3, 2)
@@ -264,7 +255,7 @@ INELASTIC = {
 @pytest.mark.parametrize("kind", INELASTIC)
 def test_higher_degrees_are_for_elastic_beams(kind):
     beam = ub.Beam((0, 0), (1, 0), cells=4, name="girder", **INELASTIC[kind])
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+    scene = clamped(beam)
     with pytest.raises(ub.ArgumentError, match="degree = 2 is for elastic beams, and girder"):
         ub.Simulation(scene, ub.Static(), mesh=ub.Mesh(degree=2))
     ub.Simulation(scene, ub.Static()).close()
@@ -292,7 +283,7 @@ def test_values_between_nodes(degree):
     """Under its own weight a cell of degree 2 is a parabola of u, and u is exact everywhere."""
     beam = ub.Beam((0, 0), (0, 1), STEEL, cells=1)
     load = ub.LineLoad(beam, force=(0.0, -100.0))  # N/m
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     solution = bend(scene, mesh=ub.Mesh(degree=degree))
     for s in (0.1, 0.5, 0.77, 1.0):
         exact = -100.0 / 1e6 * (s - s**2 / 2)
@@ -336,13 +327,7 @@ def test_everything_takes_a_higher_degree(mesh, shared_path, on_first_rank):
         ub.Fatigue(ub.HotSpot.fibre(arm.at(0.3), y=0.1, E=1e9), ub.SNCurve(range=1e8)),
     ]  # fmt: skip
     solution = ub.simulate(
-        scene,
-        ub.EnergyMomentum(0.05),
-        t=(0, 0.1),
-        dt=0.01,
-        mesh=mesh,
-        record=records,
-        progress=False,
+        scene, ub.EnergyMomentum(0.05), t=(0, 0.1), dt=0.01, mesh=mesh, record=records
     )
     assert solution.energy.worst < 1e-9
     written = on_first_rank(lambda: (shared_path / "b.xdmf").read_text())
@@ -354,7 +339,5 @@ def test_everything_takes_a_higher_degree(mesh, shared_path, on_first_rank):
     modes = ub.modes(scene, 3, at=solution)
     ub.plot(modes)
     assert modes.grid.mesh == mesh
-    again = ub.simulate(
-        scene, ub.EnergyMomentum(0.05), t=(0.1, 0.12), dt=0.01, start=solution, progress=False
-    )
+    again = ub.simulate(scene, ub.EnergyMomentum(0.05), t=(0.1, 0.12), dt=0.01, start=solution)
     assert again.energy.worst < 1e-9

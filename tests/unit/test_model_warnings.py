@@ -11,6 +11,8 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from helpers import raises
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -33,10 +35,6 @@ def begin(*beams, scheme=None, **parts):
 def warns(*parts):
     """`pytest.warns` for a ModelWarning whose message has all `parts`, in this order."""
     return pytest.warns(ub.ModelWarning, match=".*".join(map(re.escape, parts)))
-
-
-def raises(*parts):
-    return pytest.raises(ub.ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
 def test_warnings_point_at_the_line_of_the_user():
@@ -115,12 +113,12 @@ def test_massless_parts_whose_motion_is_not_determined(hold, moves):
         ),
     ],
 )  # fmt: skip
-def test_massless_parts_that_something_holds(hold):
+def test_massless_parts_that_something_holds_do_not_warn(hold):
     a = beam((0, 0), (1, 0), name="a")
     b = beam((1, 0), (2, 0), ub.Section(**LIGHT, rhoA=0.0), name="b")
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", ".*touch", ub.ModelWarning)
-        begin(a, b, **hold(a, b))
+        begin(a, b, **hold(a, b))  # no other warning is issued
 
 
 def test_massless_parts_of_large_scenes():
@@ -213,15 +211,15 @@ def test_a_ring_that_is_not_closed():
         },
     ],
 )
-def test_beams_that_are_joined_where_they_touch(join):
+def test_beams_that_are_joined_where_they_touch_do_not_warn(join):
     a, b = beam(name="a"), beam((1, 0), (2, 0), name="b")
-    begin(a, b, **join(a, b))
+    begin(a, b, **join(a, b))  # no warning is issued
 
 
-def test_beams_that_cross_or_are_apart():
+def test_beams_that_cross_or_are_apart_do_not_warn():
     """Ends matter: beams in two planes may cross."""
     a, b, c = beam((-1, 0), (1, 0)), beam((0, -1), (0, 1)), beam((1.01, 0), (2, 0))
-    begin(a, b, c)
+    begin(a, b, c)  # no warning is issued
 
 
 def test_touching_places_of_large_scenes_are_found_fast():
@@ -284,9 +282,10 @@ def test_a_point_of_a_body_that_was_meant_relative_to_its_centre(inertia):
     begin(bodies=[wheel], connectors=[near], supports=far)
 
 
-def test_a_long_arm_that_meets_something():
+def test_a_long_arm_that_meets_something_does_not_warn():
     """A small bob on a long massless arm: the point is far out, but the pivot is there."""
     bob = ub.Body((0, -5), mass=1.0, inertia=1e-4, name="bob")
+    # no warning is issued
     begin(bodies=[bob], joints=[ub.Revolute(ub.ground(0, 0), bob.at(0, 0))])
 
 
@@ -336,11 +335,12 @@ def test_motions_that_jump_at_the_start():
     begin(one, scheme=ub.Static(), supports=[ub.Clamped(one.start), jump])
 
 
-def test_a_run_that_begins_where_the_motion_is():
+def test_a_run_that_begins_where_the_motion_is_does_not_warn():
     one = beam()
     held = ub.PrescribedDisplacement(one.end, v=0.01)
-    scene = ub.Scene([one], supports=[ub.Clamped(one.start), held])
+    scene = clamped(one, held)
     statics = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, comm=MPI.COMM_SELF)
+    # no warning is issued
     ub.Simulation(scene, ub.EnergyMomentum(), t0=1.0, start=statics, comm=MPI.COMM_SELF).close()
 
 

@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
@@ -17,7 +18,7 @@ SECTION = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3)
 
 def cantilever(cells=6, **more):
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=cells, name="beam")
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], **more)
+    return clamped(beam, **more)
 
 
 def mechanism(m=1.0, s=1.0, kg=1.0, angle=0.0, *, damped=True):
@@ -72,7 +73,7 @@ def test_a_roller_at_an_angle():
         end = (2 * math.cos(angle), 2 * math.sin(angle))
         beam = ub.Beam((0, 0), end, SECTION, cells=6)
         roller = ub.Roller(beam.end, along=end)
-        return ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start), roller]), 4).omega
+        return ub.modes(clamped(beam, roller), 4).omega
 
     np.testing.assert_allclose(omega(0.6), omega(0.0), rtol=1e-9)
 
@@ -177,8 +178,8 @@ def test_what_has_yielded_answers_elastically():
     section = ub.Section(EA=1e4, GA=4e3, EI=20.0, rhoA=0.5, rhoI=1e-3, bending=law)
     beam = ub.Beam((0, 0), (2, 0), section, cells=6)
     push = ub.PointLoad(beam.end, force=(0, 0.55), amplitude=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
-    bent = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    scene = clamped(beam, loads=[push])
+    bent = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     assert bent.energy.lost["plastic"][-1] > 0
     elastic = ub.modes(cantilever(), 3).omega
     np.testing.assert_allclose(ub.modes(scene, 3, at=bent).omega, elastic, rtol=1e-2)
@@ -188,7 +189,7 @@ def test_a_hinge_that_bears_nothing_is_a_joint():
     """In the cell of the hinge the rest is elastic: a joint between two cells is h/2 away."""
     cells = 40
     open_ = ub.Beam((0, 0), (2, 0), SECTION, cells=cells, hinges={0.5: ub.Softening(0.0, 1.0)})
-    scene = ub.Scene([open_], supports=[ub.Clamped(open_.start), ub.Pinned(open_.end)])
+    scene = clamped(open_, ub.Pinned(open_.end))
     one = ub.Beam((0, 0), (1, 0), SECTION, cells=cells // 2)
     two = ub.Beam((1, 0), (2, 0), SECTION, cells=cells // 2)
     joint = ub.Revolute(one.end, two.start)
@@ -213,7 +214,7 @@ def test_a_rotating_frame_keeps_energy():
         loads=[frame],
         masses=[ub.PointMass(beam.end, 0.3)],
     )
-    solution = ub.simulate(thrown, ub.EnergyMomentum(), t=(0, 1.0), dt=0.02, progress=False)
+    solution = ub.simulate(thrown, ub.EnergyMomentum(), t=(0, 1.0), dt=0.02)
     assert np.ptp(solution.displacement(beam.end)[:, 1]) > 1e-3
     assert solution.energy.worst < 1e-9  # the ledger closes
 
@@ -237,14 +238,14 @@ def test_what_acts_in_the_undeformed_scene_is_named():
     }
     for name, more in others.items():
         with pytest.warns(ub.ModelWarning, match=f"{name}.*no equilibrium.*give at=simulate"):
-            ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)], **more), 1)
+            ub.modes(clamped(beam, **more), 1)
     held = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, u=0.001)]
     with pytest.warns(ub.ModelWarning, match="PrescribedDisplacement at .* no equilibrium"):
         ub.modes(ub.Scene([beam], supports=held), 1)
     # What balances, a load of the undeformed scene, and a work without a force there: no warning.
     bed = ub.Potential("bed", lambda q, axis: 5 * q[1] ** 2)
     pull = ub.PointLoad(beam.end, force=(1, 0))
-    ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[pull], works=[bed]), 1)
+    ub.modes(clamped(beam, loads=[pull], works=[bed]), 1)
 
 
 def test_modes_of_what_its_weight_holds():
@@ -269,7 +270,7 @@ def test_a_thrown_body_flies_straight():
     )
     errors = []
     for steps in (50, 100):
-        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=1 / steps, progress=False)
+        solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=1 / steps)
         there = solution.position(body.middle)[-1]
         errors.append(np.linalg.norm(there - (math.cos(rate), -math.sin(rate))))
     assert errors[1] < 1e-3
@@ -279,7 +280,7 @@ def test_a_thrown_body_flies_straight():
 # -- files and pictures --------------------------------------------------------------------------
 
 
-def test_shapes(shared_path, on_first_rank):
+def test_the_largest_displacement_of_a_mode_is_one(shared_path, on_first_rank):
     """The largest displacement is one, and the file has all modes."""
     scene = cantilever()
     found = ub.modes(scene, 3)
@@ -302,7 +303,7 @@ def test_shapes(shared_path, on_first_rank):
 
 
 @pytest.mark.serial
-def test_pictures(tmp_path):
+def test_modes_have_pictures(tmp_path):
     scene = cantilever(loads=[])
     found = ub.modes(scene, 4)
     ub.plot(found).savefig(tmp_path / "modes.png")
@@ -353,7 +354,7 @@ def test_change_of_stiffness_is_its_derivative():
     change between motions are those of its matrix, to round-off.
     """
     scene = mixed()
-    loaded = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+    loaded = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     small = SmallMotions(scene, loaded, 2.0)
     simulation, random = small._simulation, np.random.default_rng(0)
     along = small._path()
@@ -376,13 +377,11 @@ def test_change_of_stiffness_is_its_derivative():
 # -- wrong calls ---------------------------------------------------------------------------------
 
 
-def test_wrong_calls():
+def test_wrong_calls_are_refused():
     scene = cantilever()
     beam = scene.beams[0]
     other = cantilever(4)
-    solution = ub.simulate(
-        cantilever(loads=[ub.Gravity()]), ub.Static(), t=(0, 1), dt=1, progress=False
-    )
+    solution = ub.simulate(cantilever(loads=[ub.Gravity()]), ub.Static(), t=(0, 1), dt=1)
     for call, message in (
         (lambda: ub.modes(scene, 0), "modes: n = 0 must be"),
         (lambda: ub.modes(beam, 2), "modes: scene = .* is not a Scene"),
@@ -403,11 +402,11 @@ def test_wrong_calls():
             call()
 
 
-def test_no_mass():
+def test_a_scene_without_mass_has_no_modes():
     section = ub.Section(EA=1e4, GA=4e3, EI=20.0)
     beam = ub.Beam((0, 0), (2, 0), section, cells=2)
     with pytest.raises(ub.ArgumentError, match="nothing that can move has mass"):
-        ub.modes(ub.Scene([beam], supports=[ub.Clamped(beam.start)]), 1)
+        ub.modes(clamped(beam), 1)
 
 
 def test_a_lone_body_seen_from_a_rotating_frame():

@@ -3,6 +3,7 @@
 
 import numpy as np
 import pytest
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 
@@ -22,16 +23,15 @@ def hinged_frame():
     left = ub.Beam((0, 0), (0, 3), section, cells=15)
     roof = ub.Beam((0, 3), (4, 3), section, cells=20, hinges=hinge)
     right = ub.Beam((4, 3), (4, 0), section, cells=15)
-    return ub.Scene(
+    return rigid_chain(
         [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
         loads=[ub.PointLoad(left.end, force=(200e3, 0), amplitude=lambda t: float(t < 0.02))],
     )
 
 
 def run_of(scene, steps, dt):
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, steps * dt), dt=dt, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, steps * dt), dt=dt)
     assert run.parts == steps
     assert abs(run.energy.worst) < 1e-9
     return run
@@ -63,8 +63,8 @@ def test_a_cantilever_that_yields_in_many_cells(kinematic):
     section = ub.Section(EA=1e6, GA=GA, EI=EI, bending=ub.ElastoPlastic(My, kinematic=kinematic))
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
     load = ub.PointLoad(beam.end, force=(0, 2 * My), amplitude=lambda t: t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False)
+    scene = clamped(beam, loads=[load])
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     P, b = 2 * My, 0.5
     plastic = (P * (1 - b**3) / 3 - My * (1 - b**2) / 2) / kinematic
     exact = P / 3 / EI + P / GA + plastic
@@ -84,7 +84,7 @@ def test_a_kept_tangent_ends_below_the_tolerance():
     ends = []
     for rtol in (1e-10, 1e-13):
         run = ub.simulate(
-            hinged_frame(), ub.EnergyMomentum(), t=(0, 0.05), dt=1e-3, progress=False,
+            hinged_frame(), ub.EnergyMomentum(), t=(0, 0.05), dt=1e-3,
             newton=ub.Newton(rtol=rtol),
         )  # fmt: skip
         ends.append(np.delete(run.q[-1], run.grid.multipliers))

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from helpers import run
 
 import ufl_beam as ub
 from ufl_beam.discretization.state_io import Memory
@@ -28,10 +29,6 @@ def star(number, *, hinge=None, joint=ub.Rigid, moment=0.0):
     clamped = [ub.Clamped(member.start) for member in members]
     ends = [member.end for member in members]
     return ub.Scene(members, joints=[joint(*ends)], supports=clamped, loads=forces)
-
-
-def run(scene, scheme):
-    return ub.simulate(scene, scheme, t=(0, 1), dt=0.1, progress=False)
 
 
 @pytest.mark.parametrize("scheme", [*DYNAMIC, *STATIC], ids=str)
@@ -86,9 +83,7 @@ def storeys(embedded):
 @pytest.mark.parametrize("embedded", [False, True])
 def test_a_frame_falls_when_all_hinges_around_its_nodes_have_broken(embedded):
     """The run goes on; what was dissipated is a whole number of fracture energies, all spent."""
-    solution = ub.simulate(
-        storeys(embedded), ub.EnergyMomentumDecaying(), t=(0, 0.15), dt=1e-3, progress=False
-    )
+    solution = ub.simulate(storeys(embedded), ub.EnergyMomentumDecaying(), t=(0, 0.15), dt=1e-3)
     energy = solution.energy
     broken = energy.lost["hinges"][-1] / 10.0
     assert broken > 11

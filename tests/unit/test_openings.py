@@ -8,6 +8,7 @@ from functools import cache
 
 import numpy as np
 import pytest
+from helpers import run
 
 import ufl_beam as ub
 from ufl_beam.discretization.state_io import Memory
@@ -33,10 +34,6 @@ def pushed(hinge=None, *, cells=8, fibres=None):
     return beam, ub.Scene([beam], supports=[ub.Pinned(beam.start), ub.Roller(beam.end), push])
 
 
-def run(scene, scheme, dt):
-    return ub.simulate(scene, scheme, t=(0, 1), dt=dt, progress=False)
-
-
 def in_steps(values, scheme):
     """What acts in the steps of an elastic run, from values at their ends."""
     return (1 - scheme.theta) * values[:-1] + scheme.theta * values[1:]
@@ -46,7 +43,7 @@ def in_steps(values, scheme):
 def largest_moment(scheme, dt):
     """Largest moment that acts in a step of a run in which the hinges stay closed; N m."""
     beam, scene = pushed(ub.Softening(FOREVER, FOREVER))
-    solution = run(scene, scheme, dt)
+    solution = run(scene, scheme, dt=dt)
     K = np.array([solution.strains(beam, n)[:, 2] for n in range(len(solution))])
     M = beam.section.EI * K  # that hinges know of
     return np.abs(in_steps(M, scheme)).max()
@@ -65,7 +62,7 @@ def test_a_limit_just_above_the_largest_moment_stays_closed(scheme, law, dt, ene
     The resistance falls from 0.01 to 1e4 times as fast as the cell can follow.
     """
     beam, scene = pushed(law(1.001 * largest_moment(scheme, dt), energy))
-    solution = run(scene, scheme, dt)
+    solution = run(scene, scheme, dt=dt)
     assert solution.energy.lost["hinges"][-1] == 0.0
     assert not solution.material(beam).jump.any()
     assert (
@@ -83,10 +80,10 @@ def test_a_limit_just_below_the_largest_moment_opens(scheme, law, dt, energy):
     _, scene = pushed(law(0.999 * largest_moment(scheme, dt), energy))
     if energy < 1.0 and scheme == ub.Static():
         with pytest.raises(ub.ConvergenceError) as failure:
-            run(scene, scheme, dt)
+            run(scene, scheme, dt=dt)
         assert failure.value.time == pytest.approx(0.5, abs=3e-3)
         return
-    solution = run(scene, scheme, dt)
+    solution = run(scene, scheme, dt=dt)
     assert solution.energy.lost["hinges"][-1] > 0.0
 
 
@@ -100,7 +97,7 @@ def test_cracks_of_fibres(scheme, part, opens):
     def moved(limit):
         law = ub.Fibres(ub.ElastoPlastic(np.inf), number=4, softening=ub.Softening(limit, 1e4))
         beam, scene = pushed(fibres=law)
-        solution = run(scene, scheme, dt)
+        solution = run(scene, scheme, dt=dt)
         return solution, [solution.strains(beam, n) for n in range(len(solution))]
 
     _, strains = moved(limit)
@@ -126,7 +123,7 @@ def test_springs_that_soften(scheme, part, opens):
         push = ub.PointLoad(beam.end, force=(0, 100.0), amplitude=ub.Table([0, 0.5, 1], [0, 1, 0]))
         clamp = ub.Clamped(beam.start)
         scene = ub.Scene([beam], supports=[clamp], loads=[push], connectors=[spring])
-        solution = run(scene, scheme, dt)
+        solution = run(scene, scheme, dt=dt)
         return solution, solution.connector(spring).force
 
     _, force = moved(limit)
@@ -141,7 +138,7 @@ def test_only_what_must_open_does():
     When it opens in a jump, the others unload.
     """
     beam, scene = pushed(ub.Softening(10.0, 1e-3), cells=16)
-    solution = run(scene, ub.EnergyMomentum(), 0.1)
+    solution = run(scene, ub.EnergyMomentum(), dt=0.1)
     n = int(np.argmax(solution.energy.lost["hinges"] > 0))
     assert (solution.material(beam, n).hinge > 0).sum() == 1
 
@@ -198,7 +195,7 @@ def chain(limits):
 def test_the_largest_excess_opens_first(limits, opens):
     """In one step in which all springs would bear 1.3 N; one that opens relieves the others."""
     springs, scene = chain(limits)
-    solution = run(scene, ub.EnergyMomentumStatic(), 1.0)
+    solution = run(scene, ub.EnergyMomentumStatic(), dt=1.0)
     assert [solution.connector(one).dissipated[-1] > 0 for one in springs] == opens
     force = min(*limits, 1.3)
     assert solution.connector(springs[0]).force[-1] == pytest.approx(force, rel=0.02)
@@ -211,6 +208,6 @@ def test_no_search_where_nothing_opens():
     elastic = ub.Simulation(scene, ub.EnergyMomentum())
     assert not elastic.march.opens
     assert (
-        run(closed, ub.EnergyMomentum(), 0.01).iterations
-        == run(scene, ub.EnergyMomentum(), 0.01).iterations
+        run(closed, ub.EnergyMomentum(), dt=0.01).iterations
+        == run(scene, ub.EnergyMomentum(), dt=0.01).iterations
     )

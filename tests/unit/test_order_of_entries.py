@@ -16,7 +16,6 @@ SCHEMES = [
     ub.Static(),
     ub.EnergyMomentumStatic(),
 ]
-QUIET = {"dt": 0.02, "progress": False}
 
 
 def chain():
@@ -75,7 +74,7 @@ def test_a_table_goes_on_on_other_processes(shared_path, on_first_rank):
     def run(end, name, comm=None):
         table = ub.History(shared_path / f"{name}.csv", [scene.beams[3].end])
         file = ub.Checkpoint(shared_path / f"{name}.checkpoint", every=2)
-        more = {"record": table, "checkpoint": file, "comm": comm, **QUIET}
+        more = {"record": table, "checkpoint": file, "comm": comm, "dt": 0.02}
         return ub.simulate(scene, ub.EnergyMomentum(), t=(0, end), **more)
 
     on_first_rank(lambda: run(0.04, "split", MPI.COMM_SELF) and None)

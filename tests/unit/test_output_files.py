@@ -15,6 +15,7 @@ from mpi4py import MPI
 import h5py
 import numpy as np
 import pytest
+from scenes import SECTION, clamped
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
@@ -23,21 +24,15 @@ from ufl_beam.output.output_files import OutputFile, read, require_writable
 from ufl_beam.output.paraview_files import PAGE, Lines, VtkhdfWriter, XdmfWriter
 from ufl_beam.simulation.checkpoint import FORMAT
 
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.1)
-
 
 def scene():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="left")
-    return ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], loads=[ub.PointLoad(beam.end, force=(0, -3))]
-    )
+    return clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, -3))])
 
 
 def run(*record, steps=5, dt=0.1, **more):
     scheme = ub.EnergyMomentum()
-    return ub.simulate(
-        scene(), scheme, t=(0, steps * dt), dt=dt, record=record, progress=False, **more
-    )
+    return ub.simulate(scene(), scheme, t=(0, steps * dt), dt=dt, record=record, **more)
 
 
 # -- files that two outputs would write ------------------------------------------------------------
@@ -53,16 +48,10 @@ class Notes(ub.Recorder):
     def files(self):
         return (self.path,)
 
-    def require_writable(self):
-        pass
-
     def open(self, simulation):
         pass
 
     def write(self, simulation):
-        pass
-
-    def close(self):
         pass
 
 
@@ -133,7 +122,7 @@ def test_xdmf_and_a_checkpoint_of_one_stem(shared_path, on_first_rank):
 
 
 def test_devices_may_be_shared():
-    run(ub.History("/dev/null"), ub.History("/dev/null"))
+    run(ub.History("/dev/null"), ub.History("/dev/null"))  # is not refused
 
 
 def test_the_file_of_a_study_is_not_that_of_a_member(shared_path):
@@ -144,7 +133,7 @@ def test_the_file_of_a_study_is_not_that_of_a_member(shared_path):
         return {"x": x}
 
     with pytest.raises(RuntimeError, match=r"study and record\[0\] \(History\) would both write"):
-        ub.study(member, [{"x": 1.0}, {"x": 2.0}], path=path, progress=False)
+        ub.study(member, [{"x": 1.0}, {"x": 2.0}], path=path)
     # Afterwards it is free again
     assert not output_files._in_use
     run(ub.History(path), steps=1)
@@ -197,9 +186,7 @@ def test_a_step_costs_the_same_at_any_time(recorder, tmp_path):
     factor of 3 for that as well.  A file that grew with the steps took 30 ms for the thousandth.
     """
     beam = ub.Beam((0, 0), (4, 0), SECTION, cells=8)
-    simulation = ub.Simulation(
-        ub.Scene([beam], supports=[ub.Clamped(beam.start)]), ub.EnergyMomentum()
-    )
+    simulation = ub.Simulation(clamped(beam), ub.EnergyMomentum())
     file = recorder(tmp_path / f"a{recorder.ending}")
     file.open(simulation)
 

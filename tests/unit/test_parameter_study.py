@@ -4,7 +4,6 @@
 import json
 import math
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -14,21 +13,18 @@ from mpi4py import MPI
 import h5py
 import numpy as np
 import pytest
+from helpers import raises
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
 from ufl_beam.parallel import active_comm
 
 COMM = MPI.COMM_WORLD
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 
 def post(force=1.0):
     beam = ub.Beam((0, 0), (0, 2), SECTION, cells=3)
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(force, 0))],
-    )
+    return clamped(beam, loads=[ub.PointLoad(beam.end, force=(force, 0))])
 
 
 def pushed(force, record=()):
@@ -53,10 +49,6 @@ def numbers(*x):
 
 def bits(study):
     return {name: (x.shape, x.tobytes()) for name, x in study.results.items()}
-
-
-def raises(*parts, kind=ub.ArgumentError):
-    return pytest.raises(kind, match=".*".join(map(re.escape, parts)))
 
 
 @pytest.fixture
@@ -311,7 +303,7 @@ def test_the_file_is_written_on_the_way(tmp_path):
         (square, numbers(1, 2, 1), ("cases[2] = {'x': 1} occurs twice",)),
     ],
 )
-def test_calls(member, cases, says):
+def test_wrong_calls_are_refused(member, cases, says):
     with raises("study: ", *says):
         ub.study(member, cases)
 
@@ -344,7 +336,7 @@ def test_members_that_return_different_things(other, shared_path):
     assert len(ub.Study.load(path)) == 1
 
 
-def test_unknown_results():
+def test_unknown_results_are_named():
     with raises("no result 'cube'; there is powers, square"):
         ub.study(square, numbers(1))["cube"]
 

@@ -8,6 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import ufl
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.analysis.critical_points import Candidate
@@ -53,7 +54,7 @@ def down_to(place, v):
 
 
 @pytest.mark.parametrize("factor", [4.0, 20.0])
-def test_snap_through(factor):
+def test_a_two_bar_truss_snaps_through(factor):
     """[closed] The whole curve and both limit points: one cell a bar is exact.
 
     The solver's tolerance is 1e-10 of forces of 60 kN; a limit point is located to 1e-7 of a step.
@@ -279,7 +280,7 @@ def frame(corner):
 
 
 @pytest.mark.parametrize("free", ["N", "V", "M", "NM", "VM"])
-def test_releases(free):
+def test_releases_make_no_critical_points(free):
     """An elastic frame under small loads has no critical point; Newton's method takes few steps."""
     scene = frame(lambda a, b: ub.Release(a, b, free=free))
     path = ub.follow(scene, ub.LoadControl(1.0), steps=10)
@@ -429,7 +430,7 @@ def test_events_of_a_path(law):
     section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
     beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.0: law(10.0, 5.0)})
     load = ub.PointLoad(beam.end, force=(0, 10.0), amplitude=growing)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     events = ub.Events()
     ub.follow(scene, ub.DissipationControl(0.5), steps=30, record=events)
     assert events.found

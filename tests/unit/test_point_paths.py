@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars, C, histories
-from laws_of_ones_own import Dashpot, PowerLaw, SameHardening, Stiffening
+from uniaxial_points import LENGTH, Bars, C, histories
+from user_laws import Dashpot, PowerLaw, SameHardening, Stiffening
 
 import ufl_beam as ub
 
@@ -19,6 +19,10 @@ LAWS = {
     "softening": (ub.ElastoPlastic(math.inf), SOFTENS),
     "linear": (ub.ElastoPlastic(math.inf), ub.LinearSoftening(4.0, 0.3)),
     "both": (ub.ElastoPlastic(2.0, 30.0), SOFTENS),
+    "viscous both": (
+        ub.ElastoPlastic(2.0, 5.0, 5.0, ub.Perzyna(0.5)),
+        ub.LinearSoftening(4.0, 0.3),
+    ),
     "joint": (ub.ElastoPlastic(math.inf), ub.Softening(0.0, 1.0)),
     "power": (PowerLaw(3.0, 0.01, 5.0), None),
     "power, softening": (PowerLaw(2.5, 0.01, 5.0), SOFTENS),
@@ -43,7 +47,7 @@ OPENS = [law for law, (_, softening) in LAWS.items() if softening is not None]
 
 @each_law
 @each_scheme
-def test_tangents(law, scheme):
+def test_tangents_are_derivatives(law, scheme):
     """Against central differences; cells at a corner of a law are left out."""
     some = Bars(300, *LAWS[law], scheme)
     *before, last = histories(300, steps=5)

@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import doubles, ffi, lib
@@ -14,7 +15,7 @@ from ufl_beam.simulation.stepper import Prediction
 def prediction_of(scheme):
     """One of a single beam, and the number of its degrees of freedom."""
     beam = ub.Beam((0, 0), (2, 0), ub.Section(EA=1, GA=1, EI=1, rhoA=1, rhoI=1), cells=2)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+    scene = clamped(beam)
     simulation = ub.Simulation(scene, scheme)
     simulation.close()
     return simulation.prediction, simulation.share.size
@@ -42,7 +43,7 @@ def guess(prediction, q, dt):
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum()])
-def test_uniform_motion(scheme):
+def test_uniform_motion_is_predicted_exactly(scheme):
     """[closed] Exact over any steps; round-off of the times is below 1e-12 of them."""
     prediction, size = prediction_of(scheme)
     v = np.arange(1.0, size + 1)
@@ -50,7 +51,7 @@ def test_uniform_motion(scheme):
     assert found == pytest.approx(5 * v, rel=1e-12)
 
 
-def test_constant_acceleration():
+def test_constant_acceleration_is_predicted_exactly():
     """[closed] Exact over equal steps; a longer one is at the velocity of the last."""
     prediction, size = prediction_of(ub.EnergyMomentum())
     a = SMALL * np.arange(1.0, size + 1)
@@ -95,7 +96,7 @@ def test_motion_that_steps_do_not_resolve(places):
     assert found == pytest.approx(np.full(size, 2 * places[4] - places[3]), rel=1e-12)
 
 
-def test_statics():
+def test_in_statics_the_last_increment_is_repeated():
     """Load steps have no inertia: the last one is repeated, and no second difference is kept."""
     prediction, size = prediction_of(ub.Static())
     a = np.ones(size)

@@ -10,15 +10,15 @@ from types import SimpleNamespace
 from mpi4py import MPI
 
 import pytest
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
 from ufl_beam import parallel
 
 FIRST = MPI.COMM_WORLD.rank == 0
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
 BEAM = ub.Beam((0, 0), (0, 2), SECTION, cells=2)
 PUSH = ub.PointLoad(BEAM.end, force=(1.0, 0), amplitude=lambda t: t)
-SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[PUSH])
+SCENE = clamped(BEAM, loads=[PUSH])
 
 
 def simulate(**more):

@@ -5,14 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme
+from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.records import members
 from ufl_beam.simulation import step_equation
 
 BEAM = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0), cells=2)
-SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
+SCENE = clamped(BEAM)
 
 
 @pytest.fixture(autouse=True)
@@ -36,13 +37,6 @@ def without(*names):
     """A scheme in statics that has all but some members."""
     static = ub.Static()
     return type("Mine", (), {n: getattr(static, n) for n in members(Scheme) if n not in names})()
-
-
-def test_members():
-    assert members(Scheme)["theta"] is None
-    assert members(Scheme)["mean"] is Scheme.mean
-    assert [*members(DynamicScheme)][: len(members(Scheme))] == [*members(Scheme)]
-    assert {"kept", "coefficients"} <= {*members(DynamicScheme)} - {*members(Scheme)}
 
 
 @pytest.mark.parametrize("names", [("half_tangents",), ("theta", "mean"), ("mean",)])

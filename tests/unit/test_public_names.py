@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from scenes import SECTION
 
 import ufl_beam as ub
 
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=0.01)
 LEFT = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="left")
 RIGHT = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="right")
 HIGH = ub.Beam((1, 1), (2, 1), SECTION, cells=2, name="high")

@@ -6,12 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from laws_of_ones_own import Dashpot
+from scenes import clamped
+from user_laws import Dashpot
 
 import ufl_beam as ub
 
 SECTION = ub.Section(EA=1e3, GA=1e3, EI=1.0, rhoA=1.0, rhoI=1e-3)
-QUIET = {"progress": False}
 SLOW_MOTION = pytest.mark.filterwarnings("ignore:.*takes v:ufl_beam.ModelWarning")
 
 
@@ -48,7 +48,7 @@ def test_a_work_with_velocities_acts_in_statics_as_dampers_do(scheme):
         load = ub.PointLoad(bar.at(0.5), (0, force), amplitude=lambda t: 1 + t)
         held, acting = {"supports": guides[:1], "connectors": springs}, more.get("works", [])
         scene = ub.Scene([bar], loads=[load], works=acting, **held)
-        return ub.simulate(scene, scheme, t=(0, 1), dt=dt, **QUIET).displacement(bar.end)[:, 1]
+        return ub.simulate(scene, scheme, t=(0, 1), dt=dt).displacement(bar.end)[:, 1]
 
     u, begin = [0.0], 0.0
     if scheme != ub.Static():
@@ -67,11 +67,11 @@ def test_a_work_with_velocities_acts_in_statics_as_dampers_do(scheme):
 def test_a_static_run_warns_of_a_work_with_velocities():
     scene = pushed(works=[drag(1.0)])
     with pytest.warns(ub.ModelWarning, match=r"'wind' takes v, which is \(q1 - q0\)/dt") as told:
-        ub.simulate(scene, ub.Static(), t=(0, 0.1), dt=0.1, **QUIET)
+        ub.simulate(scene, ub.Static(), t=(0, 0.1), dt=0.1)
     assert told[0].filename == __file__
-    ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1, **QUIET)  # warnings are errors here
+    ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.1)  # warnings are errors here
     push = ub.VirtualWork("push", lambda q, w: (1 + q[1]) * w[1])
-    ub.simulate(pushed(works=[push]), ub.Static(), t=(0, 0.1), dt=0.1, **QUIET)
+    ub.simulate(pushed(works=[push]), ub.Static(), t=(0, 0.1), dt=0.1)
 
 
 def test_whether_a_work_takes_rates():
@@ -83,9 +83,9 @@ def test_whether_a_work_takes_rates():
 
 def split(scene, scheme):
     """The works and losses of a run, and their sums in two runs of which one goes on."""
-    whole = ub.simulate(scene, scheme, t=(0, 1), dt=0.05, **QUIET)
-    one = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.05, **QUIET)
-    two = ub.simulate(scene, scheme, t=(0.5, 1), dt=0.05, start=one, **QUIET)
+    whole = ub.simulate(scene, scheme, t=(0, 1), dt=0.05)
+    one = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.05)
+    two = ub.simulate(scene, scheme, t=(0.5, 1), dt=0.05, start=one)
     names = [*whole.energy.supplied, *whole.energy.lost]
     entries = {n: (whole.energy[n][-1], one.energy[n][-1] + two.energy[n][-1]) for n in names}
     if not scheme.dynamic:  # else reactions of a first state are not known
@@ -111,7 +111,7 @@ def test_the_work_of_drag_in_two_runs_is_that_of_one(scheme):
 def test_the_last_step_of_decaying_midpoint_goes_on(reference):
     """Its second differences begin with the step before; [round-off] as above."""
     scene, scheme = pushed(), ub.EnergyMomentumDecaying()
-    newton = {"newton": ub.Newton(reference=reference), **QUIET}
+    newton = {"newton": ub.Newton(reference=reference)}
     whole = ub.simulate(scene, scheme, t=(0, 1), dt=0.05, **newton)
     one = ub.simulate(scene, scheme, t=(0, 0.5), dt=0.05, **newton)
     two = ub.simulate(scene, scheme, t=(0.5, 1), dt=0.05, start=one, **newton)
@@ -131,9 +131,7 @@ def test_the_work_of_a_support_in_two_damped_runs_is_that_of_one(scheme):
     """As above; forces of damping are a part of its reaction."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
     moving = ub.PrescribedDisplacement(beam.end, v=lambda t: -0.05 * math.sin(t) ** 2)
-    scene = ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start), moving], damping=[ub.KelvinVoigt(0.5)]
-    )
+    scene = clamped(beam, moving, damping=[ub.KelvinVoigt(0.5)])
     entries, throughput = split(scene, scheme)
     assert entries["damping"][0] > 0.1 * throughput
     for whole, sum_of_parts in entries.values():
@@ -145,7 +143,7 @@ def test_the_work_of_drag_in_the_first_step_of_a_moving_scene():
     bar = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
     flying = ub.Velocity((bar,), linear=(0.0, 2.0))
     scene = ub.Scene([bar], initial=[flying], works=[drag(0.1)])
-    run = ub.simulate(scene, ub.Newmark(), t=(0, 0.02), dt=0.01, **QUIET)
+    run = ub.simulate(scene, ub.Newmark(), t=(0, 0.02), dt=0.01)
     assert np.diff(run.energy["wind"]) == pytest.approx(-0.1 * 2.0**2 * 0.01, rel=5e-3)
 
 

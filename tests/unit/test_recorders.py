@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import SECTION, clamped, rigid_chain
 from time_series import read_vtkhdf, read_xdmf
 
 import ufl_beam as ub
@@ -16,16 +17,13 @@ MOTION = (("u", "m"), ("v", "m"), ("psi", "rad"))
 FORCE = (("force", "N"), ("work", "J"))
 TURNING = (("motion", "rad"), ("force", "N m"), ("work", "J"))
 
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
-
 
 def scene():
     """Two beams at an angle; no two vertices at one point but those of the rigid corner."""
     post = ub.Beam((0, 0), (0, 2), SECTION, cells=3, name="post")
     arm = ub.Beam((0, 2), (3, 3), SECTION, cells=4, name="arm")
-    return ub.Scene(
+    return rigid_chain(
         [post, arm],
-        joints=[ub.Rigid(post.end, arm.start)],
         supports=[ub.Clamped(post.start)],
         loads=[ub.PointLoad(arm.end, force=(5, -30), amplitude=ub.ramp(1.0))],
     )
@@ -189,7 +187,7 @@ def test_time_series_show_bodies_and_links(series, beams):
 @pytest.mark.parametrize(
     ("every", "kept"), [(1, [0, 1, 2, 3, 4, 5, 6]), (2, [0, 2, 4, 6]), (4, [0, 4])]
 )
-def test_every(series, every, kept):
+def test_a_series_has_every_nth_state(series, every, kept):
     make, read = series
     solution = run(scene(), make(every=every))
     found = read()
@@ -246,7 +244,7 @@ def test_names_in_a_table_are_no_formulas(shared_path, on_first_rank):
     works = [ub.Potential(name, lambda q: q[1] ** 2) for name in names]
     pushed = ub.Scene([beam], supports=pushed.supports, works=works)
     ub.simulate(
-        pushed, ub.Static(), t=(0, 1), dt=1.0, progress=False,
+        pushed, ub.Static(), t=(0, 1), dt=1.0,
         record=ub.History(shared_path / "a.csv"),
     )  # fmt: skip
     line = on_first_rank(lambda: (shared_path / "a.csv").read_text().splitlines()[0])
@@ -446,11 +444,9 @@ def test_rows_of_displacements_follow_the_beam(degree):
     )
     beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges=hinges)
     load = ub.PointLoad(beam.end, force=(0.0, -20.0), amplitude=ub.ramp(0.1))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     extremes, mesh = ub.Extremes(), ub.Mesh(degree=degree)
-    run = ub.simulate(
-        scene, ub.EnergyMomentum(), t=(0, 0.1), dt=5e-3, record=extremes, mesh=mesh, progress=False
-    )
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=5e-3, record=extremes, mesh=mesh)
     low = extremes.displacement(beam).low
     assert len(low) == 4 * degree + 1
     for row, s in ((0, 0.0), (2 * degree, 0.5), (-1, 1.0)):

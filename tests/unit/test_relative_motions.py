@@ -108,7 +108,7 @@ class Between:
 
 @pytest.mark.parametrize("seed", SEEDS)
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_values(motion, seed):
+def test_relative_motions_are_those_by_hand(motion, seed):
     some = Between(motion, ub.EnergyMomentum(), seed)
     expected = by_hand(some.link, some.q1[some.dofs])
     (value,) = some.coupling.motion(some.q1)
@@ -183,7 +183,7 @@ LAWS = {
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(), ub.EnergyMomentum(0.2, 0.1)], ids=str)
 @pytest.mark.parametrize("law", LAWS)
 @pytest.mark.parametrize("motion", MOTIONS)
-def test_tangent(motion, law, scheme):
+def test_tangents_are_derivatives(motion, law, scheme):
     scene, _ = pair(motion, LAWS[law])
     for seed in range(9):
         probe = Probe(scene, scheme, turn=0.8, seed=seed)

@@ -1,36 +1,24 @@
 # SPDX-License-Identifier: MIT
 """Small scenes under `mpirun` are computed by each process: all must find the same motion."""
 
-import os
-import subprocess
-import sys
 from pathlib import Path
 
 from mpi4py import MPI
 
 import numpy as np
 import pytest
-from test_collective_errors import MPIRUN, needs_mpirun
+from helpers import needs_mpirun, on_two_processes
 
 import ufl_beam as ub
 
-SCRIPT = Path(__file__).with_name("drawing.py")
+SCRIPT = Path(__file__).with_name("script_of_copies.py")
 
 
 @pytest.fixture(scope="module")
 def outcomes(tmp_path_factory):
     """What a script on two processes finds: (function, run) -> outcomes of both."""
     table = tmp_path_factory.mktemp("copies") / "run.csv"
-    command = ["mpirun", "-n", "2", sys.executable, str(SCRIPT), str(table)]
-    run = subprocess.run(
-        command,
-        env={**os.environ, **MPIRUN},
-        stdin=subprocess.DEVNULL,
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
+    run = on_two_processes(SCRIPT, table, timeout=120)
     assert run.returncode == 0, run.stderr
     *lines, end = run.stdout.splitlines()
     assert end == "end"

@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 
@@ -118,7 +119,7 @@ def test_ends_of_beams_bear_what_supports_and_joints_do(actions, scheme):
     )
     if refused:
         pytest.skip("the scheme refuses it")
-    run = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.01, progress=False)
+    run = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.01)
     require_equilibrium(run, joint, np.arange(1, len(run)))
 
 
@@ -134,7 +135,7 @@ def test_ends_of_beams_bear_what_supports_and_joints_do(actions, scheme):
 )
 def test_cells_that_yield_or_break(kind, scheme):
     scene, joint = two_beams("weight" if scheme.dynamic else "line", kind)
-    run = ub.simulate(scene, scheme, t=(0, 0.2), dt=0.01, progress=False)
+    run = ub.simulate(scene, scheme, t=(0, 0.2), dt=0.01)
     material = run.material(scene.beams[0])
     assert (material.plastic if kind == "yielding" else material.hinge).any()
     require_equilibrium(run, joint, np.arange(1, len(run)))
@@ -146,7 +147,7 @@ def test_cells_that_yield_or_break(kind, scheme):
 def test_thinned_saved_and_continued(scheme, shared_path):
     """Steps that are not kept change nothing; files and runs that go on have the same numbers."""
     scene, joint = two_beams("weight")
-    times = {"dt": 0.01, "progress": False}
+    times = {"dt": 0.01}
     whole = ub.simulate(scene, scheme, t=(0, 0.12), **times)
     some = ub.simulate(scene, scheme, t=(0, 0.12), every=3, **times)
     most = ub.simulate(scene, scheme, t=(0, 0.12), max_states=3, **times)
@@ -175,7 +176,7 @@ def test_thinned_saved_and_continued(scheme, shared_path):
 def test_the_first_forces_of_a_run_that_goes_on(goes_on, loaded, shared_path):
     """They are the last ones before it, from memory or a file, in diagrams and envelopes."""
     scene, _ = two_beams("weight")
-    times = {"dt": 0.01, "progress": False}
+    times = {"dt": 0.01}
     half = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.05), **times)
     start = half
     if loaded:
@@ -196,7 +197,7 @@ def test_the_first_forces_of_a_run_that_goes_on(goes_on, loaded, shared_path):
 )
 def test_as_in_the_reference_path(scheme):
     scene, joint = two_beams("virtual work", "yielding")
-    options = {"t": (0, 0.1), "dt": 0.02, "progress": False}
+    options = {"t": (0, 0.1), "dt": 0.02}
     run = ub.simulate(scene, scheme, **options)
     other = ub.simulate(scene, scheme, newton=ub.Newton(reference=True), **options)
     require_equilibrium(other, joint, np.arange(1, len(other)))
@@ -205,7 +206,7 @@ def test_as_in_the_reference_path(scheme):
         assert np.abs(np.subtract(one, two)).max() < 1e-7 * np.abs(one.N).max()
 
 
-def test_paths():
+def test_section_forces_along_a_path_are_in_equilibrium():
     scene, joint = two_beams("line")
     path = ub.follow(scene, ub.LoadControl(0.05), steps=4)
     require_equilibrium(path, joint, np.arange(1, len(path)))
@@ -216,7 +217,7 @@ def test_paths():
 def test_processes_that_share_a_scene(actions, kind, monkeypatch):
     monkeypatch.setattr("ufl_beam.parallel.SMALLEST_SHARE", 1)
     scene, joint = two_beams(actions, kind)
-    options = {"t": (0, 0.1), "dt": 0.02, "progress": False}
+    options = {"t": (0, 0.1), "dt": 0.02}
     extremes, others = ub.Extremes(3), ub.Extremes(3)
     run = ub.simulate(scene, ub.EnergyMomentum(), record=extremes, **options)
     alone = ub.simulate(scene, ub.EnergyMomentum(), record=others, comm=MPI.COMM_SELF, **options)
@@ -260,7 +261,7 @@ def static(cells, degree, **more):
     supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
     made = {field: [make(beam) for make in makes] for field, makes in more.items()}
     scene = ub.Scene([beam], supports=supports, **made)
-    options = {"t": (0, 1), "dt": 1.0, "progress": False, "mesh": ub.Mesh(degree=degree)}
+    options = {"t": (0, 1), "dt": 1.0, "mesh": ub.Mesh(degree=degree)}
     return ub.simulate(scene, ub.Static(), **options).diagram(beam)
 
 
@@ -306,7 +307,7 @@ def test_a_thermal_gradient_by_a_potential(degree):
     beam = ub.Beam((0, 0), (6, 0), STIFF, cells=4)
     supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
     scene = ub.Scene([beam], supports=supports, works=[gradient(beam)])
-    options = {"t": (0, 1), "dt": 1.0, "progress": False, "mesh": ub.Mesh(degree=degree)}
+    options = {"t": (0, 1), "dt": 1.0, "mesh": ub.Mesh(degree=degree)}
     run = ub.simulate(scene, ub.Static(), **options)
     close(run.diagram(beam).M, -54e3)
     assert np.abs(run.diagram(beam).V).max() < 1e-6 * 54e3
@@ -319,7 +320,7 @@ def test_a_spinning_rod(scheme):
     spin = ub.Velocity([rod], angular=2.0)
     # The stretch begins with ωy = 0: parameters that damp its vibration
     start = ub.Scene([rod], initial=[spin], damping=[ub.KelvinVoigt(1e-3)])
-    run = ub.simulate(start, scheme, t=(0, 4), dt=0.01, progress=False)
+    run = ub.simulate(start, scheme, t=(0, 4), dt=0.01)
     s, N, V, M = run.diagram(rod)
     exact = 2.0 * 4.0 * (1 - (2 * s - 1) ** 2) / 2
     close(N, exact, 2e-3)
@@ -329,7 +330,7 @@ def test_a_spinning_rod(scheme):
 def test_section_forces_of_places():
     """They are those of the diagram there; at a vertex of the cell before it."""
     scene, _ = two_beams("weight")
-    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.05), dt=0.01, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.05), dt=0.01)
     beam = scene.beams[1]  # four cells, nine points each
     for s, point in ((0.0, 0), (0.125, 4), (0.25, 8), (0.28125, 10), (1.0, 35)):
         found = run.section_forces_at(beam.at(s))
@@ -381,11 +382,12 @@ def test_supports_of_places_that_a_joint_puts_together():
     a = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="a")
     b = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="b")
     pin, hold = ub.Pinned(a.end), ub.PrescribedDisplacement(b.start, psi=0.0)
-    scene = ub.Scene(
-        [a, b], joints=[ub.Rigid(a.end, b.start)], supports=[ub.Pinned(a.start), pin, hold],
+    scene = rigid_chain(
+        [a, b],
+        supports=[ub.Pinned(a.start), pin, hold],
         loads=[ub.PointLoad(b.end, force=(0.0, -1.0))],
-    )  # fmt: skip
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    )
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1.0)
     # [closed] b is a cantilever: 1 N, 1 N m
     assert run.reaction(pin)[-1] == pytest.approx((0, 1, 0), abs=1e-6)
     assert run.reaction(hold)[-1] == pytest.approx((0, 0, 1), abs=1e-6)
@@ -394,7 +396,7 @@ def test_supports_of_places_that_a_joint_puts_together():
         supports=[ub.PrescribedDisplacement(a.start, psi=0.0)],
         loads=[ub.PointLoad(a.end, force=(0, -1.0))],
     )  # fmt: skip
-    run = ub.simulate(grounded, ub.Static(), t=(0, 1), dt=1.0, progress=False)
+    run = ub.simulate(grounded, ub.Static(), t=(0, 1), dt=1.0)
     # [closed] The ground bears the force, not the support
     assert run.reaction(grounded.supports[0])[-1] == pytest.approx((0, 0, 1), abs=1e-6)
 
@@ -414,7 +416,7 @@ def test_two_supports_that_hold_the_same_are_refused(one, other, held):
     with pytest.raises(
         ub.ArgumentError, match=f"supports in conflict: .* both hold {held}; remove"
     ):
-        ub.Scene([a, b], joints=[ub.Rigid(a.end, b.start)], supports=[one(a.end), other(b.start)])
+        rigid_chain([a, b], supports=[one(a.end), other(b.start)])
 
 
 # -- extremes --------------------------------------------------------------------------------------
@@ -436,7 +438,7 @@ def test_extremes_are_those_of_the_diagrams_of_all_steps(scheme, actions, kind, 
 
 def require_extremes(scene, scheme, points, **options):
     extremes = ub.Extremes(points)
-    times = {"t": (0, 0.4), "dt": 0.02, "progress": False, **options}
+    times = {"t": (0, 0.4), "dt": 0.02, **options}
     run = ub.simulate(scene, scheme, record=extremes, **times)
     assert len(run) == 21
     for beam in scene.beams:
@@ -461,7 +463,7 @@ def test_extremes_of_any_number_of_cells(cells, degree):
     """Batches that are full and not, and more cells than C takes in at once."""
     beam = ub.Beam.arc((0, 0), 2.0, (0.0, 1.0), SECTION, cells=cells)
     load = ub.LineLoad(beam, force=(1.0, -3.0), moment=0.2, amplitude=lambda t: math.sin(9 * t))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load, ub.Gravity()])
+    scene = clamped(beam, loads=[load, ub.Gravity()])
     require_extremes(scene, ub.EnergyMomentum(), 3, mesh=ub.Mesh(degree=degree))
     require_extremes(scene, ub.Static(), 2, mesh=ub.Mesh(degree=degree))
 
@@ -479,7 +481,7 @@ def test_extremes_of_paths():
 def test_a_recorder_of_extremes_changes_nothing():
     """Nor does it bring Python into the steps."""
     scene, _ = two_beams("weight")
-    times = {"t": (0, 0.4), "dt": 0.01, "progress": False}
+    times = {"t": (0, 0.4), "dt": 0.01}
     alone = ub.simulate(scene, ub.EnergyMomentum(), **times)
     watched = ub.simulate(
         scene, ub.EnergyMomentum(), record=[ub.Extremes(), ub.Extremes(3)], **times
@@ -497,7 +499,7 @@ def test_the_envelope_of_a_clamped_beam():
     load = ub.LineLoad(beam, force=(0, -1e4), amplitude=growing)
     scene = ub.Scene([beam], supports=supports, loads=[load])
     extremes = ub.Extremes()
-    options = {"t": (0, 1), "dt": 0.25, "record": extremes, "progress": False}
+    options = {"t": (0, 1), "dt": 0.25, "record": extremes}
     run = ub.simulate(scene, ub.Static(), **options)
     found = extremes.section_forces(beam)
     # Linear cells err by h²/l², 1/64 [closed]; the reaction has the same error

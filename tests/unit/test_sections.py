@@ -23,14 +23,14 @@ def check(section, *, A, I, shear_area):
     assert section.rhoI == pytest.approx(7850.0 * I, rel=CLOSE)
 
 
-def test_rectangle():
+def test_a_rectangle_has_its_stiffnesses():
     # b h, b h^3 / 12, shear factor 5/6
     section = ub.Section.rectangle(b=0.1, h=0.3, **STEEL)
     check(section, A=0.03, I=0.1 * 0.027 / 12, shear_area=0.025)
     assert section.depth == 0.3
 
 
-def test_circle():
+def test_a_circle_has_its_stiffnesses():
     # pi r^2, pi r^4 / 4, shear factor 9/10
     section = ub.Section.circle(0.2, **STEEL)
     check(
@@ -42,7 +42,7 @@ def test_circle():
     assert section.depth == 0.2
 
 
-def test_tube():
+def test_a_tube_has_its_stiffnesses():
     # radii 0.1 and 0.08: pi (R^2 - r^2), pi (R^4 - r^4) / 4; differences lose two digits
     section = ub.Section.tube(0.2, 0.02, **STEEL)
     A, I = math.pi * 0.0036, math.pi * (1e-4 - 0.4096e-4) / 4
@@ -58,7 +58,7 @@ def test_tube_that_is_full_is_a_circle():
     assert pytest.approx(circle.EI, rel=CLOSE) == tube.EI
 
 
-def test_i_shape():
+def test_an_i_shape_has_its_stiffnesses():
     # By flanges and web: 2 (b tf^3 / 12 + b tf d^2) + tw hw^3 / 12, d = (h - tf) / 2
     h, b, tw, tf = 0.3, 0.15, 0.01, 0.02
     web, d = 0.26, 0.14

@@ -6,6 +6,7 @@ from copy import copy
 import numpy as np
 import pytest
 import ufl
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
 from ufl_beam.compiled import code_cache, jit, simd_kernels
@@ -13,8 +14,6 @@ from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.simd_kernels import in_batches
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
-
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 
 
 def pointwise(expression, values, *, several=False):
@@ -59,14 +58,14 @@ ANGLES = np.concatenate(
 
 
 @pytest.mark.parametrize("function", [ufl.sin, ufl.cos])
-def test_angles(function):
+def test_sines_and_cosines_are_those_of_the_c_library(function):
     """Within two last digits of the C library, also relative to what is near zero."""
     one, several = both(function, ANGLES)
     assert np.all(np.abs(several - one) <= 2 * np.spacing(np.abs(one)))
 
 
 @pytest.mark.parametrize("flag", ["-O2", "-ffp-contract=off", "-U__FP_FAST_FMA"])
-def test_quotients(flag):
+def test_quotients_are_right_to_the_last_digit(flag):
     """To the last digit but rarely, and 1 for equal numbers, also where products are rounded."""
     divide = "void divide(int n, const double *a, const double *b, double *c)"
     loop = (
@@ -105,7 +104,7 @@ def test_far_angles_lose_what_they_do_not_have():
     ids=["root", "powers", "constant or not", "not or constant"],
 )
 @pytest.mark.parametrize("cells", [1, 3, 4, 9])
-def test_expressions(expression, cells):
+def test_expressions_hold_for_any_number_of_cells(expression, cells):
     """Any number of cells, also such that leave some lanes empty."""
     one, several = both(expression, np.linspace(-1.0, 2.0, cells))
     assert np.allclose(several, one, rtol=1e-14, atol=0)
@@ -146,7 +145,7 @@ CONDITIONS = {
 
 
 @pytest.mark.parametrize("condition", CONDITIONS)
-def test_logical_operators(condition):
+def test_logical_operators_choose_exactly(condition):
     """Exactly: cells choose one number or the other."""
     values, holds = np.linspace(-1.0, 2.0, 13), CONDITIONS[condition]
     one, several = both(lambda x: ufl.conditional(holds(x), x**2, -1.0), values)
@@ -232,7 +231,7 @@ def scene(damping=(), **section):
     frame = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0, **section)
     beam = ub.Beam((1, 2), (4, 6), frame, cells=19)  # of which some fill no batch
     loads = [ub.PointLoad(beam.end, force=(30.0, -20.0), moment=40.0)]
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads, damping=damping)
+    return clamped(beam, loads=loads, damping=damping)
 
 
 def hub(spokes):

@@ -7,6 +7,7 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -31,7 +32,7 @@ def braced(force, unit=1.0, *, time=lambda t: t, rhoA=0.0):
 
 
 def ends(scene, scheme):
-    run = ub.simulate(scene, scheme, t=(0, 1), dt=0.25, progress=False)
+    run = ub.simulate(scene, scheme, t=(0, 1), dt=0.25)
     assert run.parts == 4
     return run.displacement(scene.beams[1].end)[-1]
 
@@ -72,8 +73,8 @@ def test_an_elastic_strain_keeps_its_digits():
     bar = ub.Beam((0, 0), (3, 4), ub.Section(EA=E, GA=E, EI=E), cells=3)
     for force in (1.0, 1e-12, 1e-100):
         load = ub.PointLoad(bar.end, force=tuple(force * along))
-        scene = ub.Scene([bar], supports=[ub.Clamped(bar.start)], loads=[load])
-        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+        scene = clamped(bar, loads=[load])
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
         # Linear but for strains of 1e-9
         assert run.section_forces(bar)[:, 0] == pytest.approx([force] * 3, rel=1e-8)
 
@@ -82,7 +83,7 @@ def test_a_motion_comes_to_rest():
     """A beam on a spring loses its motion: it goes through 1e-157 m, whose square is nothing, to
     less than 1e-300 m, in steps without a cut."""
     scene = braced(1e4, time=lambda t: float(t < 0.1), rhoA=100.0)
-    run = ub.simulate(scene, ub.EnergyMomentum(0.45, 0.45), t=(0, 12), dt=0.01, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(0.45, 0.45), t=(0, 12), dt=0.01)
     assert run.parts == 1200
     largest = np.abs(run.displacement(scene.beams[1].end)).max(axis=1)
     assert np.isfinite(largest).all()
@@ -111,7 +112,7 @@ def test_a_small_load_on_a_post_that_a_spring_holds(force, how):
         solution = ub.follow(scene, how, steps=200)
         assert solution.critical == []
     else:
-        solution = ub.simulate(scene, how, t=(0, 20), dt=0.1, progress=False)
+        solution = ub.simulate(scene, how, t=(0, 20), dt=0.1)
     assert solution.times[-1] == pytest.approx(20.0)
     bending = h**3 / (3 * EI) * (1 - 1 / (4 * 4**2))  # n = 4
     exact = force * (bending + h / GA + h**2 / k)
@@ -129,7 +130,7 @@ def test_a_beam_on_a_spring_comes_to_rest(tip):
         connectors=[ub.Turn(foot, post.start, ub.Spring(2 * E))],
         loads=[ub.PointLoad(post.end, force=(1e4, 0), amplitude=lambda t: float(t < 0.1))],
     )
-    run = ub.simulate(scene, ub.EnergyMomentum(0.3, 0.3), t=(0, 10), dt=0.01, progress=False)
+    run = ub.simulate(scene, ub.EnergyMomentum(0.3, 0.3), t=(0, 10), dt=0.01)
     assert run.parts == 1000
     assert np.abs(run.displacement(post.end)[-1]).max() < 1e-300
 
@@ -142,15 +143,15 @@ def test_small_motions_of_a_drive():
         ground = ub.ground(0, 0)
         motor = ub.Turn(ground, beam.start, ub.PrescribedMotion(lambda t, size=size: size * t))
         scene = ub.Scene([beam], joints=[ub.Revolute(ground, beam.start)], connectors=[motor])
-        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
         assert run.displacement(beam.end)[-1, 2] == pytest.approx(size, rel=1e-9)
 
         beam = ub.Beam((0, 0), (2, 1), section, cells=2)
         jack = ub.Stretch(
             ub.ground(2, 0), beam.end, ub.PrescribedMotion(lambda t, size=size: size * t)
         )
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[jack])
-        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+        scene = clamped(beam, connectors=[jack])
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
         # The jack stands upright; turning it matters to the square of the motion over its length.
         assert run.connector(jack).motion[-1] == pytest.approx(size, rel=1e-9)
         assert run.displacement(beam.end)[-1, 1] == pytest.approx(size, rel=1e-2)
@@ -167,9 +168,9 @@ def test_a_small_load_beside_a_large_one(part):
     beam = ub.Beam((0, 0), (1, 0), section, cells=8)
     push = ub.PointLoad(beam.end, force=(-part * math.pi**2 / 4, 0), amplitude=ub.ramp(1.0))
     side = ub.PointLoad(beam.end, force=(0, 1e-9), amplitude=ub.ramp(1.0))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push, side])
+    scene = clamped(beam, loads=[push, side])
     found, expected = (
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, newton=newton, progress=False)
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=dt, newton=newton)
         for dt, newton in ((0.1, None), (1.0, ub.Newton(rtol=1e-15)))
     )
     deflections = [one.displacement(beam.end)[-1, 1] for one in (found, expected)]

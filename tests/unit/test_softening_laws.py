@@ -8,9 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from bars import LENGTH, Bars
-from laws_of_ones_own import Exponential, Fading, Kinked, Petersson, Rising
+from scenes import clamped, rigid_chain
 from scipy.integrate import quad
+from uniaxial_points import LENGTH, Bars
+from user_laws import Exponential, Fading, Kinked, Petersson, Rising
 
 import ufl_beam as ub
 from ufl_beam.model.softening_laws import SMALL
@@ -121,7 +122,7 @@ def turned(law, motion, place="cell", rho=0.0):
     beam = ub.Beam((0, 0), (1, 0), ub.Section(**whole, hinge=hinge), cells=1, hinges=hinges)
     supports = [ub.PrescribedDisplacement(beam.end, psi=motion)]
     if place in ("cell", "hinge"):
-        return ub.Scene([beam], supports=[ub.Clamped(beam.start), *supports])
+        return clamped(beam, *supports)
     of_link = ub.RigidPlastic(law) if place == "connector" else ub.Spring(1e3, softening=law)
     link = ub.Turn(ub.ground(0, 0), beam.start, of_link)
     return ub.Scene([beam], supports=[ub.Pinned(beam.start), *supports], connectors=[link])
@@ -149,7 +150,7 @@ def response(run, place):
 def test_moment_is_the_traction(law, place):
     """[closed] Under a growing rotation; opened, it has dissipated the integral of the traction."""
     scene = turned(law, lambda t: 2.0 * t, place)
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.025, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.025)
     M, opening, dissipated = response(run, place)
     open_ = opening > 1e-9
     assert np.count_nonzero(open_) > 30
@@ -170,7 +171,7 @@ def test_complete_opening_takes_the_energy(place, scheme):
     rho = 0.01 if scheme.dynamic else 0.0
     for law, tolerance in ((LAWS["Petersson"], 1e-10), (LAWS["kinked"], 1e-3)):
         scene = turned(law, lambda t: 2.0 * t, place, rho=rho)
-        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01, progress=False)
+        run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01)
         assert run.energy.worst < 1e-9
         assert run.energy.lost["hinges"][-1] == pytest.approx(G, rel=tolerance)
         assert response(run, place)[0][-1] == pytest.approx(0.0, abs=1e-9 * T)
@@ -189,7 +190,7 @@ def pulled(law):
             beam.end, u=lambda t: 5e-3 * SWING(t), psi=lambda t: 0.02 * SWING(t)
         )
     ]
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start), *ends])
+    return clamped(beam, *ends)
 
 
 CRACKS = {
@@ -226,7 +227,7 @@ def test_both_solvers_agree(name, place, scheme):
     """To and fro; works and losses to 1e-9; the ledger closes."""
     runs = [
         ub.simulate(
-            scene_of(name, place), scheme, t=(0, 1), dt=1 / 10, progress=False,
+            scene_of(name, place), scheme, t=(0, 1), dt=1 / 10,
             newton=ub.Newton(rtol=1e-12, reference=reference),
         )
         for reference in (False, True)
@@ -252,7 +253,7 @@ def test_an_exponential_law_of_ones_own_is_softening(place, scheme):
     for law in (mine, ub.Softening(mine.limit, mine.fracture_energy)):
         scene = pulled(law) if place == "fibres" else turned(law, SWING, place, rho=0.01)
         newton = ub.Newton(rtol=1e-13)
-        runs.append(ub.simulate(scene, scheme, t=(0, 1), dt=0.02, newton=newton, progress=False))
+        runs.append(ub.simulate(scene, scheme, t=(0, 1), dt=0.02, newton=newton))
     one, other = runs
     assert np.abs(one.q - other.q).max() < 1e-12 * max(1.0, np.abs(one.q).max())
     lost, same = (run.energy.lost["hinges"] for run in runs)
@@ -261,7 +262,7 @@ def test_an_exponential_law_of_ones_own_is_softening(place, scheme):
 
 @pytest.mark.parametrize("place", [*PLACES, "fibres"])
 def test_a_run_that_goes_on_is_the_whole_one(place):
-    scheme, of = ub.EnergyMomentum(), {"dt": 0.02, "progress": False}
+    scheme, of = ub.EnergyMomentum(), {"dt": 0.02}
     scene = scene_of("rising", place)
     whole = ub.simulate(scene, scheme, t=(0, 1), **of)
     half = ub.simulate(scene, scheme, t=(0, 0.5), **of)
@@ -273,7 +274,7 @@ def test_a_run_that_goes_on_is_the_whole_one(place):
 @pytest.mark.parametrize("place", ["cell", "hinge"])
 def test_files_want_the_class(place, tmp_path):
     """They have numbers and no code; a checkpoint is of one run, and of one law."""
-    scene, of = scene_of("Petersson", place), {"t": (0, 1), "dt": 0.05, "progress": False}
+    scene, of = scene_of("Petersson", place), {"t": (0, 1), "dt": 0.05}
     path, checkpoint = tmp_path / "run.h5", ub.Checkpoint(tmp_path / "point.h5", every=5)
     run = ub.simulate(scene, ub.Static(), checkpoint=checkpoint, **of)
     run.save(path)
@@ -291,7 +292,7 @@ def test_modes_of_what_is_left(place):
     found = []
     for law in (Petersson(T, G), Exponential(T, G), ub.LinearSoftening(T, G)):
         scene = turned(law, lambda t: 5.0 * t, place, rho=1.0)
-        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, progress=False)
+        run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01)
         found.append(ub.modes(scene, 2, at=run).frequencies)
     assert found[0] == pytest.approx(found[2], rel=1e-6)
     assert found[1] == pytest.approx(found[2], rel=1e-6)
@@ -302,7 +303,7 @@ def test_a_spring_that_never_breaks(reference):
     """[closed] A spring and a beam of the same stiffness bear half of what one would."""
     scene = turned(ub.Softening(np.inf, 1.0), lambda t: 0.1 * t, "spring")
     newton = ub.Newton(reference=reference)
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, newton=newton)
     assert run.connector(scene.connectors[0]).force == pytest.approx([0.0, 25.0, 50.0], rel=1e-9)
 
 
@@ -311,7 +312,7 @@ def test_events_and_pictures():
     law = LAWS["rising"]
     scene = turned(law, lambda t: 2.0 * t)
     events = ub.Events()
-    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, record=events, progress=False)
+    run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.01, record=events)
     assert [event.what for event in events.found] == ["opens", "is free"]
     _, _, dissipated = response(run, "cell")
     before = run.times < events.found[-1].time
@@ -327,10 +328,11 @@ def test_of_two_members_the_one_that_may_bear_more_keeps_its_hinge():
     def hinges(*laws):
         one = ub.Beam((0, 0), (1, 0), section, hinges={1.0: laws[0]})
         two = ub.Beam((1, 0), (1, 1), section, hinges={0.0: laws[1]})
-        scene = ub.Scene(
-            [one, two], joints=[ub.Rigid(one.end, two.start)], supports=[ub.Clamped(one.start)],
+        scene = rigid_chain(
+            [one, two],
+            supports=[ub.Clamped(one.start)],
             loads=[ub.PointLoad(two.end, force=(1.0, 0.0))],
-        )  # fmt: skip
+        )
         return len(scene.hinges)
 
     strong = ub.Softening(1.2 * T, G)
@@ -346,7 +348,7 @@ def test_jumps_where_the_traction_falls_most():
         scene = turned(law, lambda t, end=end: end * t, rho=0.01)
         with warnings.catch_warnings(record=True) as found:
             warnings.simplefilter("always")
-            run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, progress=False)
+            run = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
         assert run.energy.lost["hinges"][-1] > 0
         said.append([str(one.message) for one in found])
     assert not any("opened suddenly" in one for one in said[0])
@@ -495,7 +497,7 @@ def test_a_law_that_ufl_cannot_trace_is_refused(place):
     scene = turned(OfNumPy(100.0), lambda t: t, place)
     at = rf"OfNumPy: .* UFL: .*\({__file__}, line {line_of(OfNumPy, 'np.exp')}\)"
     with pytest.raises(ub.ArgumentError, match=at):
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
 
 
 def test_numbers_are_replaced():

@@ -5,10 +5,10 @@ import math
 
 import numpy as np
 import pytest
+from scenes import SECTION, clamped
 
 import ufl_beam as ub
 
-SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0, rhoA=1.0, rhoI=1.0)
 EQUILIBRIUM = 1e-9
 """Forces to the tolerance of Newton's method, 1e-10 of those in the scene, which are below 10 kN
 in the tests that say so."""
@@ -16,9 +16,7 @@ in the tests that say so."""
 
 def cantilever(*loads, cells=4, **more):
     beam = ub.Beam((1, 1), (3, 1), SECTION, cells=cells, **more)
-    scene = ub.Scene(
-        [beam], supports=[ub.Clamped(beam.start)], loads=[load(beam) for load in loads]
-    )
+    scene = clamped(beam, loads=[load(beam) for load in loads])
     return scene, beam
 
 
@@ -84,7 +82,7 @@ def test_small_displacement_is_that_of_the_table_book():
     assert abs(u) < 1e-11
 
 
-def test_rigid_rotation():
+def test_a_stiff_beam_rotates_rigidly():
     """A stiff beam driven at its start: position, rotation and velocity on the circle."""
     stiff = ub.Section(EA=1e9, GA=1e9, EI=1e9, rhoA=1.0, rhoI=1.0)
     beam = ub.Beam((1, 1), (3, 1), stiff, cells=2)
@@ -218,7 +216,7 @@ def test_section_forces_in_any_direction():
         beam = ub.Beam((0, 0), tuple(2 * t), SECTION, cells=4)
         force = 1e-3 * t + 2e-3 * n  # deflections of 1e-5 m
         load = ub.PointLoad(beam.end, force=tuple(force))
-        solution = static(ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), 1)
+        solution = static(clamped(beam, loads=[load]), 1)
         N, V, M = solution.section_forces(beam).T
         assert pytest.approx(4 * [1e-3], rel=1e-3) == N
         assert pytest.approx(4 * [2e-3], rel=1e-3) == V

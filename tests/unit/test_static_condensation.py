@@ -178,7 +178,7 @@ def tower():
 def test_on_several_processes_as_on_one(scheme):
     """Under mpirun the same scene, shared, and by each process alone."""
     alone, together = (
-        ub.simulate(tower(), scheme, t=(0, 1), dt=0.1, progress=False, comm=comm)
+        ub.simulate(tower(), scheme, t=(0, 1), dt=0.1, comm=comm)
         for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
     )
     assert alone.parts == together.parts == 10

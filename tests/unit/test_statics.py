@@ -7,6 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import run
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -23,10 +25,6 @@ def cantilever(*loads, supports=(), **section):
     )
 
 
-def run(scene, scheme, t=(0, 1), dt=0.1, **more):
-    return ub.simulate(scene, scheme, t=t, dt=dt, progress=False, **more)
-
-
 # -- loads that are there from the start ---------------------------------------------------------
 
 STEADY = {
@@ -39,7 +37,7 @@ STEADY = {
 
 @pytest.mark.parametrize("load", STEADY.values(), ids=STEADY)
 @pytest.mark.parametrize("theta", [0.5, 0.75, 1.0])
-def test_steady_loads(load, theta):
+def test_under_steady_loads_both_static_schemes_agree(load, theta):
     """`EnergyMomentumStatic` arrives where `Static` does, in the first step, with an exact ledger.
 
     The loads are applied in parts that turn no node by more than 0.02 rad: forces are in error by
@@ -232,9 +230,9 @@ def test_who_asks_for_a_velocity_is_told():
     beam = ub.Beam((0, 0), (1, 0), ub.Section(EA=1e3, GA=1e3, EI=1.0), cells=2)
     brake = ub.Controller(lambda now: -0.1 * now.velocity(beam.end)[1])
     slide = ub.Slide(ub.ground(2, 0), beam.end, brake, axis=(0, 1))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], connectors=[slide])
+    scene = clamped(beam, connectors=[slide])
     with pytest.raises(ub.ArgumentError, match=r"velocity of beam.end .*the run is static"):
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5, progress=False)
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.5)
     simulation = ub.Simulation(ub.Scene([beam], supports=scene.supports), ub.EnergyMomentumStatic())
     with pytest.raises(ub.ArgumentError, match="there is none"):
         simulation.velocity(beam.end)
@@ -266,7 +264,7 @@ def test_a_hanging_body():
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
-def test_hanging_rods(scheme):
+def test_hanging_rods_stretch_under_their_weight(scheme):
     """[closed] ∫N/EA: (3/2 + 1/2) m g l/EA, for l = 1; small strains 2e-5."""
     scene = rods((0, 0), (0, -1), (0, -2))
     run = ub.simulate(scene, scheme, t=(0, 3), dt=0.5)

@@ -205,7 +205,7 @@ def test_beams_that_share_nothing(number, scheme):
         loads=[ub.PointLoad(beam.end, force=(0, -1.0)) for beam in beams],
     )
     alone, together = (
-        ub.simulate(scene, scheme, t=(0, 1), dt=0.25, progress=False, comm=comm).q
+        ub.simulate(scene, scheme, t=(0, 1), dt=0.25, comm=comm).q
         for comm in (MPI.COMM_SELF, MPI.COMM_WORLD)
     )
     # Residuals of 1e-10 of the forces, 1 N, on stiffnesses of some 10 N/m

@@ -150,7 +150,7 @@ MEANT = pytest.mark.filterwarnings("ignore:.*takes v:ufl_beam.ModelWarning")
 @MEANT
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
-def test_tangent(kind, scheme):
+def test_the_tangent_is_the_derivative_of_the_residual(kind, scheme):
     probe = Probe(scene(kind), scheme, turn=1.5)
     tangent = probe.tangent()
     # Central differences with ε = 1e-5: ε² of third derivatives and 1e-16/ε of values, 1e-9

@@ -2,7 +2,6 @@
 """Trade-offs: of runs whose errors and times are laws, and of small scenes."""
 
 import math
-import re
 from types import SimpleNamespace
 
 from mpi4py import MPI
@@ -10,6 +9,7 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import scenes
+from helpers import raises
 
 import ufl_beam as ub
 from ufl_beam.analysis import tradeoff
@@ -20,10 +20,6 @@ CELLS, STEP, SECONDS, BUILDING = 1e-2, 1e-1, 1e-4, 0.1
 EFFORT = 14
 """Of the steps of all runs, of a scene without surprises, see `test_a_tolerance_is_met`."""
 LINEAR, STRICT = ub.Mesh(), ub.Newton()  # nothing else is tried
-
-
-def raises(*parts, kind=ub.ArgumentError):
-    return pytest.raises(kind, match="(?s)" + ".*".join(map(re.escape, parts)))
 
 
 @pytest.fixture
@@ -225,7 +221,7 @@ def test_the_recommendation_are_arguments_of_simulate(law):
     law(smooth)
     found = ask(tolerance=1e-4)
     assert set(found.recommended) == {"scheme", "t", "dt", "mesh", "newton"}
-    again = tradeoff.simulate(SCENE, progress=False, **found.recommended)
+    again = tradeoff.simulate(SCENE, **found.recommended)
     assert again.value == found.best.values["value"]
     said = str(found)
     assert "errors of 0.0001 of each quantity" in said
@@ -379,7 +375,7 @@ def test_coarse_steps_that_fail_are_left_out(law):
         ({"budget": 1.0, "mesh": [2]}, ("mesh[0] = 2 is not a Mesh",)),
     ],
 )
-def test_calls(call, says):
+def test_wrong_calls_are_refused(call, says):
     call = {"scheme": ub.Static(), "t": (0, 1), "dt": 0.5, **call}
     if call["scheme"] == ():
         call["scheme"], says = [], ("scheme is empty",)
@@ -398,7 +394,7 @@ def test_calls(call, says):
         ({"q": lambda s: 0.0}, ("quantity 'q' is zero",)),
     ],
 )
-def test_quantities(quantities, says):
+def test_wrong_quantities_are_refused(quantities, says):
     with raises(*says):
         ub.tradeoff(SCENE, quantities, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.1)
 
@@ -418,7 +414,7 @@ def test_statics_needs_cells_alone():
         scene, {"tip": end}, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance={"tip": 1e-3}
     )
     assert found.best.dials.dt == 0.5
-    again = ub.simulate(scene, **found.recommended, progress=False, comm=MPI.COMM_SELF)
+    again = ub.simulate(scene, **found.recommended, comm=MPI.COMM_SELF)
     fine = ub.simulate(
         scene, ub.Static(), t=(0, 1), dt=0.5, mesh=ub.Mesh(refine=100), comm=MPI.COMM_SELF
     )
@@ -427,7 +423,7 @@ def test_statics_needs_cells_alone():
     assert np.abs(found.limit["tip"] - end(fine)).max() < found.uncertainty["tip"] + 1e-5
 
 
-def test_a_vibration():
+def test_cells_and_steps_of_a_vibration_are_chosen():
     """A cantilever that is let go: cells and steps; its history as an array of one shape."""
     section = ub.Section(EA=1e4, GA=1e4, EI=1.0, rhoA=1.0, rhoI=1e-3)
     scene = scenes.cantilever(section, cells=1, force=(0, 0.1), time=lambda t: math.sin(t) ** 2)

@@ -9,7 +9,8 @@ from mpi4py import MPI
 
 import numpy as np
 import pytest
-from laws_of_ones_own import Dashpot, PowerLaw
+from scenes import clamped
+from user_laws import Dashpot, PowerLaw
 
 import ufl_beam as ub
 from ufl_beam.model.material_law import has_quadratic_energies, judges_dissipation
@@ -119,7 +120,7 @@ def held_at_the_end(law):
     beam = ub.Beam((0, 0), (2, 0), ub.Section(**STEEL), cells=2, name="girder")
     device = ub.Slide(ub.ground(2, 0), beam.end, law, axis=(0, 1))
     load = ub.PointLoad(beam.end, (0, -1e4))
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], connectors=[device])
+    return clamped(beam, loads=[load], connectors=[device])
 
 
 def test_a_damper_that_drives():

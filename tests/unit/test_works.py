@@ -3,6 +3,7 @@
 
 import math
 import re
+from functools import partial
 from pathlib import Path
 
 from mpi4py import MPI
@@ -10,6 +11,8 @@ from mpi4py import MPI
 import numpy as np
 import pytest
 import ufl
+from helpers import raises, require_restart, run
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 from ufl_beam.discretization.compiled_forms import prepared
@@ -44,18 +47,15 @@ def flying(b=5.0, cells=4):
     first = ub.Beam((0, 0), (2, 0.5), SECTION, cells=cells)
     second = ub.Beam((2, 0.5), (3, 0), SECTION, cells=cells // 2)
     spin = ub.Velocity((first, second), linear=(1.0, 2.0), angular=3.0)
-    return ub.Scene(
+    return rigid_chain(
         [first, second],
-        joints=[ub.Rigid(first.end, second.start)],
         initial=[spin],
         loads=[ub.PointLoad(first.start, force=(0, 3))],
         works=works(second, b),
     )
 
 
-def run(scene, scheme=None, **more):
-    more = {"t": (0, 2), "dt": 0.05, "progress": False, **more}
-    return ub.simulate(scene, scheme or ub.EnergyMomentum(), **more)
+run = partial(run, t=(0, 2), dt=0.05)
 
 
 # -- ledger ------------------------------------------------------------------------------------
@@ -225,7 +225,7 @@ def test_buckling_by_a_field():
 
     def critical(b):
         field = ub.Potential("field", lambda q, b: b * ufl.cos(q[2]), numbers={"b": b})
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], works=[field])
+        scene = clamped(beam, loads=[push], works=[field])
         return ub.buckling(scene, 1, mesh=ub.Mesh(degree=3)).factors[0]
 
     # The force P that is left beside the field m b: EI ψ'' + (m b + P) sin ψ = 0 for both.
@@ -296,41 +296,24 @@ def test_any_number_of_processes(scheme):
         np.testing.assert_allclose(together.energy[name], alone.energy[name], atol=1e-8)
 
 
-def same_works(resumed, whole):
-    """To the last bit on one process; several add their parts in another order."""
-    np.testing.assert_allclose(resumed, whole, rtol=0, atol=1e-13 * (MPI.COMM_WORLD.size > 1))
-
-
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.1), ub.Newmark(), ub.GeneralizedAlpha()])
-def test_restart(scheme, shared_path):
-    scene, field = flying(lambda t: 5 + t), ("soil", "magnet", "air", "magnet in time")
-    whole = run(scene, scheme)
-    file = ub.Checkpoint(shared_path / "run.checkpoint", every=7)
-    run(scene, scheme, t=(0, 1), dt=0.05, checkpoint=file)
-    resumed = run(scene, scheme, checkpoint=file)
-    assert np.array_equal(resumed.q, whole.q)
-    for name in field:
-        same_works(resumed.energy[name], whole.energy[name])
+def test_a_run_goes_on_from_a_checkpoint(scheme, shared_path):
+    require_restart(run, flying(lambda t: 5 + t), (), scheme, shared_path, until=2)
 
 
 @pytest.mark.filterwarnings("ignore:.*takes v:ufl_beam.ModelWarning")  # motion in time is meant
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentumStatic()])
 def test_restart_in_statics(scheme, shared_path):
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], works=works(b=lambda t: 5 + t))
-    whole = run(scene, scheme, dt=0.2)
-    file = ub.Checkpoint(shared_path / "run.checkpoint", every=3)
-    run(scene, scheme, t=(0, 1), dt=0.2, checkpoint=file)
-    resumed = run(scene, scheme, dt=0.2, checkpoint=file)
-    assert np.array_equal(resumed.q, whole.q)
-    same_works(resumed.energy["air"], whole.energy["air"])
+    scene = clamped(beam, works=works(b=lambda t: 5 + t))
+    require_restart(partial(run, dt=0.2), scene, (), scheme, shared_path, until=2)
 
 
 def test_a_continued_run():
     """It takes the state as one that works have led to: nothing grows a second time."""
     beam = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
     work = ub.VirtualWork("load", lambda w, q: 30.0 * (1 + q[1]) * w[1])
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], works=[work])
+    scene = clamped(beam, works=[work])
     first = run(scene, ub.Static(), t=(0, 1), dt=0.5)
     second = run(scene, ub.Static(), t=(1, 2), dt=0.5, start=first)
     np.testing.assert_allclose(second.q, first.q[-1][None].repeat(3, 0), atol=1e-9)
@@ -368,7 +351,7 @@ def test_the_blocks_of_the_page_run(capsys):
     # Hetényi's deflection to the error of 32 cells, λ² h²/12 = 1e-3
     assert sunk == pytest.approx(-1.350e-5, rel=1e-3)
     assert field < 0 > in_time
-    wired = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], works=[names["wire"]])
+    wired = clamped(BEAM, works=[names["wire"]])
     assert run(wired, t=(0, 0.1)).energy["current"][-1] > 0
 
 
@@ -377,10 +360,6 @@ def test_the_blocks_of_the_page_run(capsys):
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
 BODY = ub.Body((0, 0), mass=1.0, inertia=1.0)
 STRAY = ub.Beam((0, 1), (1, 1), SECTION, cells=2, name="stray")
-
-
-def raises(*parts):
-    return pytest.raises(ub.ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
 @pytest.mark.parametrize(
@@ -430,7 +409,7 @@ def raises(*parts):
         (lambda: ub.Scene([BEAM], works=3), ("works = 3 must be a list",)),
     ],
 )
-def test_bad_works(make, says):
+def test_bad_works_are_refused(make, says):
     with raises(*says):
         make()
 
@@ -493,7 +472,7 @@ def test_a_number_that_fails_later_is_named():
     work = ub.VirtualWork(
         "gust", lambda w, c: c * w[1], numbers={"c": lambda t: 1.0 if t < 0.1 else None}
     )
-    scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], works=[work])
+    scene = clamped(BEAM, works=[work])
     with raises("VirtualWork 'gust': the time function returned None at t = "):
         run(scene, t=(0, 1))
 
@@ -502,6 +481,6 @@ def test_a_work_that_is_no_number_ends_the_run():
     """The square root has no derivative at rest; the message names the beam."""
     still = ub.VirtualWork("drag", lambda v, w: -ufl.sqrt(v[1] ** 2) * v[1] * w[1])
     push = ub.PointLoad(BEAM.end, force=(0.0, 1.0))
-    scene = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[push], works=[still])
+    scene = clamped(BEAM, loads=[push], works=[still])
     with pytest.raises(ub.ConvergenceError, match="girder"):
         run(scene, t=(0, 1))

@@ -75,7 +75,7 @@ def test_the_estimate_counts_dissipation(scheme):
     assert abs(at_end(decaying, scene.bodies[0].middle) - math.sin(6.0)) < 0.1
 
 
-def test_order():
+def test_the_number_of_steps_goes_with_the_cube_root_of_the_tolerance():
     """Errors of steps go with dt³, their sum with dt²: an 8th of the tolerance, half the steps."""
     scene = oscillator()
     runs = [run(scene, ub.Adaptive(tolerance), end=6.0) for tolerance in (8e-6, 1e-6)]

@@ -10,6 +10,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import ufl
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 
@@ -27,9 +28,7 @@ def a_frame(EA, cells):
     right = ub.Beam((1, 1), (2, 0), section, cells=cells)
     load = ub.PointLoad(right.start, force=(0, -8), amplitude=growing)
     supports = [ub.Clamped(left.start), ub.Clamped(right.end)]
-    scene = ub.Scene(
-        [left, right], joints=[ub.Rigid(left.end, right.start)], supports=supports, loads=[load]
-    )
+    scene = rigid_chain([left, right], supports=supports, loads=[load])
     return right.start, scene, 8 / 2**0.5
 
 
@@ -37,7 +36,7 @@ def column(EA, cells):
     """A column at 53 degrees, so that round-off of its axial force moves it sideways."""
     beam = ub.Beam((0, 0), (0.6, 0.8), ub.Section(EA=EA, GA=EA, EI=1.0), cells=cells)
     load = ub.PointLoad(beam.end, force=(-0.6, -0.8), amplitude=growing)
-    return beam.end, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load]), 1.0
+    return beam.end, clamped(beam, loads=[load]), 1.0
 
 
 def portal(EA, cells):
@@ -61,7 +60,7 @@ def test_buckling_against_follow(make, EA, control):
     """
     place, scene, N = make(EA, 16)
     factor = ub.buckling(scene, 1).factors[0]
-    path = ub.follow(scene, control, until=lambda now: now.t > 1.2 * factor, progress=False)
+    path = ub.follow(scene, control, until=lambda now: now.t > 1.2 * factor)
     (point,) = path.critical
     assert point.kind == "bifurcation"
     assert point.factor == pytest.approx(factor, rel=factor * N / EA + 2e-7)
@@ -92,7 +91,7 @@ def test_a_ring_under_pressure(EA, cells, control):
     ]
     water = ub.VirtualWork("water", pressure, numbers={"p": growing})
     scene = ub.Scene([arc], supports=supports, works=[water])
-    path = ub.follow(scene, control, until=lambda now: now.t >= 4, progress=False)
+    path = ub.follow(scene, control, until=lambda now: now.t >= 4)
     (point,) = path.critical
     assert point.kind == "bifurcation"
     assert point.factor == pytest.approx(3.0, abs=6.5 / cells**2 + 20 / EA)
@@ -142,12 +141,7 @@ def test_a_frame_of_roorda_has_a_limit_point():
         girder = ub.Beam((0, 1), (1, 1), section, cells=16)
         load = ub.PointLoad(post.end, force=(0, -1), amplitude=growing)
         supports = [ub.Pinned(post.start), ub.Pinned(girder.end)]
-        scene = ub.Scene(
-            [post, girder],
-            joints=[ub.Rigid(post.end, girder.start)],
-            supports=supports,
-            loads=[load],
-        )
+        scene = rigid_chain([post, girder], supports=supports, loads=[load])
         path = ub.follow(
             scene, ub.ArcLength(0.02, factor=5), until=lambda now: bool(now.solution.critical)
         )

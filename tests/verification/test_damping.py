@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -34,7 +35,6 @@ def released(*damping, cells=8, steps=100, periods=6, force=1.0):
         t=(0, periods * PERIOD),
         dt=PERIOD / steps,
         start=pulled,
-        progress=False,
     )
 
 
@@ -88,7 +88,7 @@ def spinning(damping):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
     spin = ub.Velocity((beam,), angular=2 * math.pi, about=(0.5, 0.0))
     scene = ub.Scene([beam], initial=[spin], damping=[damping])
-    return ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01, progress=False)
+    return ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.01)
 
 
 def test_kelvin_voigt_is_objective():
@@ -116,13 +116,10 @@ def test_kelvin_voigt_in_statics_is_retarded():
     creep = 0.5  # s
 
     def stretched(dt):
-        scene = ub.Scene(
-            [beam],
-            supports=[ub.Clamped(beam.start)],
-            loads=[ub.PointLoad(beam.end, force=(0.01, 0))],
-            damping=[ub.KelvinVoigt(creep)],
+        scene = clamped(
+            beam, loads=[ub.PointLoad(beam.end, force=(0.01, 0))], damping=[ub.KelvinVoigt(creep)]
         )
-        solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=dt, progress=False)
+        solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=dt)
         assert solution.energy.worst < 1e-9
         return solution.displacement(beam.end)[-1, 0]
 
@@ -138,14 +135,13 @@ def test_a_cell_with_a_hinge_is_left_out():
     section = ub.Section(EA=1e6, GA=1e6, EI=100.0, rhoA=1.0, rhoI=1e-3)
     joint = ub.Softening(limit=0.0, fracture_energy=1.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.0: joint})
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
+    scene = clamped(
+        beam,
         initial=[ub.Velocity((beam,), angular=0.0)],
         loads=[ub.PointLoad(beam.end, force=(0, 1.0), amplitude=lambda t: float(t < 0.1))],
         damping=[ub.KelvinVoigt(0.01)],
     )
-    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.005, progress=False)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.005)
     assert abs(solution.displacement(beam.end)[-1, 2]) > 0.1
     # The arm is rigid beside the hinge: its damping takes a small part of the work.
     assert solution.energy["damping"][-1] < 0.05 * solution.energy["loads"][-1]
@@ -161,7 +157,7 @@ BAD = [
 
 
 @pytest.mark.parametrize(("make", "message"), BAD, ids=[message for _, message in BAD])
-def test_bad_damping(make, message):
+def test_bad_damping_is_refused(make, message):
     with pytest.raises(ub.ArgumentError) as error:
         make()
     assert message in str(error.value)
@@ -169,7 +165,7 @@ def test_bad_damping(make, message):
 
 def test_rayleigh_in_statics_is_refused():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=1)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], damping=[KINDS["both"]])
+    scene = clamped(beam, damping=[KINDS["both"]])
     with pytest.raises(ub.ArgumentError, match="statics has none; use KelvinVoigt"):
         ub.Simulation(scene, ub.Static())
 

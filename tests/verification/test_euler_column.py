@@ -51,8 +51,8 @@ def buckled(cells, P, α):
     turned = ub.PrescribedDisplacement(beam.end, psi=lambda t: α * t)
     held = ub.Scene([beam], supports=[foot, turned], loads=[load])
     free = ub.Scene([beam], supports=[foot], loads=[load])
-    bent = ub.simulate(held, ub.Static(), t=(0, 1), dt=0.05, progress=False)
-    after = ub.simulate(free, ub.Static(), t=(1, 2), dt=1, start=bent, progress=False)
+    bent = ub.simulate(held, ub.Static(), t=(0, 1), dt=0.05)
+    after = ub.simulate(free, ub.Static(), t=(1, 2), dt=1, start=bent)
     return after.displacement(beam.end)[-1] + (1, 0, 0)
 
 

@@ -28,7 +28,7 @@ DISPLACEMENTS = [0, 1, 3, 4]
 def run(cells, dt):
     scene = flying_beam(cells=cells)
     tight = ub.Newton(rtol=1e-13)
-    return ub.simulate(scene, ub.EnergyMomentum(), t=(0, 10), dt=dt, newton=tight, progress=False)
+    return ub.simulate(scene, ub.EnergyMomentum(), t=(0, 10), dt=dt, newton=tight)
 
 
 def ends(cells, dt):

@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 from convergence.study import extrapolated, romberg
 from numpy.polynomial import Legendre
+from scenes import clamped
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
@@ -71,7 +72,7 @@ def test_the_first_frequency_of_a_slender_cantilever_keeps_its_digits(cells):
     """
     section = ub.Section(EA=1e9, GA=1e9, EI=1.0, rhoA=1.0)
     beam = beam_of(cells, section)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)])
+    scene = clamped(beam)
     found = ub.modes(scene, 1, mesh=ub.Mesh(degree=3)).omega[0]
     np.testing.assert_allclose(found, 1.875104**2, rtol=2 * 0.5e-6 / 1.875104)
 
@@ -105,7 +106,7 @@ def pulled(cells, N, *, EI=1.0, n=3):
         supports=[ub.Pinned(beam.start), ub.Roller(beam.end)],
         loads=[ub.PointLoad(beam.end, force=(N, 0))],
     )
-    state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+    state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
     return ub.modes(scene, n, at=state)
 
 
@@ -150,8 +151,8 @@ def test_becks_column():
     for part in (0.995, 1.005):
         beam = beam_of(80)
         load = ub.FollowerLoad(beam.end, force=(-20.0509 * part, 0))
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
-        state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+        scene = clamped(beam, loads=[load])
+        state = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
         growth.append(-ub.modes(scene, 2, at=state).damping.min())
     assert abs(growth[0]) < 1e-5  # both are near: to the root of round-off
     assert growth[1] > 1e-2
@@ -258,7 +259,7 @@ def test_a_bead_in_a_bowl():
     scene = ub.Scene(
         bodies=[bead], joints=[bowl], connectors=[soft, turn], loads=[ub.Gravity((0, -g))]
     )
-    rest = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+    rest = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
     found = ub.modes(scene, 2, at=rest).omega
     np.testing.assert_allclose(found, [1.0, math.sqrt(g / radius)], rtol=1e-7)
 
@@ -289,7 +290,7 @@ def test_a_stocky_column_is_reissners():
         load = ub.PointLoad(beam.end, force=(-1, 0), amplitude=lambda t: t)
         supports = [ub.Pinned(beam.start), ub.Roller(beam.end)]
         scene = ub.Scene([beam], supports=supports, loads=[load])
-        near = ub.simulate(scene, ub.Static(), t=(0, 0.999 * wanted), dt=wanted, progress=False)
+        near = ub.simulate(scene, ub.Static(), t=(0, 0.999 * wanted), dt=wanted)
         more = ub.buckling(scene, 1, t=wanted, at=near).factors[0]
         runs.append(wanted * (0.999 + 0.001 * more))
         far = ub.buckling(scene, 1).factors[0]
@@ -327,12 +328,10 @@ def test_decrement_of_a_vibration():
     push = ub.PointLoad(beam.end, force=(0, 3e-4), amplitude=lambda t: float(t <= 0))
     held = ub.Scene([beam], supports=supports(beam), loads=[push])
     free = ub.Scene([beam], supports=supports(beam), damping=[ub.KelvinVoigt(0.02)])
-    bent = ub.simulate(held, ub.Static(), t=(-1, 0), dt=1, progress=False)
+    bent = ub.simulate(held, ub.Static(), t=(-1, 0), dt=1)
     first = ub.modes(free, 1)
     period = 1 / first.frequencies[0]
-    moving = ub.simulate(
-        free, ub.EnergyMomentum(), t=(0, 10 * period), dt=period / 200, start=bent, progress=False
-    )
+    moving = ub.simulate(free, ub.EnergyMomentum(), t=(0, 10 * period), dt=period / 200, start=bent)
     tip = moving.displacement(beam.end)[:, 1]
     _, heights = ub.peaks(moving.times, tip)
     mean, _ = ub.logarithmic_decrement(heights[3:])
@@ -375,8 +374,8 @@ def test_rotating_beam(rate):
     for cells in (10, 20, 40):
         beam = beam_of(cells)
         frame = ub.RotatingFrame(rate)
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[frame])
-        steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+        scene = clamped(beam, loads=[frame])
+        steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
         runs.append(ub.modes(scene, 3, at=steady).omega)
     np.testing.assert_allclose(romberg(*runs), ritz(rate, 3), rtol=1e-4)
 
@@ -397,7 +396,7 @@ def test_foucaults_pendulum():
     """[closed] Seen from a frame that turns with Ω, ω0 is ω0 - Ω and ω0 + Ω."""
     ω, rate = 3.0, 0.5
     scene, _ = sprung_body(2 * ω**2, 2 * ω**2, 2.0, loads=[ub.RotatingFrame(rate, (1, 0))])
-    steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+    steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
     found = ub.modes(scene, 2, at=steady)
     np.testing.assert_allclose(found.omega, [ω - rate, ω + rate], rtol=1e-12)
     np.testing.assert_allclose(found.damping, 0.0, atol=1e-12)
@@ -414,7 +413,7 @@ def test_mass_on_a_turning_rail():
         connectors=[ub.Slide(here, body.middle, ub.Spring(k), axis=(1, 0))],
         loads=[ub.RotatingFrame(rate)],
     )
-    steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+    steady = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
     found = ub.modes(scene, 1, at=steady)
     np.testing.assert_allclose(found.omega, [math.sqrt(k / mass - rate**2)], rtol=1e-12)
     # k x = m Ω² (1 + x)

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import pytest
 
-SCRIPT = Path(__file__).with_name("killed.py")
+SCRIPT = Path(__file__).with_name("script_of_kills.py")
 
 SIGNALS = [signal.SIGKILL, signal.SIGINT, signal.SIGKILL, signal.SIGTERM]
 
@@ -97,7 +97,7 @@ def kills_in_steps(tmp_path, number, steps, every):
 
 
 @pytest.mark.serial
-def test_two_kills(tmp_path):
+def test_a_run_survives_two_kills(tmp_path):
     kills_in_steps(tmp_path, 2, steps=1000, every=10)
 
 

@@ -15,6 +15,7 @@ import math
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -50,7 +51,7 @@ def pushed(beams, joints, supports, place, component, size=2e-3, steps=100):
     """Largest force of a support that moves ``place`` in one direction: the limit load."""
     move = ub.PrescribedDisplacement(place, **{component: lambda t: size * t})
     scene = ub.Scene(beams, joints=joints, supports=[*supports, move])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / steps, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / steps)
     force = solution.reaction(move)[1:, ["u", "v", "psi"].index(component)]
     assert force[-1] == pytest.approx(force[-3], rel=1e-3)  # a plateau
     return force[-1]
@@ -64,7 +65,7 @@ def loaded(scene_of, expected):
     """
     scene = scene_of(lambda t: expected * t)
     try:
-        solution = ub.simulate(scene, ub.Static(), t=(0, 1.02), dt=1 / 400, progress=False)
+        solution = ub.simulate(scene, ub.Static(), t=(0, 1.02), dt=1 / 400)
     except ub.ConvergenceError as failure:
         solution = failure.solution
     return solution.times[np.abs(solution.q).max(axis=1) < FAR][-1]  # 1.02 where there is no limit
@@ -106,7 +107,7 @@ def test_line_load(end, factor):
 
     def scene(time):
         load = ub.LineLoad(beam, force=(0, -M_P), amplitude=time)
-        return ub.Scene([beam], supports=[ub.Clamped(beam.start), end(beam.end)], loads=[load])
+        return clamped(beam, end(beam.end), loads=[load])
 
     assert loaded(scene, factor) == pytest.approx(1, rel=5e-3)
 
@@ -170,8 +171,8 @@ def test_cantilever_that_breaks():
     law = ub.LinearSoftening(a["M_u"], a["M_u"] ** 2 / (2 * a["K_s"]))
     beam = ub.Beam((0, 0), (l, 0), section, cells=20, corners=(h / l,), hinges={0.0: law})
     push = ub.PrescribedDisplacement(beam.end, v=lambda t: 0.12 * t)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), push])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.005, progress=False)
+    scene = clamped(beam, push)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.005)
     F = solution.reaction(push)[1:, 1]
     M = solution.section_forces_at(beam.start)[:, 2]
     hinge = solution.material_at(beam.start)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
 
@@ -25,7 +26,7 @@ def test_damage_of_cycles_of_one_size():
     beam = ub.Beam((0, 0), (2, 0), section, cells=2)
     F, W, n = 20e3, 0.1 * 0.2**2 / 6, 20
     push = ub.PointLoad(beam.end, force=(0, F), amplitude=lambda t: math.sin(2 * math.pi * t))
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
+    scene = clamped(beam, loads=[push])
     spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
     curve = ub.SNCurve(range=71e6, cycles=2e6, slope=3.0)
     fatigue = ub.Fatigue(spot, curve, resolution=1e3)
@@ -47,9 +48,8 @@ def softening_portal():
     roof = ub.Beam((0, 4), (6, 4), section, cells=2, name="roof")
     right = ub.Beam((6, 4), (6, 0), section, cells=2, name="right", hinges={0.75: law})
     shake = ub.PointLoad(left.end, force=(20e3, 0.0), amplitude=lambda t: math.sin(8 * t))
-    return ub.Scene(
+    return rigid_chain(
         [left, roof, right],
-        joints=[ub.Rigid(left.end, roof.start), ub.Rigid(roof.end, right.start)],
         supports=[ub.Clamped(left.start), ub.Clamped(right.end)],
         damping=[ub.Rayleigh(mass=2.0)],
         loads=[shake],

@@ -23,7 +23,7 @@ SOLVED = 1e-9
 
 def run(scene, end, dt, scheme=None, **more):
     scheme = scheme or ub.EnergyMomentum()
-    return ub.simulate(scene, scheme, t=(0, end), dt=dt, progress=False, **more)
+    return ub.simulate(scene, scheme, t=(0, end), dt=dt, **more)
 
 
 def crossing(times, values):

@@ -29,7 +29,7 @@ def closed_form(a):
 def computed(cells):
     """(w, u, θ) at all loads of the table."""
     scene = cantilever(cells=cells, force=(0, 1), time=lambda t: t)
-    solution = ub.simulate(scene, ub.Static(), t=(0, LOADS[-1]), dt=0.1, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, LOADS[-1]), dt=0.1)
     rows = np.rint(LOADS / 0.1).astype(int)
     u, v, ψ = solution.displacement(scene.beams[0].end)[rows].T
     return np.column_stack([v, -u, ψ])

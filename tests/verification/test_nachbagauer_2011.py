@@ -32,7 +32,7 @@ def tip(cells, force=FORCE):
     """(u, v, ψ) of the tip, u in the direction of the source."""
     scene = cantilever(SECTION, length=LENGTH, cells=cells, force=(0, force))
     tight = ub.Newton(rtol=1e-13)  # nine digits are compared
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, newton=tight, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, newton=tight)
     return solution.displacement(scene.beams[0].end)[-1] * (-1, 1, 1)
 
 

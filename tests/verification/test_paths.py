@@ -11,6 +11,7 @@ import math
 import numpy as np
 import pytest
 from convergence.study import extrapolated
+from scenes import clamped, rigid_chain
 from verification.test_euler_column import TABLE, closed_form
 
 import ufl_beam as ub
@@ -44,9 +45,8 @@ def lee(cells, *, moved=False):
     girder = ub.Beam((0, 1.2), (1.2, 1.2), section, cells=cells, name="girder")
     place = girder.at(0.2)
     push = ub.PrescribedDisplacement(place, v=lambda t: -t)
-    scene = ub.Scene(
+    scene = rigid_chain(
         [column, girder],
-        joints=[ub.Rigid(column.end, girder.start)],
         supports=[ub.Pinned(column.start), ub.Pinned(girder.end), *([push] if moved else [])],
         loads=[] if moved else [ub.PointLoad(place, force=(0, -1e3), amplitude=growing)],
     )
@@ -83,7 +83,7 @@ def test_lee_frame_turning_points():
 # -- S7: deep arch -----------------------------------------------------------------------------
 
 
-def test_deep_arch():
+def test_a_deep_arch_has_its_two_limit_loads():
     """[calc] 897.287, which [pub] DaDeppo and Schmidt 1975 give as 897; the minimum after it.
 
     The cells are chords of the arc.  v of a maximum that is flat has two digits less than P.
@@ -95,9 +95,9 @@ def test_deep_arch():
         angles = (math.pi / 2 + half, math.pi / 2 - half)
         arch = ub.Beam.arc((0, 0), 100.0, angles, section, cells=cells)
         apex = arch.at(0.5)
-        scene = ub.Scene(
-            [arch],
-            supports=[ub.Clamped(arch.start), ub.Pinned(arch.end)],
+        scene = clamped(
+            arch,
+            ub.Pinned(arch.end),
             loads=[ub.PointLoad(apex, force=(0, -1000), amplitude=growing)],
         )
         path = ub.follow(scene, ub.ArcLength(0.04), until=two_critical_points)
@@ -116,7 +116,7 @@ def column(cells, section, P):
     """A perfect column of unit length, clamped at its foot, loaded along its axis."""
     beam = ub.Beam((0, 0), (1, 0), section, cells=cells)
     load = ub.PointLoad(beam.end, force=(-P, 0), amplitude=growing)
-    return beam, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    return beam, clamped(beam, loads=[load])
 
 
 @pytest.mark.parametrize("cells", [4, 32])
@@ -185,7 +185,7 @@ def test_hinge_snap_back(law, steepness):
         hinges={0.0: law(SCALE * M_U, SCALE**2 * energy)},
     )  # fmt: skip
     load = ub.PointLoad(beam.end, force=(0, SCALE * M_U / LENGTH), amplitude=growing)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    scene = clamped(beam, loads=[load])
     control = ub.DissipationControl(SCALE**2 * energy / 16, ub.ArcLength(0.2))
     spent = SCALE**2 * energy * 0.9
     path = ub.follow(scene, control, until=lambda now: now.ledger.lost["hinges"] > spent)

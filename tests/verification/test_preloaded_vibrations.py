@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -16,7 +17,7 @@ TIGHT = ub.Newton(rtol=1e-13)  # of forces that are large beside those of so sma
 def cantilever(**more):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=8)
     loads = more.pop("loads", lambda beam: [])(beam)
-    return beam.end, ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=loads, **more)
+    return beam.end, clamped(beam, loads=loads, **more)
 
 
 def field(q, axis, p):

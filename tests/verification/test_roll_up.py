@@ -33,7 +33,7 @@ def rolled(length, section, cells, turns=1.0):
     scene = cantilever(
         section, length=length, cells=cells, moment=turns * 2 * math.pi * section.EI / length
     )
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
     return turns * 2 * math.pi * solution.times, solution.displacement(scene.beams[0].end)
 
 
@@ -43,7 +43,7 @@ def on_circle(radius, length, θ):
 
 @pytest.mark.parametrize("cells", [1, 3, 10, 20])
 @pytest.mark.parametrize("name", DATA_SETS)
-def test_polygon(name, cells):
+def test_an_end_moment_bends_cells_to_a_polygon(name, cells):
     """[closed] To solver tolerance.
 
     Unbalanced forces are 1e-10 of M/L = θ EI/L²; a force F moves the end of a cantilever by
@@ -60,14 +60,14 @@ def test_polygon(name, cells):
 
 
 @pytest.mark.parametrize("name", DATA_SETS)
-def test_full_circle(name):
+def test_the_tip_comes_to_the_clamp(name):
     """[closed] The tip comes to the clamp, with any number of cells."""
     length, section = DATA_SETS[name]
     _, computed = rolled(length, section, 10)
     np.testing.assert_allclose(computed[-1], [-length, 0, 2 * math.pi], rtol=0, atol=1e-9 * length)
 
 
-def test_order():
+def test_positions_converge_with_second_order():
     """Second order to the true circle at λ = 0.4, 0.8, ... turns (GXBeam); next term 1e-3 here."""
     length, section = DATA_SETS["GXBeam"]
     errors = []

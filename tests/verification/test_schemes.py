@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from scenes import flying_beam, swing
+from scenes import clamped, flying_beam, swing
 
 import ufl_beam as ub
 
@@ -36,9 +36,7 @@ SOFT = ub.Section(EA=400.0, GA=400.0, EI=20.0, rhoA=1.0, rhoI=0.05)
 
 def go(scene, scheme, end, steps, **more):
     newton = ub.Newton(rtol=1e-12)
-    return ub.simulate(
-        scene, scheme, t=(0, end), dt=end / steps, newton=newton, progress=False, **more
-    )
+    return ub.simulate(scene, scheme, t=(0, end), dt=end / steps, newton=newton, **more)
 
 
 # -- order -------------------------------------------------------------------------------------
@@ -49,7 +47,7 @@ def shaken():
     beam = ub.Beam((0, 0), (1, 0), SOFT, cells=4)
     push = ub.PointLoad(beam.end, force=(0, 10), amplitude=lambda t: math.sin(3 * t))
     damping = [ub.Rayleigh(mass=1.0, stiffness=0.01)]
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push], damping=damping)
+    return clamped(beam, loads=[push], damping=damping)
 
 
 @lru_cache
@@ -69,7 +67,7 @@ def rates(scheme, steps=(50, 100, 200)):
 
 
 @pytest.mark.parametrize("scheme", SECOND_ORDER, ids=str)
-def test_second_order(scheme):
+def test_errors_are_of_second_order(scheme):
     """What is measured against has a hundredth of the error of the finest run, so 1 % off 4."""
     orders, runs = rates(scheme)
     assert orders.min() > 1.7  # annihilating needs shorter steps until only the leading term counts
@@ -84,7 +82,7 @@ def test_second_order(scheme):
 
 
 @pytest.mark.parametrize("scheme", FIRST_ORDER, ids=str)
-def test_first_order(scheme):
+def test_errors_are_of_first_order(scheme):
     orders, _ = rates(scheme)
     assert orders[-1] == pytest.approx(1, abs=0.2)
 
@@ -94,7 +92,7 @@ def test_adaptive_steps_keep_to_their_tolerance(scheme):
 
     def error(tolerance):
         dt = ub.Adaptive(tolerance)
-        solution = ub.simulate(shaken(), scheme, t=(0, 0.5), dt=dt, progress=False)
+        solution = ub.simulate(shaken(), scheme, t=(0, 0.5), dt=dt)
         return np.abs(solution.q[-1] - exact()[0]).max(), solution.time_error
 
     (coarse, said), (fine, said_fine) = error(1e-5), error(1e-7)
@@ -114,9 +112,9 @@ OMEGA = math.sqrt(3 * EA / (DENSITY * LENGTH**2))
 def bar():
     section = ub.Section(EA=EA, GA=EA, EI=EA, rhoA=DENSITY, rhoI=1.0)
     beam = ub.Beam((0, 0), (LENGTH, 0), section, cells=1)
-    return ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=0, psi=0)],
+    return clamped(
+        beam,
+        ub.PrescribedDisplacement(beam.end, v=0, psi=0),
         initial=[ub.Velocity([beam], linear=(0.1, 0))],
     )
 
@@ -262,7 +260,7 @@ def test_newmark_survives_the_snap_of_the_swing_but_not_its_energy():
     not what there was, and the ledger says so; the decaying scheme accounts for what it takes.
     """
     runs = [
-        ub.simulate(swing(), scheme, t=(0, 2), dt=1e-3, progress=False)
+        ub.simulate(swing(), scheme, t=(0, 2), dt=1e-3)
         for scheme in (ub.Newmark(), ub.EnergyMomentumDecaying())
     ]
     newmark, decaying = (run.energy for run in runs)
@@ -281,7 +279,7 @@ def test_accelerations_carry_on(scheme):
     whole = go(scene, scheme, 0.5, 100)
     first = go(scene, scheme, 0.25, 50)
     second = ub.simulate(
-        scene, scheme, t=(0.25, 0.5), dt=0.005, start=first, progress=False, newton=ub.Newton(1e-12)
+        scene, scheme, t=(0.25, 0.5), dt=0.005, start=first, newton=ub.Newton(1e-12)
     )
     # The guess of the first step differs, and with it what Newton's method leaves
     assert np.abs(second.q - whole.q[50:]).max() < 1e-10
@@ -360,7 +358,7 @@ TURNING = one_beam(loads=lambda beam: ub.RotatingFrame(1.0))
         (ub.GeneralizedAlpha(), TURNING, "RotatingFrame.* needs the mean velocity"),
     ],
 )
-def test_refused(scheme, scene, message):
+def test_wrong_schemes_are_refused(scheme, scene, message):
     with pytest.raises(ub.ArgumentError, match=message):
         ub.simulate(scene, scheme, t=(0, 1), dt=0.1)
 

@@ -93,7 +93,7 @@ def rigid():
 
 @lru_cache
 def run(make=flexible, dt=5e-3, **more):
-    solution = ub.simulate(make(**more), ub.EnergyMomentum(), t=(0, 3), dt=dt, progress=False)
+    solution = ub.simulate(make(**more), ub.EnergyMomentum(), t=(0, 3), dt=dt)
     if make is rigid:
         crank, rod = solution.scene.bodies
         return solution, crank.middle, rod.at(CRANK + ROD, 0)
@@ -114,14 +114,14 @@ def limit(make=flexible):
     return extrapolated(answer(make, 5e-3), answer(make, 2.5e-3))
 
 
-def test_digits():
+def test_digits_of_the_source():
     """Half a unit of the last digit, and one more for the time step that they were found with."""
     angle, slider = answer(flexible, 2.5e-3)
     assert (np.abs(angle - ANGLE) <= 2 * HALF_ANGLE).all()
     assert (np.abs(slider - SLIDER) <= 2 * HALF_SLIDER).all()
 
 
-def test_limit():
+def test_the_limit_of_small_steps():
     """Half a unit of the last digit, and the error that Δt = 2.5e-3 s still has."""
     left = np.abs(limit() - answer(flexible, 2.5e-3))
     for values, expected, half, more in zip(
@@ -133,7 +133,7 @@ def test_limit():
 
 
 @pytest.mark.filterwarnings("ignore:the energy ledger is open:ufl_beam.ModelWarning")
-def test_mesh():
+def test_half_the_cells_change_little():
     """Half the cells: rotations and positions differ by the flexibility of the rod alone."""
     coarse, fine = answer(flexible, 5e-3, cells=2), answer(flexible, 5e-3)
     # Cells of h see the bending of the rod, about 1e-4 of its length, to (h/L)² = 1/16 of it
@@ -171,7 +171,7 @@ def by_energy():
     return np.array([θ, CRANK * np.cos(θ) + ROD * np.cos(lean(θ))])
 
 
-def test_rigid_parts():
+def test_bodies_solve_the_differential_equation():
     """Bodies: their limit is the differential equation, to what a second extrapolation leaves."""
     exact = by_energy()
     error, coarser = (np.abs(answer(rigid, dt) - exact) for dt in (2.5e-3, 5e-3))
@@ -197,7 +197,7 @@ def test_other_ways_to_hold_the_slider(kind):
 
 
 @pytest.mark.parametrize("make", [flexible, rigid])
-def test_energy(make):
+def test_the_ledger_closes_and_energy_stays(make):
     """The ledger closes, and after the pulse the energy stays; [calc] 0.038576 J.
 
     0.038576 J was found with a time step, too: the work M θ(1 s) has the digits of θ.
@@ -216,7 +216,7 @@ def test_energy(make):
 
 
 @pytest.mark.parametrize("make", [flexible, rigid])
-def test_constraints(make):
+def test_ends_stay_together(make):
     """All ends stay together, and the slider on its line, to 1e-10 m at all times."""
     solution, _, slider = run(make)
     assert np.abs(solution.position(slider)[:, 1]).max() < 1e-10

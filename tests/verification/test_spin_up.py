@@ -29,7 +29,7 @@ LENGTH, OMEGA = 10.0, 6.0
 def deflection(cells, dt):
     """Times, and (u, v) of the tip in the axes that turn with the hub."""
     scene = spin_up(cells=cells)
-    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 20), dt=dt, progress=False)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 20), dt=dt)
     x, y = solution.position(scene.beams[0].end).T
     angle = np.array([spin_up_angle(t) for t in solution.times])
     u, v = np.cos(angle) * x + np.sin(angle) * y - LENGTH, np.cos(angle) * y - np.sin(angle) * x
@@ -65,7 +65,7 @@ def limit():
     return after, np.abs(after - before)
 
 
-def test_tip(limit):
+def test_the_tip_follows_the_table(limit):
     """[calc] Table of (u, v), to 1e-5 of the largest deflection.
 
     Our limit is good to 4e-7 (asserted), and the last digit of the table is not: the limit has

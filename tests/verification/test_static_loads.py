@@ -10,7 +10,7 @@ import math
 import numpy as np
 import pytest
 from convergence.study import extrapolated, orders, romberg
-from scenes import beam_on_roller, cantilever, quarter_circle
+from scenes import beam_on_roller, cantilever, clamped, quarter_circle
 from scipy.special import ellipeinc, ellipj, ellipk
 
 import ufl_beam as ub
@@ -24,7 +24,7 @@ ARC = 1.7
 
 def at_tip(scene, **options):
     """(u, v, ψ) of the end of the first beam under the full load."""
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, progress=False, **options)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, **options)
     return solution.displacement(scene.beams[0].end)[-1]
 
 
@@ -112,7 +112,7 @@ def test_follower_force_at_the_end():
 
     def computed(cells):
         scene = cantilever(cells=cells, force=(0, 1), time=lambda t: t, load=ub.FollowerLoad)
-        solution = ub.simulate(scene, ub.Static(), t=(0, 13), dt=0.25, progress=False)
+        solution = ub.simulate(scene, ub.Static(), t=(0, 13), dt=0.25)
         rows = np.rint(loads / 0.25).astype(int)
         return solution.displacement(scene.beams[0].end)[rows] + (1, 0, 0)
 
@@ -145,7 +145,7 @@ def test_roller_at_an_angle(angle):
     force, s = np.array([1.0, -3.0]), 0.4
     scene = beam_on_roller(STOCKY, along=tuple(along), force=tuple(force), s=s)
     beam, (pin, roller) = scene.beams[0], scene.supports
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
 
     assert abs(solution.displacement(beam.end)[-1, :2] @ across) <= 1e-15
     assert np.abs(solution.displacement(beam.end)[-1]).max() > 0.1
@@ -168,7 +168,7 @@ def test_small_reaction_of_the_roller(angle):
     """Moments about the pin of the undeformed beam: R cos(angle) L = P s L."""
     along = (math.cos(angle), math.sin(angle))
     scene = beam_on_roller(STOCKY, along=along, force=(0, -SMALL), s=0.4)
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1, progress=False)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1)
     R = 0.4 * SMALL / math.cos(angle)
     expected = [-R * math.sin(angle), R * math.cos(angle), 0]
     # The roller moves, and the arm with it, by the axial force over EA: SMALL/100.
@@ -217,7 +217,7 @@ def test_polyline_is_two_beams_rigidly_joined():
     def load(beam):
         return [ub.PointLoad(beam.end, force=(-1, -3), amplitude=ub.ramp(1.0))]
 
-    one = ub.Scene([stick], supports=[ub.Clamped(stick.start)], loads=load(stick))
+    one = clamped(stick, loads=load(stick))
     two = ub.Scene(
         [arm, post],
         joints=[ub.Rigid(post.end, arm.start)],
@@ -226,8 +226,7 @@ def test_polyline_is_two_beams_rigidly_joined():
     )
     tight = ub.Newton(rtol=1e-13)
     of_one, of_two = (
-        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, newton=tight, progress=False)
-        for scene in (one, two)
+        ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1, newton=tight) for scene in (one, two)
     )
     assert np.abs(of_one.displacement(stick.end)[-1, :2]).max() > 0.5
     for here, there in ((stick.at(0.5), post.end), (stick.end, arm.end)):

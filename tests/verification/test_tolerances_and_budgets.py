@@ -10,6 +10,7 @@ import math
 import numpy as np
 import pytest
 import scenes
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -50,11 +51,7 @@ def softening_cantilever():
     section = ub.Section.rectangle(b=0.05, h=0.1, **steel)
     beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges={0.0: ub.Softening(20e3, 2e3)})
     push = ub.Table([0, 0.01, 0.02], [0, 1, 0])
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, force=(0, 40e3), amplitude=push)],
-    )
+    scene = clamped(beam, loads=[ub.PointLoad(beam.end, force=(0, 40e3), amplitude=push)])
     return scene, beam.end, {"t": (0.0, 0.05), "dt": 1e-3}
 
 
@@ -88,7 +85,6 @@ def test_a_tolerance_is_kept(make, part):
         t=times["t"],
         dt=dials.dt / 5,
         mesh=ub.Mesh(refine=2 * max(dials.mesh.refine, 8)),
-        progress=False,
     )
     error = np.abs(found.best.values["end"] - end(fine)).max()
     print(f"{make.__name__}: asked {tolerance:.2e}, got {error:.2e}")
@@ -98,7 +94,7 @@ def test_a_tolerance_is_kept(make, part):
     # The limit is known as well as it says; the reference itself errs by a part of the tolerance.
     apart = np.abs(found.limit["end"] - end(fine)).max()
     assert apart <= found.uncertainty["end"] + 0.25 * tolerance
-    again = ub.simulate(scene, **found.recommended, progress=False)
+    again = ub.simulate(scene, **found.recommended)
     assert np.array_equal(end(again), found.best.values["end"])
 
 
@@ -123,7 +119,6 @@ def test_a_tolerance_is_used_up_at_a_limited_cost(make, part):
         t=times["t"],
         dt=found.best.dials.dt / 10,
         mesh=ub.Mesh(refine=8, degree=3),
-        progress=False,
     )
     error = np.abs(found.best.values["path"] - path(fine)).max() / np.abs(path(fine)).max()
     print(f"{make.__name__}: asked {part:.2e}, got {error:.2e}, effort {found.effort:.1f}")

@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 import ufl
 from convergence.study import orders
+from scenes import clamped
 from scipy.integrate import quad, solve_ivp
 from scipy.optimize import brentq
 
 import ufl_beam as ub
 
 TIGHT = ub.Newton(rtol=1e-13)
-QUIET = {"progress": False, "newton": TIGHT}
 
 
 # -- wind drag on a falling, free beam ---------------------------------------------------------
@@ -40,7 +40,7 @@ def falling(dt, cells=16):
         initial=[ub.Velocity((beam,), linear=(1.0, 5.0), angular=3.0)],
         works=[ub.VirtualWork("wind", drag, numbers=numbers)],
     )
-    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, TIME), dt=dt, **QUIET)
+    solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, TIME), dt=dt, newton=TIGHT)
     middle = solution.displacement(beam.at(0.5))[-1]
     return middle, solution
 
@@ -103,7 +103,7 @@ def on_soil(mesh, scheme=None, force=1e-4, dt=0.5):
     soil = ub.Potential("soil", lambda q, k: k * q[1] ** 2 / 2, numbers={"k": 4.0})
     held = [ub.PrescribedDisplacement(beam.at(0.5), u=0.0)]
     scene = ub.Scene([beam], supports=held, loads=[load], works=[soil])
-    return beam, ub.simulate(scene, scheme or ub.Static(), t=(0, 1), dt=dt, mesh=mesh, **QUIET)
+    return beam, ub.simulate(scene, scheme or ub.Static(), t=(0, 1), dt=dt, mesh=mesh, newton=TIGHT)
 
 
 @pytest.mark.parametrize(("degree", "cells"), [(1, (8, 16, 32)), (2, (4, 8, 16)), (3, (2, 4, 8))])
@@ -161,7 +161,7 @@ def cantilever(b, **more):
     section = ub.Section(EA=1e7, GA=1e7, EI=1.0, rhoA=1.0, rhoI=1e-3)
     beam = ub.Beam((0, 0), (1, 0), section, cells=1)
     works = [magnetised(beam, b)]
-    return beam, ub.Scene([beam], supports=[ub.Clamped(beam.start)], works=works, **more)
+    return beam, clamped(beam, works=works, **more)
 
 
 @pytest.mark.parametrize(("degree", "cells"), [(1, (8, 16)), (2, (4, 8)), (3, (8, 16))])
@@ -174,7 +174,7 @@ def test_a_magnet_across_a_field(degree, cells):
     for n in cells:
         beam, scene = cantilever(lambda t: 4.0 * t)
         mesh = ub.Mesh(refine=n, degree=degree)
-        solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, mesh=mesh, **QUIET)
+        solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25, mesh=mesh, newton=TIGHT)
         errors.append(abs(solution.displacement(beam.end)[-1, 2] - magnetic_elastica(4.0)))
     np.testing.assert_allclose(orders(errors), 2 * degree, atol=0.2)
 
@@ -183,13 +183,13 @@ def test_the_ledger_of_a_magnet():
     """Exact in statics, while the field grows and turns; and in motion after it was let go."""
     _, scene = cantilever(lambda t: 4.0 * min(t, 1.0))
     mesh = ub.Mesh(refine=8)
-    bent = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.1, mesh=mesh, **QUIET)
+    bent = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.1, mesh=mesh, newton=TIGHT)
     assert bent.energy.worst < 1e-9
     assert bent.energy["field"][-1] < -1
-    swinging = ub.simulate(scene, ub.EnergyMomentum(), t=(1, 3), dt=0.02, start=bent, **QUIET)
+    swinging = ub.simulate(scene, ub.EnergyMomentum(), t=(1, 3), dt=0.02, start=bent, newton=TIGHT)
     assert swinging.energy.worst < 1e-9
     _, still = cantilever(1.0)
-    free = ub.simulate(still, ub.EnergyMomentum(), t=(0, 3), dt=0.02, mesh=mesh, **QUIET)
+    free = ub.simulate(still, ub.EnergyMomentum(), t=(0, 3), dt=0.02, mesh=mesh, newton=TIGHT)
     assert free.energy.worst < 1e-9
     assert np.ptp(free.energy["field"]) > 0.1
 
@@ -209,7 +209,7 @@ def test_a_current_in_a_field():
     closer = ub.PrescribedDisplacement(beam.end, u=lambda t: -0.1 * t, v=0.0)
     wire = ub.VirtualWork("current", lorentz, numbers={"IB": 50.0})
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), closer], works=[wire])
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02, **QUIET)
+    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.02, newton=TIGHT)
     # An arc of length 1 over a chord of 0.9: sin x/x = 0.9 with x half its angle.
     half = brentq(lambda x: math.sin(x) / x - 0.9, 0.1, 2.0)
     radius = 1 / (2 * half)

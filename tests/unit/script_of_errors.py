@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Functions of a user that raise on one process or on all; run by test_collective_errors.py.
 
-`mpirun -n 2 python3 raising.py` prints a line for each case: its name, the exceptions of all
-processes; `mpirun -n 2 python3 raising.py CASE RANK` lets one process fail where nobody agrees.
+`mpirun -n 2 python3 script_of_errors.py` prints a line for each case: its name, the exceptions of
+all processes; with the arguments CASE and RANK one process fails where processes do not agree.
 """
 
 import math
@@ -34,9 +34,6 @@ class Watch(ub.Recorder):
     def __init__(self, at, action):
         self.at, self.action = at, action
 
-    def require_writable(self):
-        pass
-
     def open(self, sim):
         if self.at == "open":
             self.action()
@@ -44,9 +41,6 @@ class Watch(ub.Recorder):
     def write(self, sim):
         if self.at == "write" and sim.t > 0.02:
             self.action()
-
-    def close(self):
-        pass
 
 
 class Remembers:
@@ -77,7 +71,7 @@ def failure(rank, make):
 
 
 def run(scene, **more):
-    more = {"t": (0, 0.05), "dt": 0.01, "progress": False, **more}
+    more = {"t": (0, 0.05), "dt": 0.01, **more}
     return ub.simulate(scene, more.pop("scheme", ub.EnergyMomentum()), **more)
 
 

@@ -6,8 +6,9 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
-from bars import Bars, C
-from laws_of_ones_own import Dashpot, PowerLaw, SameHardening, Stiffening
+from scenes import clamped
+from uniaxial_points import Bars, C
+from user_laws import Dashpot, PowerLaw, SameHardening, Stiffening
 
 import ufl_beam as ub
 from ufl_beam.model.fibres import Fibres
@@ -25,7 +26,7 @@ def bent(law, cells=4, moment=200.0, time=lambda t: t):
     """A cantilever under a moment at its end."""
     beam = ub.Beam((0, 0), (2, 0), section(bending=law), cells=cells)
     load = ub.PointLoad(beam.end, moment=moment, amplitude=time)
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+    return clamped(beam, loads=[load])
 
 
 def rotation(run):
@@ -53,7 +54,7 @@ def test_a_law_without_variables():
     """[closed] N = EA Σ + c Σ³ of a bar that is pulled."""
     beam = ub.Beam((0, 0), (1, 0), section(axial=Stiffening(1e8)), cells=2)
     pull = ub.PrescribedDisplacement(beam.end, u=lambda t: 0.1 * t, v=0.0)
-    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start), pull])
+    scene = clamped(beam, pull)
     run = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.25)
     Σ = 0.1 * run.times
     assert run.section_forces_at(beam.at(0.5))[:, 0] == pytest.approx(
@@ -61,7 +62,7 @@ def test_a_law_without_variables():
     )
 
 
-def test_relaxation():
+def test_a_dashpot_relaxes_exponentially():
     """[closed] At constant strain stress decays as exp(-t C/eta); of second order at θ = 1/2."""
     errors = []
     for n in (10, 20):
@@ -87,7 +88,7 @@ SCENES = {
 
 def thrown(beam, **more):
     load = ub.PointLoad(beam.end, force=(0, 300.0), amplitude=lambda t: float(t < 0.05))
-    return ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load], **more)
+    return clamped(beam, loads=[load], **more)
 
 
 def thrown_one(law):

@@ -9,6 +9,8 @@ import math
 
 import numpy as np
 import pytest
+from helpers import run
+from scenes import clamped
 
 import ufl_beam as ub
 
@@ -21,10 +23,6 @@ SAME = 1e-9
 def moves(solution, *places):
     """Displacements and rotations, in their unit."""
     return np.array([solution.displacement(place) for place in places])
-
-
-def run(scene, scheme=None, **more):
-    return ub.simulate(scene, scheme or ub.EnergyMomentum(), progress=False, **more)
 
 
 # -- places ----------------------------------------------------------------------------------------
@@ -40,10 +38,9 @@ def guided(x=0.0, unit=1.0):
     def curve(s):
         return x * unit + unit + 0.3 * s**2 / unit, s
 
-    return ub.Scene(
-        [beam],
+    return clamped(
+        beam,
         joints=[ub.Guided(beam.end, curve)],
-        supports=[ub.Clamped(beam.start)],
         loads=[ub.PointLoad(beam.end, force=(0, 5 * unit), amplitude=ub.ramp(0.1))],
     )
 
@@ -112,7 +109,7 @@ def test_the_size_of_a_scene_does_not_depend_on_axes():
         beam = ub.Beam.polyline(corners, section, cells=2)
         push = 3j * along
         load = ub.PointLoad(beam.end, force=(push.real, push.imag))
-        scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[load])
+        scene = clamped(beam, loads=[load])
         sizes.append(scene.size)
         times.append(run(scene, t=(0, 0.1), dt=ub.Adaptive(1e-4)).times)
     assert sizes == pytest.approx([math.hypot(1, 0.5)] * 2, rel=1e-12)

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A run that goes on after it was killed; prints the checksum of all that it computes and writes.
 
-python3 killed.py DIRECTORY STEPS EVERY: the steps of the run, and from checkpoint to checkpoint.
+python3 script_of_kills.py DIRECTORY STEPS EVERY: steps of the run, and between its checkpoints.
 """
 
 import hashlib
@@ -58,7 +58,6 @@ solution = ub.simulate(
     every=50,
     record=ub.History(directory / "run.csv", [b.end]),
     checkpoint=ub.Checkpoint(directory / "run.h5", every=every),
-    progress=False,
 )
 total = hashlib.sha256((directory / "run.csv").read_bytes())
 energy = solution.energy

@@ -39,7 +39,7 @@ def scene_of(time):
 
 def simulated(time, scheme, **more):
     end, scene = scene_of(time)
-    solution = ub.simulate(scene, scheme, t=(0, 1), progress=False, **more)
+    solution = ub.simulate(scene, scheme, t=(0, 1), **more)
     return solution.displacement(end)[-1].tolist()
 
 

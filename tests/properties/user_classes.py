@@ -15,7 +15,7 @@ import ufl
 import ufl_beam as ub
 
 sys.path.append(str(Path(__file__).parents[1]))
-from laws_of_ones_own import Dashpot, Petersson, PowerLaw, Rising  # noqa: F401
+from user_laws import Dashpot, Petersson, PowerLaw, Rising  # noqa: F401
 
 f = ub.law_functions
 

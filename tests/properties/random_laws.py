@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Random laws of sections and connectors, written as Python source; see any_scene.py."""
+"""Random numbers, and laws of sections and connectors as Python source; see random_scenes.py."""
 
 import math
 
@@ -11,7 +11,27 @@ INVERSE = {"1/m": "m", "1": "1", "m": "1/m"}
 CLASSES = ["ElastoPlastic", "ElastoPlastic", "RambergOsgood", "ArmstrongFrederick", "BoucWen"]
 
 
-class Laws:
+class Draws:
+    """Draws of a writer, from its generator `_random`."""
+
+    def _chance(self, part):
+        return self._random.random() < part
+
+    def _integer(self, low, high):
+        return int(self._random.integers(low, high + 1))
+
+    def _some(self, low, high):
+        return float(self._random.uniform(low, high))
+
+    def _size(self, low, high):
+        """A size whose decimal logarithm is uniform."""
+        return 10 ** self._some(low, high)
+
+    def _one(self, choices):
+        return choices[self._integer(0, len(choices) - 1)]
+
+
+class Laws(Draws):
     """The part of the writer of random scenes that draws laws."""
 
     def _hardening(self, limit, stiffness, dimensions):

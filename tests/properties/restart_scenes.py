@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """A scene of all that remembers something, and a run of it that can be killed and run again.
 
-As a script: ``python3 restarted.py FOLDER`` runs or goes on, and writes the solution at the end.
+``python3 restart_scenes.py FOLDER`` runs or goes on, and writes the solution at the end.
 """
 
 import sys
@@ -116,7 +116,6 @@ def run(folder, *, steps=60, every=2, record=()):
     checkpoint = ub.Checkpoint(folder / "run.checkpoint", every=every)
     return ub.simulate(
         scene, ub.EnergyMomentum(0.05, 0.02), t=(0, 0.005 * steps), dt=0.005, every=3,
-        progress=False,
         record=[*files, *record], checkpoint=checkpoint,
     )  # fmt: skip
 

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Statements of one scene that must give one motion: other axes, units, directions, orders.
 
-A scene is written as Python source by :mod:`any_scene`.  All its numbers go through a
+A scene is written as Python source by :mod:`random_scenes`.  All its numbers go through a
 :class:`Statement`, which knows what each is in the units and axes of the statement.  So any scene
 that fails can be printed and run by hand.
 """

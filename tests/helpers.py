@@ -1,0 +1,139 @@
+# SPDX-License-Identifier: MIT
+"""Shared calls and checks: runs, messages of errors, ledgers, recorders, `mpirun`."""
+
+import os
+import re
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+
+from mpi4py import MPI
+
+import numpy as np
+import pytest
+
+import ufl_beam as ub
+
+
+def run(scene, scheme=None, t=(0, 1), dt=0.1, **options):
+    """Simulate by the energy-momentum scheme, if there is no other."""
+    return ub.simulate(scene, scheme or ub.EnergyMomentum(), t=t, dt=dt, **options)
+
+
+def raises(*parts, kind=ub.ArgumentError):
+    """`pytest.raises` for an error whose message has all `parts`, in this order."""
+    return pytest.raises(kind, match="(?s)" + ".*".join(map(re.escape, parts)))
+
+
+def law_of(fields=None, **members):
+    """A connector law of a user, with numbers as `fields`, and other members."""
+    names = dict.fromkeys(fields or {}, float)
+    kind = type("Mine", (ub.ConnectorLaw,), {"__annotations__": names, **members})
+    return dataclass(frozen=True)(kind)(**(fields or {}))
+
+
+def require_no_gain(energy):
+    """Dissipated energies never decrease, but for round-off."""
+    for lost in energy.lost.values():
+        assert np.diff(lost).min() >= -1e-12 * energy.throughput
+
+
+def assert_balanced(energy):
+    """An exact ledger closes, and nothing that was dissipated comes back."""
+    assert energy.worst <= 1e-9
+    require_no_gain(energy)
+
+
+def require_reference(run, scene, link, scheme, **more):
+    """The reference solver, with the laws by NumPy, finds the same, ledger included; the run."""
+    found, reference = (
+        run(scene, scheme, newton=ub.Newton(rtol=1e-12, reference=one), **more)
+        for one in (False, True)
+    )
+    np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * np.abs(found.q).max())
+    for mine, other in zip(found.connector(link), reference.connector(link), strict=True):
+        np.testing.assert_allclose(mine, other, rtol=0, atol=1e-9 * max(np.abs(mine).max(), 1e-3))
+    assert list(found.energy) == list(reference.energy)
+    for entry in found.energy:
+        a, b = found.energy[entry], reference.energy[entry]
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.throughput)
+    return found
+
+
+def require_restart(run, scene, links, scheme, folder, until):
+    """A run resumed at half time ends bit for bit as the whole one, one from `start=` nearly so."""
+    half, whole = until / 2, run(scene, scheme, t=(0, until))
+    file = ub.Checkpoint(folder / "run.checkpoint", every=7)
+    run(scene, scheme, t=(0, half), checkpoint=file)
+    resumed = run(scene, scheme, t=(0, until), checkpoint=file)
+    assert np.array_equal(resumed.q, whole.q)
+    for link in links:
+        for mine, other in zip(resumed.connector(link), whole.connector(link), strict=True):
+            assert np.array_equal(mine, other)
+    for entry in whole.energy:
+        # Several processes add up what was lost before and after in another order.
+        digits = 0.0 if MPI.COMM_WORLD.size == 1 else 1e-14
+        scale = digits * whole.energy.throughput
+        np.testing.assert_allclose(resumed.energy[entry], whole.energy[entry], rtol=0, atol=scale)
+    second = run(scene, scheme, t=(half, until), start=run(scene, scheme, t=(0, half)))
+    np.testing.assert_allclose(second.q[-1], whole.q[-1], rtol=0, atol=1e-8 * np.abs(whole.q).max())
+    return whole
+
+
+class AfterEachStep(ub.Recorder):
+    """Calls a function with the state after each step, also in a run that goes on."""
+
+    def __init__(self, function):
+        self.function = function
+
+    def open(self, simulation):
+        pass
+
+    def write(self, simulation):
+        self.function(simulation)
+
+    def state(self):
+        return {}
+
+    def resume(self, simulation, state):
+        pass
+
+
+def at_step(number, action):
+    """A recorder that calls a function without arguments after a step of this number."""
+    steps = iter(range(1, number + 1))
+    return AfterEachStep(lambda _: next(steps, None) == number and action())
+
+
+def stop_after(steps):
+    """A recorder that interrupts the run after so many steps."""
+
+    def interrupt():
+        raise KeyboardInterrupt
+
+    return at_step(steps, interrupt)
+
+
+MPIRUN = {
+    "OMPI_ALLOW_RUN_AS_ROOT": "1",
+    "OMPI_ALLOW_RUN_AS_ROOT_CONFIRM": "1",
+    "OMPI_MCA_mpi_yield_when_idle": "1",
+    "PRTE_MCA_rmaps_default_mapping_policy": ":oversubscribe",
+}
+"""Root may run it, on any number of cores."""
+
+needs_mpirun = pytest.mark.skipif(shutil.which("mpirun") is None, reason="there is no mpirun")
+
+
+def on_two_processes(*arguments, timeout=300):
+    """Output and status of Python with these arguments on two processes; a hang is a failure."""
+    return subprocess.run(
+        ["mpirun", "-n", "2", sys.executable, *map(str, arguments)],
+        env={**os.environ, **MPIRUN},
+        stdin=subprocess.DEVNULL,
+        capture_output=True,
+        text=True,
+        timeout=timeout,
+        check=False,
+    )
