@@ -1,5 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""What users do wrong, and what the message says: which object, what is wrong, what to do."""
+"""Messages: which object is wrong, why, and what to do; and failed runs, which lose nothing.
+
+Kinds of wrong values of each argument are refused in test_wrong_arguments.py.
+"""
 
 import csv
 import math
@@ -26,7 +29,7 @@ def raises(*parts):
     return pytest.raises(ub.ArgumentError, match=".*".join(map(re.escape, parts)))
 
 
-def test_errors_are_those_of_python():
+def test_errors_are_a_value_error_or_a_type_error_too():
     """A wrong value is a ValueError, a wrong type a TypeError, too; models have their own class."""
     assert issubclass(ub.ArgumentError, ValueError)
     assert issubclass(ub.ConvergenceError, RuntimeError)
@@ -41,10 +44,9 @@ def test_errors_are_those_of_python():
     assert not isinstance(error.value, ub.ModelError | TypeError)
 
 
-# -- sections ----------------------------------------------------------------------------------
+# -- numbers, sections, beams, functions of time -------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["EA", "GA", "EI"])
 @pytest.mark.parametrize(
     ("value", "says"),
     [
@@ -56,219 +58,101 @@ def test_errors_are_those_of_python():
         (None, "= None is not a number"),
     ],
 )
-def test_stiffness(name, value, says):
-    numbers = {"EA": 1.0, "GA": 1.0, "EI": 1.0, name: value}
-    with raises("Section", name, says):
-        ub.Section(**numbers)
-
-
-@pytest.mark.parametrize("name", ["rhoA", "rhoI", "depth"])
-@pytest.mark.parametrize("value", [-1.0, math.nan])
-def test_inertia_and_depth(name, value):
-    with raises("Section", name, str(value).rstrip(".0")):
-        ub.Section(EA=1.0, GA=1.0, EI=1.0, **{name: value})
+def test_a_wrong_number_is_shown_with_its_condition(value, says):
+    with raises(f"Section: EI {says}"):
+        ub.Section(EA=1.0, GA=1.0, EI=value)
 
 
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: ub.Section.rectangle(0.0, 1.0, **STEEL), ("rectangle", "b = 0 must be positive")),
+        (lambda: ub.PointMass(beam().end, -1.0), "PointMass at girder.end (1, 0): mass = -1"),
+        (lambda: beam(cells=2.5), "girder: cells = 2.5 must be a whole number, at least 1"),
+        (lambda: ub.Beam((0, 0), 3.0, SECTION), "beam: end = 3.0 must be a pair (x, y)"),
+        (lambda: beam().at(1.5), "girder.at(1.5): s must lie between 0 and 1"),
+        # sections
         (
-            lambda: ub.Section.rectangle(1.0, -1.0, **STEEL),
-            ("rectangle", "h = -1 must be positive"),
+            lambda: ub.Section.tube(0.1, 0.06, **STEEL),
+            "wall t = 0.06 m is thicker than the radius of d",
         ),
-        (lambda: ub.Section.circle(math.nan, **STEEL), ("circle", "d = nan is not finite")),
-        (lambda: ub.Section.tube(0.1, 0.06, **STEEL), ("tube", "t = 0.06", "thicker", "d = 0.1")),
-        (lambda: ub.Section.i_shape(0.1, 0.1, 0.01, 0.05, **STEEL), ("i_shape", "do not fit")),
-        (lambda: ub.Section.i_shape(0.1, 0.1, 0.2, 0.01, **STEEL), ("i_shape", "do not fit")),
-        (lambda: ub.Section.circle(0.1, E=1.0, nu=0.6), ("nu = 0.6", "(-1, 0.5]")),
-        (lambda: ub.Section.circle(0.1, E=1.0, nu=-1.0), ("nu = -1.0", "(-1, 0.5]")),
-        (lambda: ub.Section.circle(0.1, E=1.0, nu=math.nan), ("nu = nan",)),
-        (lambda: ub.Section.circle(0.1, E=0.0, nu=0.3), ("E = 0 must be positive",)),
-        (lambda: ub.Section.circle(0.1, **STEEL, rho=-1.0), ("rho = -1 must be at least 0",)),
-    ],
-)
-def test_shapes(make, says):
-    with raises("Section", *says):
-        make()
-
-
-# -- beams and places --------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
+        (lambda: ub.Section.i_shape(0.1, 0.1, 0.01, 0.05, **STEEL), "i_shape: .* do not fit"),
+        (lambda: ub.Section.i_shape(0.1, 0.1, 0.2, 0.01, **STEEL), "i_shape: .* do not fit"),
+        (lambda: ub.Section.circle(0.1, E=1.0, nu=0.6), "nu = 0.6 must lie in (-1, 0.5]"),
+        # beams
         (
             lambda: ub.Beam((1, 2), (1, 2), SECTION, name="post"),
-            ("post: zero length, both ends are at (1.0, 2.0)",),
+            "post: zero length, both ends are at (1.0, 2.0)",
         ),
-        (lambda: beam(cells=0), ("girder: cells = 0", "at least 1")),
-        (lambda: beam(cells=-3), ("girder: cells = -3", "at least 1")),
-        (lambda: beam(cells=2.5), ("girder: cells = 2.5", "whole number")),
-        (lambda: ub.Beam((0, 0), (1, math.nan), SECTION), ("beam: end[1] = nan is not finite",)),
-        (lambda: ub.Beam((0, 0), 3.0, SECTION), ("beam: end = 3.0 must be a pair (x, y)",)),
-        (lambda: ub.Beam((0, 0, 0), (1, 0, 0), SECTION), ("must be a pair (x, y)",)),
-        (lambda: ub.Beam((0, 0), (1, 0), STEEL, name="x"), ("x: section", "is not a Section")),
         (
             lambda: ub.Beam.arc((0, 0), 1.0, (2, 2), SECTION, name="ring"),
-            ("ring: zero length, both angles of the arc are 2",),
+            "ring: zero length, both angles of the arc are 2",
         ),
-        (
-            lambda: ub.Beam.arc((0, 0), 0.0, (0, 1), SECTION),
-            ("beam: radius = 0 must be positive",),
-        ),
-        (lambda: ub.Beam.arc((0, 0), 1.0, 1.0, SECTION), ("angles = 1.0 must be a pair",)),
         (
             lambda: ub.Beam.polyline([(0, 0)], SECTION, name="path"),
-            ("path: a polyline needs at least two points, not 1",),
+            "path: a polyline needs at least two points, not 1",
         ),
         (
             lambda: ub.Beam.polyline([(0, 0), (1, 0), (1, 0)], SECTION, name="path"),
-            ("path: zero length between two points at (1.0, 0.0)",),
-        ),
-        (
-            lambda: ub.Beam.polyline([(0, 0), (1, math.inf)], SECTION, name="path"),
-            ("path: point 1[1] = inf is not finite",),
-        ),
-        (
-            lambda: ub.Beam.along(lambda s: (s, math.nan), SECTION, name="wave"),
-            ("wave: curve(0)[1] = nan is not finite",),
+            "path: zero length between two points at (1.0, 0.0)",
         ),
         (
             lambda: ub.Beam.along(lambda s: (s, math.inf if s == 0.5 else 0.0), SECTION, cells=4),
-            ("beam: curve(0.5)[1] = inf is not finite",),
+            "beam: curve(0.5)[1] = inf is not finite",
         ),
-        (lambda: ub.Beam.along(lambda s: s, SECTION), ("curve(0) = 0.0 must be a pair (x, y)",)),
-        (lambda: beam().at(1.5), ("girder.at(1.5)", "between 0 and 1")),
-        (lambda: beam().at(-0.1), ("girder.at(-0.1)", "between 0 and 1")),
-        (lambda: beam().at(math.nan), ("girder.at(s): s = nan is not finite",)),
-        (lambda: beam().at("middle"), ("girder.at(s): s = 'middle' is not a number",)),
-        (lambda: ub.Place("girder", 0.5), ("Place: 'girder' is not a Beam",)),
+        # functions of time
+        (
+            lambda: ub.Table([0, 2, 1], [0, 0, 0]),
+            "Table: times must increase, but times[1] = 2",
+        ),
+        (
+            lambda: ub.Table([0, 1, 1], [0, 0, 1]),
+            "Table: times must increase, but times[1] = 1 is",
+        ),
+        (lambda: ub.Table([0, 1], [0]), "Table: 2 times and 1 values; give the same number"),
+        (lambda: ub.Table([], []), "Table: 0 times and 0 values"),
+        (lambda: push(lambda t: 1 / t), "the time function fails at t = 0: ZeroDivisionError"),
+        (lambda: push(lambda t: math.nan), "the time function is nan at t = 0"),
+        (
+            lambda: push(lambda t: "x"),
+            "PointLoad at girder.end .*: the time function returned 'x' at t = 0; it must",
+        ),
+        (lambda: push(lambda: 1.0), "the time function fails at t = 0: TypeError"),
+        (lambda: push(2.0), "amplitude = 2.0 must be a function of t, such as ub.Table"),
     ],
 )
-def test_beams_and_places(make, says):
-    with raises(*says):
+def test_a_message_says_why_a_part_is_refused(make, says):
+    with raises(*says.split(".*")):
         make()
 
 
-def test_a_curve_that_stands_still():
+def push(amplitude):
+    return ub.PointLoad(beam().end, force=(1, 0), amplitude=amplitude)
+
+
+def test_a_curve_that_stands_still_is_refused():
     point = ub.Beam.along(lambda s: (max(s, 0.5), 0.0), SECTION, cells=4, name="halt")
     scene = ub.Scene([point])
     with raises("halt: zero length of a cell at"):
         ub.Simulation(scene, ub.EnergyMomentum())
 
 
-# -- time functions ----------------------------------------------------------------------------
+# -- supports and joints -------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: ub.Table([0, 2, 1], [0, 0, 0]), ("Table", "increase", "times[1] = 2", "by 1")),
-        (lambda: ub.Table([0, 1, 1], [0, 0, 1]), ("Table", "increase", "times[1] = 1", "by 1")),
-        (lambda: ub.Table([0, 1], [0]), ("Table: 2 times and 1 values", "the same number of each")),
-        (lambda: ub.Table([], []), ("Table: 0 times and 0 values",)),
-        (lambda: ub.Table([0, math.nan], [0, 1]), ("Table: times[1] = nan is not finite",)),
-        (lambda: ub.Table([0, 1], [0, math.inf]), ("Table: values[1] = inf is not finite",)),
-        (lambda: ub.Table([0, "x"], [0, 1]), ("Table: times[1] = 'x' is not a number",)),
-        (lambda: ub.ramp(0.0), ("ramp: duration = 0 must be positive",)),
-        (lambda: ub.ramp(-1.0), ("ramp: duration = -1 must be positive",)),
-    ],
-)
-def test_tables(make, says):
-    with raises(*says):
-        make()
-
-
-LOADS = {
-    "PointLoad at girder.end": lambda time: ub.PointLoad(beam().end, force=(1, 0), amplitude=time),
-    "FollowerLoad at girder.end": lambda time: ub.FollowerLoad(beam().end, amplitude=time),
-    "LineLoad on girder": lambda time: ub.LineLoad(beam(), force=(1, 0), amplitude=time),
-    "Gravity": lambda time: ub.Gravity(amplitude=time),
-    "PrescribedDisplacement at girder.end (1, 0), psi": lambda time: ub.PrescribedDisplacement(
-        beam().end, psi=time
-    ),
-}
-
-
-@pytest.mark.parametrize("owner", LOADS)
-@pytest.mark.parametrize(
-    ("time", "says"),
-    [
-        (lambda t: 1 / t, ("the time function fails at t = 0: ZeroDivisionError",)),
-        (lambda t: math.nan, ("the time function is nan at t = 0",)),
-        (lambda t: "x", ("the time function returned 'x' at t = 0; it must return a number",)),
-        (lambda: 1.0, ("the time function fails at t = 0: TypeError",)),
-    ],
-    ids=["fails", "nan", "text", "no argument"],
-)
-def test_time_functions(owner, time, says):
-    with raises(owner, *says):
-        LOADS[owner](time)
-
-
-@pytest.mark.parametrize("owner", [name for name in LOADS if "PrescribedDisplacement" not in name])
-def test_a_number_is_no_time_function(owner):
-    with raises(owner, "amplitude = 2.0 must be a function of t, such as ub.Table"):
-        LOADS[owner](2.0)
-
-
-# -- loads, masses, supports, joints -------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("make", "says"),
-    [
-        (lambda: ub.PointLoad(beam(), force=(1, 0)), ("PointLoad", "is not a place", "beam.start")),
-        (lambda: ub.FollowerLoad((0, 1)), ("FollowerLoad: (0, 1) is not a place",)),
-        (
-            lambda: ub.PointLoad(beam().end, force=5),
-            ("PointLoad at girder.end", "force = 5", "pair"),
-        ),
-        (lambda: ub.PointLoad(beam().end, force=(1, math.nan)), ("force[1] = nan is not finite",)),
-        (lambda: ub.PointLoad(beam().end, moment=math.inf), ("moment = inf is not finite",)),
-        (lambda: ub.LineLoad(beam().end, force=(1, 0)), ("LineLoad", "is not a Beam")),
-        (lambda: ub.LineLoad(beam(), moment="x"), ("LineLoad on girder: moment = 'x'",)),
-        (lambda: ub.Gravity(-9.81), ("Gravity: acceleration = -9.81 must be a pair",)),
-        (lambda: ub.PointMass(beam(), 1.0), ("PointMass", "is not a place")),
-        (
-            lambda: ub.PointMass(beam().end, -1.0),
-            ("PointMass at girder.end", "mass = -1", "least 0"),
-        ),
-        (lambda: ub.PointMass(beam().end, 1.0, -1.0), ("PointMass", "inertia = -1", "least 0")),
-        (lambda: ub.PointMass(beam().end, math.nan), ("mass = nan is not finite",)),
-        (lambda: ub.Clamped(beam()), ("Clamped", "is not a place", "beam.start, .end or .at(s)")),
-        (lambda: ub.Pinned(None), ("Pinned: None is not a place",)),
+        (lambda: ub.Clamped(beam()), ("Clamped", "is not a place; use beam.start, .end or .at(s)")),
         (lambda: ub.Roller(beam().end, along=(0, 0)), ("Roller at girder.end", "no direction")),
-        (
-            lambda: ub.Roller(beam().end, along=1.0),
-            (
-                "Roller",
-                "along = 1.0 must be a pair",
-            ),
-        ),
         (
             lambda: ub.PrescribedDisplacement(beam().end),
             ("PrescribedDisplacement", "nothing", "at least one of u, v, psi"),
         ),
-        (
-            lambda: ub.PrescribedDisplacement(beam().end, u=math.nan),
-            ("PrescribedDisplacement", "u = nan is not finite"),
-        ),
-        (
-            lambda: ub.PrescribedDisplacement(beam().end, psi="x"),
-            ("PrescribedDisplacement", "psi = 'x' is not a number"),
-        ),
         (lambda: ub.Rigid(beam().end), ("Rigid: a joint needs at least two places",)),
         (lambda: ub.Revolute(), ("Revolute: a joint needs at least two places",)),
-        (lambda: ub.Rigid(beam().end, beam()), ("Rigid", "is not a place")),
-        (lambda: ub.Velocity([beam()], linear=1.0), ("Velocity: linear = 1.0 must be a pair",)),
-        (lambda: ub.Velocity([beam()], angular=math.nan), ("Velocity: angular = nan",)),
-        (lambda: ub.Velocity([beam()], about=0), ("Velocity: about = 0 must be a pair",)),
     ],
 )
-def test_parts(make, says):
+def test_a_message_says_what_a_support_or_a_joint_needs(make, says):
     with raises(*says):
         make()
 
@@ -276,12 +160,12 @@ def test_parts(make, says):
 # -- the scene as a whole ------------------------------------------------------------------------
 
 
-def test_empty_scene():
+def test_a_scene_without_beams_is_refused():
     with raises("Scene: no beams"):
         ub.Scene([])
 
 
-def test_the_same_beam_twice():
+def test_a_beam_in_the_scene_twice_is_refused():
     one, other = beam(), beam(name="other")
     with raises("girder is in the scene twice, as beams[0] and beams[2]"):
         ub.Scene([one, other, one])
@@ -289,29 +173,12 @@ def test_the_same_beam_twice():
 
 @pytest.mark.parametrize(
     ("part", "expected"),
-    [
-        ("joints", "Joint"),
-        ("supports", "Support"),
-        ("loads", "PointLoad or FollowerLoad or LineLoad or Gravity"),
-        ("masses", "PointMass"),
-        ("initial", "Velocity"),
-    ],
+    [("joints", "Joint"), ("loads", "PointLoad or FollowerLoad or LineLoad or Gravity")],
 )
-def test_wrong_kinds_in_lists(part, expected):
-    wrong = ub.Section(EA=1.0, GA=1.0, EI=1.0)
-    with raises(f"Scene: {part}[0] = ", f"is not a {expected}"):
-        ub.Scene([beam()], **{part: [wrong]})
-
-
-def test_no_beam_in_beams():
-    with raises("Scene: beams[1] = 'girder' is not a Beam"):
-        ub.Scene([beam(), "girder"])
-
-
-def test_supports_among_the_joints():
+def test_a_support_in_another_list_is_refused(part, expected):
     one = beam()
-    with raises("Scene: joints[0] = ", "is not a Joint"):
-        ub.Scene([one], joints=[ub.Clamped(one.start)])
+    with raises(f"Scene: {part}[0] = ", f"is not a {expected}"):
+        ub.Scene([one], **{part: [ub.Clamped(one.start)]})
 
 
 STRAY = ub.Beam((0, 0), (1, 0), SECTION, name="stray")
@@ -329,25 +196,25 @@ STRAY = ub.Beam((0, 0), (1, 0), SECTION, name="stray")
         ("Rigid(stray.start", {"joints": [ub.Rigid(STRAY.start, STRAY.end)]}),
     ],
 )
-def test_places_on_beams_that_are_not_there(owner, parts):
+def test_parts_of_beams_outside_of_the_scene_are_refused(owner, parts):
     with raises(owner, "stray is not in the scene; add it to beams"):
         ub.Scene([beam()], **parts)
 
 
-def test_joint_places_apart():
+def test_places_of_a_joint_that_lie_apart_are_refused():
     left = ub.Beam((0, 0), (0, 3.75), SECTION, name="left")
     roof = ub.Beam((0, 4), (6, 4), SECTION, name="roof")
     with raises("Rigid: joint ends lie 0.25 m apart: roof.start (0, 4) and left.end (0, 3.75)"):
         ub.Scene([left, roof], joints=[ub.Rigid(roof.start, left.end)])
 
 
-def test_third_place_apart():
+def test_a_third_place_that_lies_apart_is_refused():
     a, b = beam(name="a"), beam(name="b")
     with raises("Revolute: joint ends lie 1 m apart: a.start (0, 0) and b.end (1, 0)"):
         ub.Scene([a, b], joints=[ub.Revolute(a.start, b.start, b.end)])
 
 
-def test_a_place_joined_to_itself():
+def test_a_place_joined_to_itself_is_refused():
     one = beam()
     with raises("Rigid(girder.end (1, 0), girder.end (1, 0)): the same place twice"):
         ub.Scene([one], joints=[ub.Rigid(one.end, one.at(1.0))])
@@ -376,13 +243,13 @@ def test_a_place_joined_to_itself():
         (lambda p: ub.Roller(p, along=(1, 1)), lambda p: ub.PrescribedDisplacement(p, u=0), "u"),
     ],
 )
-def test_supports_in_conflict(first, second, what):
+def test_two_supports_that_hold_one_displacement_are_refused(first, second, what):
     one = beam()
     with raises("in conflict", "girder.end (1, 0) and", f"both hold {what}; remove one"):
         ub.Scene([one], supports=[first(one.end), second(one.end)])
 
 
-def test_supports_in_conflict_through_a_joint():
+def test_two_supports_that_hold_one_displacement_through_a_joint_are_refused():
     a, b, c = (beam(name=name) for name in "abc")
     joints = [ub.Rigid(a.end, b.end), ub.Revolute(b.end, c.end)]
     with raises("in conflict: Pinned at a.end (1, 0) and Roller at c.end (1, 0) both hold v"):
@@ -395,7 +262,7 @@ def test_supports_in_conflict_through_a_joint():
         )
 
 
-def test_supports_at_one_place_that_hold_different_things():
+def test_supports_at_one_place_may_hold_different_displacements():
     a, b = beam(name="a"), beam(name="b")
     scene = ub.Scene(
         [a, b],
@@ -424,7 +291,7 @@ def test_supports_at_one_place_that_hold_different_things():
         (lambda a, b: ub.PrescribedDisplacement(a.start, psi=0.0), ("holds no displacement",)),
     ],
 )
-def test_friction_pressed_by_a_force_that_is_not_known(press, says):
+def test_friction_pressed_by_an_unknown_force_is_refused(press, says):
     a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
     pressing = press(a, b)
     rub = ub.Turn(a.end, b.start, ub.Coulomb(coefficient=1.0, joint=pressing))
@@ -436,7 +303,7 @@ def test_friction_pressed_by_a_force_that_is_not_known(press, says):
 
 
 @pytest.mark.parametrize("free", ["M", "N", "V", "NV", "NM"])
-def test_a_release_can_be_measured(free):
+def test_a_release_with_multipliers_has_the_same_equilibrium(free):
     """What it transmits is held by forces, its rotation too."""
     a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
     joint = ub.Release(a.end, b.start, free=free, multipliers=True)
@@ -467,7 +334,7 @@ def centers(failure):
     return {name: pytest.approx((float(x), float(y)), abs=1e-9) for name, x, y in found}
 
 
-def test_no_support():
+def test_a_beam_without_supports_is_free_in_3_ways():
     with raises(
         "free to move in 3 independent ways",
         "girder (beam 0)",
@@ -477,20 +344,20 @@ def test_no_support():
         static(ub.Scene([beam()]))
 
 
-def test_one_pin():
+def test_a_beam_on_one_pin_can_turn_about_it():
     one = beam()
     with raises("free to move in 1 way", "girder (beam 0) can turn about") as failure:
         static(ub.Scene([one], supports=[ub.Pinned(one.start)]))
     assert centers(failure) == {"girder": (0, 0)}
 
 
-def test_single_roller():
+def test_a_beam_on_one_roller_is_free_in_2_ways():
     one = beam()
     with raises("free to move in 2 independent ways", "girder (beam 0)"):
         static(ub.Scene([one], supports=[ub.Roller(one.end)]))
 
 
-def test_rollers_along_one_direction():
+def test_a_beam_on_parallel_rollers_can_shift_along_them():
     one = beam()
     supports = [ub.Roller(one.start, along=(3, 4)), ub.Roller(one.end, along=(3, 4))]
     with raises("free to move in 1 way", "girder (beam 0) can shift along") as failure:
@@ -500,7 +367,7 @@ def test_rollers_along_one_direction():
     assert (abs(float(u)), abs(float(v))) == (0.75, 1.0)
 
 
-def test_sway_of_a_frame_of_hinges():
+def test_a_frame_of_hinges_can_sway():
     left = ub.Beam((0, 0), (0, 4), SECTION, name="left")
     roof = ub.Beam((0, 4), (6, 4), SECTION, name="roof")
     right = ub.Beam((6, 4), (6, 0), SECTION, name="right")
@@ -514,7 +381,7 @@ def test_sway_of_a_frame_of_hinges():
     static(ub.Scene([left, roof, right], joints=joints, supports=supports))
 
 
-def test_a_part_that_hangs_loose():
+def test_only_the_beam_that_hangs_loose_is_named():
     fast, loose = beam(name="fast"), ub.Beam((1, 0), (2, 0), SECTION, name="loose")
     scene = ub.Scene(
         [fast, loose],
@@ -533,7 +400,7 @@ def test_many_loose_beams_are_counted():
         static(ub.Scene(loose))
 
 
-def test_a_mechanism_of_infinitesimal_motion():
+def test_an_infinitesimal_mechanism_is_refused():
     """Two links in one line between pins: free at first order only, but statics starts there."""
     a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
     scene = ub.Scene(
@@ -546,7 +413,7 @@ def test_a_mechanism_of_infinitesimal_motion():
     assert centers(failure) == {"a": (0, 0), "b": (2, 0)}
 
 
-def test_mechanisms_of_large_scenes():
+def test_a_mechanism_of_310_beams_is_named_in_part():
     """Beyond the size of dense decompositions, by another method."""
     count = 310  # 930 unknowns
     beams = [ub.Beam((i, 0), (i + 1, 0), SECTION, cells=1, name=f"b{i}") for i in range(count)]
@@ -573,35 +440,16 @@ def run(scene=None, scheme=None, *, t=(0.0, 1.0), dt=0.5, **more):
 @pytest.mark.parametrize(
     ("call", "says"),
     [
-        (lambda: run(dt=0.0), ("simulate: dt = 0 must be positive",)),
-        (lambda: run(dt=-0.1), ("simulate: dt = -0.1 must be positive",)),
-        (lambda: run(dt=math.nan), ("simulate: dt = nan is not finite",)),
-        (lambda: run(dt="fast"), ("simulate: dt = 'fast' is not a number",)),
-        (lambda: run(t=(1.0, 0.0)), ("the end t[1] = 0 must come after the beginning 1",)),
         (lambda: run(t=(1.0, 1.0)), ("the end t[1] = 1 must come after the beginning 1",)),
         (lambda: run(t=1.0), ("simulate: t = 1.0 must be a pair (beginning, end)",)),
-        (lambda: run(t=(0, math.inf)), ("simulate: t[1] = inf is not finite",)),
-        (lambda: run(every=0), ("simulate: every = 0 must be a whole number, at least 1",)),
         (lambda: ub.XDMF("x.xdmf", every=0), ("XDMF x.xdmf: every = 0 must be a whole number",)),
-        (lambda: ub.XDMF("x.xdmf", every=1.5), ("XDMF x.xdmf: every = 1.5 must be a whole",)),
-        (lambda: ub.XDMF("x.h5"), ("XDMF x.h5: the name of the file must end in .xdmf",)),
         (
             lambda: ub.EnergyMomentum(alpha=0.6),
             ("EnergyMomentum: alpha = 0.6", "between 0 and 0.5"),
         ),
-        (
-            lambda: ub.EnergyMomentum(alpha=-0.1),
-            ("EnergyMomentum: alpha = -0.1 must be at least 0",),
-        ),
-        (lambda: ub.EnergyMomentum(beta=0.6), ("EnergyMomentum: beta = 0.6", "between 0 and 0.5")),
-        (lambda: ub.EnergyMomentum(beta=math.nan), ("EnergyMomentum: beta = nan is not finite",)),
-        (lambda: ub.EnergyMomentum(alpha="x"), ("EnergyMomentum: alpha = 'x' is not a number",)),
-        (lambda: ub.Newton(rtol=0.0), ("Newton: rtol = 0 must be positive",)),
-        (lambda: ub.Newton(rtol=math.nan), ("Newton: rtol = nan is not finite",)),
-        (lambda: ub.Newton(max_iterations=0), ("Newton: max_iterations = 0", "at least 1")),
     ],
 )
-def test_calls(call, says):
+def test_a_message_says_why_a_call_is_refused(call, says):
     with raises(*says):
         call()
 
@@ -611,7 +459,7 @@ def test_calls(call, says):
     [lambda path: ub.XDMF(path.with_suffix(".xdmf")), lambda path: ub.History(path)],
     ids=["XDMF", "History"],
 )
-def test_outputs_that_cannot_be_written(recorder, shared_path):
+def test_an_output_that_cannot_be_written_is_refused_before_the_run(recorder, shared_path):
     missing = shared_path / "nowhere" / "out.csv"
     with raises("output", "nowhere", "there is no directory", "make it first"):
         run(record=recorder(missing))
@@ -633,12 +481,12 @@ def test_a_refused_output_leaves_no_file(shared_path):
     assert list(shared_path.iterdir()) == []
 
 
-def test_histories_of_places_elsewhere(shared_path):
+def test_a_history_of_a_place_outside_of_the_scene_is_refused(shared_path):
     with raises("stray.end (1, 0): stray is not in the scene"):
         run(record=ub.History(shared_path / "a.csv", [STRAY.end]))
 
 
-def test_start_from_another_scene():
+def test_a_start_from_another_scene_is_refused():
     other = run()
     with raises(
         "start: the solution is of other beams, joints or cells; use the same Beam objects"
@@ -646,7 +494,7 @@ def test_start_from_another_scene():
         run(start=other)
 
 
-def test_start_from_other_cells():
+def test_a_start_from_other_cells_is_refused():
     """What is attached inside of a beam makes a vertex there."""
     one = beam()
     first = run(ub.Scene([one], masses=[ub.PointMass(one.at(0.3), 1.0)]))
@@ -656,14 +504,14 @@ def test_start_from_other_cells():
         run(ub.Scene([one]), start=first, mesh=ub.Mesh(2))
 
 
-def test_start_with_a_body_that_was_not_there():
+def test_a_start_with_another_body_is_refused():
     one = beam()
     hub = ub.Body((3, 0), mass=1.0, inertia=1.0, name="hub")
     with raises("start: hub is not in the scene of the solution"):
         run(ub.Scene([one], bodies=[hub]), start=run(ub.Scene([one])))
 
 
-def test_start_where_a_new_joint_is_apart():
+def test_a_start_with_a_new_joint_of_places_apart_is_refused():
     """The hinge has turned by 2 rad/s · 1 s; a rigid joint would have to turn it back."""
     a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
     turns = [ub.Velocity([x], angular=w, about=(1, 0)) for x, w in ((a, 0.0), (b, 2.0))]
@@ -679,7 +527,7 @@ def test_start_where_a_new_joint_is_apart():
 # -- initial velocities --------------------------------------------------------------------------
 
 
-def test_two_velocities_at_a_joint():
+def test_two_velocities_at_a_joint_are_refused():
     a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
     scene = ub.Scene(
         [a, b],
@@ -690,14 +538,14 @@ def test_two_velocities_at_a_joint():
         ub.Simulation(scene, ub.EnergyMomentum())
 
 
-def test_two_velocities_of_one_beam():
+def test_two_velocities_of_one_beam_are_refused():
     one = beam()
     scene = ub.Scene([one], initial=[ub.Velocity([one], angular=1.0), ub.Velocity([one])])
     with raises("Velocity: girder gets two different velocities at (0, 0)"):
         ub.Simulation(scene, ub.EnergyMomentum())
 
 
-def test_velocities_that_agree_at_a_joint():
+def test_velocities_may_differ_where_they_agree_at_the_joint():
     # Both turn about the hinge, at different rates
     a, b = beam(name="a"), ub.Beam((1, 0), (2, 0), SECTION, name="b")
     turns = [ub.Velocity([x], angular=w, about=(1, 0)) for x, w in ((a, 1.0), (b, -3.0))]
@@ -714,15 +562,17 @@ def test_velocities_that_agree_at_a_joint():
         (lambda s: s.displacement(STRAY.end), ("stray.end (1, 0): stray is not in the scene",)),
         (lambda s: s.position(STRAY.end), ("stray.end (1, 0): stray is not in the scene",)),
         (lambda s: s.section_forces_at(STRAY.end), ("stray is not in the scene",)),
+        (lambda s: s.section_forces(STRAY), ("stray is not in the scene",)),
+        (lambda s: s.displacement(STRAY), ("stray", "is not a Place")),
         (lambda s: s.reaction(ub.Clamped(STRAY.end)), ("reaction: Clamped at stray.end", "not in")),
     ],
 )
-def test_questions_about_what_is_not_there(ask, says):
+def test_results_of_beams_and_supports_outside_of_the_scene_are_refused(ask, says):
     with raises(*says):
         ask(run())
 
 
-def test_statics_has_no_velocity():
+def test_a_static_run_has_no_velocity():
     one = beam()
     solution = run(ub.Scene([one], supports=[ub.Clamped(one.start)]), ub.Static())
     with raises("velocity: the run was static"):
@@ -749,12 +599,6 @@ def resultant(**laws):
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        # hardening
-        (lambda: ub.ElastoPlastic(-1.0), ("ElastoPlastic: yield_limit = -1 must be at least 0",)),
-        (lambda: ub.ElastoPlastic(NAN), ("ElastoPlastic: yield_limit = nan is not finite",)),
-        (lambda: ub.ElastoPlastic(-INF), ("ElastoPlastic: yield_limit = -inf is not finite",)),
-        (lambda: ub.ElastoPlastic("strong"), ("ElastoPlastic: yield_limit = 'strong' is not",)),
-        (lambda: ub.ElastoPlastic(None), ("ElastoPlastic: yield_limit = None is not a number",)),
         (
             lambda: ub.ElastoPlastic(1.0, isotropic=-2.0),
             ("ElastoPlastic: isotropic = -2 must not be negative", "use Softening("),
@@ -763,118 +607,55 @@ def resultant(**laws):
             lambda: ub.ElastoPlastic(1.0, kinematic=-2.0),
             ("ElastoPlastic: kinematic = -2 must not be negative", "use Softening("),
         ),
-        (lambda: ub.ElastoPlastic(1.0, NAN), ("ElastoPlastic: isotropic = nan is not finite",)),
-        (lambda: ub.ElastoPlastic(1.0, INF), ("ElastoPlastic: isotropic = inf is not finite",)),
-        (lambda: ub.ElastoPlastic(1.0, kinematic=NAN), ("ElastoPlastic: kinematic = nan",)),
         (
             lambda: ub.ElastoPlastic(1.0, viscosity=5.0),
             ("ElastoPlastic: viscosity = 5.0 is not a Perzyna or DuvautLions",),
         ),
-        (lambda: ub.Perzyna(-1.0), ("Perzyna: eta = -1 must be at least 0",)),
-        (lambda: ub.Perzyna(NAN), ("Perzyna: eta = nan is not finite",)),
-        (lambda: ub.DuvautLions(-1.0), ("DuvautLions: tau = -1 must be at least 0",)),
-        (lambda: ub.DuvautLions("s"), ("DuvautLions: tau = 's' is not a number",)),
-        # softening
-        (lambda: ub.Softening(-1.0, 1.0), ("Softening: limit = -1 must be at least 0",)),
-        (lambda: ub.Softening(NAN, 1.0), ("Softening: limit = nan is not finite",)),
-        (lambda: ub.Softening(1.0, 0.0), ("Softening: fracture_energy = 0 must be positive",)),
-        (lambda: ub.Softening(1.0, -1.0), ("Softening: fracture_energy = -1 must be positive",)),
-        (lambda: ub.Softening(1.0, INF), ("Softening: fracture_energy = inf is not finite",)),
-        (lambda: ub.LinearSoftening(-1.0, 1.0), ("LinearSoftening: limit = -1",)),
-        (lambda: ub.LinearSoftening(1.0, 0.0), ("LinearSoftening: fracture_energy = 0 must be",)),
-        # distributions
-        (lambda: ub.Normal(0.0, 1.0, seed=1), ("Normal: mean = 0 must be positive",)),
-        (lambda: ub.Normal(1.0, 0.0, seed=1), ("Normal: deviation = 0 must be positive",)),
-        (lambda: ub.Lognormal(1.0, -1.0, seed=1), ("Lognormal: deviation = -1 must be positive",)),
-        (lambda: ub.TruncatedNormal(1.0, NAN, seed=1), ("TruncatedNormal: deviation = nan",)),
-        (lambda: ub.Weibull(-1.0, 2.0, seed=1), ("Weibull: scale = -1 must be positive",)),
-        (lambda: ub.Weibull(1.0, 0.0, seed=1), ("Weibull: shape = 0 must be positive",)),
-        (lambda: ub.Normal(1.0, 1.0, seed=-1), ("Normal: seed = -1 must be a whole number",)),
-        (lambda: ub.Normal(1.0, 1.0, seed=1.5), ("Normal: seed = 1.5 must be a whole number",)),
-        (lambda: ub.Weibull(1.0, 1.0, seed=None), ("Weibull: seed = None must be a whole number",)),
-        # sections
         (lambda: resultant(bending=BREAKS), ("Section: bending", "is not a ElastoPlastic")),
-        (lambda: resultant(axial=250e6), ("Section: axial = 250000000.0 is not a ElastoPlastic",)),
-        (lambda: resultant(hinge=STEEL_LAW), ("Section: hinge", "is not a Softening")),
         # fibres
-        (lambda: ub.Fibres(BREAKS), ("Fibres: law", "is not a ElastoPlastic")),
-        (lambda: ub.Fibres(250e6), ("Fibres: law = 250000000.0 is not a ElastoPlastic",)),
-        (lambda: ub.Fibres(STEEL_LAW, number=0), ("Fibres: number = 0", "at least 1")),
-        (lambda: ub.Fibres(STEEL_LAW, number=2.5), ("Fibres: number = 2.5", "whole number")),
-        (
-            lambda: ub.Fibres(STEEL_LAW, softening=STEEL_LAW),
-            ("Fibres: softening", "is not a Softening"),
-        ),
-        (
-            lambda: ub.Section.circle(0.1, **STEEL, fibres=STEEL_LAW),
-            ("Section: fibres", "is not a Fibres"),
-        ),
         (lambda: in_fibres(bending=STEEL_LAW), ("Section: a law bending beside fibres",)),
         (lambda: in_fibres(axial=STEEL_LAW), ("Section: a law axial beside fibres",)),
         (lambda: in_fibres(shear=STEEL_LAW), ("Section: a law shear beside fibres", "elastic")),
         (lambda: in_fibres(hinge=BREAKS), ("Section: a law hinge beside fibres",)),
         # fibres of a user
         (lambda: of_fibres([0.1, 0.1], [1, 1]), ("of_fibres: all fibres at one y", "spread them")),
-        (lambda: of_fibres([0.1], [1]), ("of_fibres: all fibres at one y",)),
         (lambda: of_fibres([0, 1], [1, 1, 1]), ("y and A must be lists of one length", "(2,)")),
-        (lambda: of_fibres([], []), ("y and A must be lists of one length",)),
-        (lambda: of_fibres(0.0, 1.0), ("y and A must be lists of one length",)),
         (lambda: of_fibres([0, 1], [1, -1]), ("y must be finite, and all A positive",)),
-        (lambda: of_fibres([0, 1], [1, 0]), ("y must be finite, and all A positive",)),
-        (lambda: of_fibres([0, NAN], [1, 1]), ("Section.of_fibres: y[1] = nan is not finite",)),
         (
-            lambda: of_fibres([0, 1], [1, 1], fibres=STEEL_LAW),
-            ("Section.of_fibres: fibres", "is not a Fibres"),
+            lambda: in_fibres(ub.Fibres(STEEL_LAW, number=1)),  # its middle is the axis
+            ("Fibres: number = 1 has no bending stiffness; use 2 or more",),
         ),
         # hinges of a beam
         (lambda: beam(hinges={1.5: BREAKS}), ("girder: hinge at s = 1.5 must lie between 0 and",)),
-        (lambda: beam(hinges={-0.1: BREAKS}), ("girder: hinge at s = -0.1 must lie between",)),
-        (lambda: beam(hinges={NAN: BREAKS}), ("girder: hinge at = nan is not finite",)),
-        (lambda: beam(hinges={"end": BREAKS}), ("girder: hinge at = 'end' is not a number",)),
         (lambda: beam(hinges={0.5: 3.0}), ("girder: hinge at s = 0.5", "a Softening or Elasto")),
-        (lambda: beam(hinges={0.5: None}), ("girder: hinge at s = 0.5", "not a Softening")),
         (
             lambda: beam(hinges={0.5: BREAKS, 0.5 + 1e-13: BREAKS}),
             ("girder: two hinges at s = 0.5", "give one"),
         ),
-        (lambda: beam(hinges=[BREAKS]), ("girder: hinges", "is not a Mapping")),
         (
             lambda: ub.Beam((0, 0), (1, 0), in_fibres(), name="post", hinges={0.5: BREAKS}),
             ("post: hinges are for resultants; here the fibres of the section soften",),
         ),
-        # schemes
-        (
-            lambda: ub.EnergyMomentumStatic(0.4),
-            ("EnergyMomentumStatic: theta = 0.4 must be at least 0.5",),
-        ),
-        (
-            lambda: ub.EnergyMomentumStatic(1.1),
-            ("EnergyMomentumStatic: theta = 1.1 must lie between 0.5 and 1",),
-        ),
-        (
-            lambda: ub.EnergyMomentumStatic(NAN),
-            ("EnergyMomentumStatic: theta = nan is not finite",),
-        ),
     ],
 )  # fmt: skip
-def test_inelastic_material(make, says):
+def test_a_message_says_why_a_material_is_refused(make, says):
     with raises(*says):
         make()
 
 
-def of_fibres(y, A, fibres=None):
-    return ub.Section.of_fibres(y, A, **STEEL, fibres=fibres or ub.Fibres(STEEL_LAW))
+def of_fibres(y, A):
+    return ub.Section.of_fibres(y, A, **STEEL, fibres=ub.Fibres(STEEL_LAW))
 
 
 @pytest.mark.parametrize("ask", ["material", "material_at"])
-def test_material_of_an_elastic_scene(ask):
+def test_an_elastic_scene_has_no_material_states(ask):
     one = beam()
     solution = run(ub.Scene([one], supports=[ub.Clamped(one.start)]), ub.Static())
     with raises("material: nothing in the scene yields or breaks; it is elastic"):
         solution.material(one) if ask == "material" else solution.material_at(one.end)
 
 
-def test_material_of_a_beam_elsewhere():
+def test_material_of_a_beam_outside_of_the_scene_is_refused():
     one = ub.Beam((0, 0), (1, 0), resultant(bending=ub.ElastoPlastic(1.0)), cells=2)
     solution = run(ub.Scene([one], supports=[ub.Clamped(one.start)]), ub.Static())
     with raises("stray is not in the scene"):
@@ -895,14 +676,8 @@ def test_material_of_a_beam_elsewhere():
         lambda: in_fibres(ub.Fibres(STEEL_LAW, number=2, softening=BREAKS)),
     ],
 )
-def test_ends_of_what_is_allowed(make):
+def test_limits_of_ranges_are_allowed(make):
     assert make() is not None
-
-
-def test_fibres_without_bending_stiffness():
-    """One layer, whose middle is the axis."""
-    with raises("Fibres: number = 1 has no bending stiffness; use 2 or more"):
-        in_fibres(ub.Fibres(STEEL_LAW, number=1))
 
 
 # -- no convergence: nothing is lost ---------------------------------------------------------------
@@ -921,7 +696,7 @@ def turned(psi, **more):
     ("psi", "time"),
     [(lambda t: 4.0 * (t > 0.55), 0.55), (lambda t: 4.0 * (t > 0), 0.0), (4.0, 0.0)],
 )
-def test_a_jump_of_more_than_a_half_turn(psi, time):
+def test_a_jump_of_more_than_a_half_turn_has_no_equilibrium(psi, time):
     with pytest.raises(ub.ConvergenceError) as failure:
         run(turned(psi), dt=0.1)
     message = str(failure.value)
@@ -933,7 +708,7 @@ def test_a_jump_of_more_than_a_half_turn(psi, time):
     assert failure.value.time == pytest.approx(time, abs=1e-12)
 
 
-def test_large_turns_within_the_limit():
+def test_a_step_with_a_large_turn_is_subdivided():
     """4 rad in 0.1 s is too much for one step of 0.1 s, but not for its parts."""
     scene = turned(lambda t: 40.0 * t)
     solution = run(scene, t=(0, 0.1), dt=0.1)
@@ -979,7 +754,7 @@ def test_nothing_is_lost_when_the_force_is_not_a_number():
     assert np.isfinite(kept.energy.total).all()
 
 
-def test_too_few_iterations():
+def test_a_step_with_too_few_iterations_says_where_the_residual_is():
     one = beam()
     push = ub.PointLoad(one.end, force=(0, 500), amplitude=lambda t: 1.0 * (t > 0.25))
     scene = ub.Scene([one], supports=[ub.Clamped(one.start)], loads=[push])
@@ -1032,7 +807,7 @@ def test_the_solution_of_an_interrupted_run_goes_on():
 @pytest.mark.filterwarnings(
     "ignore:PrescribedDisplacement at girder.start .* psi jumps:ufl_beam.ModelWarning"
 )
-def test_a_simulation_after_a_failure_is_as_good_as_any():
+def test_a_failed_run_does_not_change_the_next_one():
     one = beam()
     scene = ub.Scene([one], loads=[ub.PointLoad(one.end, force=(1, 0))])
     before = run(scene)
@@ -1052,7 +827,7 @@ def test_files_are_complete_when_a_time_function_fails_on_the_way(shared_path, o
     assert lines[-1].startswith("0.5,")
 
 
-# -- not said well yet: remove the mark when it is -------------------------------------------------
+# -- what is allowed ------------------------------------------------------------------------------
 
 
 class Pulse:
@@ -1065,34 +840,6 @@ class Pulse:
         return isinstance(other, Pulse)
 
 
-@pytest.mark.parametrize(
-    "call",
-    [
-        lambda: beam(cells=math.nan),
-        lambda: beam(cells="many"),
-        lambda: beam(cells=None),
-        lambda: ub.Table(0, 1),
-        lambda: ub.Scene(beam()),
-        lambda: ub.Velocity(beam()),
-        lambda: ub.Scene([beam()], initial=[ub.Velocity(["girder"])]),
-        lambda: run(scene=[beam()]),
-        lambda: run(scheme=ub.EnergyMomentum),
-        lambda: run(scheme="static"),
-        lambda: run(record="run.xdmf"),
-        lambda: run(record=[3]),
-        lambda: run(start=3),
-        lambda: run(newton=1e-8),
-        lambda: run().displacement(STRAY),
-    ],
-)
-def test_wrong_kinds_are_scene_errors(call):
-    try:
-        call()
-    except ub.ArgumentError:
-        return
-    pytest.fail("no error at all")
-
-
 def test_whole_numbers_of_cells_may_be_floats():
     assert len(run(ub.Scene([beam(cells=2.0)])).grid.cells) == 2
 
@@ -1100,11 +847,10 @@ def test_whole_numbers_of_cells_may_be_floats():
 def test_time_functions_need_no_hash():
     one = beam()
     run(ub.Scene([one], loads=[ub.PointLoad(one.end, force=(1, 0), amplitude=Pulse())]))
+    # no error is raised
 
 
-def test_section_forces_of_a_beam_elsewhere():
-    with raises("stray is not in the scene"):
-        run().section_forces(STRAY)
+# -- options of PETSc -----------------------------------------------------------------------------
 
 
 @pytest.fixture
@@ -1137,7 +883,7 @@ def test_wrong_petsc_options_do_no_harm_to_the_next_run(database):
         ("tolerance", "no use for the option ub_tolerance; leave it out"),
     ],
 )
-def test_options_without_effect(database, name, said):
+def test_an_option_without_effect_is_refused(database, name, said):
     with raises(f"Newton: petsc: PETSc has {said}"):
         run(newton=ub.Newton(petsc={"snes_max_it": 20, name: "1"}))
     assert database.getAll() == {}
@@ -1148,7 +894,7 @@ def test_options_without_effect(database, name, said):
     assert database.getAll() == {name: "1"}  # for whoever else reads it
 
 
-def test_options_that_petsc_asks_for_later(database):
+def test_an_option_that_petsc_asks_for_later_is_refused_unless_in_petsc_options(database):
     with raises("ub_snes_view; such options must stand in PETSC_OPTIONS"):
         run(newton=ub.Newton(petsc={"snes_view": None}))
     database["snes_view"] = ":/dev/null"
@@ -1156,7 +902,7 @@ def test_options_that_petsc_asks_for_later(database):
     run()  # known as used by now
 
 
-def test_options_of_another_linear_solver():
+def test_an_option_of_another_linear_solver_is_refused():
     """PETSc asks for some options only where others choose their solver."""
     with raises("ub_pc_factor_mat_ordering_type"):
         run(newton=ub.Newton(petsc={"pc_factor_mat_ordering_type": "rcm"}))

@@ -45,7 +45,7 @@ FROM_ZERO = [*NUMBER, -1.0]
 POSITIVE = [*FROM_ZERO, 0.0]
 COUNT = [*POSITIVE, 1.5, "2"]
 SEED = [*(v for v in NO_NUMBER if v is not HUGE), None, NAN, -1, 1.5]
-LIMIT = [*NO_NUMBER, None, NAN, -1.0]
+LIMIT = [*NO_NUMBER, None, NAN, -1.0, -INF]
 """From zero to infinity."""
 VECTOR = [
     "ab", None, 1.0, (), (1,), (1, 2, 3), (1, "2"), (1, None), (1, NAN), (INF, 0), (1j, 0),
