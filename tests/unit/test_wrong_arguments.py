@@ -515,7 +515,7 @@ WITHOUT_PARAMETERS = {
 OF_SOLUTIONS = {
     "animate", "picture", "plot", "render",
 }  # fmt: skip
-"""Pictures, whose tests are in test_plots.py."""
+"""Pictures, whose tests are in pictures/."""
 
 
 def test_every_public_callable_is_in_the_table():
