@@ -1,6 +1,6 @@
 # Every target runs through ./env, which brings DOLFINx where it is missing. `make` lists the targets.
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-compare bench-peers extremes schemes study
+.PHONY: help demo test test-mpi test-sid verify sanitize long demos demos-cheap check check-paraview docs docs-cheap docs-links test-notebook check-docs docs-pictures accelerations bench bench-test bench-compare bench-peers extremes schemes study
 
 # Natively as root Open MPI refuses to start; with more ranks than cores, too (the last two lines: versions 5 and 6).
 # ./env sets the same in its root.
@@ -56,8 +56,8 @@ demos-cheap: ## the cheap demos, alone and on 2 ranks
 	@$(call alone,$(cheap_demos))
 	@$(call on_two,$(cheap_demos))
 
-check: ## lint, format and types
-	@./env sh -ec '$(with_ruff); $$ruff check; $$ruff format --check; python3 -m mypy'
+check: ## lint, format, types, layers of imports and prose
+	@./env sh -ec '$(with_ruff); $$ruff check; $$ruff format --check; python3 -m mypy; python3 -m pytest -q tests/lint'
 
 check-paraview: ## time series opened in ParaView; builds a root with ParaView once, 2.3 GB
 	@tests/paraview/check
@@ -101,6 +101,9 @@ bench: ## time per step
 	@./env python3 benchmarks/bench_budget.py
 	@./env python3 benchmarks/bench_scaling.py
 	@./env python3 benchmarks/bench_ensemble.py
+
+bench-test: ## tests of the benchmarks
+	@./env python3 -m pytest -q benchmarks/tests
 
 bench-compare: ## benchmarks of two commits in turn: `make bench-compare with=COMMIT only="bench_step"`
 	@./env python3 benchmarks/compare.py $(with) $(if $(only),--only $(only))

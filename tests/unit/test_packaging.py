@@ -13,7 +13,6 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PROJECT = (ROOT / "pyproject.toml").read_text("utf-8")
 SHIPPED = ("demos", "docs", "tests", "benchmarks", "ufl_beam")
 
 
@@ -162,66 +161,3 @@ def test_an_installed_wheel_runs_outside_of_the_checkout(wheel, tmp_path, compil
         assert all(way in last for way in ("conda install", "Debian", "Docker"))
         assert "docs/" not in last
         assert "env" not in last.split()
-
-
-def test_pre_commit_has_the_ruff_of_make_check():
-    """`required-version` is what the Makefile installs."""
-    (required,) = re.findall(r'^required-version = "(.*?)"', PROJECT, re.MULTILINE)
-    assert f'["ruff{required}"]' in (ROOT / ".pre-commit-config.yaml").read_text()
-
-
-def test_python_is_checked_for_the_oldest_version_claimed():
-    """By ruff and mypy, since tests run with newer ones only."""
-    (oldest,) = re.findall(r'^requires-python = ">=(3\.\d+)"', PROJECT, re.MULTILINE)
-    assert f'\npython_version = "{oldest}"' in PROJECT
-    assert f'\ntarget-version = "py{oldest.replace(".", "")}"' in PROJECT
-    assert f"\n  - python >={oldest}\n" in (ROOT / "environment.yml").read_text("utf-8")
-
-
-def test_conda_gets_all_dependencies():
-    """Those of pyproject.toml with their versions, and those that it cannot name."""
-    (lists,) = re.findall(r"^dependencies = (\[.*?\n\])\n\n.*?^dev = ", PROJECT, re.M | re.S)
-    (view,) = re.findall(r"^view = \[(.*)\]", PROJECT, re.MULTILINE)
-    (test,) = re.findall(r"^test = \[(.*)\]", PROJECT, re.MULTILINE)
-    stated = re.findall(r'"([\w-]+)[^"]*"', lists.partition("]")[0] + view + test)
-    versions = dict(re.findall(r'"([\w-]+)(>=[\d.]+)"', PROJECT))
-    text = (ROOT / "environment.yml").read_text("utf-8")
-    named = dict(re.findall(r"^ +- ([\w-]+) ?([^\s#]*)", text, re.MULTILINE))
-    assert len(stated) > 12
-    assert set(stated) <= set(named)
-    for name in stated:
-        assert named[name] == versions.get(name, ""), name
-    assert {"fenics-dolfinx", "mpi4py", "petsc4py", "slepc4py", "c-compiler", "pip"} <= set(named)
-    assert "petsc=*=real*" in text
-
-
-def test_the_public_address_has_one_place():
-    """The table `[project.urls]`; a guess elsewhere would lead to the pages of strangers."""
-    address = re.compile(r"(?:https?://|ssh://|git@)[^\s\"'<>)]*ufl[-_]beam[^\s\"'<>)]*")
-    text = {".md", ".py", ".cff", ".yml", ".yaml", ".json", ".toml", ""}
-    folders = ("", ".ci/", ".devcontainer/", ".github/**/", "docs/", "demos/", "ufl_beam/**/")
-    files = [
-        path
-        for folder in (*folders, "tests/**/")
-        for path in ROOT.glob(f"{folder}*")
-        if path.suffix in text and path.is_file()
-    ]
-    assert len(files) > 300
-    where = {
-        str(path.relative_to(ROOT)): address.findall(path.read_text("utf-8")) for path in files
-    }
-    places = {path for path, found in where.items() if found}
-    assert places <= {"pyproject.toml"}
-    assert len(where["pyproject.toml"]) == len(re.findall("^Repository = ", PROJECT, re.MULTILINE))
-
-
-def test_a_forge_runs_what_everyone_can_run():
-    """Its workflow has no commands of its own, and all targets of .ci/run exist."""
-    workflow = (ROOT / ".github/workflows/ci.yml").read_text("utf-8")
-    assert re.findall(r"\brun: (.*)", workflow) == [".ci/run"]
-    targets = set(re.findall(r"^([a-z-]+):.*##", (ROOT / "Makefile").read_text(), re.MULTILINE))
-    run = (ROOT / ".ci/run").read_text("utf-8")
-    (listed,) = re.findall("for each in ([^;]*);", run)
-    alone = re.findall(r"(?:then |^)target ([a-z-]+)", run, re.MULTILINE)
-    called = {*listed.split(), *alone}
-    assert {"test", "test-mpi", "test-sid"} <= called <= targets

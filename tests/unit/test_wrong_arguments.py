@@ -7,6 +7,7 @@ kind is a list of values that the parameter must refuse.
 
 import inspect
 import math
+import re
 
 from mpi4py import MPI
 
@@ -24,8 +25,14 @@ BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
 OTHER = ub.Beam((1, 0), (2, 0), SECTION, cells=2, name="other")
 BODY = ub.Body((2, 0), mass=1.0, inertia=1.0, name="hub")
 SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)])
+GROWING = ub.Scene(
+    [BEAM],
+    supports=[ub.Clamped(BEAM.start)],
+    loads=[ub.PointLoad(BEAM.end, force=(1, 0), amplitude=lambda t: t)],
+)
 STEEL = {"E": 210e9, "nu": 0.3}
 LAW = ub.ElastoPlastic(1.0)
+BREAKS = ub.Softening(10.0, 5.0)
 SPRING = ub.Spring(1.0)
 JOINT = ub.Revolute(BEAM.end, OTHER.start, multipliers=True)
 
@@ -38,18 +45,27 @@ FROM_ZERO = [*NUMBER, -1.0]
 POSITIVE = [*FROM_ZERO, 0.0]
 COUNT = [*POSITIVE, 1.5, "2"]
 SEED = [*(v for v in NO_NUMBER if v is not HUGE), None, NAN, -1, 1.5]
-LIMIT = [*NO_NUMBER, None, NAN, -1.0]
+LIMIT = [*NO_NUMBER, None, NAN, -1.0, -INF]
 """From zero to infinity."""
 VECTOR = [
     "ab", None, 1.0, (), (1,), (1, 2, 3), (1, "2"), (1, None), (1, NAN), (INF, 0), (1j, 0),
     (HUGE, 0), (ARRAY, ARRAY),
 ]  # fmt: skip
-OBJECT = [None, "x", 1.0, (0, 0), ARRAY, object(), int]
+OBJECT = [None, "x", 1.0, (0, 0), ARRAY, object(), int, [BEAM], STEEL]
 """In the place of any object of this package."""
-LIST = [None, 1.0, "ab", [None], ["x"], [1.0], object()]
+NO_PLACE = [*OBJECT, BEAM]
+NO_BEAM = [*OBJECT, BEAM.end]
+NO_LAW = [*OBJECT, BREAKS]
+"""In the place of an elastoplastic law."""
+NO_SOFTENING = [*OBJECT, ub.Fibres(LAW)]
+LIST = [None, 1.0, "ab", [None], ["x"], [1.0], object(), BEAM, [SECTION]]
 """In the place of a list of objects of this package."""
 TEXT = [None, 1.0, b"x", ["x"], "\ud800", "a\0"]
-HINGES = [None, 1.0, "x", [], {0.5: 1}, {1.5: ub.ElastoPlastic(1.0)}]
+HINGES = [
+    None, 1.0, "x", [], [BREAKS], {0.5: 1}, {0.5: None}, {1.5: LAW}, {-0.1: LAW}, {NAN: LAW},
+    {"end": LAW},
+]  # fmt: skip
+FIBRES = [None, 1.0, "ab", [], [1.0], [0.0, NAN], [0.0, 1j], [0.0, "1"]]
 SWITCH = [None, "yes", 2, 1.5, [], ARRAY]
 PATH = [None, 1.0, "", b"x", ["x"], object()]
 FUNCTION = [None, "x", 1.0, ARRAY]
@@ -80,14 +96,14 @@ def V(value, kind):
     return value, kind
 
 
-PLACE = V(BEAM.end, OBJECT)
+PLACE = V(BEAM.end, NO_PLACE)
 TIMED = {"moment": V(1.0, NUMBER), "amplitude": V(lambda t: t, [*TIME, None])}
 SHAPE = {
     "E": V(1.0, POSITIVE),
     "nu": V(0.3, [*NUMBER, 0.6, -1.0]),
     "rho": V(1.0, optional(FROM_ZERO)),
     "shear_factor": V(0.8, POSITIVE),
-    "fibres": V(None, optional(OBJECT)),
+    "fibres": V(None, optional(NO_LAW)),
 }
 SOFTENING = {"limit": V(1.0, LIMIT), "fracture_energy": V(1.0, POSITIVE)}
 NORMAL = {"mean": V(1.0, POSITIVE), "deviation": V(0.1, POSITIVE), "seed": V(1, SEED)}
@@ -102,25 +118,15 @@ RUN = {"newton": V(None, optional(OBJECT)), **MESH, "comm": V(None, optional(OBJ
 ALONG = {"record": V((), LIST), "start": V(None, optional(OBJECT)), **RUN}
 
 
-def fixed_call(of, fixed, **parameters):
-    """A row whose callable has arguments that are not tried."""
-
-    def called(**values):
-        return of(**fixed, **values)
-
-    called.of = of
-    return called, parameters
-
-
 TABLE = {
     # sections and materials
     "Section": call(
         ub.Section,
         EA=V(1.0, POSITIVE), GA=V(1.0, POSITIVE), EI=V(1.0, POSITIVE),
         rhoA=V(0.0, optional(FROM_ZERO)), rhoI=V(0.0, FROM_ZERO),
-        depth=V(0.0, FROM_ZERO), axial=V(None, optional(OBJECT)),
-        shear=V(None, optional(OBJECT)), bending=V(None, optional(OBJECT)),
-        hinge=V(None, optional(OBJECT)), fibres=V(None, optional(OBJECT)),
+        depth=V(0.0, FROM_ZERO), axial=V(None, optional(NO_LAW)),
+        shear=V(None, optional(NO_LAW)), bending=V(None, optional(NO_LAW)),
+        hinge=V(None, optional(NO_SOFTENING)), fibres=V(None, optional(NO_LAW)),
         interaction=V(None, optional(OBJECT)),
     ),
     "Section.of_shape": call(
@@ -139,13 +145,14 @@ TABLE = {
     ),
     "Section.of_fibres": call(
         ub.Section.of_fibres,
-        y=V([0.0, 1.0], [None, 1.0, "ab", [0.0], [0.0, NAN], [0.0, 1j], [0.0, "1"], [0.0, HUGE]]),
-        A=V([1.0, 1.0], [None, 1.0, "ab", [1.0], [1.0, NAN], [1.0, -1.0], [1.0, 1j], [1.0, "1"]]),
+        y=V([0.0, 1.0], [*FIBRES, [0.0, 0.0], [0.0, HUGE]]),
+        A=V([1.0, 1.0], [*FIBRES, [1.0, -1.0], [1.0, 0.0]]),
         E=V(1.0, POSITIVE), nu=V(0.3, [*NUMBER, 0.6]), rho=V(0.0, optional(FROM_ZERO)),
-        shear_factor=V(0.8, POSITIVE), fibres=V(ub.Fibres(LAW), OBJECT),
+        shear_factor=V(0.8, POSITIVE), fibres=V(ub.Fibres(LAW), NO_LAW),
     ),
     "Fibres": call(
-        ub.Fibres, law=V(LAW, OBJECT), number=V(5, COUNT), softening=V(None, optional(OBJECT))
+        ub.Fibres,
+        law=V(LAW, NO_LAW), number=V(5, COUNT), softening=V(None, [*optional(OBJECT), LAW]),
     ),
     "ElastoPlastic": call(
         ub.ElastoPlastic,
@@ -212,7 +219,7 @@ TABLE = {
     "Beam.at": call(BEAM.at, s=V(0.5, [*NUMBER, -0.1, 1.1])),
     "Place": call(
         ub.Place,
-        beam=V(BEAM, OBJECT), s=V(0.5, [*NUMBER, -0.1, 1.1]), beyond=V(False, SWITCH),
+        beam=V(BEAM, NO_BEAM), s=V(0.5, [*NUMBER, -0.1, 1.1]), beyond=V(False, SWITCH),
     ),
     "Body": call(
         ub.Body,
@@ -225,36 +232,36 @@ TABLE = {
     # joints, connectors and their laws
     "Rigid": call(
         lambda a, b, multipliers: ub.Rigid(a, b, multipliers=multipliers),
-        a=PLACE, b=V(OTHER.start, OBJECT), multipliers=V(False, SWITCH),
+        a=PLACE, b=V(OTHER.start, NO_PLACE), multipliers=V(False, SWITCH),
     ),
     "Revolute": call(
         lambda a, b, multipliers: ub.Revolute(a, b, multipliers=multipliers),
-        a=PLACE, b=V(OTHER.start, OBJECT), multipliers=V(False, SWITCH),
+        a=PLACE, b=V(OTHER.start, NO_PLACE), multipliers=V(False, SWITCH),
     ),
     "Release": call(
         ub.Release,
-        a=PLACE, b=V(OTHER.start, OBJECT), free=V("M", [*TEXT, "", "X", "MX"]),
+        a=PLACE, b=V(OTHER.start, NO_PLACE), free=V("M", [*TEXT, "", "X", "MX"]),
         multipliers=V(False, SWITCH),
     ),
     "Prismatic": call(
         ub.Prismatic,
-        rail=PLACE, slider=V(OTHER.end, OBJECT), axis=V(None, optional(VECTOR)),
+        rail=PLACE, slider=V(OTHER.end, NO_PLACE), axis=V(None, optional(VECTOR)),
         turning=V(False, SWITCH),
     ),
-    "RigidLink": call(ub.RigidLink, a=PLACE, b=V(OTHER.end, OBJECT)),
-    "Link": call(ub.Link, a=PLACE, b=V(OTHER.end, OBJECT)),
+    "RigidLink": call(ub.RigidLink, a=PLACE, b=V(OTHER.end, NO_PLACE)),
+    "Link": call(ub.Link, a=PLACE, b=V(OTHER.end, NO_PLACE)),
     "Guided": call(
-        ub.Guided, place=V(BEAM.end, OBJECT), curve=V(lambda s: (1 + s, 0), [*CURVE, None])
+        ub.Guided, place=PLACE, curve=V(lambda s: (1 + s, 0), [*CURVE, None])
     ),
-    "Turn": call(ub.Turn, a=PLACE, b=V(OTHER.end, OBJECT), law=V(SPRING, OBJECT)),
-    "Stretch": call(ub.Stretch, a=PLACE, b=V(OTHER.end, OBJECT), law=V(SPRING, OBJECT)),
+    "Turn": call(ub.Turn, a=PLACE, b=V(OTHER.end, NO_PLACE), law=V(SPRING, OBJECT)),
+    "Stretch": call(ub.Stretch, a=PLACE, b=V(OTHER.end, NO_PLACE), law=V(SPRING, OBJECT)),
     "Slide": call(
         ub.Slide,
-        a=PLACE, b=V(OTHER.end, OBJECT), law=V(SPRING, OBJECT), axis=V(None, optional(VECTOR)),
+        a=PLACE, b=V(OTHER.end, NO_PLACE), law=V(SPRING, OBJECT), axis=V(None, optional(VECTOR)),
     ),
     "Bushing": call(
         ub.Bushing,
-        a=PLACE, b=V(OTHER.end, OBJECT), law=V(ub.Clearance(1.0, gap=1.0), OBJECT),
+        a=PLACE, b=V(OTHER.end, NO_PLACE), law=V(ub.Clearance(1.0, gap=1.0), OBJECT),
         axis=V((1.0, 0.0), VECTOR),
     ),
     "Spring": call(
@@ -293,7 +300,7 @@ TABLE = {
     # loads, supports, masses
     "PointLoad": call(ub.PointLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
     "FollowerLoad": call(ub.FollowerLoad, place=PLACE, force=V((1, 0), VECTOR), **TIMED),
-    "LineLoad": call(ub.LineLoad, beam=V(BEAM, OBJECT), force=V((1, 0), VECTOR), **TIMED),
+    "LineLoad": call(ub.LineLoad, beam=V(BEAM, NO_BEAM), force=V((1, 0), VECTOR), **TIMED),
     "Gravity": call(
         ub.Gravity, acceleration=V((0, -9.81), VECTOR), amplitude=V(lambda t: t, [*TIME, None])
     ),
@@ -383,7 +390,7 @@ TABLE = {
     ),
     "follow": call(
         ub.follow,
-        scene=V(SCENE, OBJECT), control=V(ub.LoadControl(1.0), [*OBJECT, ub.LoadControl]),
+        scene=V(GROWING, OBJECT), control=V(ub.LoadControl(1.0), [*OBJECT, ub.LoadControl]),
         until=V(None, optional(FUNCTION)), steps=V(1, COUNT), progress=V(False, SWITCH),
         **ALONG,
     ),
@@ -419,9 +426,16 @@ TABLE = {
         ),
         scheme=V(ub.EnergyMomentum(), [*OBJECT, ub.EnergyMomentum]), t=V((0, 1), [*VECTOR, (1, 0)]),
         dt=V(0.5, [*(v for v in POSITIVE if not isinstance(v, list)), []]),
-        tolerance=V(1e-3, optional(POSITIVE)),
-        budget=V(None, optional(POSITIVE)), max_seconds=V(1.0, POSITIVE), progress=V(False, SWITCH),
+        tolerance=V(1e-3, optional(POSITIVE)), budget=V(None, [1.0]),
+        max_seconds=V(1.0, POSITIVE), progress=V(False, SWITCH),
         **RUN,
+    ),
+    "tradeoff.budget": call(
+        lambda budget: ub.tradeoff(
+            SCENE, {"u": lambda s: s.displacement(BEAM.end)}, scheme=ub.EnergyMomentum(),
+            t=(0, 1), dt=0.5, budget=budget,
+        ),
+        budget=V(1.0, optional(POSITIVE)),
     ),
     # files
     "XDMF": call(ub.XDMF, path=V("run.xdmf", [*PATH, "run.h5"]), every=V(1, COUNT)),
@@ -501,7 +515,7 @@ WITHOUT_PARAMETERS = {
 OF_SOLUTIONS = {
     "animate", "picture", "plot", "render",
 }  # fmt: skip
-"""Pictures, whose tests are in test_plots.py."""
+"""Pictures, whose tests are in pictures/."""
 
 
 def test_every_public_callable_is_in_the_table():
@@ -524,6 +538,19 @@ def test_every_parameter_is_in_the_table(name):
     assert names - set(parameters) == set()
 
 
+WORDS = {
+    **dict.fromkeys(("a", "b", "rail", "slider"), "is not a place"),
+    "beam": "is not a Beam",
+    "corners": "corner",
+    "density": "the function has a parameter",
+    "hinges": "hinge",
+    "path": "the name of the file",
+    "point": "hub.at(x, y)",
+    "points": "point",
+    "quantities": "quantity",
+}
+"""Words in the place of a parameter's name."""
+
 PLACES = {"places", "place", "follow"}
 """Of recorders; what is wrong with them is said as of other places."""
 
@@ -543,7 +570,7 @@ def _wrong(name):
 
 @pytest.mark.parametrize("name", TABLE)
 def test_wrong_values_are_refused_by_name(name, monkeypatch):
-    """Each wrong value of each parameter gives one of the errors that are meant, with a name.
+    """Each wrong value gives an ArgumentError that names the object and the parameter.
 
     It is a `ModelError` for parts of models and for nothing else.
     """
@@ -553,6 +580,7 @@ def test_wrong_values_are_refused_by_name(name, monkeypatch):
 
     monkeypatch.setattr(step_equation, "Fields", no_mesh)
     of, _ = TABLE[name]
+    owners = (name.split(".")[0], "girder", "hub", "Guide")  # the law of Guided
     faults = []
     for parameter, value, values in _wrong(name):
         try:
@@ -565,7 +593,9 @@ def test_wrong_values_are_refused_by_name(name, monkeypatch):
                 faults.append(f"{parameter} = {value!r:.60}: it is a {type(error).__name__}")
             elif len(said) > 350:
                 faults.append(f"{parameter} = {value!r:.60}: {len(said)} characters")
-            elif not any(part in said for part in (name.split(".")[0], parameter, "girder", "hub")):
+            elif of_models(name) and not any(owner in said for owner in owners):
+                faults.append(f"{parameter} = {value!r:.60}: no owner in {said!r}")
+            elif not (re.search(rf"\b{parameter}\b", said) or WORDS.get(parameter, "?") in said):
                 faults.append(f"{parameter} = {value!r:.60}: no name in {said!r}")
         except Exception as error:
             faults.append(f"{parameter} = {value!r:.60}: {error!r:.100}")

@@ -3,25 +3,17 @@
 
 import dataclasses
 import math
-from dataclasses import dataclass
 
 import numpy as np
 import pytest
 import scenes
+from drawn import LAWS, STEEL, boxes_of, middles, outlines, require_apart, storeys, texts
 from matplotlib.collections import LineCollection, PolyCollection
+from matplotlib.colors import same_color
+from matplotlib.path import Path
 
 import ufl_beam as ub
-from ufl_beam.plotting.positions import (
-    Candidate,
-    Label,
-    areas_covered,
-    crossings,
-    lengths_inside,
-    place,
-)
 from ufl_beam.plotting.style import GREEN, RED
-
-STEEL = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 
 
 def frame(**parts):
@@ -34,47 +26,11 @@ def frame(**parts):
     return ub.Scene([column, girder], bodies=[rotor], joints=joints, **made)
 
 
-def collections(figure, gid, kind=object):
-    return [c for c in figure.axes[0].collections if c.get_gid() == gid and isinstance(c, kind)]
-
-
-def shapes(figure, gid, kind=object):
-    """Outlines or lines of a group, as arrays of points."""
-    return [path.vertices for c in collections(figure, gid, kind) for path in c.get_paths()]
-
-
-def words(figure):
-    return [text.get_text() for text in figure.axes[0].texts if text.get_text()]
-
-
 def amount(figure):
     """Number of lines, areas and words that are drawn."""
     drawn = sum(len(c.get_paths()) for c in figure.axes[0].collections)
     return drawn + len(figure.axes[0].texts)
 
-
-@dataclass(frozen=True)
-class Dashpot(ub.ConnectorLaw):
-    """A law of a user."""
-
-    c: float
-
-    def resistance(self, motion, rate, state, dt):
-        return self.c * rate
-
-
-LAWS = {
-    "spring": ub.Spring(2e4),
-    "damper": ub.Damper(300.0),
-    "stop": ub.Stop(1e6, high=0.02),
-    "friction": ub.Coulomb(50.0),
-    "motor": ub.PrescribedMotion(lambda t: t),
-    "actuator": ub.PrescribedForce(lambda t: t),
-    "controller": ub.Controller(lambda simulation: 0.0),
-    "function": ub.ForceLaw(lambda motion, rate: motion),
-    "own law": Dashpot(3.0),
-    "rigid-plastic": ub.RigidPlastic(ub.Softening(1e3, 10.0)),
-}
 
 OBJECTS = {
     "clamped": ("supports", lambda c, g, r: ub.Clamped(c.start)),
@@ -111,18 +67,18 @@ OBJECTS = {
     "guided": ("joints", lambda c, g, r: ub.Guided(r.middle, lambda s: (7 + s, 1 + s**2))),
     "release": ("joints", lambda c, g, r: ub.Release(c.start, ub.ground(0, 0), free="N")),
     **{
-        f"{kind.__name__} {name}": (
+        f"{kind.__name__} {type(law).__name__}": (
             "connectors",
             lambda c, g, r, kind=kind, law=law: kind(ub.ground(8, 0), r.at(7.2, 1.2), law),
         )
         for kind in (ub.Turn, ub.Stretch, ub.Slide)
-        for name, law in LAWS.items()
+        for law in LAWS
     },
 }
 
 
 @pytest.mark.parametrize("name", OBJECTS)
-def test_every_object_leaves_something(name):
+def test_every_object_is_drawn(name):
     part, make = OBJECTS[name]
     scene = frame(**{part: lambda *beams: [make(*beams)]})
     (added,) = {*getattr(scene, part)} - {*frame().joints, *scene.joints[1:]}
@@ -135,14 +91,14 @@ def test_beams_run_through_their_vertices_and_have_names():
     arc = ub.Beam.arc((0, 0), 2.0, (0.0, 1.0), STEEL, cells=6, name="arc")
     rods = [ub.Beam((3, y), (5, y), STEEL, cells=3, name="rod") for y in (0, 1)]
     figure = ub.plot(ub.Scene([arc, *rods]))
-    for drawn, beam in zip(shapes(figure, "beams"), [arc, *rods], strict=True):
+    for drawn, beam in zip(outlines(figure, "beams"), [arc, *rods], strict=True):
         np.testing.assert_array_equal(drawn, [beam.curve(s) for s in beam.vertices(())])
-    assert sorted(words(figure)) == ["arc", "rod 1", "rod 2"]  # numbers of scene.beams
-    assert len(shapes(figure, "cells")) == 5 + 2 + 2
+    assert sorted(texts(figure)) == ["arc", "rod 1", "rod 2"]  # numbers of scene.beams
+    assert len(outlines(figure, "cells")) == 5 + 2 + 2
     assert figure.axes[0].get_title(loc="left") == "model: 3 beams, 12 cells"
 
 
-def test_words_say_sizes_with_units():
+def test_labels_have_sizes_with_units():
     figure = ub.plot(
         frame(
             loads=lambda c, g, r: [
@@ -163,16 +119,14 @@ def test_words_say_sizes_with_units():
         "column", "girder", "rotor, 3 kg", "5 kN", "10 kN/m × f(t)", "20 N m, follows", "50 kg",
         "g = 9.81 m/s²", "5 m/s", "u = 10 mm", "ψ(t)", "stop ≥ −0.1 rad",
     ):  # fmt: skip
-        assert text in words(figure), text
+        assert text in texts(figure), text
 
 
 @pytest.mark.parametrize(("force", "end"), [((0, -2), "tip"), ((3, 0), "tail"), ((-3, 0), "tip")])
 def test_arrows_end_where_they_push_and_begin_where_they_pull(force, end):
     figure = ub.plot(scenes.cantilever(force=force))
-    (line,), (head,) = (
-        shapes(figure, "loads", LineCollection),
-        shapes(figure, "loads", PolyCollection),
-    )
+    (line,) = outlines(figure, "loads", LineCollection)
+    (head,) = outlines(figure, "loads", PolyCollection)
     way = (line[1] - line[0]) / np.linalg.norm(line[1] - line[0])
     np.testing.assert_allclose(way, np.array(force) / math.hypot(*force), atol=1e-12)
     nearest = {"tip": head[0], "tail": line[0]}[end]
@@ -185,13 +139,13 @@ def test_a_line_load_is_a_comb_and_stands_on_the_one_before():
     beam = ub.Beam((0, 0), (4, 0), STEEL)
     loads = [ub.LineLoad(beam, force=(0, -f)) for f in (1e3, 2e3)]
     figure = ub.plot(ub.Scene([beam], loads=loads))
-    heads = shapes(figure, "loads", PolyCollection)
+    heads = outlines(figure, "loads", PolyCollection)
     tips = np.array([head[0] for head in heads])
     assert len(heads) % 2 == 0
     first, second = np.split(tips, 2)
     np.testing.assert_allclose(first[[0, -1], 0], [0.0, 4.0], atol=1e-12)
     assert np.ptp(first[:, 1]) < 1e-12 < first[0, 1] < second[0, 1]
-    lines = shapes(figure, "loads", LineCollection)
+    lines = outlines(figure, "loads", LineCollection)
     tops = sorted({float(line[:, 1].max()) for line in lines})
     assert first[0, 1] < tops[0] < second[0, 1] < tops[-1]  # no comb reaches into the other
 
@@ -203,21 +157,20 @@ def test_colours_tell_loads_from_motions():
     )
     figure = ub.plot(scene)
     for group, color in (("loads", RED), ("velocities", GREEN)):
-        rgb = [int(color[i : i + 2], 16) / 255 for i in (1, 3, 5)]
-        for collection in collections(figure, group):
-            np.testing.assert_allclose(collection.get_edgecolor()[0, :3], rgb)
+        drawn = [c for c in figure.axes[0].collections if c.get_gid() == group]
+        assert drawn
+        assert all(same_color(c.get_edgecolor()[0], color) for c in drawn)
 
 
-def test_hinges_are_shown_where_they_are():
+def test_hinges_are_at_their_places():
     law = ub.Softening(2e4, 1e3)
     beam = ub.Beam((0, 0), (4, 0), STEEL, cells=4, hinges={0.0: law, 0.75: law})
     figure = ub.plot(ub.Scene([beam], supports=[ub.Clamped(beam.start)]))
-    found = shapes(figure, "hinges")
-    middles = np.array(sorted(tuple(np.ptp(x, axis=0) / 2 + x.min(axis=0)) for x in found))
-    np.testing.assert_allclose(middles[:, 1], 0.0, atol=1e-9)
-    assert 0.0 < middles[0, 0] < 0.3  # beside the clamp
-    assert middles[1, 0] == pytest.approx(3.0)
-    assert words(figure).count("hinge 20 kN m") == 2
+    x, y = middles(figure, "hinges").T
+    np.testing.assert_allclose(y, 0.0, atol=1e-9)
+    assert 0.0 < min(x) < 0.3  # beside the clamp
+    assert max(x) == pytest.approx(3.0)
+    assert texts(figure).count("hinge 20 kN m") == 2
 
 
 def test_a_section_with_a_hinge_shows_it_in_all_cells_and_at_the_ends():
@@ -226,55 +179,20 @@ def test_a_section_with_a_hinge_shows_it_in_all_cells_and_at_the_ends():
     beam = ub.Beam((0, 0), (4, 0), section, cells=4)
     supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
     figure = ub.plot(ub.Scene([beam], supports=supports))
-    assert len(shapes(figure, "hinges")) == 4 + 2
-    assert words(figure) == ["dots: hinges may form, from 20 kN m", "beam"]
-
-
-def boxes(figure, gid="labels"):
-    figure.draw_without_rendering()
-    texts = [text for text in figure.axes[0].texts if text.get_gid() == gid]
-    return np.array([text.get_window_extent().extents for text in texts])
-
-
-def storeys(bays, floors):
-    """A frame with a name for each member and a load for each floor."""
-    beams, joints, loads = [], {}, []
-
-    def add(a, b, name):
-        beam = ub.Beam(a, b, STEEL, cells=2, name=name)
-        beams.append(beam)
-        for place_ in (beam.start, beam.end):
-            joints.setdefault(place_.point, []).append(place_)
-        return beam
-
-    for floor in range(floors):
-        for bay in range(bays + 1):
-            add((5.0 * bay, 3.0 * floor), (5.0 * bay, 3.0 * floor + 3), f"C{floor}{bay}")
-        for bay in range(bays):
-            add((5.0 * bay, 3.0 * floor + 3), (5.0 * bay + 5, 3.0 * floor + 3), f"B{floor}{bay}")
-        loads.append(ub.PointLoad(beams[-2 * bays - 1].end, force=(1e3 * (floor + 1), 0)))
-        loads += [ub.LineLoad(beam, force=(0, -5e3)) for beam in beams[-bays:]]
-    feet = [ub.Clamped(places[0]) for (_, y), places in joints.items() if y == 0.0]
-    joined = [ub.Rigid(*places) for places in joints.values() if len(places) > 1]
-    return ub.Scene(beams, joints=joined, supports=feet, loads=loads)
+    assert len(outlines(figure, "hinges")) == 4 + 2
+    assert texts(figure) == ["dots: hinges may form, from 20 kN m", "beam"]
 
 
 @pytest.mark.parametrize(("bays", "floors", "number"), [(1, 1, 5), (2, 3, 24), (3, 4, 44)])
 def test_labels_cover_neither_beams_nor_each_other(bays, floors, number):
     scene = storeys(bays, floors)
     figure = ub.plot(scene)
-    found = boxes(figure)
+    found, axes = boxes_of(figure, "labels"), figure.axes[0]
     assert len(found) == number  # members, a force and the line loads of each floor
-    area = areas_covered(found[:, :2], found[:, 2:], found)
-    own = np.prod(found[:, 2:] - found[:, :2], axis=1)
-    # Each box covers itself; to a square pixel, as texts have whole pixels
-    np.testing.assert_allclose(area, own, atol=1.0)
-    to_pixels = figure.axes[0].transData.transform
-    ends = np.array([np.ravel(to_pixels(np.array(b.ends))) for b in scene.beams])
-    assert lengths_inside(found[:, :2], found[:, 2:], ends).max() == 0.0
-    inside = figure.axes[0].get_window_extent().extents
-    assert (found[:, :2] > inside[:2]).all()
-    assert (found[:, 2:] < inside[2:]).all()
+    require_apart(found, axes.get_window_extent())
+    for beam in scene.beams:
+        line = Path(axes.transData.transform(beam.ends))
+        assert not any(line.intersects_bbox(box, filled=False) for box in found)
 
 
 def test_everything_is_within_the_axes():
@@ -294,20 +212,20 @@ def test_everything_is_within_the_axes():
     assert box.width / box.height == pytest.approx((right - left) / (high - low))  # one scale
 
 
-def test_a_large_scene_has_few_artists():
+def test_a_thousand_beams_have_few_artists():
     """A thousand beams are one collection; their names are left out."""
     beams = [ub.Beam((i, j), (i + 1, j), STEEL, cells=2) for i in range(40) for j in range(25)]
     chains = [ub.Rigid(a.end, b.start) for a, b in zip(beams, beams[25:], strict=False)]
     figure = ub.plot(
         ub.Scene(beams, joints=chains, loads=[ub.PointLoad(beams[0].end, force=(0, -1))])
     )
-    assert len(shapes(figure, "beams")) == 1000
-    assert len(shapes(figure, "pins")) == len(chains)
-    assert words(figure) == ["1 N"]
+    assert len(outlines(figure, "beams")) == 1000
+    assert len(outlines(figure, "pins")) == len(chains)
+    assert texts(figure) == ["1 N"]
     assert len(figure.axes[0].get_children()) < 40
 
 
-def test_a_single_body_and_a_scene_far_away():
+def test_the_axes_hold_a_single_body_also_far_away():
     for x in (0.0, 1e5):
         body = ub.Body((x, 0), mass=1.0, inertia=0.1)
         axes = ub.plot(ub.Scene(bodies=[body], loads=[ub.Gravity()])).axes[0]
@@ -331,7 +249,7 @@ def test_a_single_body_and_a_scene_far_away():
         (lambda s: ub.plot(s, magnify=10), "unexpected keyword argument 'magnify'"),
     ],
 )
-def test_refused(call, message):
+def test_wrong_arguments_of_a_model_picture_are_refused(call, message):
     with pytest.raises(ub.ArgumentError) as caught:
         call(scenes.portal())
     assert message in str(caught.value)
@@ -342,43 +260,3 @@ def test_a_scene_that_contradicts_itself_is_refused_before_it_is_drawn():
     joints = [ub.Link(ub.ground(x, y), rotor.middle) for x, y in ((1, 0), (0, 1), (1, 1))]
     with pytest.raises(ub.ArgumentError, match="constraints repeat or contradict each other"):
         ub.plot(ub.Scene(bodies=[rotor], joints=joints))
-
-
-# -- labels ------------------------------------------------------------------------------------
-
-
-def test_lengths_areas_and_crossings_are_those_of_sampling():
-    random = np.random.default_rng(4)
-    low = random.uniform(0, 3, (5, 2))
-    high = low + random.uniform(0.5, 2, (5, 2))
-    lines = np.vstack([random.uniform(0, 4, (30, 4)), [[1, 0, 1, 4]], [[0, 2, 4, 2]]])
-    parts = (np.arange(20000) + 0.5)[:, None, None] / 20000
-    points = lines[:, :2] + parts * (lines[:, 2:] - lines[:, :2])
-    lengths = np.linalg.norm(lines[:, 2:] - lines[:, :2], axis=1)
-    for k in range(5):
-        inside = ((points >= low[k]) & (points <= high[k])).all(axis=2).mean(axis=0)
-        # A sample is 1/20000 of a line of at most 5.7 m; each of 32 lines errs by two of them
-        assert lengths_inside(low, high, lines)[k] == pytest.approx(inside @ lengths, abs=0.02)
-    boxes_ = np.hstack([low, high])
-    assert areas_covered(low[:1], high[:1], boxes_[:1]) == pytest.approx(np.prod(high[0] - low[0]))
-    cross = np.array([[0, 0, 2, 2], [0, 2, 2, 0], [0, 3, 1, 3]], dtype=float)
-    np.testing.assert_array_equal(crossings(cross, cross), [1, 1, 0])
-
-
-def test_a_label_moves_away_from_lines_and_other_labels():
-    up, down = np.array([0.0, 1.0]), np.array([0.0, -1.0])
-    at = np.zeros(2)
-    label = Label("x", "k", 0, (Candidate(at, up), Candidate(at, down)))
-    half = np.array([10.0, 5.0])
-    nothing = np.empty((0, 4))
-    (one,) = place([label], [half], nothing)
-    assert one.center[1] > 0.0  # the first spot
-    line = np.array([[-20.0, 9.0, 20.0, 9.0]])
-    (one,) = place([label], [half], line)
-    assert one.center[1] < 0.0
-    first, second = place([label, label], [half, half], nothing)
-    assert first.center[1] * second.center[1] < 0.0
-    assert first.overlap == second.overlap == 0.0
-    inside = np.array([-50.0, -50.0, 50.0, 3.0])
-    (one,) = place([label], [half], nothing, inside)
-    assert one.center[1] < 0.0

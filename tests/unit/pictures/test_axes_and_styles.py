@@ -4,28 +4,13 @@
 import matplotlib as mpl
 import numpy as np
 import pytest
+from drawn import boxes_of, require_apart
 from matplotlib import pyplot as plt
 from matplotlib.colors import same_color
 from matplotlib.figure import Figure
 
 import ufl_beam as ub
 from ufl_beam.plotting.style import BLUE, INK
-
-
-@pytest.fixture(scope="module")
-def bent():
-    """A cantilever that yields, with a hinge at the clamp that opens, and its extremes."""
-    section = ub.Section(EA=1e6, GA=1e6, EI=100.0, bending=ub.ElastoPlastic(8.0, isotropic=30.0))
-    hinges = {0.0: ub.Softening(10.0, 3.0)}
-    beam = ub.Beam((0, 0), (1, 0), section, cells=4, name="arm", hinges=hinges)
-    held = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=lambda t: 0.3 * t)]
-    extremes = ub.Extremes()
-    scene = ub.Scene([beam], supports=held)
-    run = ub.simulate(
-        scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.02, record=extremes, progress=False
-    )
-    return run, extremes
-
 
 ONE_PANEL = {
     "scene": lambda s, e, **ax: ub.plot(s.scene, **ax),
@@ -42,11 +27,11 @@ ONE_PANEL = {
 
 
 @pytest.mark.parametrize("draw", ONE_PANEL.values(), ids=ONE_PANEL)
-def test_axes_of_the_user(bent, draw):
-    """The picture is in them alone, and neither size nor other axes of the figure change."""
+def test_a_picture_is_in_the_axes_of_the_user_only(damaged, extremes, draw):
+    """Neither the size nor other axes of the figure change."""
     figure = Figure(figsize=(10, 4), layout="constrained")
     left, right = figure.subplots(1, 2)
-    assert draw(*bent, ax=right) is figure
+    assert draw(damaged, extremes, ax=right) is figure
     figure.draw_without_rendering()
     assert right.has_data() or right.collections
     assert not left.has_data()
@@ -54,31 +39,26 @@ def test_axes_of_the_user(bent, draw):
     np.testing.assert_array_equal(figure.get_size_inches(), (10, 4))
 
 
-def test_axes_of_a_part_of_a_figure(bent):
+def test_axes_may_be_in_a_part_of_a_figure(damaged):
     whole = Figure(figsize=(14, 5), layout="constrained")
     axes = whole.subfigures(1, 2)[1].subplots()
-    assert ub.plot(bent[0], "damage", ax=axes) is whole
+    assert ub.plot(damaged, "damage", ax=axes) is whole
     whole.draw_without_rendering()
 
 
 @pytest.mark.parametrize("draw", ONE_PANEL.values(), ids=ONE_PANEL)
-def test_what_is_no_axes_is_refused(bent, draw):
+def test_a_figure_instead_of_axes_is_refused(damaged, extremes, draw):
     with pytest.raises(ub.ArgumentError, match=r"ax = .* must be axes of Matplotlib"):
-        draw(*bent, ax=Figure())
+        draw(damaged, extremes, ax=Figure())
 
 
-def test_what_is_drawn_fits_into_the_axes_of_the_user(bent):
-    """Labels and the legend of a diagram are inside, and the legend covers no label."""
+def test_labels_and_legend_are_within_the_axes_of_the_user(damaged):
+    """Of a diagram; the legend covers no label."""
     axes = Figure(figsize=(6, 5), layout="constrained").subplots()
-    figure = ub.plot(bent[0], "M", ax=axes)
-    figure.draw_without_rendering()
-    frame, legend = axes.get_window_extent(), axes.get_legend().get_window_extent()
-    assert axes.get_legend().get_texts()[0].get_text() == "M > 0: tension right of the arrow"
-    for text in axes.texts:
-        box = text.get_window_extent()
-        assert frame.x0 <= box.x0 < box.x1 <= frame.x1
-        assert frame.y0 <= box.y0 < box.y1 <= frame.y1
-        assert not box.overlaps(legend)
+    figure = ub.plot(damaged, "M", ax=axes)
+    boxes, legend = boxes_of(figure), axes.get_legend()
+    assert legend.get_texts()[0].get_text() == "M > 0: tension right of the arrow"
+    require_apart([*boxes, legend.get_window_extent()], axes.get_window_extent())
 
 
 def beam_of(figure):
@@ -86,9 +66,9 @@ def beam_of(figure):
     return max(figure.axes[0].lines, key=lambda line: line.get_zorder() == 4)
 
 
-def test_dark_background(bent):
+def test_colours_suit_a_dark_background(damaged):
     with plt.style.context("dark_background"):
-        dark, model = ub.plot(bent[0]), ub.plot(bent[0].scene)
+        dark, model = ub.plot(damaged), ub.plot(damaged.scene)
     for figure in (dark, model):
         assert same_color(figure.get_facecolor(), "black")
         assert same_color(figure.axes[0].get_facecolor(), "black")
@@ -96,12 +76,12 @@ def test_dark_background(bent):
         labels = figure.axes[0].get_xticklabels()
         assert all(same_color(label.get_color(), "white") for label in labels)
     assert same_color(beam_of(dark).get_color(), "white")
-    assert same_color(beam_of(ub.plot(bent[0])).get_color(), INK)
+    assert same_color(beam_of(ub.plot(damaged)).get_color(), INK)
     edges = [c.get_edgecolor() for c in model.axes[0].collections if c.get_gid() == "beams"]
     assert all(same_color(edge[0], "white") for edge in edges)
 
 
-def test_sizes_of_fonts_follow_that_of_texts(bent):
+def test_sizes_of_fonts_follow_that_of_texts(damaged):
     """Sizes of titles, ticks and labels keep their proportions."""
 
     def sizes(figure):
@@ -111,14 +91,14 @@ def test_sizes_of_fonts_follow_that_of_texts(bent):
             axes.get_xticklabels()[0].get_fontsize(), axes.texts[0].get_fontsize(),
         ])  # fmt: skip
 
-    for shown in ((bent[0], "M"), (bent[0].scene,)):
+    for shown in ((damaged, "M"), (damaged.scene,)):
         ours = sizes(ub.plot(*shown))
         with mpl.rc_context({"font.size": 26.0}):
             np.testing.assert_allclose(sizes(ub.plot(*shown)), 2.0 * ours)
 
 
-def test_other_settings_of_the_user(bent):
-    run, end = bent[0], bent[0].scene.beams[0].end
+def test_settings_of_matplotlib_are_used_and_not_changed(damaged):
+    run, end = damaged, damaged.scene.beams[0].end
     settings = {"axes.edgecolor": "red", "figure.dpi": 80, "axes.prop_cycle": mpl.cycler(color="k")}
     with mpl.rc_context(settings):
         figure = ub.plot(run, "history", end)

@@ -3,40 +3,11 @@
 
 import numpy as np
 import pytest
-import scenes
+from drawn import FRACTURE, circles, moved, outlines, static, yielding_beam
 from time_series import read_xdmf
 
 import ufl_beam as ub
-from ufl_beam.plotting.inelastic import open_hinges
 from ufl_beam.plotting.style import decimal_prefix, with_unit
-
-LIMIT, FRACTURE, YIELD = 10.0, 3.0, 8.0
-"""Moments of the hinge and of yielding, N m; fracture energy of the hinge, J."""
-
-
-@pytest.fixture(scope="module")
-def bent():
-    """A cantilever with a hinge at the clamp and four cells, which yield; its end goes to and fro.
-
-    The moment at the clamp is the largest: it yields at 8 N m, and breaks at 10 N m.
-    """
-    section = ub.Section(EA=1e6, GA=1e6, EI=100.0, bending=ub.ElastoPlastic(YIELD, isotropic=30.0))
-    law = ub.Softening(LIMIT, FRACTURE)
-    beam = ub.Beam((0, 0), (1, 0), section, cells=4, name="arm", hinges={0.0: law})
-    to_and_fro = ub.Table([0, 1, 2, 3], [0, 0.15, 0.0, 0.3])
-    held = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=to_and_fro)]
-    scene = ub.Scene([beam], supports=held)
-    return ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 3), dt=0.02)
-
-
-@pytest.fixture(scope="module")
-def elastic():
-    return ub.simulate(scenes.portal(), ub.Static(), t=(0, 1), dt=1)
-
-
-@pytest.fixture
-def arm(bent):
-    return bent.scene.beams[0]
 
 
 def path_in(axes):
@@ -51,14 +22,8 @@ def legend(figure):
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
-def circles(axes):
-    """Lines of one point each that are round, and not in the legend alone."""
-    return [x for x in axes.lines if x.get_marker() == "o" and len(x.get_xdata()) == 1]
-
-
-def test_the_scene_yields_breaks_and_turns_back(bent, arm):
-    # So that the tests below are about something
-    state = bent.material_at(arm.start)
+def test_the_run_yields_breaks_and_turns_back(damaged, arm):
+    state = damaged.material_at(arm.start)
     assert state.plastic[-1] > 0
     assert 0.1 * FRACTURE < state.hinge[-1] < 0.95 * FRACTURE
     assert np.diff(state.jump).min() < 0 < np.diff(state.jump).max()
@@ -67,13 +32,13 @@ def test_the_scene_yields_breaks_and_turns_back(bent, arm):
 # -- paths -------------------------------------------------------------------------------------
 
 
-def test_moment_curvature(bent, arm):
+def test_the_path_of_moment_and_curvature_is_that_of_the_law(damaged, arm):
     place = arm.at(0.3)
-    figure = ub.plot(bent, "moment-curvature", place)
+    figure = ub.plot(damaged, "moment-curvature", place)
     axes, bar = figure.axes
     path, pieces = path_in(axes)
-    np.testing.assert_array_equal(path[:, 0], bent.strains_at(place)[:, 2])
-    np.testing.assert_array_equal(path[:, 1], bent.material_at(place).forces[:, 2])  # of the law
+    np.testing.assert_array_equal(path[:, 0], damaged.strains_at(place)[:, 2])
+    np.testing.assert_array_equal(path[:, 1], damaged.material_at(place).forces[:, 2])  # of the law
     assert (axes.get_xlabel(), axes.get_ylabel()) == ("curvature K (1/m)", "bending moment M (N m)")
     assert axes.get_title(loc="left") == f"cell at {place}"
     assert bar.get_ylabel() == "time t (s)"
@@ -90,12 +55,9 @@ def test_units_suit_the_values_and_data_stay_in_si():
     beam = ub.Beam(
         (0, 0), (1, 0), ub.Section(1e9, 1e9, 1e6, bending=ub.ElastoPlastic(5e3)), cells=1
     )
-    scene = ub.Scene(
-        [beam],
-        supports=[ub.Clamped(beam.start)],
-        loads=[ub.PointLoad(beam.end, moment=4e3, amplitude=ub.ramp(1.0))],
-    )
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=1 / 30)
+    turn = ub.PointLoad(beam.end, moment=4e3, amplitude=ub.ramp(1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[turn])
+    solution = static(scene, dt=1 / 30)
     axes = ub.plot(solution, "moment-curvature", beam.end).axes[0]
     assert axes.get_ylabel() == "bending moment M (kN m)"
     assert axes.yaxis.get_major_formatter()(-2500.0) == "−2.5"
@@ -103,9 +65,9 @@ def test_units_suit_the_values_and_data_stay_in_si():
     assert path_in(axes)[0][-1, 1] == pytest.approx(4e3, rel=1e-9)
 
 
-def test_hinge(bent, arm):
-    state = bent.material_at(arm.start)
-    figure = ub.plot(bent, "hinge", arm.start)
+def test_the_path_of_a_hinge_has_its_jump_and_moment(damaged, arm):
+    state = damaged.material_at(arm.start)
+    figure = ub.plot(damaged, "hinge", arm.start)
     axes = figure.axes[0]
     path, _ = path_in(axes)
     np.testing.assert_array_equal(path, np.column_stack([state.jump, state.forces[:, 2]]))
@@ -117,14 +79,16 @@ def test_hinge(bent, arm):
     assert f"{spent} dissipated, {100 * state.hinge[-1] / FRACTURE:.3g} % of 3 J" in title
 
 
-def test_the_filled_area_is_the_dissipated_energy(bent, arm):
+def test_the_filled_area_is_the_dissipated_energy(damaged, arm):
     fills = [
-        c for c in ub.plot(bent, "hinge", arm.start).axes[0].collections if len(c.get_paths()) < 9
+        c
+        for c in ub.plot(damaged, "hinge", arm.start).axes[0].collections
+        if len(c.get_paths()) < 9
     ]
     outlines = [path.vertices for fill in fills for path in fill.get_paths()]
     x, M = zip(*(outline.T for outline in outlines), strict=True)
     areas = [abs(np.sum(a[:-1] * b[1:] - a[1:] * b[:-1])) / 2 for a, b in zip(x, M, strict=True)]
-    lost = bent.material_at(arm.start).hinge[-1]
+    lost = damaged.material_at(arm.start).hinge[-1]
     # The steps in which the hinge begins to open start below its limit: by the moment of one step,
     # a tenth of the limit, over a jump that is a fiftieth of the whole.
     assert sum(areas) == pytest.approx(lost, rel=0.02)
@@ -133,17 +97,17 @@ def test_the_filled_area_is_the_dissipated_energy(bent, arm):
 # -- the frame ---------------------------------------------------------------------------------
 
 
-def test_damage_colours_the_cells_that_yielded(bent, arm):
-    figure = ub.plot(bent, "damage", n=50, magnify=2)
+def test_damage_colours_the_cells_that_yielded(damaged, arm):
+    figure = ub.plot(damaged, "damage", n=50, magnify=2)
     axes, bar = figure.axes
-    (zones,) = [c for c in axes.collections if c.get_gid() == "yielded"]
-    dissipated = bent.material(arm, 50).plastic
+    dissipated = damaged.material(arm, 50).plastic
     yielded = np.flatnonzero(dissipated)
     assert 0 < len(yielded) < 4
-    rest = bent.grid.points[bent.grid.vertices_of(arm)]
-    points = rest + 2 * (bent.shape(arm, 50) - rest)
-    drawn = np.array([path.vertices for path in zones.get_paths()])
-    np.testing.assert_allclose(drawn, np.stack([points[yielded], points[yielded + 1]], axis=1))
+    rest = damaged.grid.points[damaged.grid.vertices_of(arm)]
+    points = rest + 2 * (damaged.shape(arm, 50) - rest)
+    np.testing.assert_allclose(
+        outlines(figure, "yielded"), np.stack([points[yielded], points[yielded + 1]], axis=1)
+    )
     largest = dissipated.max() / 0.25  # cells of 0.25 m
     unit, prefix = decimal_prefix(largest)
     assert bar.get_ylabel() == f"dissipated by plastic strains ({prefix}J/m)"
@@ -151,58 +115,53 @@ def test_damage_colours_the_cells_that_yielded(bent, arm):
     assert axes.get_title(loc="left") == "damage at t = 1 s, displacements × 2"
 
 
-def test_damage_marks_hinges_by_the_broken_part(bent, arm):
-    first = int(np.flatnonzero(bent.material_at(arm.start).hinge)[0])
+def test_damage_marks_hinges_by_the_broken_part(damaged, arm):
+    first = int(np.flatnonzero(damaged.material_at(arm.start).hinge)[0])
     sizes = []
     for n in (first, -1):
-        figure = ub.plot(bent, "damage", n=n)
+        figure = ub.plot(damaged, "damage", n=n)
         (mark,) = circles(figure.axes[0])
-        np.testing.assert_allclose(mark.get_xydata()[0], bent.shape(arm, n)[0])
+        np.testing.assert_allclose(mark.get_xydata()[0], damaged.shape(arm, n)[0])
         assert mark.get_markerfacecolor() != "white"
         assert legend(figure) == ["hinge, 10 % broken", "50 %", "fully open"]
         sizes.append(mark.get_markersize())
     assert sizes[0] < sizes[1]
-    (hinge,) = open_hinges(bent, -1, bent.grid.points)
-    assert hinge.beam is arm
-    np.testing.assert_array_equal(hinge.at, (0, 0))
-    assert hinge.part == bent.material_at(arm.start).hinge[-1] / FRACTURE
 
 
-def test_no_marks_before_anything_happens(bent):
-    figure = ub.plot(bent, "damage", n=0)
+def test_there_are_no_marks_before_damage(damaged):
+    figure = ub.plot(damaged, "damage", n=0)
     assert len(figure.axes) == 1  # no colour bar
-    assert not [c for c in figure.axes[0].collections if c.get_gid() == "yielded"]
+    assert not outlines(figure, "yielded")
     assert not circles(figure.axes[0])
     assert not figure.legends
 
 
 @pytest.mark.parametrize("law", [ub.Softening(0.0, 1.0), ub.LinearSoftening(1.0, 1e-2)])
-def test_what_is_fully_open_is_hollow(law):
+def test_a_fully_open_hinge_is_hollow(law):
     """A hinge without resistance, and one of linear softening turned beyond 2 G/M = 0.02.
 
     The end does not turn, so that what is left is no mechanism.
     """
     section = ub.Section(EA=1e6, GA=1e6, EI=100.0)
     beam = ub.Beam((0, 0), (1, 0), section, cells=2, hinges={0.0: law})
-    held = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=lambda t: 0.1 * t, psi=0)]
-    scene = ub.Scene([beam], supports=held)
+    scene = moved(beam, v=lambda t: 0.1 * t, psi=0)
     solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.05)
     (mark,) = circles(ub.plot(solution, "damage").axes[0])
     assert mark.get_markerfacecolor() == "white"
 
 
 @pytest.mark.parametrize("what", ["shape", "M"])
-def test_diagrams_mark_hinges_and_yielded_cells(bent, arm, what):
-    figure = ub.plot(bent, what, n=50)
+def test_diagrams_mark_hinges_and_yielded_cells(damaged, arm, what):
+    figure = ub.plot(damaged, what, n=50)
     axes = figure.axes[0]
     (mark,) = circles(axes)
-    np.testing.assert_allclose(mark.get_xydata()[0], bent.shape(arm, 50)[0])
-    ends = bent.shape(arm, 50)
-    (zone,) = np.flatnonzero(bent.material(arm, 50).plastic)
+    np.testing.assert_allclose(mark.get_xydata()[0], damaged.shape(arm, 50)[0])
+    ends = damaged.shape(arm, 50)
+    (zone,) = np.flatnonzero(damaged.material(arm, 50).plastic)
     bands = [line.get_xydata() for line in axes.lines if line.get_linewidth() > 5]
     np.testing.assert_allclose(bands, [ends[zone : zone + 2]])
     assert legend(figure)[-2:] == ["yielded or cracked", "hinge, open"]
-    nothing_yet = ub.plot(bent, what, n=1)
+    nothing_yet = ub.plot(damaged, what, n=1)
     assert not circles(nothing_yet.axes[0])
     assert not any(line.get_linewidth() > 5 for line in nothing_yet.axes[0].lines)
 
@@ -211,9 +170,7 @@ def test_cracks_of_fibres_are_damage():
     law = ub.Fibres(ub.ElastoPlastic(np.inf), number=4, softening=ub.Softening(1e6, 100.0))
     section = ub.Section.rectangle(b=0.1, h=0.2, E=30e9, nu=0.2, fibres=law)
     beam = ub.Beam((0, 0), (1, 0), section, cells=1)
-    held = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, u=lambda t: 1e-4 * t)]
-    scene = ub.Scene([beam], supports=held)
-    solution = ub.simulate(scene, ub.Static(), t=(0, 1), dt=0.1)
+    solution = static(moved(beam, u=lambda t: 1e-4 * t), dt=0.1)
     axes, bar = ub.plot(solution, "damage").axes
     assert bar.get_ylabel() == "dissipated by plastic strains and cracks (J/m)"
     # One cell of 1 m: its energy is the upper end of the bar
@@ -224,17 +181,17 @@ def test_cracks_of_fibres_are_damage():
 # -- the ledger --------------------------------------------------------------------------------
 
 
-def test_dissipation(bent):
-    figure = ub.plot(bent, "dissipation")
+def test_dissipation_stacks_the_losses_of_the_ledger(damaged):
+    figure = ub.plot(damaged, "dissipation")
     (axes,) = figure.axes
-    energy = bent.energy
-    lower = np.zeros_like(bent.times)
+    energy = damaged.energy
+    lower = np.zeros_like(damaged.times)
     assert len(axes.collections) == len(energy.lost) == 3
     for area, (name, lost) in zip(axes.collections, energy.lost.items(), strict=True):
         assert area.get_label() == f"lost: {name}"
         (outline,) = [path.vertices for path in area.get_paths()]
         for bound in (lower, lower + lost):
-            points = np.column_stack([bent.times, bound])
+            points = np.column_stack([damaged.times, bound])
             # The outline holds them to the rounding of the sum
             apart = np.abs(outline[None] - points[:, None]).sum(axis=2).min(axis=1)
             assert apart.max() <= 1e-14 * energy.throughput
@@ -250,7 +207,7 @@ def test_dissipation(bent):
     assert set(legend(figure)) == {*drawn, *(f"lost: {name}" for name in energy.lost)}
 
 
-def test_dissipation_says_what_was_there_at_the_start():
+def test_dissipation_adds_the_energy_at_the_start():
     section = ub.Section(1e4, 1e4, 100.0, rhoA=1.0, rhoI=0.01, bending=ub.ElastoPlastic(1e3))
     beam = ub.Beam((0, 0), (1, 0), section, cells=1)
     thrown = ub.Scene([beam], initial=[ub.Velocity((beam,), (1.0, 0.0))])
@@ -264,11 +221,8 @@ def test_dissipation_says_what_was_there_at_the_start():
 
 
 def test_xdmf_holds_jumps_and_dissipated_energies(shared_path, on_first_rank):
-    section = ub.Section(EA=1e6, GA=1e6, EI=100.0, bending=ub.ElastoPlastic(YIELD, isotropic=30.0))
-    law = ub.Softening(LIMIT, FRACTURE)
-    beam = ub.Beam((0, 0), (1, 0), section, cells=4, hinges={0.0: law})
-    held = [ub.Clamped(beam.start), ub.PrescribedDisplacement(beam.end, v=lambda t: 0.1 * t)]
-    scene = ub.Scene([beam], supports=held)
+    beam = yielding_beam()
+    scene = moved(beam, v=lambda t: 0.1 * t)
     file = ub.XDMF(shared_path / "run.xdmf")
     solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.1, record=file)
 
@@ -296,24 +250,20 @@ def test_xdmf_holds_jumps_and_dissipated_energies(shared_path, on_first_rank):
         lambda s: ub.plot(s, "dissipation"),
     ],
 )
-def test_elastic_scenes_are_refused(elastic, draw):
+def test_elastic_scenes_are_refused(portal, draw):
     with pytest.raises(ub.ArgumentError, match="nothing in the scene yields or breaks"):
-        draw(elastic)
+        draw(portal)
 
 
-def test_elastic_scenes_have_no_open_hinges(elastic):
-    assert open_hinges(elastic, -1, elastic.grid.points) == []
-
-
-def test_a_cell_without_a_hinge_is_refused(bent, arm):
+def test_a_cell_without_a_hinge_is_refused(damaged, arm):
     with pytest.raises(ub.ArgumentError, match=r"plot: neither arm.at\(0.9\).*has a hinge"):
-        ub.plot(bent, "hinge", arm.at(0.9))
+        ub.plot(damaged, "hinge", arm.at(0.9))
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [({"n": 200}, "n = 200: the solution kept 151 times"), ({"magnify": 0}, "magnify = 0")],
 )
-def test_damage_refuses(bent, options, message):
+def test_wrong_arguments_of_damage_are_refused(damaged, options, message):
     with pytest.raises(ub.ArgumentError, match=message):
-        ub.plot(bent, "damage", **options)
+        ub.plot(damaged, "damage", **options)

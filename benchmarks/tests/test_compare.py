@@ -2,16 +2,9 @@
 """Benchmarks of two commits side by side: the table of ratios, and a run in a small repository."""
 
 import subprocess
-import sys
-from pathlib import Path
-
-import pytest
-
-sys.path.append(str(Path(__file__).parents[2] / "benchmarks"))
 
 import compare
-
-pytestmark = pytest.mark.serial  # files and git
+import pytest
 
 BENCHMARK = """
 import json, pathlib

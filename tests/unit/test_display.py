@@ -1,23 +1,73 @@
 # SPDX-License-Identifier: MIT
-"""Models and results in notebooks: text, tables, and pictures that are drawn when shown."""
+"""Models and results at prompts, in one line, and in notebooks: tables and pictures.
 
+The lines of all public classes are checked in test_examples.py.
+"""
+
+import math
 import re
 import subprocess
 import sys
 from base64 import b64decode
+from fractions import Fraction
 from io import BytesIO
+from typing import NamedTuple
 
 import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.display import html_of
+from ufl_beam.display import counted, html_of, one_line
+from ufl_beam.model.supports import still
 from ufl_beam.plotting import plots
 
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 BEAM = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
 FORCE = ub.PointLoad(BEAM.end, force=(0, -1e5), amplitude=lambda t: t)
 SCENE = ub.Scene([BEAM], supports=[ub.Clamped(BEAM.start)], loads=[FORCE])
+
+
+# -- one line ----------------------------------------------------------------------------------
+
+
+class Pair(NamedTuple):
+    """Two things, of which the second has a default."""
+
+    first: object
+    second: object = 1.0
+
+
+def test_empty_fields_and_default_values_are_left_out():
+    assert one_line(Pair(2)) == "Pair(first=2)"
+    assert one_line(Pair({}, 2)) == "Pair(second=2)"
+    assert repr(ub.Newton()) == "Newton()"
+    assert repr(ub.Newton(rtol=1e-8)) == "Newton(rtol=1e-08)"
+
+
+def test_numbers_have_six_digits():
+    assert one_line(Pair(math.pi, np.float64(1) / 3)) == "Pair(first=3.14159, second=0.333333)"
+    assert one_line(Pair((0.1 + 0.2, 1))) == "Pair(first=(0.3, 1))"
+    assert repr(ub.Mesh(refine=Fraction(3, 2))) == "Mesh(refine=3/2)"
+
+
+def test_functions_have_their_names():
+    assert one_line(Pair(still)) == "Pair(first=still)"
+
+
+def test_long_arrays_have_their_shapes():
+    assert one_line(Pair(np.arange(3.0))) == "Pair(first=[0, 1, 2])"
+    assert one_line(Pair(np.zeros((9, 3)))) == "Pair(first=array of shape (9, 3))"
+    assert one_line(Pair([*range(9)])) == "Pair(first=[0, 1, 2, 3, 4, 5, ...])"
+
+
+def test_parts_of_a_scene_are_counted():
+    assert counted((1, "body", "bodies"), (0, "joint", "joints"), (2, "load", "loads")) == (
+        "1 body, 2 loads"
+    )
+    assert repr(ub.Scene(bodies=[ub.Body((0, 0), mass=1.0, inertia=1.0)])) == "<Scene: 1 body>"
+
+
+# -- pages in notebooks ------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +100,7 @@ def test_a_scene_is_drawn():
 
 
 @pytest.mark.serial
-def test_a_solution_has_its_text_ledger_and_shapes(solution):
+def test_a_solution_has_its_text_its_ledger_and_shapes(solution):
     page = solution._repr_html_()
     for line in solution.summary():
         assert line in page

@@ -1,32 +1,20 @@
 # SPDX-License-Identifier: MIT
 """The benchmark of `make accelerations`: what it switches off, compares and writes."""
 
-import sys
 from pathlib import Path
 
+import accelerations
+import bench_accelerations as bench
 import pytest
+import switches
 
 import ufl_beam as ub
 
 ROOT = Path(__file__).parents[2]
 
-pytestmark = pytest.mark.serial
-
-
-@pytest.fixture(scope="module")
-def bench():
-    """The benchmark, whose modules import each other by their names."""
-    with pytest.MonkeyPatch.context() as patch:
-        patch.syspath_prepend(str(ROOT / "benchmarks"))
-        import bench_accelerations
-
-        yield bench_accelerations
-    for name in ("bench_accelerations", "accelerations", "switches", "bench_step", "records"):
-        sys.modules.pop(name, None)
-
 
 @pytest.fixture
-def advanced(bench):
+def advanced():
     """Simulation of a variant by name, some large steps after the start of the elastic scene."""
     runs = []
 
@@ -41,7 +29,7 @@ def advanced(bench):
 
 
 @pytest.mark.parametrize("scene", ["elastic", "large", "swing", "hinged", "jointed"])
-def test_all_variants_reach_the_same_state(bench, scene):
+def test_all_variants_reach_the_same_state(scene):
     runs = bench.compared(scene, 8)
     assert list(runs) == bench.variants(scene)
     iterations = {name: run.simulation.iterations for name, run in runs.items()}
@@ -51,7 +39,7 @@ def test_all_variants_reach_the_same_state(bench, scene):
         run.simulation.close()
 
 
-def test_the_scenes_have_what_they_are_for(bench):
+def test_points_open_and_couplings_dissipate_in_the_scenes():
     run = bench.Run(bench.SHIPPED, bench.hinged_beam(8), 0.01)
     run.advance(150)
     assert (run.simulation.inelastic[0].points["opening"] > 0).sum() > 1
@@ -64,37 +52,47 @@ def test_the_scenes_have_what_they_are_for(bench):
     assert len(jointed.simulation.scene.beams) == 4
 
 
-def test_a_variant_that_computes_something_else_is_found(bench, monkeypatch):
+def test_a_variant_with_another_result_is_refused(monkeypatch):
     wrong = bench.VARIANTS["cell by cell"]._replace(newton={"rtol": 1e-3})
     monkeypatch.setitem(bench.VARIANTS, "cell by cell", wrong)
     with pytest.raises(RuntimeError, match="elastic, 8 cells: cell by cell is off by"):
         bench.compared("elastic", 8)
 
 
-def test_what_is_switched_off(bench, advanced):
-    import switches
-
-    def snes(simulation):
-        return simulation.solver._snes.getType()
-
-    shipped = advanced(switches.SHIPPED)
-    assert snes(shipped) == "shell"
-    assert shipped.beams[0]._force.cells.lanes > 1
-    assert shipped.solver._factors._elimination.c.chains == 2  # from both ends
-    assert snes(advanced(switches.PETSC)) == "newtonls"
-    assert advanced(switches.SCALAR).beams[0]._force.cells.lanes == 1
-    whole = advanced(switches.WHOLE)
-    assert snes(whole) == "shell"
-    assert whole.solver._factors._elimination.c.left_size == len(whole.q)
-    assert shipped.equation.c.fronts
-    assert not advanced(switches.LEFT).equation.c.fronts
-    assert shipped.prediction.c.second
-    assert not advanced(switches.VELOCITY).prediction.c.second
+def state_of(simulation):
+    """Type of Newton's method, and whether SIMD, chains, fronts and prediction are in use."""
+    elimination = simulation.solver._factors._elimination.c
+    return {
+        "newton": simulation.solver._snes.getType(),
+        "SIMD": simulation.beams[0]._force.cells.lanes > 1,
+        "two ends": elimination.chains == 2,
+        "no chains": elimination.left_size == len(simulation.q),
+        "fronts": bool(simulation.equation.c.fronts),
+        "second order": bool(simulation.prediction.c.second),
+    }
 
 
-def test_kept_tangents_are_switched_off(bench):
-    import switches
+def test_variants_switch_off_one_acceleration_and_leave_the_package_as_it_was(advanced):
+    shipped = state_of(advanced(switches.SHIPPED))
+    assert shipped == {
+        "newton": "shell", "SIMD": True, "two ends": True, "no chains": False, "fronts": True,
+        "second order": True,
+    }  # fmt: skip
+    for variant, change in {
+        switches.PETSC: {"newton": "newtonls"},
+        switches.SCALAR: {"SIMD": False},
+        switches.WHOLE: {"no chains": True},
+        switches.LEFT: {"fronts": False},
+        switches.VELOCITY: {"second order": False},
+    }.items():
+        found = state_of(advanced(variant))
+        assert {key: found[key] for key in change} == change
+    for variant in switches.VARIANTS:
+        advanced(variant)
+    assert state_of(advanced(switches.SHIPPED)) == shipped
 
+
+def test_kept_tangents_are_switched_off():
     def kept(name):
         run = bench.Run(name, bench.flying_beam(8), 0.1)
         found = 0
@@ -108,19 +106,6 @@ def test_kept_tangents_are_switched_off(bench):
     assert kept(switches.TANGENTS)[0] == 0
 
 
-def test_nothing_stays_replaced(bench, advanced):
-    import switches
-
-    for name in switches.VARIANTS:
-        advanced(name)
-    simulation = advanced(switches.SHIPPED)
-    assert simulation.solver._snes.getType() == "shell"
-    assert simulation.beams[0]._force.cells.lanes > 1
-    assert simulation.solver._factors._elimination.c.chains == 2
-    assert simulation.equation.c.fronts
-    assert simulation.prediction.c.second
-
-
 # -- gains and lines -------------------------------------------------------------------------------
 
 
@@ -132,7 +117,7 @@ def case(variant, times, scene="elastic", cells=8):
     }  # fmt: skip
 
 
-def cases(bench, factors):
+def cases(factors):
     """Cases of all scenes; one round is ten times as slow, for all variants alike."""
     return [
         case(name, [f, 10 * f, 1.1 * f], scene, cells)
@@ -143,24 +128,22 @@ def cases(bench, factors):
     ]
 
 
-def test_gains_are_ratios_within_a_round(bench):
-    found = bench.gains(cases(bench, {"as shipped": 1.0, "cell by cell": 1.5}))
+def test_gains_are_ratios_within_a_round():
+    found = bench.gains(cases({"as shipped": 1.0, "cell by cell": 1.5}))
     assert found["SIMD kernels"]["elastic", 64] == pytest.approx(1.5)
     assert found["dense fronts"]["hinged", 8] == pytest.approx(2.0)
     assert {scene for scene, _ in found["SIMD kernels"]} == {"elastic", "hinged", "jointed"}
 
 
-def test_what_gains_too_little_is_to_be_deleted(bench):
-    found = bench.gains(cases(bench, {"as shipped": 1.0, "cell by cell": 1.09}))
+def test_accelerations_of_little_gain_are_marked():
+    found = bench.gains(cases({"as shipped": 1.0, "cell by cell": 1.09}))
     rows = {row.split(" | ")[0][2:]: row for row in bench.summary(found).splitlines()}
     assert "to be deleted" in rows["SIMD kernels"]
     assert "| 1.09 | 1.09 |" in rows["SIMD kernels"]
     assert "to be deleted" not in rows["dense fronts"]
 
 
-def test_lines_of_code(bench):
-    import accelerations
-
+def test_lines_of_code_are_counted_once():
     for one in accelerations.ACCELERATIONS.values():
         for place in one.code:
             assert accelerations.lines_of(place)
@@ -176,11 +159,11 @@ def test_lines_of_code(bench):
             accelerations.lines_of(gone)
 
 
-def test_the_page(bench, tmp_path):
+def test_the_page_has_a_table_for_each_key(tmp_path):
     page = tmp_path / "page.md"
     text = bench.PAGE.read_text(encoding="utf-8")
     page.write_text(text, encoding="utf-8")
-    bench.write(page, cases(bench, {"as shipped": 1.0}), 90)
+    bench.write(page, cases({"as shipped": 1.0}), 90)
     written = page.read_text(encoding="utf-8")
     for key in ("summary", "gains, jointed", "times, large"):
         inside = written.split(f"<!-- {key} -->\n")[1].split(f"<!-- end of {key} -->")[0]
@@ -193,7 +176,7 @@ def test_the_page(bench, tmp_path):
 
 
 @pytest.mark.parametrize("scene", ["large", "hinged"])
-def test_times_of_a_small_scene(bench, scene):
+def test_times_have_a_row_for_each_variant(scene):
     found = list(bench.measure(scene, 8, rounds=2, steps=1))
     assert [case["variant"] for case in found] == bench.variants(scene)
     assert all(len(case["times"]) == 2 and case["us_min"] > 0 for case in found)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""First lines of docstrings, links between pages, and public names in the documentation."""
+"""Docstrings, links between pages, public names on the pages, and lines of licence."""
 
 import ast
 import re
@@ -40,7 +40,7 @@ DOCSTRINGS = {
 }
 
 
-def test_docstrings_say_something():
+def test_docstrings_have_more_than_three_words():
     assert len(DOCSTRINGS) > 500
     assert {name: text for name, text in DOCSTRINGS.items() if len(text.split()) <= 3} == {}
 
@@ -52,7 +52,7 @@ def test_docstrings_begin_with_a_noun_or_a_verb():
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_relative_links_lead_somewhere(page):
+def test_targets_of_links_exist(page):
     text = page.read_text(encoding="utf-8")
     for target in re.findall(r"\]\(([^)#\s]+)[^)]*\)", text):
         if not target.startswith("http"):
@@ -60,7 +60,7 @@ def test_relative_links_lead_somewhere(page):
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
-def test_pages_name_what_exists(page):
+def test_files_and_names_on_the_pages_exist(page):
     """Files in code font, and names of the package."""
     text = page.read_text(encoding="utf-8")
     for name in re.findall(r"`(?:[\w/]+/)?(\w+\.(?:py|c|h))`", text):
@@ -74,3 +74,30 @@ def test_public_names_are_documented():
     pages = [page for page in PAGES if page.name == "README.md" or page.parent.name == "docs"]
     words = {word for page in pages for word in re.findall(r"\w+", page.read_text("utf-8"))}
     assert [name for name in [*ub.__all__, *ub.RESULTS] if name not in words] == []
+
+
+def test_public_names_belong_to_the_package():
+    assert len(set(ub.__all__)) == len(ub.__all__)
+    for name in ub.__all__:
+        thing = getattr(ub, name)
+        module = thing.__name__ if name == "law_functions" else thing.__module__
+        assert module.startswith("ufl_beam."), name
+
+
+SOURCES = [
+    path
+    for folder in ("ufl_beam", "tests", "demos", "benchmarks")
+    for path in sorted((ROOT / folder).rglob("*"))
+    if path.suffix in {".py", ".c", ".h"} and "output" not in path.parts
+]
+
+
+def test_sources_state_their_licence():
+    """In the first line; demos, whose first cell is text, in that of their first cell of code."""
+    licence = "SPDX-License-Identifier: MIT"
+    for path in SOURCES:
+        text = path.read_text(encoding="utf-8")
+        if text.startswith("# %% [markdown]"):
+            text = text.partition("\n# %%\n")[2]
+        first = text.partition("\n")[0]
+        assert first in (f"# {licence}", f"/* {licence} */"), path

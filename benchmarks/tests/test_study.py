@@ -1,17 +1,13 @@
 # SPDX-License-Identifier: MIT
 """What `make study` says follows from its numbers; the runs themselves are not made here."""
 
-import importlib.util
 import json
 import math
 from pathlib import Path
 
+import advice
 import pytest
-
-PATH = Path(__file__).parents[2] / "benchmarks" / "study" / "advice.py"
-spec = importlib.util.spec_from_file_location("study_advice", PATH)
-advice = importlib.util.module_from_spec(spec)
-spec.loader.exec_module(advice)
+import records
 
 
 def run(scheme, seconds, error, degree=1):
@@ -41,7 +37,7 @@ CASE = {
 @pytest.mark.parametrize(
     ("target", "scheme", "seconds"), [(1e-2, "A", 1.0), (1e-3, "A", 2.0), (1e-4, "B", 5.0)]
 )
-def test_the_cheapest(target, scheme, seconds):
+def test_the_cheapest_run_within_an_error_is_found(target, scheme, seconds):
     best = advice.cheapest(CASE, target)
     assert (best["scheme"], best["seconds"]) == (scheme, seconds)
 
@@ -51,7 +47,7 @@ def test_errors_that_the_reference_cannot_tell_are_not_claimed():
     assert advice.cheapest(CASE, 1e-5) is None
 
 
-def test_what_to_choose():
+def test_advice_compares_schemes_by_time():
     (line,) = advice.advice([CASE])
     assert "an error of 0.001 takes 2 s with A, 100 steps, 8 cells; " in line
     assert "B as long" in line
@@ -61,7 +57,7 @@ def test_what_to_choose():
     assert "no run comes near the reference" in none
 
 
-def test_the_table_over_scenes():
+def test_the_table_has_means_over_scenes():
     slower = {**CASE, "runs": [run("A", 4.0, 5e-4), run("B", 1.0, 5e-4)]}
     rows = {line.split(" | ")[0]: line for line in advice.overall([CASE, slower])}
     # Means of 1 and 4 for A, of 1.1 and 1 for B
@@ -71,10 +67,7 @@ def test_the_table_over_scenes():
 
 
 def test_results_have_a_line_for_each_record():
-    spec = importlib.util.spec_from_file_location("records", PATH.parents[1] / "records.py")
-    records = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(records)
-    text = (PATH.parents[1] / "results" / "study.json").read_text(encoding="utf-8")
+    text = (Path(__file__).parents[1] / "results" / "study.json").read_text(encoding="utf-8")
     study = json.loads(text)
     assert records.in_lines(study) + "\n" == text
     rows = sum(len(case["runs"]) + len(case["dials"]) for case in study["cases"])

@@ -1,0 +1,187 @@
+# SPDX-License-Identifier: MIT
+"""Pictures and films by PyVista: what they show, without a screen."""
+
+import os
+import shutil
+import sys
+
+import numpy as np
+import pytest
+from drawn import FIRST, static
+
+import ufl_beam as ub
+from ufl_beam.plotting import films
+
+
+@pytest.fixture
+def no_screen(monkeypatch):
+    pyvista = pytest.importorskip("pyvista")
+    if tuple(pyvista.vtk_version_info) < (9, 4) and shutil.which("Xvfb") is None:
+        pytest.skip("neither Xvfb nor a VTK that draws without a screen")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    yield
+    assert "DISPLAY" not in os.environ
+
+
+def require_a_frame(path):
+    """The first rank writes a picture; between the time and the bar of colours is the frame."""
+    from matplotlib.image import imread
+
+    assert path.exists() == FIRST
+    if FIRST:
+        picture = imread(path)
+        assert picture.shape[:2] == (200, 320)
+        assert np.count_nonzero(picture[30:160, :, :3].min(axis=-1) < 0.8) > 300
+
+
+@pytest.mark.usefixtures("no_screen")
+@pytest.mark.parametrize("color", ["M", "rotation"])
+def test_a_frame_is_rendered(swing, tmp_path, color):
+    path = tmp_path / "swing.png"
+    ub.render(swing, path, quantity=color, thickness=20, size=(320, 200))
+    require_a_frame(path)
+
+
+@pytest.mark.usefixtures("no_screen")
+@pytest.mark.parametrize("degree", [1, 3])
+@pytest.mark.parametrize("color", ["M", "rotation"])
+def test_hinges_and_inner_nodes_are_rendered(tmp_path, color, degree):
+    """The vertices of a beam are not one after the other then."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e3)
+    beam = ub.Beam((0, 0), (2, 0), section, cells=4, hinges={0.5: ub.Softening(50.0, 20.0)})
+    force = ub.PointLoad(beam.end, force=(0, -40), amplitude=ub.ramp(1.0))
+    scene = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[force])
+    path = tmp_path / "hinged.png"
+    ub.render(static(scene, mesh=ub.Mesh(degree=degree)), path, quantity=color, size=(320, 200))
+    require_a_frame(path)
+
+
+def frames_of(film):
+    """Images of a GIF, (n, height, width, 3), and their durations in ms."""
+    from PIL import Image, ImageSequence
+
+    with Image.open(film) as gif:
+        shown = [
+            (np.asarray(f.convert("RGB")), f.info["duration"]) for f in ImageSequence.Iterator(gif)
+        ]
+    images, durations = zip(*shown, strict=True)
+    return np.array(images), list(durations)
+
+
+@pytest.mark.usefixtures("no_screen")
+def test_a_front_camera_follows_a_place(tmp_path):
+    bar = ub.Section(EA=1e4, GA=1e4, EI=10.0, rhoA=1.0, rhoI=1e-3)
+    beam = ub.Beam((0, 0), (1, 0), bar)
+    scene = ub.Scene(beams=[beam], initial=[ub.Velocity([beam], linear=(0.0, 3.0))])
+    flight = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 1), dt=0.25)
+    camera = ub.Camera((0, 0, -1), follow=beam.at(0.5), width=2.0)
+    film = ub.animate(
+        flight, tmp_path / "flight.gif", fps=4, seconds=1, thickness=3, camera=camera,
+        size=(400, 200),
+    )  # fmt: skip
+    assert os.fspath(film) == str(tmp_path / "flight.gif")
+    if FIRST:
+        for frame in frames_of(film)[0]:
+            # The beam is half as wide as the picture, and in the middle of it.
+            dark = np.flatnonzero(frame[60:140].min(axis=(0, 2)) < 240)
+            np.testing.assert_allclose([dark[0], dark[-1]], [100, 300], atol=3)
+        assert film._repr_html_().startswith('<img alt="flight"')
+
+
+@pytest.mark.usefixtures("no_screen")
+def test_a_camera_sees_the_whole_motion_and_stands_still(swing, tmp_path):
+    path = tmp_path / "swing.gif"
+    ub.animate(swing, path, fps=10, seconds=0.5, quantity="N", magnify=3, size=(240, 160))
+    assert path.exists() == FIRST
+    if FIRST:
+        frames, durations = frames_of(path)
+        assert durations == [100] * 5
+        assert frames.shape[:3] == (5, 160, 240)
+        middle = frames[:, 25:130].astype(float).mean(axis=-1)
+        assert np.abs(middle[-1] - middle[0]).max() > 50  # it moves
+        edge = np.concatenate([middle[:, :, :2], middle[:, :, -2:]], axis=2)
+        assert edge.min() > 240  # and stays within the picture
+        bar = frames[:, 150:].astype(float)
+        assert np.abs(bar - bar[0]).max() < 40  # one scale of colours; GIF has 256 of them
+
+
+@pytest.mark.usefixtures("no_screen")
+def test_bodies_without_beams_move_in_a_film(engine, tmp_path):
+    path = tmp_path / "engine.gif"
+    ub.animate(engine, path, fps=10, seconds=0.4, size=(320, 160))
+    assert path.exists() == FIRST
+    if FIRST:
+        frames = frames_of(path)[0].astype(float).mean(axis=-1)[:, 25:]
+        assert len(frames) == 4
+        assert np.count_nonzero(frames[0] < 200) > 500  # bodies, and all that is on them
+        assert np.count_nonzero(np.abs(frames[-1] - frames[0]) > 50) > 100  # they move
+        edge = np.concatenate([frames[:, :, :2], frames[:, :, -2:]], axis=2)
+        assert edge.min() > 240  # and stay within the picture
+
+
+def images(count):
+    return iter(np.full((count, 15, 21, 3), 200, np.uint8))
+
+
+def test_ffmpeg_writes_mp4(tmp_path):
+    try:
+        films.write_mp4(tmp_path / "a.mp4", images(3), fps=10)
+    except ImportError as error:
+        pytest.skip(str(error))
+    film = ub.Film(tmp_path / "a.mp4")
+    with open(film, "rb") as file:
+        assert file.read(12)[4:8] == b"ftyp"
+    assert '<video controls loop style="max-width: 100%" src="data:video/mp4;base64,AAAA' in (
+        film._repr_html_()
+    )
+
+
+def test_the_message_of_ffmpeg_is_passed_on(tmp_path, monkeypatch):
+    program = tmp_path / "ffmpeg"
+    program.write_text("#!/bin/sh\necho no such codec >&2\nexit 3\n")
+    program.chmod(0o755)
+    monkeypatch.setattr(films, "_ffmpeg", lambda: str(program))
+    with pytest.raises(RuntimeError, match="ffmpeg: no such codec"):
+        films.write_mp4(tmp_path / "a.mp4", images(2000), fps=10)
+
+
+def test_an_interrupted_film_leaves_no_file(tmp_path, monkeypatch):
+    program = tmp_path / "ffmpeg"
+    program.write_text('#!/bin/sh\nfor last; do :; done\ncat > "$last"\n')
+    program.chmod(0o755)
+    monkeypatch.setattr(films, "_ffmpeg", lambda: str(program))
+
+    def interrupted():
+        yield from images(3)
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        films.write_mp4(tmp_path / "a.mp4", interrupted(), fps=10)
+    assert not (tmp_path / "a.mp4").exists()
+
+
+@pytest.mark.skipif(not FIRST, reason="only the first process makes pictures of bodies")
+@pytest.mark.parametrize(
+    ("missing", "path", "message"),
+    [
+        ("pyvista", "a.gif", r"pip install ufl_beam\[view\]"),
+        ("imageio_ffmpeg", "a.mp4", "pip install imageio-ffmpeg, or: apt-get install ffmpeg"),
+    ],
+)
+@pytest.mark.usefixtures("no_screen")
+def test_a_missing_package_is_named(portal, tmp_path, monkeypatch, missing, path, message):
+    monkeypatch.setitem(sys.modules, missing, None)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(ImportError, match=message):
+        ub.animate(portal, tmp_path / path)
+    assert not (tmp_path / path).exists()
+
+
+@pytest.mark.skipif(not FIRST, reason="only the first process makes pictures of bodies")
+def test_a_missing_screen_is_an_error(portal, tmp_path, monkeypatch):
+    pyvista = pytest.importorskip("pyvista")
+    monkeypatch.setattr(pyvista, "vtk_version_info", (9, 3, 0))
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    with pytest.raises(RuntimeError, match="apt-get install xvfb"):
+        ub.render(portal, tmp_path / "a.png")

@@ -1,0 +1,381 @@
+# SPDX-License-Identifier: MIT
+"""Diagrams, shapes, histories and energies: values, units, labels, and refused arguments."""
+
+import math
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import scenes
+from drawn import FIRST, boxes_of, middles, outlines, require_apart, static, storeys, texts
+from matplotlib.path import Path
+
+import ufl_beam as ub
+from ufl_beam.plotting.style import BLUE, RED, WHITE, decimal_prefix, number, with_unit
+
+UNIT = {"N": "N", "V": "N", "M": "N m"}
+
+
+def values_of(solution, what):
+    """What diagrams show along each beam."""
+    return [getattr(solution.diagram(beam), what) for beam in solution.scene.beams]
+
+
+def chains(axes):
+    """Lines of a picture, each in its pieces, without symbols."""
+    lines = [x.get_xydata() for x in axes.lines if x.get_linestyle() != "None"]
+    ends = [np.flatnonzero(np.isnan(x[:, 0])) for x in lines]
+    return [
+        [c[np.isfinite(c[:, 0])] for c in np.split(x, k)] for x, k in zip(lines, ends, strict=True)
+    ]
+
+
+def areas_of(figure):
+    """Outlines of the areas of a diagram, each closed; m."""
+    return outlines(figure, RED) + outlines(figure, BLUE)
+
+
+def test_the_shape_has_all_beams_where_they_are(swing):
+    figure = ub.plot(swing)
+    axes, scene = figure.axes[0], swing.scene
+    undeformed, _, deformed, *_ = chains(axes)
+    assert len(undeformed) == len(scene.beams)
+    for chain, beam in zip(deformed, scene.beams, strict=True):
+        np.testing.assert_array_equal(chain, swing.shape(beam))
+    assert len(outlines(figure, "pins", fill=WHITE)) == len(scene.joints)
+    at = [swing.position(mass.place)[-1] for mass in scene.masses]
+    np.testing.assert_allclose(middles(figure, "masses"), at, atol=1e-12)
+    assert axes.get_aspect() == 1.0
+    assert (axes.get_xlabel(), axes.get_ylabel()) == ("x (m)", "y (m)")
+    assert axes.get_title(loc="left") == "shape at t = 0.1 s"
+    assert not areas_of(figure)
+
+
+def in_a_row(count, length):
+    """Picture of beams in one line, rigidly joined."""
+    ends = np.linspace(0.0, length, count + 1)
+    beams = [ub.Beam((a, 0), (b, 0), scenes.SLENDER) for a, b in pairwise(ends)]
+    joints = [ub.Rigid(a.end, b.start) for a, b in pairwise(beams)]
+    supports = [ub.Clamped(beams[0].start), *(ub.Roller(beam.end) for beam in beams)]
+    return ub.plot(static(ub.Scene(beams=beams, joints=joints, supports=supports)))
+
+
+def test_the_number_of_artists_does_not_grow_with_the_scene():
+    """20 000 beams would take minutes as as many artists."""
+    few, many = in_a_row(3, 3.0).axes[0], in_a_row(30, 30.0).axes[0]
+    assert len(few.get_children()) == len(many.get_children())
+
+
+def test_pins_shrink_where_beams_are_short():
+    # Beams of 0.33 and 0.017 m in a picture of one size: the symbols become 0.3 times as large
+    long, short = (np.ptp(outlines(in_a_row(n, 1.0), "pins")[0], axis=0) for n in (3, 60))
+    np.testing.assert_allclose(short, 0.3 * long)
+
+
+@pytest.mark.parametrize("what", ["N", "V", "M"])
+def test_extreme_values_are_those_of_the_solution(portal, what):
+    values = np.concatenate(values_of(portal, what))
+    factor, prefix = decimal_prefix(np.abs(values).max())
+    expected = {number(x / factor) for x in (values.max(), values.min())}
+    if what == "N":  # all beams are in compression
+        expected = {number(values.min() / factor)}
+    figure = ub.plot(portal, what)
+    bold = {text.get_text() for text in figure.axes[0].texts if text.get_weight() == "bold"}
+    assert bold == expected
+    assert set(texts(figure)) <= {number(x / factor) for x in values}
+    title = figure.axes[0].get_title(loc="left")
+    assert f" {what} ({prefix}{UNIT[what]}) at t = 1 s" in title
+
+
+@pytest.mark.parametrize("what", ["N", "V", "M"])
+def test_an_area_for_each_run_of_one_sign(portal, what):
+    runs = sum(1 + np.count_nonzero(np.diff(f > 0)) for f in values_of(portal, what))
+    assert len(areas_of(ub.plot(portal, what))) == runs
+
+
+def test_ordinates_are_in_proportion_to_the_values(portal):
+    # A patch of one beam: axis start, the values, axis back.  The roof is nearly horizontal, its
+    # displacement at this load some millimetres: 1 % of the ordinates.
+    roof = portal.scene.beams[1]
+    s, values, *_ = portal.diagram(roof)
+    (outline,) = [x for x in areas_of(ub.plot(portal, "N")) if np.ptp(x[:, 0]) > 5.5]
+    tips, shape = outline[1 : 1 + len(values)], portal.shape(roof)
+    heights = tips[:, 1] - np.interp(s, portal.grid.parameters(roof), shape[:, 1])
+    np.testing.assert_allclose(heights / heights[0], values / values[0], rtol=0.01)
+
+
+def test_moments_stand_on_the_side_in_tension():
+    for a, b in (((0, 0), (1, 0)), ((1, 0), (0, 0))):
+        beam = ub.Beam(a, b, scenes.SLENDER, cells=2)
+        left, right = (beam.start, beam.end) if a == (0, 0) else (beam.end, beam.start)
+        force = 1e-3 * scenes.SLENDER.EI
+        load = ub.PointLoad(right, force=(0, -force))
+        scene = ub.Scene([beam], supports=[ub.Clamped(left)], loads=[load])
+        (area,) = areas_of(ub.plot(static(scene), "M"))
+        assert area[:, 1].max() > 0.05  # the upper fibre of a cantilever pulled down
+
+
+def simple_beam(cells, length=6.0, load=10e3, direction=0.0):
+    """A beam on two supports under a line load across it; turned by an angle."""
+    along = np.array([math.cos(direction), math.sin(direction)])
+    section = ub.Section(EA=1e10, GA=1e10, EI=1e9)
+    beam = ub.Beam((0, 0), tuple(length * along), section, cells=cells)
+    across = load * np.array([along[1], -along[0]])
+    scene = ub.Scene(
+        [beam],
+        supports=[ub.Pinned(beam.start), ub.Roller(beam.end, along=tuple(along))],
+        loads=[ub.LineLoad(beam, force=tuple(across), amplitude=lambda t: t)],
+    )
+    return static(scene)
+
+
+@pytest.mark.parametrize("direction", [0.0, 2.0])
+def test_moments_under_a_line_load_are_a_parabola(direction):
+    """[closed] w l²/8 = 45 kN m, a parabola without steps; the deflection is 2e-5 of l."""
+    solution = simple_beam(4, direction=direction)
+    figure = ub.plot(solution, "M")
+    assert texts(figure) == ["45"]
+    (area,) = areas_of(figure)
+    x = np.repeat(np.linspace(0.0, 6.0, 33), [1, *(1, 1, 1, 1, 1, 1, 1, 2) * 3, *[1] * 8])
+    along = np.array([math.cos(direction), math.sin(direction)])
+    tips = area[1 : 1 + len(x)]
+    np.testing.assert_allclose(tips @ along, x, atol=1e-3)
+    depth = tips @ (along[1], -along[0])
+    parabola = 4 * (x / 6) * (1 - x / 6)
+    np.testing.assert_allclose(depth, depth.max() * parabola, atol=1e-3)
+
+
+@pytest.mark.parametrize("what", ["N", "V", "M"])
+@pytest.mark.parametrize("name", ["portal", "beam", "upright"])
+def test_extreme_values_cover_nothing(portal, name, what):
+    """Neither areas of the diagram nor beams; labels do not overlap and are in the picture."""
+    solution = {
+        "portal": lambda: portal,
+        "beam": lambda: simple_beam(8),
+        "upright": lambda: simple_beam(8, direction=math.pi / 2),
+    }[name]()
+    figure = ub.plot(solution, what)
+    axes, boxes = figure.axes[0], boxes_of(figure)
+    require_apart(boxes, figure.bbox)
+    for k, box in enumerate(boxes):
+        if axes.texts[k].get_weight() != "bold":
+            continue
+        inside = np.stack(
+            np.meshgrid(np.linspace(box.x0, box.x1, 20), np.linspace(box.y0, box.y1, 10)), axis=-1
+        ).reshape(-1, 2)
+        for outline in map(Path, areas_of(figure)):
+            outline = outline.transformed(axes.transData)
+            assert not outline.contains_points(inside).any()
+        for line in axes.lines[:3]:
+            drawn = line.get_path().transformed(line.get_transform())
+            assert not drawn.intersects_bbox(box, filled=False)
+
+
+def test_forty_labels_do_not_overlap():
+    figure = ub.plot(static(storeys(3, 4)), "M")
+    boxes = boxes_of(figure)
+    assert len(boxes) >= 40
+    require_apart(boxes, figure.bbox)
+    # Lines that lead to labels cross no other label
+    for mark, own in zip(figure.axes[0].texts, boxes, strict=True):
+        if mark.arrow_patch is not None:
+            line = mark.arrow_patch.get_path().transformed(mark.arrow_patch.get_transform())
+            assert not any(line.intersects_bbox(box) for box in boxes if box is not own)
+
+
+def test_the_legend_names_the_signs_in_the_picture(portal):
+    """The roof of the portal is in compression, and so are its posts."""
+    (legend,) = ub.plot(portal, "N").legends
+    assert [text.get_text() for text in legend.get_texts()] == ["N < 0: compression"]
+    (legend,) = ub.plot(portal, "M").legends
+    assert [text.get_text()[:5] for text in legend.get_texts()] == ["M > 0", "M < 0"]
+    assert not ub.plot(portal).legends
+
+
+@pytest.mark.parametrize(("width", "height"), [(1.0, 1.0), (1.0, 3.0), (4.0, 1.0), (1.0, 1.6)])
+def test_the_axes_fill_the_figure(width, height):
+    """But for words and numbers: an inch or so in each direction."""
+    section = ub.Section(EA=1e9, GA=1e9, EI=1e7)
+    post = ub.Beam((0, 0), (0, height), section, cells=4)
+    roof = ub.Beam((0, height), (width, height), section, cells=4)
+    scene = ub.Scene(
+        [post, roof],
+        joints=[ub.Rigid(post.end, roof.start)],
+        supports=[ub.Clamped(post.start)],
+        loads=[ub.PointLoad(roof.end, force=(0, -1e3), amplitude=lambda t: t)],
+    )
+    figure = ub.plot(static(scene), "M")
+    figure.draw_without_rendering()
+    inches = figure.get_size_inches()
+    blank = inches * (1 - figure.axes[0].get_position().size)
+    assert inches.max() <= 9.0
+    assert (blank < 1.5).all()
+
+
+def test_extremes_of_a_beam_of_one_cell_are_one_area():
+    scene = scenes.cantilever(cells=1, force=(0.0, 1.0))
+    extremes = ub.Extremes()
+    static(scene, record=extremes)
+    assert len(areas_of(ub.plot(extremes, "V"))) == 1
+
+
+def test_envelopes_are_two_diagrams():
+    """Each area has ordinates of one of both, across the axis: none leads from one to the other."""
+    section = ub.Section(EA=1e6, GA=1e6, EI=1e4, rhoA=1.0, rhoI=0.01)
+    beam = ub.Beam((0, 0), (6, 0), section, cells=8)
+    shake = ub.LineLoad(beam, force=(0.0, 1.0), amplitude=lambda t: math.sin(7 * t))
+    supports = [ub.Clamped(beam.start), ub.Clamped(beam.end)]
+    scene = ub.Scene([beam], supports=supports, loads=[shake])
+    extremes = ub.Extremes()
+    run = ub.simulate(
+        scene, ub.EnergyMomentum(), t=(0, 1), dt=0.05, record=extremes, progress=False
+    )
+    found = extremes.section_forces(beam)
+    drawn = [outline[:-1] for outline in areas_of(ub.plot(extremes, "V"))]
+    x = 6 * run.diagram(beam, points=2).s
+    scale = None
+    assert drawn
+    for outline in drawn:
+        tips = outline[np.abs(outline[:, 1]) > 1e-12]
+        for at, ordinate in tips:
+            near = np.isclose(x, at)
+            assert near.any()
+            values = np.concatenate([found.low[near, 1], found.high[near, 1]])
+            scale = scale or ordinate / values[np.argmax(values * np.sign(ordinate))]
+            assert np.isclose(scale * values, ordinate, rtol=1e-9).any()
+        # From the lowest to the largest x along the tips, and back along the axis
+        assert (np.diff(tips[:, 0]) >= 0).all()
+
+
+def test_there_is_no_diagram_without_a_force(swing):
+    figure = ub.plot(swing, "M", n=0)
+    assert not areas_of(figure)
+    assert not texts(figure)
+
+
+def test_displacements_are_magnified(portal):
+    axes = ub.plot(portal, magnify=10).axes[0]
+    roof = portal.scene.beams[1]
+    drawn = chains(axes)[2][1]
+    undeformed = portal.grid.points[portal.grid.vertices_of(roof)]
+    np.testing.assert_allclose(drawn - undeformed, 10 * (portal.shape(roof) - undeformed))
+    assert "× 10" in axes.get_title(loc="left")
+
+
+def test_a_saved_picture_has_the_size_of_its_figure(portal, tmp_path):
+    from matplotlib.image import imread
+
+    figure = ub.plot(portal, "M")
+    figure.savefig(tmp_path / "portal.png")
+    assert (tmp_path / "portal.png").exists() == FIRST
+    if FIRST:
+        width, height = figure.get_size_inches() * figure.dpi
+        picture = imread(tmp_path / "portal.png")
+        assert abs(picture.shape[0] - height) <= 1
+        assert abs(picture.shape[1] - width) <= 1
+        assert picture[..., :3].std() > 0.01
+
+
+def test_shapes_have_a_bar_of_times(swing):
+    figure = ub.plot(swing, "shapes", count=5)
+    axes, bar = figure.axes
+    scene = swing.scene
+    shapes = [chain for chain in chains(axes) if len(chain) == len(scene.beams)]
+    assert len(shapes) == 6
+    assert len(outlines(figure, "masses")) == 5 * len(scene.masses)
+    assert bar.get_ylabel() == "time t (s)"
+    np.testing.assert_allclose(bar.get_ylim(), (0, 0.1))
+
+
+def test_shapes_are_at_the_nearest_kept_times(swing):
+    axes = ub.plot(swing, "shapes", [0.0519, 0.0]).axes[0]
+    # Undeformed, then t = 0, then t = 0.05, which is step 10
+    _, _, last = [chain for chain in chains(axes) if len(chain) == len(swing.scene.beams)]
+    np.testing.assert_array_equal(last[0], swing.shape(swing.scene.beams[0], 10))
+
+
+@pytest.mark.parametrize(
+    ("component", "column", "label"),
+    [
+        ("u", 0, "displacement u (m)"),
+        ("psi", 2, "rotation ψ (rad)"),
+        ("dv/dt", 1, "velocity dv/dt (m/s)"),
+    ],
+)
+def test_a_history_has_a_line_for_each_place(swing, component, column, label):
+    beam = swing.scene.beams[0]
+    places = [beam.start, beam.at(0.3)]
+    figure = ub.plot(swing, "history", places, component=component)
+    axes = figure.axes[0]
+    motion = swing.velocity if "/" in component else swing.displacement
+    for line, place in zip(axes.lines[1:], places, strict=True):
+        np.testing.assert_array_equal(line.get_xdata(), swing.times)
+        np.testing.assert_array_equal(line.get_ydata(), motion(place)[:, column])
+        assert line.get_label() == str(place)
+    assert axes.get_ylabel() == label
+    assert axes.get_xlabel() == "time t (s)"
+
+
+def test_a_history_may_be_of_one_place_of_a_beam_or_a_body(portal, engine):
+    for run, place in (
+        (portal, portal.scene.beams[0].end),
+        (engine, engine.scene.bodies[0].middle),
+    ):
+        (_, line) = ub.plot(run, "history", place).axes[0].lines
+        np.testing.assert_array_equal(line.get_ydata(), run.displacement(place)[:, 1])
+
+
+def test_the_ledger_is_drawn_with_its_error(swing):
+    ledger, check = ub.plot(swing, "energy").axes
+    energy = swing.energy
+    drawn = {line.get_label(): line.get_ydata() for line in ledger.lines}
+    entries = {*energy.state, *energy.supplied, *energy.lost}
+    assert set(drawn) == entries | {"in the scene"}
+    for name in entries:
+        np.testing.assert_array_equal(drawn[name], energy[name])
+    assert check.get_yscale() == "log"
+    assert check.lines[0].get_ydata().max() == pytest.approx(energy.worst)
+    assert "(J)" in ledger.get_ylabel()
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0 N m"),
+        (-12345.0, "−12.3 kN m"),
+        (999.9, "1 kN m"),
+        (0.0158, "15.8 mN m"),
+        (2.5e6, "2.5 MN m"),
+    ],
+)
+def test_values_have_a_decimal_prefix(value, text):
+    assert with_unit(value, "N m") == text
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda s: ub.plot(s, "Q"), "quantity = 'Q' of a Solution is not one of shape, "),
+        (lambda s: ub.plot(s, n=3), "n = 3: the solution kept 3 times; give -3 to 2"),
+        (lambda s: ub.plot(s, magnify=0), "magnify = 0 must be positive"),
+        (lambda s: ub.plot(s, "shapes", count=0), "count = 0 must be at least 1"),
+        (lambda s: ub.plot(s, "shapes", 8), "for so many shapes give count=8"),
+        (lambda s: ub.plot(s, "history", s.scene.beams[0].end, component="w"), "component = 'w'"),
+        (lambda s: ub.plot(s, "history", s.scene.beams[0].end, component="du/dt"), "static"),
+        (lambda s: ub.render(s, "a.jpg"), r"a.jpg: the name must end in .png"),
+        (lambda s: ub.render(s, "nowhere/a.png"), "no directory nowhere"),
+        (lambda s: ub.render(s, "a.png", quantity="K"), "quantity = 'K' is not one of"),
+        (lambda s: ub.render(s, "a.png", n=7), "n = 7"),
+        (lambda s: ub.render(s, "a.png", thickness=-1), "thickness = -1 must be positive"),
+        (lambda s: ub.render(s, "a.png", size=(800, 0)), "size = 0 must be at least"),
+        (lambda s: ub.render(s, "a.png", camera="front"), "camera = 'front' is not a Camera"),
+        (lambda s: ub.animate(s, "a.gif", progress=2), "progress = 2 must be True or False"),
+        (lambda s: ub.animate(s, "a.avi"), "must end in .gif or .mp4"),
+        (lambda s: ub.animate(s, "a.gif", fps=0), "fps = 0 must be positive"),
+        (lambda s: ub.animate(s, "a.gif", seconds=0), "seconds = 0 must be positive"),
+    ],
+)
+def test_wrong_arguments_of_pictures_are_refused(portal, call, message):
+    with pytest.raises(ub.ArgumentError) as caught:
+        call(portal)
+    assert message in str(caught.value)
