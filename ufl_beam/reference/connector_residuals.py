@@ -218,7 +218,7 @@ class GuideForce(Linked):
         """Return the parameter of the nearest point of the curve, starting at the latest point."""
         s = nearest(self._curve, x, self._s, self._step, self._size)
         if not math.isfinite(s):
-            raise NoNumber(f"{self._place} is where no nearest point of its guide curve was found")
+            raise NoNumber(f"{self._place}: no nearest point was found on its guide curve")
         return s
 
     def _equation(self, x: Array) -> Array:
