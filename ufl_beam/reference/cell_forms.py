@@ -338,10 +338,9 @@ class CellForce(Force):
 
 def lumps(grid: Grid) -> list[tuple[Index, float, float]]:
     """Return dofs, mass and inertia of point masses and rigid bodies; (3,), kg, kg m²."""
-    masses = [(grid.node(m.place), m.mass, m.inertia) for m in grid.scene.masses]
-    return masses + [
-        (grid.node(body.middle), body.mass, body.inertia) for body in grid.scene.bodies
-    ]
+    masses = [(grid.node(mass.place), mass.mass, mass.inertia) for mass in grid.scene.masses]
+    bodies = [(grid.node(body.middle), body.mass, body.inertia) for body in grid.scene.bodies]
+    return masses + bodies
 
 
 def coupled(size: int, rows: Index, columns: Index, values: Array) -> csr_array:
