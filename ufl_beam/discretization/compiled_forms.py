@@ -23,7 +23,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, first_of, kernel, lib
+from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, view_pointer
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
@@ -193,7 +193,7 @@ class Kernel:
             ffi.new("cells *"),
             tabulate=self._form.tabulate, several=self._in_lanes, lanes=self.lanes,
             number=number, of_cell=cell_size, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
-            width=packed.strides[0] // (packed.itemsize * self.lanes), w=first_of(packed),
+            width=packed.strides[0] // (packed.itemsize * self.lanes), w=view_pointer(packed),
             constants=self._form.constants, coordinates=self._coordinates, rows=self._entries,
             coefficients=coefficients, all=np.empty(coefficients),
             is_functional=self._is_functional, **self._places,

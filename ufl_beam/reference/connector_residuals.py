@@ -81,7 +81,7 @@ class Connectors(Linked):
             for form in (forms.work, forms.tangent, forms.motion, forms.rate)
         )
         geometry = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.links]
-        put(forms.numbers, np.reshape(geometry, (-1, 8 * k)))
+        put(forms.geometry, np.reshape(geometry, (-1, 8 * k)))
         by_cell = forms.motion.arguments()[0].ufl_function_space()
         self._cell_dofs = cell_dofs(by_cell).ravel()
         self._length = np.where([link.turns for link in self.links], 1.0, setting.grid.scene.size)

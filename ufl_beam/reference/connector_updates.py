@@ -17,8 +17,8 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, NoNumber
-from ufl_beam.mechanics.connector_equations import Slip, numbers, slip
-from ufl_beam.mechanics.time_schemes import Step, way_to_rest
+from ufl_beam.mechanics.connector_equations import RigidPlasticStep, parameters, rigid_plastic_step
+from ufl_beam.mechanics.time_schemes import Step, increment_to_rest
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.checks import require_returned
 from ufl_beam.model.connector_law import ConnectorLaw
@@ -353,7 +353,7 @@ class _Friction(LawInStep):
         self._creep = softness / self._limit if self._limit > 0 else 0.0
         # With this motion the velocity at the end is zero; without motion it would return reversed.
         self._rest_motion = (
-            way_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.link]
+            increment_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.link]
         )
         self._direction, self._against, self._guessed = self.z["slip"], False, True
 
@@ -418,7 +418,7 @@ class _Slipping(LawInStep):
     def __init__(self, link: Connector, setting: Setting) -> None:
         super().__init__(link, setting)
         law, self.opens, self.slope = law_of(link), self, _slope(link, setting.grid.scene.size)
-        self._law, self._parameters = law, {name: float(x) for name, x in numbers(law).items()}
+        self._law, self._parameters = law, {name: float(x) for name, x in parameters(law).items()}
         self.z = {"slipped": 0.0, "start": 0.0, "limit": float(law.limit), "back force": 0.0}
         self.z |= {"dissipated": 0.0, "way": 0.0, "stored": 0.0}
         self.excess, self.released, self._hardens = 0.0, False, isinstance(law, ElastoPlastic)
@@ -433,9 +433,11 @@ class _Slipping(LawInStep):
             self.z["way"]
         )  # slip direction of the iterate; at first of the last step
 
-    def _law_step(self, grown: Any, direction: int) -> Slip:
+    def _law_step(self, grown: Any, direction: int) -> RigidPlasticStep:
         at = {**self._parameters, **self.z, "θ": self.setting.scheme.theta, "dt": self.dt}
-        return slip(self._law, {**at, "slip": grown, "direction": direction}, self.setting.scheme)
+        return rigid_plastic_step(
+            self._law, {**at, "slip": grown, "direction": direction}, self.setting.scheme
+        )
 
     @np.errstate(all="ignore")
     def row(self, e1: float, λ: float) -> Row:

@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.work_forms import GROWTH, statement
-from ufl_beam.mechanics.kinematics import split, turn
+from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_schemes import Step, acting, has_inertia
 from ufl_beam.model.bodies import GROUND, carries
 from ufl_beam.model.functions import value_at
@@ -146,7 +146,7 @@ class FrameForce(LoadForce):
         self._pairs = np.unique(nodes[:, :2], axis=0)  # degrees of freedom u, v of the nodes
         # Mass times a quarter turn; Coriolis' force is 2 Ω times it times the velocities.
         (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
-        density = element.inertia[0] * ufl.dot(turn(u), w_u)
+        density = element.inertia[0] * ufl.dot(perpendicular(u), w_u)
         G = mass.cells.form(density * element.dx_of_mass()).assembled()
         for (i, j, _), m, _ in lumps(grid):
             G = G + coupled(grid.size, np.array([i, j]), np.array([j, i]), m * np.array([-1, 1]))

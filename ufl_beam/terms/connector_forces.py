@@ -185,8 +185,8 @@ class Couplings(Links):
         """Return a kernel of a form on the connectors, with their numbers."""
         unit = np.tile([[0.0, 0.0], [1.0, 0.0]], (self._cells, 1, 1))
         kernel = Kernel(form, self.forms.q1, self._dofs, unit)
-        if kernel.uses(self.forms.numbers):
-            kernel.put(self.forms.numbers, self._geometry)
+        if kernel.uses(self.forms.geometry):
+            kernel.put(self.forms.geometry, self._geometry)
         return kernel
 
     def phases(self, callbacks: Callbacks) -> Phases:

@@ -22,7 +22,7 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
-from ufl_beam.mechanics.connector_equations import numbers, slip
+from ufl_beam.mechanics.connector_equations import parameters, rigid_plastic_step
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import (
@@ -321,10 +321,10 @@ class RigidPlasticForms:
     """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
 
     def __init__(self, law: SofteningLaw | ElastoPlastic, scheme: Scheme) -> None:
-        self._pointwise = pointwise = Pointwise((*INPUTS, *numbers(law)))
+        self._pointwise = pointwise = Pointwise((*INPUTS, *parameters(law)))
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
         with traced(law):
-            end = slip(law, at, scheme)._asdict()
+            end = rigid_plastic_step(law, at, scheme)._asdict()
             force = end.pop("force")
             slope = ufl.diff(force, at["slip"])
         self._response = force, slope
@@ -384,11 +384,11 @@ class RigidPlasticLaws(Response):
             self._enter(hardening=(ledger.state, "hardening"))
         if loss:
             self._enter(numerical=(ledger.lost, "numerical"))
-        inputs = (*INPUTS, *numbers(law.law))
+        inputs = (*INPUTS, *parameters(law.law))
         self._storage = np.zeros((n, len(inputs)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(inputs)}
         for i, link in enumerate(links):
-            for name, value in numbers(law_of(link)).items():
+            for name, value in parameters(law_of(link)).items():
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
         self._initial_limit = self._at["number yield_limit" if self._hardens else "number limit"]

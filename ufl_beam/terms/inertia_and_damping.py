@@ -33,7 +33,7 @@ from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import (
-    MORE,
+    FURTHER,
     V_BEFORE,
     Coefficients,
     DynamicScheme,
@@ -71,11 +71,11 @@ def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
     try:
         c = _coefficients(known, 1.0, 1.0, number)
         rows = c.inertia, c.velocity, *c.rates, *([c.slip] if c.slip else [])
-        right = len(c.rates) == 1 + number and {len(row) for row in rows} == {MORE + number}
+        right = len(c.rates) == 1 + number and {len(row) for row in rows} == {FURTHER + number}
         right = right and bool(np.isfinite(rows).all()) and c.rates[0][0] != 0.0
     except (TypeError, ValueError, AttributeError):
         right = False
-    if not right or MORE + number > lib.MOST_RATES:
+    if not right or FURTHER + number > lib.MOST_RATES:
         raise ModelError(
             f"{scheme!r}: coefficients(dt, last_dt, known) must return Coefficients with rows of "
             f"3 + known numbers, {1 + number} of them in rates, see docs/extending.md"
@@ -88,7 +88,7 @@ def numbers_in_python(handle: Any, c: Any) -> int:
     """Callback of C: write ``scheme_numbers`` of loops.h for a step."""
     scheme, number = ffi.from_handle(handle)
     inertia, velocity, rates, slip = _coefficients(scheme, c.dt, c.last_dt, c.more)
-    rows = inertia, velocity, slip or [0.0] * MORE, *rates
+    rows = inertia, velocity, slip or [0.0] * FURTHER, *rates
     places = c.inertia, c.velocity, c.slip, *c.rates
     for place, row in zip(places, rows, strict=False):
         place[0:number] = [*row, *[0.0] * (number - len(row))]
@@ -121,7 +121,7 @@ class Inertia(Term):
         self.loops, at = self._times.loops, (fields.order, self._times.rate)
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at)]
         self._ledger, self._A, self.scheme = ledger, A, scheme
-        size, number = len(v), MORE + len(scheme.kept)
+        size, number = len(v), FURTHER + len(scheme.kept)
         self.slips = checked_coefficients(scheme).slip is not None
         # Changes are stored elsewhere.  Velocities before the last step are not computed anew; if
         # nothing needs them, new velocities use their memory.
@@ -173,12 +173,12 @@ class Inertia(Term):
     @property
     def more(self) -> tuple[Array, ...]:
         """Known further rates of the scheme."""
-        return tuple(self._rate(MORE + k).copy() for k in range(self.c.more))
+        return tuple(self._rate(FURTHER + k).copy() for k in range(self.c.more))
 
     def keep(self, *more: Array) -> None:
         """Set the further rates of the scheme; a step can begin with any, or if none are needed."""
         for k, rate in enumerate(more):
-            self._rate(MORE + k)[:] = rate
+            self._rate(FURTHER + k)[:] = rate
         self.c.more, self.c.ready = len(more), bool(more) or not self.scheme.kept
 
     def take(self, v: Array, v_before: Array, last_dt: float) -> None:

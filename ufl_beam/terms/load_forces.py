@@ -25,7 +25,7 @@ from ufl_beam.discretization.function_spaces import (
 )
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.mechanics.kinematics import split, turn
+from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.functions import value_at
@@ -236,7 +236,7 @@ class FollowerLoads(_AtDofs):
 @stated
 def _turned_mass(element: Element) -> ufl.Form:
     (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
-    return element.inertia[0] * ufl.dot(turn(u), w_u) * element.dx_of_mass()
+    return element.inertia[0] * ufl.dot(perpendicular(u), w_u) * element.dx_of_mass()
 
 
 class FrameForces(LoadTerm):
