@@ -109,7 +109,7 @@ def _checksums(entry: Path, name: str) -> str:
     for path in sorted(entry.iterdir()):
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) or status.st_uid not in TRUSTED:
-            raise ValueError(f"{path} is no file of this user")
+            raise ValueError(f"{path} is not a file of this user")
         if path.name != CHECKSUMS:
             lines.append(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}")
     return "\n".join(lines) + "\n"

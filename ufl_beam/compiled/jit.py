@@ -139,7 +139,7 @@ def _imported(name: str, directory: Path) -> ModuleType:
     library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
     spec = importlib.util.spec_from_file_location(name, library)
     if spec is None or spec.loader is None:
-        raise ImportError(f"{library} is no library of Python")
+        raise ImportError(f"{library} is not a Python library")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module

@@ -89,7 +89,7 @@ def in_vectors(kernel: str) -> str:
                 line = line.replace("&&", "&").replace("||", "|")
                 line = re.sub(r"!(?!=)", "~", re.sub(r"\bbool\b", "mask", line))
                 if re.search(rf"= {_NUMBER} [<>!=]=? {_NUMBER};", line):
-                    raise Refused("a condition on numbers that are known")
+                    raise Refused("a condition on constants")
             line = re.sub(r"= ([^;?]+) \? ([^;:]+) : ([^;:]+);", r"= PICK(\1, \2, \3);", line)
             line = re.sub(rf"\b({'|'.join(FUNCTIONS)})\(", r"lanes_\1(", line)
         lines.append(line)

@@ -352,7 +352,7 @@ class DolfinxFields(Fields):
         # The order of the vertices of a cell orients the beam.
         expected = grid.points[grid.cells[cells[order]]]
         if not np.array_equal(cell_coordinates(self.mesh)[:, :, :2], expected):
-            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
+            raise RuntimeError("this version of DOLFINx reverses cells; please report it")
         super().__init__(share, order if positions is None else positions[order])
         self.element = element = Element(grid.mesh, self.mesh)
         for function in (element.stiffness, element.inertia):

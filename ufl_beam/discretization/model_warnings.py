@@ -42,13 +42,13 @@ def warn_of_masses(scene: Scene) -> None:
     if any(beam.section.rhoA for beam in scene.beams):
         warn(
             f"{names}: without mass, because neither rho nor rhoA of the section is given, but "
-            "other beams of the scene have mass. Give it, rhoA=0.0 if none is meant"
+            "other beams of the scene have mass. Give rho or rhoA; rhoA=0.0 if they have none"
         )
     elif not any(body.mass for body in scene.bodies) and not any(m.mass for m in scene.masses):
         warn(
             f"{names}: without mass, because neither rho nor rhoA of the section is given, and "
-            "nothing else in the scene has mass, so that dynamics has no inertia. Give it, or use "
-            "Static()"
+            "nothing else in the scene has mass, so that dynamics has no inertia. Give rho or "
+            "rhoA, or use Static()"
         )
 
 
@@ -86,8 +86,8 @@ def warn_of_touching(grid: Grid) -> None:
     gap = math.dist(end.point, touched.point)
     more = f"; so do {len(pairs) - 1} more pairs of places" if len(pairs) > 1 else ""
     warn(
-        f"{end} and {touched} touch ({gap:.3g} m apart), but no joint or connector joins them, so "
-        f"that they move independently{more}. Join them with Rigid or Revolute if that is meant"
+        f"{end} and {touched} touch ({gap:.3g} m apart), but no joint or connector joins them, "
+        f"so that they move independently{more}. If they are connected, join them, as with Rigid"
     )
 
 
@@ -236,6 +236,6 @@ def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
             unit = "rad" if is_rotation else "m"
             warn(
                 f"{name} jumps from {value:.6g} to {target:.6g} {unit} at the start, "
-                f"t = {t:g} s, which in dynamics is a blow. Let it grow in time, as "
+                f"t = {t:g} s, which in dynamics is an impact. Let it grow in time, as "
                 "ub.Table and lambda t: ... can, or begin with start= from a static run"
             )

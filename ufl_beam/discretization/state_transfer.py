@@ -63,8 +63,8 @@ class Transfer:
             nodes = ((b, old.nodes_of(b)[0], new.nodes_of(b)[0]) for b in new.scene.beams)
             beam = next(b for b, before, now in nodes if not np.array_equal(before, now))
             raise ModelError(
-                f"start: {beam.name} has other vertices than in the solution, because something "
-                "is attached at other places; let these be corners=(s, ...) of the beam in both"
+                f"start: {beam.name} has other vertices than in the solution, because objects "
+                "are attached at other places; add these places to corners=(s, ...) of both beams"
             )
         for body in new.scene.bodies:
             if body not in old.scene.bodies:

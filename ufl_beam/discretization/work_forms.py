@@ -151,7 +151,7 @@ def _returned(work: Work, known: Mapping[str, Any], element: Element) -> Expr:
         )
     if any(domain != element.space.mesh.ufl_domain() for domain in extract_domains(value)):
         raise ModelError(
-            f"{work}: the function uses a mesh of its own; let it use axis.x for the place, and "
+            f"{work}: the function uses a mesh of its own; use axis.x for the place, and "
             "`numbers` for its parameters"
         )
     return value

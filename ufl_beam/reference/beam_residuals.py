@@ -347,8 +347,8 @@ def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:
                 forces.append(KelvinVoigtForce(damping, indices, setting))
         elif inertia is None:
             raise ModelError(
-                "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
-                "use KelvinVoigt, which acts in the time of a static run"
+                "Rayleigh: it damps vibrations, and statics has no inertia. Use "
+                "KelvinVoigt, which acts in the time of a static run"
             )
         else:
             forces.append(RayleighForce(damping, setting, inertia))

@@ -309,8 +309,8 @@ def damping_forces(
     if isinstance(damping, Rayleigh):
         if rates is None:
             raise ModelError(
-                "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
-                "use KelvinVoigt, which acts in the time of a static run"
+                "Rayleigh: it damps vibrations, and statics has no inertia. Use "
+                "KelvinVoigt, which acts in the time of a static run"
             )
         return [RayleighForces(damping, fields, scheme, A, ledger, rates)]
     grid = fields.share.grid
