@@ -87,7 +87,8 @@ def warn_of_touching(grid: Grid) -> None:
     more = f"; so do {len(pairs) - 1} more pairs of places" if len(pairs) > 1 else ""
     warn(
         f"{end} and {touched} touch ({gap:.3g} m apart), but no joint or connector joins them, "
-        f"so that they move independently{more}. If they are connected, join them, as with Rigid"
+        f"so that they move independently{more}. Join them with Rigid or Revolute if they are "
+        "connected"
     )
 
 
