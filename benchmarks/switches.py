@@ -57,7 +57,11 @@ def without_kept_tangents():
     source = c_library._SOURCE.replace(KEEPS, "e->near = 0 && !kept &&")
     declarations = c_library.DECLARATIONS + c_library._CALLBACKS
     other = compiled(
-        "ufl_beam_tangents", declarations, lambda: source, made_of=[source], flags=c_library.FLAGS
+        "ufl_beam_tangents",
+        declarations,
+        lambda: source,
+        depends_on=[source],
+        flags=c_library.FLAGS,
     )
     for name, field in other.ffi.typeof("petsc_functions").fields:
         address = int(c_library.ffi.cast("intptr_t", getattr(c_library.lib.petsc, name)))

@@ -210,7 +210,7 @@ def kernel(degree=1, cells=2, coordinates=None):
 
 
 def test_cells_with_more_entries_than_there_is_room_for():
-    with pytest.raises(ValueError, match=r"13 x 13 .* has 169 entries; loops.h has room for 144"):
+    with pytest.raises(ValueError, match=r"13 x 13 .* has 169 entries; loops.h allows 144"):
         kernel(degree=12)
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from ufl_beam.compiled import code_cache, jit, simd_kernels
-from ufl_beam.compiled.code_cache import CHECKSUMS, intact, kept
+from ufl_beam.compiled.code_cache import CHECKSUMS, cached, intact
 
 ENTRY = "numbers_1234"
 
@@ -44,7 +44,7 @@ class Builds:
         return self.number
 
     def __call__(self, name=ENTRY):
-        value, directory = kept(name, self.build, self.load)
+        value, directory = cached(name, self.build, self.load)
         assert value == self.number
         assert (directory / "source.c").exists()
         return self.count
@@ -146,7 +146,7 @@ def test_a_library_of_another_system_is_built_again(place):
     def load(directory):
         raise ImportError("undefined symbol")
 
-    assert kept(ENTRY, builds.build, load)[0] == 1
+    assert cached(ENTRY, builds.build, load)[0] == 1
     assert builds.count == 2
 
 
@@ -157,7 +157,7 @@ def test_a_build_that_is_stopped_leaves_nothing(place, stop):
         raise stop
 
     with pytest.raises(stop):
-        kept(ENTRY, build, build)
+        cached(ENTRY, build, build)
     assert [path.name for path in place.iterdir()] == [f"{ENTRY}.lock"]
     assert Builds()() == 1
 
@@ -168,7 +168,7 @@ def test_damaged_c_is_compiled_again(place):
     def answer():
         module = jit.compiled(
             *("ufl_beam_test", "int answer(void);", lambda: "int answer(void) { return 42; }"),
-            **{"made_of": [], "flags": []},
+            **{"depends_on": [], "flags": []},
         )
         return module.lib.answer()
 
@@ -210,7 +210,7 @@ def build(directory):
     with open(place.parent / "log", "a") as file:
         file.write("built\\n")
     time.sleep(float(sys.argv[2]))
-code_cache.kept("slow", build, lambda directory: None)
+code_cache.cached("slow", build, lambda directory: None)
 """
 
 
@@ -426,7 +426,7 @@ def test_warnings_are_logged_if_the_user_asks_for_it():
 def test_without_a_compiler_there_are_words(place, monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
     with pytest.raises(jit.CompilerError, match=r"no-such-compiler.*need a C compiler.*gcc"):
-        jit.compiled("ufl_beam_test", "", lambda: "", made_of=[], flags=[])
+        jit.compiled("ufl_beam_test", "", lambda: "", depends_on=[], flags=[])
 
 
 def test_a_kernel_without_vectors_is_remembered(place, tmp_path):

@@ -182,7 +182,7 @@ def test_two_nodes_are_a_case_of_many():
     ψ0, ψ1, w = (cells.field(cells.values(1.2))[0] for _ in range(3))
     short, general = (
         cells.at_points(ufl.as_vector([*turn(ψ0, ψ1, w, cells.axis), 0]))
-        for turn in (kinematics._turn_of_two_nodes, kinematics._turn_of_nodes)
+        for turn in (kinematics._two_node_rotation, kinematics._nodal_rotation)
     )
     assert np.abs(short).max() > 1
     assert np.abs(short - general).max() < 1e-13  # sums of ten numbers of order one

@@ -56,7 +56,7 @@ module = compiled(
     "ufl_beam_loops",
     DECLARATIONS + _CALLBACKS,
     lambda: _SOURCE,
-    made_of=[_SOURCE],
+    depends_on=[_SOURCE],
     flags=FLAGS,
 )
 ffi: Any = module.ffi
@@ -78,7 +78,7 @@ def petsc(name: str, *arguments: Any) -> None:
     if error := getattr(lib.petsc, name)(*map(opaque, arguments)):
         text, specific = ffi.new("const char **"), ffi.new("char **")
         lib.petsc.PetscErrorMessage(error, text, specific)
-        words = (ffi.string(of[0]).decode() for of in (text, specific) if of[0])
+        words = (ffi.string(message[0]).decode() for message in (text, specific) if message[0])
         raise RuntimeError(f"{name} of PETSc failed with error {error}: {': '.join(words)}")
 
 
@@ -95,9 +95,9 @@ doubles = partial(ffi.from_buffer, ffi.typeof("double[]"))
 """Pointer to a contiguous array of float64; it keeps the array alive."""
 
 
-def first_of(array: Array) -> Any:
+def view_pointer(array: Array) -> Any:
     """Return a pointer to the first number of a view of float64; it keeps the array alive."""
-    return ffi.gc(ffi.cast("double *", array.ctypes.data), lambda _, kept=array: None)
+    return ffi.gc(ffi.cast("double *", array.ctypes.data), lambda _, alive=array: None)
 
 
 _INT32, _INT32_ARRAY = np.dtype(np.int32), ffi.typeof("int32_t[]")
@@ -110,7 +110,7 @@ def integers(array: Index) -> Any:
     return ffi.from_buffer(_INT32_ARRAY, array)
 
 
-_kept: WeakKeyDictionary[Any, dict[str, Any]] = WeakKeyDictionary()
+_alive: WeakKeyDictionary[Any, dict[str, Any]] = WeakKeyDictionary()
 
 
 def fill(struct: Any, **fields: Any) -> Any:
@@ -118,11 +118,11 @@ def fill(struct: Any, **fields: Any) -> Any:
 
     Arrays become pointers to their float64 or int32.
     """
-    kept = _kept.setdefault(struct, {})
+    alive = _alive.setdefault(struct, {})
     for name, value in fields.items():
         if isinstance(value, np.ndarray):
             value = doubles(value) if value.dtype == np.float64 else integers(value)
-        kept[name] = value
+        alive[name] = value
         setattr(struct, name, value)
     return struct
 
@@ -146,22 +146,22 @@ def in_order(enum: str, values: Mapping[str, T], prefix: str = "") -> list[T]:
     return [values[name] for name in expected]
 
 
-LARGE = 2**16
+LARGE_SCENE = 2**16
 """Number of unknowns from which on memory is released to the system; that takes 0.03 ms or more."""
 
 
 def give_back_memory(unknowns: int) -> None:
     """Return freed memory of large scenes to the system; the GNU C library keeps it otherwise."""
-    if unknowns > LARGE:
+    if unknowns > LARGE_SCENE:
         lib.give_back_memory()
 
 
-def kernel(pointer: Any, of: Any) -> Any:
-    """Cast an FFCx kernel, a function pointer of the cffi instance ``of``, for loops.h."""
-    expected, found = ffi.typeof("kernel *").cname, of.typeof(pointer).cname
-    if found != expected:
+def kernel(pointer: Any, instance: Any) -> Any:
+    """Cast an FFCx kernel, a function pointer of the cffi ``instance``, for loops.h."""
+    expected, actual = ffi.typeof("kernel *").cname, instance.typeof(pointer).cname
+    if actual != expected:
         raise RuntimeError(
-            f"{VERSIONS} make kernels of the C type {found}; ufl_beam calls {expected}. It is "
+            f"{VERSIONS} make kernels of the C type {actual}; ufl_beam calls {expected}. It is "
             "tested with DOLFINx 0.9 to 0.11"
         )
-    return ffi.cast("kernel *", int(of.cast("intptr_t", pointer)))
+    return ffi.cast("kernel *", int(instance.cast("intptr_t", pointer)))

@@ -46,7 +46,7 @@ TRUSTED = os.geteuid(), 0
 """Users whose files are loaded: this one and the administrator."""
 
 
-def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tuple[T, Path]:
+def cached(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tuple[T, Path]:
     """Load an entry of the cache, which is built if it is missing or damaged; return its directory.
 
     If several processes need the same entry, one builds it and the others wait.  ``build`` writes
@@ -69,7 +69,7 @@ def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tu
     with locked(place / f"{name}.lock"):
         if not foreign and intact(entry):  # another process was faster
             return load(entry), entry
-        _remove_parts(entry)
+        _remove_incomplete(entry)
         scratch = Path(tempfile.mkdtemp(prefix=f"{name}.", suffix=".part", dir=place))
         try:
             new = scratch / "new"
@@ -89,7 +89,7 @@ def kept(name: str, build: Callable[[Path], T], load: Callable[[Path], T]) -> tu
     return loaded, entry
 
 
-def _remove_parts(entry: Path) -> None:
+def _remove_incomplete(entry: Path) -> None:
     """Remove incomplete builds of an entry that killed processes have left."""
     for rest in entry.parent.glob(f"{entry.name}.*.part"):
         shutil.rmtree(rest, ignore_errors=True)
@@ -109,7 +109,7 @@ def _checksums(entry: Path, name: str) -> str:
     for path in sorted(entry.iterdir()):
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) or status.st_uid not in TRUSTED:
-            raise ValueError(f"{path} is no file of this user")
+            raise ValueError(f"{path} is not a file of this user")
         if path.name != CHECKSUMS:
             lines.append(f"{hashlib.sha256(path.read_bytes()).hexdigest()}  {path.name}")
     return "\n".join(lines) + "\n"
@@ -143,7 +143,7 @@ def sweep(place: Path) -> None:
                     if _age(aside / CHECKSUMS) < UNUSED:  # a process has just used it
                         aside.rename(entry)
                         continue
-                _remove_parts(entry)
+                _remove_incomplete(entry)
                 lock.unlink()
 
 

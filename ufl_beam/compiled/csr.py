@@ -43,9 +43,9 @@ class Csr:
 
     def zeros_like(self) -> Csr:
         """Return a matrix that shares the sparsity pattern."""
-        other = copy(self)
-        other.data = np.zeros(len(self.data))  # zeros_like would touch the memory
-        return other
+        matrix = copy(self)
+        matrix.data = np.zeros(len(self.data))  # zeros_like would touch the memory
+        return matrix
 
     @property
     def size(self) -> int:
@@ -68,12 +68,12 @@ class Csr:
 
     def positions(self, rows: Index, columns: Index) -> Index:
         """Find the entries (rows[k], columns[k]) in :attr:`data`; they must exist."""
-        found = np.empty(len(rows), dtype=np.int32)
+        positions = np.empty(len(rows), dtype=np.int32)
         structure = (self.size, integers(self.indptr), integers(self.indices))
         pairs = [np.ascontiguousarray(x, dtype=np.int32) for x in (rows, columns)]
-        if not lib.find_entries(*structure, len(found), *map(integers, (*pairs, found))):
+        if not lib.find_entries(*structure, len(positions), *map(integers, (*pairs, positions))):
             raise ValueError("the matrix has no such entry")
-        return found
+        return positions
 
     def blocks(self, dofs: Index, lanes: int) -> Index:
         """Find the entries of all pairs of ``dofs``, int32, of each cell, in batches of cells.
@@ -82,16 +82,17 @@ class Csr:
         :func:`in_batches`.  It has positions in the row (uint8) if rows have at most 256 entries,
         else positions in :attr:`data` (int32).
         """
-        cells, of_cell = dofs.shape
+        cells, cell_size = dofs.shape
         narrow = self.narrow()
-        shape = (-(-cells // lanes), of_cell**2, lanes)
-        found = np.empty(shape, dtype=np.uint8 if narrow else np.int32)
-        place = ffi.NULL if narrow else integers(found)
-        column = ffi.from_buffer("uint8_t[]", found) if narrow else ffi.NULL
-        of = (self.size, integers(self.indptr), integers(self.indices), cells, of_cell, lanes)
-        if not lib.find_blocks(*of, integers(dofs), place, column):
+        shape = (-(-cells // lanes), cell_size**2, lanes)
+        positions = np.empty(shape, dtype=np.uint8 if narrow else np.int32)
+        place = ffi.NULL if narrow else integers(positions)
+        column = ffi.from_buffer("uint8_t[]", positions) if narrow else ffi.NULL
+        structure = self.size, integers(self.indptr), integers(self.indices)
+        sizes = cells, cell_size, lanes
+        if not lib.find_blocks(*structure, *sizes, integers(dofs), place, column):
             raise ValueError("the matrix has no such entry")
-        return found
+        return positions
 
     def petsc(self) -> PETSc.Mat:
         """Return a PETSc matrix on this process that shares the arrays and keeps them alive."""
@@ -135,16 +136,16 @@ class Product:
     """
 
     def __init__(self, A: Csr) -> None:
-        entries = np.flatnonzero(A.data).astype(np.int32)
-        indptr = np.searchsorted(entries, A.indptr).astype(np.int32)
+        nonzero = np.flatnonzero(A.data).astype(np.int32)
+        indptr = np.searchsorted(nonzero, A.indptr).astype(np.int32)
         width = np.diff(indptr)
         row = np.repeat(np.arange(A.size, dtype=np.int32), width)
-        away = A.indices[entries] - row
+        away = A.indices[nonzero] - row
         begins = np.ones(A.size, dtype=bool)
         for number in np.unique(width):
             rows = np.flatnonzero(width == number).astype(np.int32)
-            of_rows = away[indptr[rows, None] + np.arange(number, dtype=np.int32)]
-            alike = (of_rows[1:] == of_rows[:-1]).all(axis=1) & (np.diff(rows) == 1)
+            distances = away[indptr[rows, None] + np.arange(number, dtype=np.int32)]
+            alike = (distances[1:] == distances[:-1]).all(axis=1) & (np.diff(rows) == 1)
             begins[rows[1:][alike]] = False
         first = np.flatnonzero(begins)
         self._rows, self._widths = np.diff(np.append(first, A.size)).astype(np.int32), width[first]

@@ -23,7 +23,7 @@ import cffi
 import numpy as np
 import ufl
 
-from ufl_beam.compiled.code_cache import kept
+from ufl_beam.compiled.code_cache import cached
 from ufl_beam.dolfinx_compat import TABULATE, compile_form, fem, form_key
 
 HEADERS = f"""\
@@ -86,7 +86,7 @@ def compiled(
     declarations: str,
     source: Callable[[], str],
     *,
-    made_of: Sequence[str],
+    depends_on: Sequence[str],
     flags: Sequence[str],
     check: Callable[[ModuleType], None] = lambda _: None,
 ) -> ModuleType:
@@ -97,20 +97,20 @@ def compiled(
         declarations: C declarations of its functions and types for Python.
         source: Function that returns its C code, called if the module is not in the cache; it may
             raise :class:`Refused`.
-        made_of: Texts on which the C code and the effect of the flags depend.
+        depends_on: Texts on which the C code and the effect of the flags depend.
         flags: Compiler flags.
         check: Function called with the newly compiled module; it may raise :class:`Refused`.
     """
     # Python's own flags have -g; debug symbols take a fifth of the time and half of the file.
     flags = [*flags, "-g0", "-fvisibility=hidden", *EXTRA]
-    name = f"{stem}_{_digest(declarations, *made_of, *flags, sys.version, repr(PROCESSOR))}"
+    name = f"{stem}_{_digest(declarations, *depends_on, *flags, sys.version, repr(PROCESSOR))}"
 
     def build(directory: Path) -> ModuleType | Refused:
         builder = cffi.FFI()
         builder.cdef(declarations)
         try:
-            of_compiler = {"extra_compile_args": flags, "extra_link_args": EXTRA}
-            builder.set_source(name, source(), libraries=["m"], **of_compiler)
+            options = {"extra_compile_args": flags, "extra_link_args": EXTRA}
+            builder.set_source(name, source(), libraries=["m"], **options)
             with _explained(stem):
                 builder.compile(tmpdir=directory)
             check(module := _imported(name, directory))
@@ -123,7 +123,7 @@ def compiled(
         refusal = directory / REFUSAL
         return Refused(refusal.read_text()) if refusal.exists() else _imported(name, directory)
 
-    module, directory = kept(name, build, load)
+    module, directory = cached(name, build, load)
     if isinstance(module, Refused):
         raise module
     module.__file__ = str(directory / Path(str(module.__file__)).name)  # built in another directory
@@ -139,7 +139,7 @@ def _imported(name: str, directory: Path) -> ModuleType:
     library = directory / (name + str(sysconfig.get_config_var("EXT_SUFFIX")))
     spec = importlib.util.spec_from_file_location(name, library)
     if spec is None or spec.loader is None:
-        raise ImportError(f"{library} is no library of Python")
+        raise ImportError(f"{library} is not a Python library")
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
     return module
@@ -153,7 +153,7 @@ def compiled_form(form: ufl.Form) -> tuple[fem.Form, Path]:
             return compile_form(form, directory)
 
     key = _digest(form_key(form))
-    loaded, directory = kept(f"form_{key}", build, partial(compile_form, form))
+    loaded, directory = cached(f"form_{key}", build, partial(compile_form, form))
     module = Path(loaded.module.__file__).name
     return loaded, directory / (module.split(".")[0] + ".c")
 

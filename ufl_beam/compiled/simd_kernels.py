@@ -89,7 +89,7 @@ def in_vectors(kernel: str) -> str:
                 line = line.replace("&&", "&").replace("||", "|")
                 line = re.sub(r"!(?!=)", "~", re.sub(r"\bbool\b", "mask", line))
                 if re.search(rf"= {_NUMBER} [<>!=]=? {_NUMBER};", line):
-                    raise Refused("a condition on numbers that are known")
+                    raise Refused("a condition on constants")
             line = re.sub(r"= ([^;?]+) \? ([^;:]+) : ([^;:]+);", r"= PICK(\1, \2, \3);", line)
             line = re.sub(rf"\b({'|'.join(FUNCTIONS)})\(", r"lanes_\1(", line)
         lines.append(line)
@@ -100,8 +100,8 @@ def in_vectors(kernel: str) -> str:
 def written(source: Path) -> str:
     """Return the kernel that FFCx wrote into the file ``source`` for a cell form."""
     pattern = r"^void tabulate_tensor_.*?^}(?=\s*^(?:bool|ufcx_integral) )"
-    if source.exists() and (found := re.search(pattern, source.read_text(), re.M | re.S)):
-        return found[0]
+    if source.exists() and (match := re.search(pattern, source.read_text(), re.M | re.S)):
+        return match[0]
     raise Refused(f"{source} has no kernel")
 
 
@@ -131,15 +131,15 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
     for signs in ([1.0], [1.0], [-1.0, 1.0], [-1.0, 1.0]):
         w = random.uniform(0.1, 1.0, (width, LANES)) * random.choice(signs, (width, LANES))
         x = np.array([[0.0, 0.0, 0.0, 1.0, 0.5, 0.0]]).T + random.uniform(-0.1, 0.1, (6, LANES))
-        numbers, (one, several) = random.uniform(0.1, 0.9, constants), np.zeros((2, entries, LANES))
+        c, (single, several) = random.uniform(0.1, 0.9, constants), np.zeros((2, entries, LANES))
         address = module.ffi.cast("void *", kernel)
-        module.lib.compute_both(address, *map(at, (w, numbers, x, one, several)))
-        scale = np.abs(one).max(axis=0, where=np.isfinite(one), initial=0.0)
+        module.lib.compute_both(address, *map(at, (w, c, x, single, several)))
+        scale = np.abs(single).max(axis=0, where=np.isfinite(single), initial=0.0)
         with np.errstate(invalid="ignore"):
-            good = (np.abs(several - one) <= AGREEMENT * scale) | (several == one)
-        wrong += np.sum(~good & ~(np.isnan(one) & np.isnan(several)))
+            good = (np.abs(several - single) <= AGREEMENT * scale) | (several == single)
+        wrong += np.sum(~good & ~(np.isnan(single) & np.isnan(several)))
     if wrong:
-        why = f"{wrong} of {16 * entries} entries are not those of FFCx's kernel"
+        why = f"{wrong} of {16 * entries} entries differ from FFCx's kernel"
         LOGGER.warning("a kernel in vectors, compiled by %s, is wrong: %s", VERSIONS, why)
         raise Refused(why)
 
@@ -154,8 +154,8 @@ def in_lanes(
     among the coefficients, and the number of unknowns.
     """
     names = ("LANES", "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "AT", "UNKNOWNS")
-    numbers = LANES, math.isqrt(sizes[0]), *sizes, *unknowns
-    defined = [f"#define {x} {n}" for x, n in zip(names, numbers, strict=True)]
+    values = LANES, math.isqrt(sizes[0]), *sizes, *unknowns
+    defined = [f"#define {x} {n}" for x, n in zip(names, values, strict=True)]
     head, loop = "\n".join([HEADERS, DECLARATIONS, *defined, text("lanes.h")]), text("lanes.c")
     try:
         module = compiled(
@@ -163,7 +163,7 @@ def in_lanes(
             INTERFACE,
             lambda: "\n".join([head, in_vectors(written(source)), loop]),
             # FFCx names its files by a hash of their content.
-            made_of=[source.name, head, loop, Path(__file__).read_text()],
+            depends_on=[source.name, head, loop, Path(__file__).read_text()],
             flags=FLAGS,
             check=lambda module: require_agreement(module, kernel, sizes),
         )

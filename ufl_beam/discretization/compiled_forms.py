@@ -23,7 +23,7 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.c_library import doubles, ffi, fill, first_of, kernel, lib
+from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, view_pointer
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
@@ -74,7 +74,7 @@ def prepared(form: ufl.Form) -> Prepared:
     if entries > lib.MOST_ENTRIES:
         raise ValueError(
             f"a form on cells of {' x '.join(map(str, sizes))} degrees of freedom has {entries} "
-            f"entries; loops.h has room for {lib.MOST_ENTRIES}"
+            f"entries; loops.h allows {lib.MOST_ENTRIES}"
         )
     tabulate = tabulator(compiled)
     return Prepared(compiled, source, tabulate, used, columns, constants, packed, entries)
@@ -86,17 +86,17 @@ def patterns(places: npt.NDArray[np.uint8]) -> dict[str, Any]:
     The first patterns belong to cells of degree 1 with contiguous entries in each row.
     """
     batches, entries, lanes = places.shape
-    as_one = places.reshape(batches, entries * lanes).view(f"V{entries * lanes}")[:, 0]
-    _, first, has = np.unique(as_one, return_index=True, return_inverse=True)
-    found = places[first]
+    rows = places.reshape(batches, entries * lanes).view(f"V{entries * lanes}")[:, 0]
+    _, first, has = np.unique(rows, return_index=True, return_inverse=True)
+    distinct = places[first]
     in_rows = np.zeros(len(first), dtype=bool)
     if entries == 36:
-        of_nodes = found.reshape(len(found), 6, 6, lanes)[:, :, [0, 2, 4, 1, 3, 5]]
-        in_rows = (np.diff(of_nodes, axis=2) == 1).all(axis=(1, 2, 3))
+        by_node = distinct.reshape(len(distinct), 6, 6, lanes)[:, :, [0, 2, 4, 1, 3, 5]]
+        in_rows = (np.diff(by_node, axis=2) == 1).all(axis=(1, 2, 3))
     order = np.argsort(~in_rows, kind="stable")
     number = np.empty(len(first), dtype=np.int32)
     number[order] = np.arange(len(first))
-    pattern = ffi.from_buffer("uint8_t[]", found[order])
+    pattern = ffi.from_buffer("uint8_t[]", distinct[order])
     return {"pattern": pattern, "has": number[has], "in_rows": int(in_rows.sum())}
 
 
@@ -140,15 +140,15 @@ class Kernel:
             )
         self._matrix: Csr | None = None
         self._at, self._unknowns = 0, 0
-        self._stated, self._columns = ready.packed, ready.columns  # without the unknown
+        self._values, self._columns = ready.packed, ready.columns  # without the unknown
         if self.uses(unknown):
             columns, self._unknowns = dict(ready.columns), self._dofs.shape[1]
-            of_unknown = columns.pop(id(unknown))
-            self._at = of_unknown.start
-            self._stated = np.delete(ready.packed, of_unknown, axis=1)
-            number = np.delete(np.arange(ready.packed.shape[1]), of_unknown).searchsorted
+            unknown_columns = columns.pop(id(unknown))
+            self._at = unknown_columns.start
+            self._values = np.delete(ready.packed, unknown_columns, axis=1)
+            number = np.delete(np.arange(ready.packed.shape[1]), unknown_columns).searchsorted
             self._columns = {
-                of: slice(number(x.start), number(x.stop)) for of, x in columns.items()
+                function: slice(number(x.start), number(x.stop)) for function, x in columns.items()
             }
         address = None
         if several is not None:
@@ -165,8 +165,8 @@ class Kernel:
     @cached_property
     def _packed(self) -> Array:
         """Values of the coefficients in the cells except the unknown, in batches."""
-        stated = self._stated
-        return in_batches(np.tile(stated, (len(self._dofs) // len(stated), 1)), self.lanes)
+        values = self._values
+        return in_batches(np.tile(values, (len(self._dofs) // len(values), 1)), self.lanes)
 
     @cached_property
     def _places(self) -> dict[str, Any]:
@@ -175,10 +175,10 @@ class Kernel:
         if self._to_dofs or self._is_functional:
             return {}
         if self._matrix is not None:
-            found = self._matrix.blocks(self._dofs, self.lanes)
-            if found.dtype == np.int32:
-                return {"row": found}
-            return {"begin": self._matrix.indptr, **patterns(found)}
+            positions = self._matrix.blocks(self._dofs, self.lanes)
+            if positions.dtype == np.int32:
+                return {"row": positions}
+            return {"begin": self._matrix.indptr, **patterns(positions)}
         places = np.zeros(shape, dtype=np.int32)
         if self._is_vector:
             places += np.arange(places.size, dtype=np.int32).reshape(shape)
@@ -187,13 +187,13 @@ class Kernel:
     @cached_property
     def cells(self) -> Any:
         """Argument of ``add_cells`` of loops.h; made when all of its arrays are known."""
-        number, of_cell = self._dofs.shape
+        number, cell_size = self._dofs.shape
         packed, coefficients = self._packed, self._form.packed.shape[1]
         return fill(
             ffi.new("cells *"),
             tabulate=self._form.tabulate, several=self._in_lanes, lanes=self.lanes,
-            number=number, of_cell=of_cell, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
-            width=packed.strides[0] // (packed.itemsize * self.lanes), w=first_of(packed),
+            number=number, of_cell=cell_size, dofs=self._dofs, unknowns=self._unknowns, at=self._at,
+            width=packed.strides[0] // (packed.itemsize * self.lanes), w=view_pointer(packed),
             constants=self._form.constants, coordinates=self._coordinates, rows=self._entries,
             coefficients=coefficients, all=np.empty(coefficients),
             is_functional=self._is_functional, **self._places,
@@ -218,14 +218,14 @@ class Kernel:
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
         self._packed[:, columns] = in_batches(rows, self.lanes)
 
-    def share(self, other: Kernel) -> bool:
-        """Use the packed values of ``other``, if it has this form's values contiguously."""
-        mine, others = self._columns, other._columns
+    def share(self, source: Kernel) -> bool:
+        """Use the packed values of ``source``, if it has this form's values contiguously."""
+        mine, others = self._columns, source._columns
         shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}
-        if not mine.keys() <= others.keys() or len(shifts) != 1 or self.lanes != other.lanes:
+        if not mine.keys() <= others.keys() or len(shifts) != 1 or self.lanes != source.lanes:
             return False
         (first,) = shifts
-        self._packed = other._packed[:, first : first + self._stated.shape[1]]
+        self._packed = source._packed[:, first : first + self._values.shape[1]]
         return True
 
     def place(self, A: Csr) -> None:
@@ -243,9 +243,9 @@ class Kernel:
             batch, see :func:`in_batches`; and a second array of the same shape.
         """
         batches = -(-len(self._dofs) // self.lanes)
-        each, other = np.zeros((2, batches, self._entries, self.lanes))
+        each, second = np.zeros((2, batches, self._entries, self.lanes))
         fill(self.cells, each=each)
-        return ffi.addressof(self.cells, "each"), self.lanes, other
+        return ffi.addressof(self.cells, "each"), self.lanes, second
 
     def add(self, q: Array, b: Array) -> None:
         """Add the form at the unknown ``q`` to a vector, or to the entries of the matrix."""

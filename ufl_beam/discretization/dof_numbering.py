@@ -56,14 +56,14 @@ class Grid:
         mesh = Mesh() if mesh is None else mesh
         require_kind(mesh, Mesh, "mesh")
         self.scene, self.mesh, beams = scene, mesh, scene.beams
-        self._number_of_beam: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
+        self._beam_indices: dict[Member, int] = {beam: i for i, beam in enumerate(beams)}
         self._parameters: list[Array] = []
-        of_kind: dict[object, Array] = {}  # equal beams share parameters
+        by_kind: dict[object, Array] = {}  # equal beams share parameters
         for beam, attached in scene.attached.items():
             kind = beam.cells, beam.corners, frozenset(attached) - {0.0, 1.0}
-            if kind not in of_kind:
-                of_kind[kind] = np.array(mesh.vertices(beam, attached))
-            self._parameters.append(of_kind[kind])
+            if kind not in by_kind:
+                by_kind[kind] = np.array(mesh.vertices(beam, attached))
+            self._parameters.append(by_kind[kind])
         counts = np.array([len(p) for p in self._parameters], dtype=np.int64)
         self.first_vertices = np.concatenate([[0], np.cumsum(counts)])
         self._first_cells = self.first_vertices - np.arange(len(beams) + 1)
@@ -102,12 +102,12 @@ class Grid:
     def _add_hinges(self, places: Sequence[Place]) -> None:
         """Give each plastic hinge a second vertex, an end of the cell beyond it."""
         at = np.array([self.vertex(place) for place in places], dtype=np.int64)
-        numbers = range(len(self.points), len(self.points) + len(at))
+        vertices = range(len(self.points), len(self.points) + len(at))
         beyond = [Place(place.beam, place.s, beyond=True) for place in places]
-        self._beyond = dict(zip(beyond, numbers, strict=True))
+        self._beyond = dict(zip(beyond, vertices, strict=True))
         self.points = np.concatenate([self.points, self.points[at]])
         self.cells_at_hinges = np.array([self.cell(place) for place in places], dtype=np.int64)
-        for place, number, cell in zip(places, numbers, self.cells_at_hinges, strict=True):
+        for place, number, cell in zip(places, vertices, self.cells_at_hinges, strict=True):
             at_end = place.s == 1.0
             cell_beyond = cell if at_end or place.s == 0.0 else cell + 1
             self.cells[cell_beyond, int(at_end)] = number
@@ -118,23 +118,24 @@ class Grid:
         row = {body: nodes + i for i, body in enumerate(rigid_bodies)}
 
         @cache
-        def at(of: Node) -> int:
-            return row[of] if isinstance(of, Body) else self.vertex(of)
+        def at(carrier: Node) -> int:
+            return row[carrier] if isinstance(carrier, Body) else self.vertex(carrier)
 
         slots = np.arange(3 * (nodes + len(rigid_bodies)))
         shared = slots >= 3 * nodes
         same = self.scene.representatives.items()
-        pairs = [(3 * at(one) + c, 3 * at(other) + c) for (one, c), (other, _) in same]
+        pairs = [(3 * at(first) + c, 3 * at(second) + c) for (first, c), (second, _) in same]
         ones, others = np.reshape(np.array(pairs, dtype=np.int64), (-1, 2)).T
         slots[ones] = others
         shared[others] = True
-        kept = slots == np.arange(len(slots))
+        independent = slots == np.arange(len(slots))
         inner = self.nodes_of_cells[:, 2:]
         position = np.arange(nodes + len(rigid_bodies), dtype=np.float64)
         position[list(self._beyond.values())] = self.vertices_at_hinges
         position[inner] = position[self.cells[:, :1]] + self.mesh.nodes[1:-1]
         ordered = (3 * np.argsort(position)[:, None] + np.arange(3)).ravel()
-        order = np.concatenate([ordered[(kept & of)[ordered]] for of in (~shared, shared)])
+        groups = independent & ~shared, independent & shared
+        order = np.concatenate([ordered[group[ordered]] for group in groups])
         number = np.empty(len(slots), dtype=np.int32)
         number[order] = np.arange(len(order))
         dofs = number[slots].reshape(-1, 3)
@@ -143,24 +144,26 @@ class Grid:
         self.multipliers: Index = len(order) + np.arange(len(self.scene.links))
         self.size = len(order) + len(self.multipliers)
 
-    def agrees(self, other: Grid) -> bool:
+    def agrees(self, grid: Grid) -> bool:
         """Return whether another grid has the same degrees of freedom."""
         return (
-            self.scene.beams == other.scene.beams
-            and np.array_equal(self.points, other.points)
-            and np.array_equal(self.dofs, other.dofs)
+            self.scene.beams == grid.scene.beams
+            and np.array_equal(self.points, grid.points)
+            and np.array_equal(self.dofs, grid.dofs)
         )
 
     def checksum(self) -> int:
         """Compute a checksum of points and numbering."""
-        numbers = np.concatenate([self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers])
-        return crc32(numbers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
+        integers = np.concatenate(
+            [self.dofs.ravel(), self.dofs_of_bodies.ravel(), self.multipliers]
+        )
+        return crc32(integers.astype("<i8").tobytes(), crc32(self.points.astype("<f8").tobytes()))
 
     # -- beams, vertices, cells ------------------------------------------------------------------
 
     def _index(self, beam: Member) -> int:
         """Return the number of a beam of the scene."""
-        number = self._number_of_beam.get(beam)
+        number = self._beam_indices.get(beam)
         if number is not None:
             return number
         if not isinstance(beam, Member):
@@ -196,11 +199,13 @@ class Grid:
     @cached_property
     def sections(self) -> tuple[list[Any], Index]:
         """Sections of the beams, each object once, and the number of each beam's section."""
-        numbers: dict[int, int] = {}
-        of_beams = [numbers.setdefault(id(b.section), len(numbers)) for b in self.scene.beams]
-        of_beam = np.array(of_beams, dtype=np.int32)
-        firsts = np.unique(of_beam, return_index=True)[1]
-        return [self.scene.beams[i].section for i in firsts], of_beam
+        indices: dict[int, int] = {}
+        section_numbers = [
+            indices.setdefault(id(b.section), len(indices)) for b in self.scene.beams
+        ]
+        beam_sections = np.array(section_numbers, dtype=np.int32)
+        firsts = np.unique(beam_sections, return_index=True)[1]
+        return [self.scene.beams[i].section for i in firsts], beam_sections
 
     @cached_property
     def inelastic(self) -> list[tuple[Layout, Index]]:
@@ -210,19 +215,22 @@ class Grid:
             ModelError: Such cells have a degree above one.
         """
         groups = dict[Layout, list[int]]()
-        sections, of_beam = self.sections
+        sections, beam_sections = self.sections
         for number, section in enumerate(sections):
             layout = section.layout(section.hinge)
             if layout is not None and not layout.elastic:
                 if self.mesh.degree > 1:
-                    beam = self.scene.beams[int(np.argmax(of_beam == number))]
+                    beam = self.scene.beams[int(np.argmax(beam_sections == number))]
                     raise ModelError(
                         f"Mesh: degree = {self.mesh.degree} is for elastic beams, and {beam.name} "
                         "may yield or break; use degree=1 with more cells, or an elastic section"
                     )
                 groups.setdefault(layout, []).append(number)
-        of_cell = of_beam[self.beam_of_cell]
-        return [(layout, np.flatnonzero(np.isin(of_cell, one))) for layout, one in groups.items()]
+        cell_sections = beam_sections[self.beam_of_cell]
+        return [
+            (layout, np.flatnonzero(np.isin(cell_sections, group)))
+            for layout, group in groups.items()
+        ]
 
     @cached_property
     def inelastic_cells(self) -> Index:
@@ -243,24 +251,24 @@ class Grid:
     def keys(self, cells: Index) -> list[tuple[int, int]]:
         """Return for each cell a checksum of its beam's ends, and its number in the beam."""
         beams = self.beam_of_cell[cells]
-        of_beam = [
+        checksums = [
             crc32(struct.pack("4d", *beam.ends[0], *beam.ends[1])) for beam in self.scene.beams
         ]
         in_beam = cells - self._first_cells[beams]
-        return [(of_beam[b], int(c)) for b, c in zip(beams, in_beam, strict=True)]
+        return [(checksums[b], int(c)) for b, c in zip(beams, in_beam, strict=True)]
 
     # -- places ----------------------------------------------------------------------------------
 
     def cell_and_part(self, place: Place) -> tuple[int, float]:
         """Return the cell at a place, and the fraction of it that lies before the place."""
         require_kind(place, Place, "place")
-        if place.beam not in self._number_of_beam:
+        if place.beam not in self._beam_indices:
             raise ModelError(f"{place}: {place.beam.name} is not in the scene")
-        i = self._number_of_beam[place.beam]
+        i = self._beam_indices[place.beam]
         s = self._parameters[i]
         left = min(max(bisect_left(s, place.s) - 1, 0), len(s) - 2)
-        part = (place.s - s[left]) / (s[left + 1] - s[left])
-        return int(self._first_cells[i]) + left, float(part)
+        fraction = (place.s - s[left]) / (s[left + 1] - s[left])
+        return int(self._first_cells[i]) + left, float(fraction)
 
     def cell(self, place: Place) -> int:
         """Return the cell at a place; at a vertex the cell before it, at the start the first."""
@@ -275,16 +283,16 @@ class Grid:
             return int(self.first_vertices[i])
         if place.s == 1.0:
             return int(self.first_vertices[i + 1]) - 1
-        cell, part = self.cell_and_part(place)
-        return cell + i + round(part)
+        cell, fraction = self.cell_and_part(place)
+        return cell + i + round(fraction)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
         """Return nodes of the cell at a place, vertices first, and their weights; (degree + 1,)."""
-        cell, part = self.cell_and_part(place)
-        first, *between, last = self.mesh.weights(part)
+        cell, fraction = self.cell_and_part(place)
+        first, *between, last = self.mesh.weights(fraction)
         nodes = self.nodes_of_cells[cell].copy()
-        if part in (0.0, 1.0):  # the attached side of a hinge, not the cell's
-            nodes[int(part)] = self.vertex(place)
+        if fraction in (0.0, 1.0):  # the attached side of a hinge, not the cell's
+            nodes[int(fraction)] = self.vertex(place)
         return nodes, np.array([first, last, *between])
 
     def place(self, vertex: int) -> Place:
@@ -312,25 +320,25 @@ class Grid:
 
     # -- degrees of freedom ----------------------------------------------------------------------
 
-    def nodes_of(self, one: Member | Body) -> tuple[Array, Index]:
+    def nodes_of(self, member: Member | Body) -> tuple[Array, Index]:
         """Return points and degrees of freedom of nodes of a beam or body; (n, 2), (n, 3); m."""
-        if isinstance(one, Body):
-            return np.array([one.center]), self.node(one.middle).reshape(1, 3)
-        nodes = self._nodes_of(one)
+        if isinstance(member, Body):
+            return np.array([member.center]), self.node(member.middle).reshape(1, 3)
+        nodes = self._beam_nodes(member)
         return self.points[nodes], self.dofs[nodes]
 
-    def _nodes_of(self, beam: Member) -> Index:
+    def _beam_nodes(self, beam: Member) -> Index:
         """Return the nodes of a beam, including both sides of its hinges."""
         return np.union1d(self.nodes_of_cells[self.cells_of(beam)], self.vertices_of(beam))
 
     def node(self, anchor: Anchor) -> Index:
         """Return degrees of freedom of the vertex or body that an anchor belongs to; (3,)."""
-        of = node(anchor)
-        if not isinstance(of, Body):
-            return np.asarray(self.dofs[self.vertex(of)])
-        if of not in self.scene.rigid_bodies:
-            raise ModelError(f"{anchor}: {of.name} is not in the scene")
-        return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(of)])
+        carrier = node(anchor)
+        if not isinstance(carrier, Body):
+            return np.asarray(self.dofs[self.vertex(carrier)])
+        if carrier not in self.scene.rigid_bodies:
+            raise ModelError(f"{anchor}: {carrier.name} is not in the scene")
+        return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(carrier)])
 
     @cached_property
     def rotations(self) -> Index:
@@ -359,13 +367,13 @@ class Grid:
     def describe(self, dof: int) -> str:
         """Describe a degree of freedom by its component, beam and point."""
         if dof in self.multipliers:
-            return f"what holds {self.scene.links[dof - self.multipliers[0]]}"
+            return f"force of {self.scene.links[dof - self.multipliers[0]]}"
         if dof not in self.dofs:
             body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
             return f"{COMPONENTS[component]} of {self.scene.rigid_bodies[body].name}"
         node, component = np.argwhere(self.dofs == dof)[0]
         x, y = self.points[node]
-        beam = next(b for b in self.scene.beams if node in self._nodes_of(b))
+        beam = next(b for b in self.scene.beams if node in self._beam_nodes(b))
         return f"{COMPONENTS[component]} of {beam.name} at ({x:g}, {y:g})"
 
     def describe_cell(self, number: int) -> str:
@@ -375,7 +383,7 @@ class Grid:
 
     def worst(self, sizes: Array) -> dict[str, float]:
         """Describe the largest degree of freedom of each beam, body and connector, if not zero."""
-        dofs_of_beams = [self.nodes_of(beam)[1] for beam in self.scene.beams]
-        groups = [*dofs_of_beams, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
+        beam_dofs = [self.nodes_of(beam)[1] for beam in self.scene.beams]
+        groups = [*beam_dofs, *self.dofs_of_bodies, *self.multipliers.reshape(-1, 1)]
         worst = sorted({int(g.flat[np.argmax(sizes[g])]) for g in groups}, key=lambda d: -sizes[d])
         return {self.describe(dof): float(sizes[dof]) for dof in worst if sizes[dof]}

@@ -49,8 +49,8 @@ class Element:
 
     def __init__(self, mesh: Mesh, cells: meshes.Mesh | None = None) -> None:
         self.degree, self._lumped = mesh.degree, mesh.lumped
-        one_cell = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]])
-        self._cell = cells or line_mesh(*one_cell)
+        unit_cell = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]])
+        self._cell = cells or line_mesh(*unit_cell)
         line = basix.ufl.element("Lagrange", "interval", mesh.degree)
         along = fem.Function(fem.functionspace(self._cell, ("DG", 1)))
         along.x.array[along.function_space.dofmap.list] = 0.0, 1.0
@@ -130,8 +130,8 @@ def applied(form: ufl.Form, q1: fem.Function) -> ufl.Form:
 class Fields:
     """Cells of one process, or some of them, on which forms of the element are evaluated.
 
-    Loops in C evaluate the forms, which are compiled once for all scenes.  ``part`` holds positions
-    in ``share.cells``.
+    Loops in C evaluate the forms, which are compiled once for all scenes.  ``positions`` in
+    ``share.cells`` select the cells.
 
     Attributes:
         cell_dofs: Local degrees of freedom of the cells; (num_cells, 3 (degree + 1)).
@@ -139,11 +139,11 @@ class Fields:
         element: The element that forms are stated on.
     """
 
-    def __init__(self, share: Share, part: Index | None = None) -> None:
+    def __init__(self, share: Share, positions: Index | None = None) -> None:
         self.share = share
         everywhere = np.arange(len(share.cells), dtype=np.int32)
-        whole = part is None or np.array_equal(part, everywhere)
-        self.order: Index = everywhere if part is None else part
+        whole = positions is None or np.array_equal(positions, everywhere)
+        self.order: Index = everywhere if positions is None else positions
         self.cell_dofs = share.cell_dofs if whole else share.cell_dofs[self.order]
         self._matrix: Csr | None = None
         self.element = element_of(share.grid.mesh)
@@ -198,9 +198,9 @@ class Fields:
             links = share.grid.scene.links
             couples = [share.cell_dofs, share.link_dofs, share.body_dofs]
             component = np.array([links[i].component for i in share.links], dtype=np.int32)
-            for back in range(1, component.max(initial=0) + 1):  # forces of one bushing
-                later, force = np.flatnonzero(component >= back), share.link_dofs[:, 6]
-                couples.append(np.column_stack([force[later], force[later - back]]))
+            for offset in range(1, component.max(initial=0) + 1):  # forces of one bushing
+                later, force = np.flatnonzero(component >= offset), share.link_dofs[:, 6]
+                couples.append(np.column_stack([force[later], force[later - offset]]))
             self._matrix = coupling(share.size, *couples)
             return self._matrix
         return self._matrix.zeros_like()
@@ -217,18 +217,20 @@ class Fields:
         """Return properties of the cells' sections, for a coefficient of the element."""
         grid = self.share.grid
         names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
-        sections, of_beam = grid.sections
-        numbers = [[getattr(section, name) for name in names] for section in sections]
+        sections, beam_sections = grid.sections
+        properties = [[getattr(section, name) for name in names] for section in sections]
         beams = grid.beam_of_cell[self.share.cells[self.order]]
-        return np.asarray(np.array(numbers).reshape(-1, len(names))[of_beam[beams]])
+        return np.asarray(np.array(properties).reshape(-1, len(names))[beam_sections[beams]])
 
 
 @stated
-def mass_form(of: Element) -> ufl.Form:
+def mass_form(element: Element) -> ufl.Form:
     """Return the mass of the beams as a bilinear form; kg, kg m²."""
-    v = of.configuration()
-    momentum = ufl.derivative(kinetic_energy(v, of.inertia) * of.dx_of_mass(), v, of.w)
-    return ufl.derivative(momentum, v, ufl.TrialFunction(of.space))  # P(67)
+    v = element.configuration()
+    momentum = ufl.derivative(
+        kinetic_energy(v, element.inertia) * element.dx_of_mass(), v, element.w
+    )
+    return ufl.derivative(momentum, v, ufl.TrialFunction(element.space))  # P(67)
 
 
 def mass_kernel(fields: Fields) -> Kernel:
@@ -239,8 +241,8 @@ def mass_kernel(fields: Fields) -> Kernel:
 
 def lumps(scene: Scene) -> list[tuple[Anchor, float, float]]:
     """List places, masses and rotary inertias of the point masses and the bodies; kg, kg m²."""
-    masses = [(one.place, one.mass, one.inertia) for one in scene.masses]
-    return masses + [(one.middle, one.mass, one.inertia) for one in scene.bodies]
+    masses = [(mass.place, mass.mass, mass.inertia) for mass in scene.masses]
+    return masses + [(body.middle, body.mass, body.inertia) for body in scene.bodies]
 
 
 def mass_matrix(fields: Fields) -> Csr:
@@ -249,14 +251,14 @@ def mass_matrix(fields: Fields) -> Csr:
     for place, mass, inertia in lumps(share.grid.scene):
         dofs = share.grid.node(place)
         mine = share.owns(dofs)
-        here = share.local(dofs[mine])
-        M.data[M.positions(here, here)] += np.array([mass, mass, inertia])[mine]
+        local_dofs = share.local(dofs[mine])
+        M.data[M.positions(local_dofs, local_dofs)] += np.array([mass, mass, inertia])[mine]
     return M
 
 
 @stated
-def _weighted_strains(of: Element) -> ufl.Form:
-    return of.sampled(strain(of.q1, of.axis))
+def _weighted_strains(element: Element) -> ufl.Form:
+    return element.sampled(strain(element.q1, element.axis))
 
 
 class Strains:
@@ -287,9 +289,13 @@ class Strains:
 
 
 @stated
-def _section_forces(of: Element) -> ufl.Form:
-    r = resultants(strain(of.q1, of.axis), of.stiffness)
-    return ufl.dot(r, ufl.TestFunction(of.stiffness.function_space)) / of.axis.h * of.dx(1)
+def _section_forces(element: Element) -> ufl.Form:
+    r = resultants(strain(element.q1, element.axis), element.stiffness)
+    return (
+        ufl.dot(r, ufl.TestFunction(element.stiffness.function_space))
+        / element.axis.h
+        * element.dx(1)
+    )
 
 
 def section_forces(fields: Fields) -> Kernel:
@@ -319,7 +325,7 @@ def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
             f"dolfinx.total: {shorten(integral)} must be a form of UFL without test functions, "
             "such as expression * view.dx, or a scalar expression"
         )
-    if any(one.integral_type() != "cell" for one in integral.integrals()):
+    if any(term.integral_type() != "cell" for term in integral.integrals()):
         raise ModelError(
             "dolfinx.total: the form has integrals over facets, and the mesh of each process has "
             "facets of its own where it ends; integrate over cells, with dx"
@@ -327,7 +333,7 @@ def integrated(integral: ufl.Form | Expr, mesh: meshes.Mesh) -> float:
     if any(domain != mesh.ufl_domain() for domain in integral.ufl_domains()):
         raise ModelError("dolfinx.total: the form is of another mesh; state it on view.mesh")
     # Separately, as each compiled form has one quadrature rule.
-    forms = (compiled_form(ufl.Form([one]))[0] for one in integral.integrals())
+    forms = (compiled_form(ufl.Form([term]))[0] for term in integral.integrals())
     return float(sum(fem.assemble_scalar(form) for form in forms))
 
 
@@ -338,16 +344,16 @@ class DolfinxFields(Fields):
         mesh: Mesh of the cells, which DOLFINx reorders.
     """
 
-    def __init__(self, share: Share, part: Index | None = None) -> None:
-        grid, cells = share.grid, share.cells if part is None else share.cells[part]
-        vertices, numbers = np.unique(grid.cells[cells], return_inverse=True)
-        self.mesh = line_mesh(grid.points[vertices], numbers.reshape(-1, 2))
+    def __init__(self, share: Share, positions: Index | None = None) -> None:
+        grid, cells = share.grid, share.cells if positions is None else share.cells[positions]
+        vertices, local_vertices = np.unique(grid.cells[cells], return_inverse=True)
+        self.mesh = line_mesh(grid.points[vertices], local_vertices.reshape(-1, 2))
         order: Index = np.asarray(self.mesh.topology.original_cell_index)
         # The order of the vertices of a cell orients the beam.
         expected = grid.points[grid.cells[cells[order]]]
         if not np.array_equal(cell_coordinates(self.mesh)[:, :, :2], expected):
-            raise RuntimeError("this version of DOLFINx turns cells around; please report it")
-        super().__init__(share, order if part is None else part[order])
+            raise RuntimeError("this version of DOLFINx reverses cells; please report it")
+        super().__init__(share, order if positions is None else positions[order])
         self.element = element = Element(grid.mesh, self.mesh)
         for function in (element.stiffness, element.inertia):
             dofs = dofs_of_cells(function.function_space)

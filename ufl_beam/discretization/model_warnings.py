@@ -42,13 +42,13 @@ def warn_of_masses(scene: Scene) -> None:
     if any(beam.section.rhoA for beam in scene.beams):
         warn(
             f"{names}: without mass, because neither rho nor rhoA of the section is given, but "
-            "other beams of the scene have mass. Give it, rhoA=0.0 if none is meant"
+            "other beams of the scene have mass. Give rho or rhoA; rhoA=0.0 if they have none"
         )
     elif not any(body.mass for body in scene.bodies) and not any(m.mass for m in scene.masses):
         warn(
             f"{names}: without mass, because neither rho nor rhoA of the section is given, and "
-            "nothing else in the scene has mass, so that dynamics has no inertia. Give it, or use "
-            "Static()"
+            "nothing else in the scene has mass, so that dynamics has no inertia. Give rho or "
+            "rhoA, or use Static()"
         )
 
 
@@ -65,10 +65,10 @@ def warn_of_rates(scene: Scene) -> None:
 
 def warn_of_free_hinges(scene: Scene) -> None:
     """Warn of hinges at free ends that are omitted because only a moment load is beyond them."""
-    there = {place_of(hinge) for hinge in scene.hinges}
+    hinge_places = {place_of(hinge) for hinge in scene.hinges}
     for load in scene.moments:
         place = load.place
-        if not isinstance(place, Place) or place in there:
+        if not isinstance(place, Place) or place in hinge_places:
             continue
         law = place.beam.hinges.get(place.s)
         if law is not None and law.opens:
@@ -82,44 +82,45 @@ def warn_of_touching(grid: Grid) -> None:
     """Warn of ends of beams that touch another beam without a joint or connector between them."""
     if not grid.scene.beams or not len(pairs := _touching(grid)):
         return
-    end, other = (grid.place(int(vertex)) for vertex in pairs[0])
-    gap = math.dist(end.point, other.point)
+    end, touched = (grid.place(int(vertex)) for vertex in pairs[0])
+    gap = math.dist(end.point, touched.point)
     more = f"; so do {len(pairs) - 1} more pairs of places" if len(pairs) > 1 else ""
     warn(
-        f"{end} and {other} touch ({gap:.3g} m apart), but no joint or connector joins them, so "
-        f"that they move independently{more}. Join them with Rigid or Revolute if that is meant"
+        f"{end} and {touched} touch ({gap:.3g} m apart), but no joint or connector joins them, "
+        f"so that they move independently{more}. Join them with Rigid or Revolute if they are "
+        "connected"
     )
 
 
 def _touching(grid: Grid) -> Index:
     """Return vertices of ends, and vertices that they touch without a joint; (num_pairs, 2)."""
     first = grid.first_vertices
-    beam_of = np.repeat(np.arange(len(first) - 1), np.diff(first))
+    beams = np.repeat(np.arange(len(first) - 1), np.diff(first))
     points = grid.points[: first[-1]]
     ends = np.column_stack([first[:-1], first[1:] - 1]).ravel()
-    steps = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(beam_of) == 0)
-    lengths = np.bincount(beam_of[:-1], weights=steps, minlength=len(first) - 1)
-    reach = TOUCHING * lengths[beam_of]
+    steps = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(beams) == 0)
+    lengths = np.bincount(beams[:-1], weights=steps, minlength=len(first) - 1)
+    reach = TOUCHING * lengths[beams]
     tree = KDTree(points)
-    near = tree.query_ball_point(points[ends], reach[ends], return_sorted=False)
-    counts = np.array([len(one) for one in near])
+    neighbours = tree.query_ball_point(points[ends], reach[ends], return_sorted=False)
+    counts = np.array([len(indices) for indices in neighbours])
     end = np.repeat(ends, counts)
-    other = np.fromiter(chain.from_iterable(near), dtype=np.int64, count=len(end))
+    touched = np.fromiter(chain.from_iterable(neighbours), dtype=np.int64, count=len(end))
     # A beam touches itself only if both of its ends meet.
-    apart = (beam_of[end] != beam_of[other]) | (np.isin(other, ends) & (end < other))
-    gap = np.linalg.norm(points[end] - points[other], axis=1)
-    kept = apart & (gap <= np.minimum(reach[end], reach[other]))
-    if not kept.any():
+    apart = (beams[end] != beams[touched]) | (np.isin(touched, ends) & (end < touched))
+    gap = np.linalg.norm(points[end] - points[touched], axis=1)
+    touching = apart & (gap <= np.minimum(reach[end], reach[touched]))
+    if not touching.any():
         return np.empty((0, 2), dtype=np.int64)
-    end, other, gap = end[kept], other[kept], gap[kept]
+    end, touched, gap = end[touching], touched[touching], gap[touching]
     group = _groups(grid)[: first[-1]]
-    joined = group[end] == group[other]
-    keys = end * len(first) + beam_of[other]
+    joined = group[end] == group[touched]
+    keys = end * len(first) + beams[touched]
     loose = ~joined & ~np.isin(keys, keys[joined])
-    end, other, gap, keys = end[loose], other[loose], gap[loose], keys[loose]
+    end, touched, gap, keys = end[loose], touched[loose], gap[loose], keys[loose]
     order = np.lexsort((gap, keys))
     _, nearest = np.unique(keys[order], return_index=True)
-    pairs = np.column_stack([end, other])[order][nearest]
+    pairs = np.column_stack([end, touched])[order][nearest]
     # Two ends that touch each other count as one pair.
     _, once = np.unique(np.sort(pairs, axis=1), axis=0, return_index=True)
     return np.asarray(pairs[np.sort(once)])
@@ -157,21 +158,21 @@ def warn_of_far_points(scene: Scene) -> None:
         return
     others = list(_points(scene))
     tree = KDTree([point for point, _ in others])
-    for spot in spots:
-        near = tree.query_ball_point(spot.point, 1e-9 * scene.size)
-        if any(others[i][1] is not spot.body for i in near):
+    for place in spots:
+        neighbours = tree.query_ball_point(place.point, 1e-9 * scene.size)
+        if any(others[i][1] is not place.body for i in neighbours):
             continue
-        body, ((x, y), (cx, cy)) = spot.body, (spot.point, spot.body.center)
-        out = math.dist(spot.point, body.center)
+        body, ((x, y), (cx, cy)) = place.body, (place.point, place.body.center)
+        out = math.dist(place.point, body.center)
         if body.mass and body.inertia:
             far = out > FAR_OUT * math.sqrt(body.inertia / body.mass)
         else:
-            box = np.array([*(point for point, of in others if of is not body), body.center])
-            far = _outside(np.array(spot.point), box) > math.hypot(*np.ptp(box, axis=0)) > 0.0
+            box = np.array([*(point for point, owner in others if owner is not body), body.center])
+            far = _outside(np.array(place.point), box) > math.hypot(*np.ptp(box, axis=0)) > 0.0
         if far:
             warn(
-                f"{spot} is {out:.4g} m away from the centre of {body.name}, and nothing else "
-                "is there. body.at(x, y) takes coordinates of the undeformed scene; what is meant "
+                f"{place} is {out:.4g} m away from the centre of {body.name}, and nothing else "
+                "is there. body.at(x, y) takes coordinates of the undeformed scene; a point "
                 f"relative to the centre is at({cx:g} + {x:g}, {cy:g} + {y:g})"
             )
 
@@ -195,9 +196,9 @@ def warn_of_origin(scene: Scene) -> None:
         if velocity.angular == 0.0 or velocity.about is not None:
             continue
         moved = set(velocity.beams)
-        ends = np.array([p for p, of in _points(scene) if of in moved])
+        ends = np.array([p for p, owner in _points(scene) if owner in moved])
         if away > (np.linalg.norm(np.ptp(ends, axis=0)) if len(ends) else 0.0):
-            names = ", ".join(one.name for one in velocity.beams[:3])
+            names = ", ".join(beam.name for beam in velocity.beams[:3])
             warn(
                 f"Velocity of {names}: angular = {velocity.angular:g} rad/s without about= turns "
                 f"about the origin, which is {away:.4g} m away from the scene. Give about=(x, y), "
@@ -227,14 +228,15 @@ def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
         for support in grid.scene.supports
         for c, f in support.moving.items()
     ] + [
-        (f"{link}: its motion", here, value_at(link.law.motion, t, link), link.turns)
-        for link, here in zip(grid.scene.links, motions, strict=True)
+        (f"{link}: its motion", value, value_at(link.law.motion, t, link), link.turns)
+        for link, value in zip(grid.scene.links, motions, strict=True)
         if isinstance(link.law, PrescribedMotion) and link.law is not HELD
     ]
-    for what, here, target, turns in starts:
-        if abs(target - here) > JUMP * (1.0 if turns else grid.scene.size):
+    for name, value, target, is_rotation in starts:
+        if abs(target - value) > JUMP * (1.0 if is_rotation else grid.scene.size):
+            unit = "rad" if is_rotation else "m"
             warn(
-                f"{what} jumps from {here:.6g} to {target:.6g} {'rad' if turns else 'm'} at the "
-                f"start, t = {t:g} s, which in dynamics is a blow. Let it grow in time, as "
+                f"{name} jumps from {value:.6g} to {target:.6g} {unit} at the start, "
+                f"t = {t:g} s, which in dynamics is an impact. Let it grow in time, as "
                 "ub.Table and lambda t: ... can, or begin with start= from a static run"
             )

@@ -21,11 +21,11 @@ def bisected(points: Array, number: int) -> Index:
 
     Recursive coordinate bisection divides along the longer side of the bounding box.
     """
-    part = np.zeros(len(points), dtype=np.int32)
+    subdomains = np.zeros(len(points), dtype=np.int32)
     to_divide = [(np.arange(len(points)), 0, number)]
     while to_divide:
         these, first, number = to_divide.pop()
-        part[these] = first
+        subdomains[these] = first
         if number > 1 and len(these):
             longer = np.ptp(points[these], axis=0).argmax()
             half = number // 2
@@ -34,7 +34,7 @@ def bisected(points: Array, number: int) -> Index:
                 [len(these) * half // number],
             )
             to_divide += [(before, first, half), (after, first + half, number - half)]
-    return part
+    return subdomains
 
 
 class Share:
@@ -64,45 +64,45 @@ class Share:
     def __init__(self, grid: Any, comm: MPI.Intracomm) -> None:
         self.grid = grid
         self.comm, self.alone = comm, comm.size == 1
-        rank_of_cell = bisected(grid.points[grid.cells].mean(axis=1), comm.size)
+        cell_ranks = bisected(grid.points[grid.cells].mean(axis=1), comm.size)
         owner = np.full(grid.size, comm.size, dtype=np.int32)
         for rank in reversed(range(comm.size)):  # the first process that has it
-            owner[grid.dofs[grid.nodes_of_cells[rank_of_cell == rank]]] = rank
-        self.cells = np.flatnonzero(rank_of_cell == comm.rank).astype(np.int32)
-        of_cell = grid.dofs[grid.nodes_of_cells[self.cells]].transpose(0, 2, 1)
-        of_cell = of_cell.reshape(len(self.cells), 3 * (grid.mesh.degree + 1))
-        of_hinge, cell_of_hinge = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
-        np.minimum.at(owner, of_hinge, rank_of_cell[cell_of_hinge][:, None])
-        of_link = grid.dofs_of_links
-        rank_of_link = owner[of_link].min(axis=1, initial=comm.size) % comm.size
-        np.minimum.at(owner, of_link, rank_of_link[:, None])
+            owner[grid.dofs[grid.nodes_of_cells[cell_ranks == rank]]] = rank
+        self.cells = np.flatnonzero(cell_ranks == comm.rank).astype(np.int32)
+        cell_dofs = grid.dofs[grid.nodes_of_cells[self.cells]].transpose(0, 2, 1)
+        cell_dofs = cell_dofs.reshape(len(self.cells), 3 * (grid.mesh.degree + 1))
+        hinge_dofs, hinge_cells = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
+        np.minimum.at(owner, hinge_dofs, cell_ranks[hinge_cells][:, None])
+        link_dofs = grid.dofs_of_links
+        link_ranks = owner[link_dofs].min(axis=1, initial=comm.size) % comm.size
+        np.minimum.at(owner, link_dofs, link_ranks[:, None])
         owner[owner == comm.size] = 0  # bodies without attachments
-        self.links = np.flatnonzero(rank_of_link == comm.rank)
+        self.links = np.flatnonzero(link_ranks == comm.rank)
         order = np.argsort(owner, kind="stable")
         number = np.empty(grid.size, dtype=np.int32)  # of PETSc
         number[order] = np.arange(grid.size, dtype=np.int32)
 
         own = owner == comm.rank
         ghost = np.zeros(grid.size, dtype=bool)
-        ghost[of_cell] = True
-        ghost[of_hinge[rank_of_cell[cell_of_hinge] == comm.rank]] = True
-        ghost[of_link[self.links]] = True
+        ghost[cell_dofs] = True
+        ghost[hinge_dofs[cell_ranks[hinge_cells] == comm.rank]] = True
+        ghost[link_dofs[self.links]] = True
         ghost &= ~own
         self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
         self.size, self.num_owned = len(self.dofs), int(own.sum())
         self.ghosts: Index = number[self.dofs[self.num_owned :]]
         self._local: Index = np.full(grid.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
-        self.cell_dofs = self._local[of_cell]
-        self.link_dofs = self._local[of_link[self.links]]
-        of_body = self._local[grid.dofs_of_bodies]
-        self.body_dofs = of_body[(of_body >= 0).all(axis=1)]
+        self.cell_dofs = self._local[cell_dofs]
+        self.link_dofs = self._local[link_dofs[self.links]]
+        body_dofs = self._local[grid.dofs_of_bodies]
+        self.body_dofs = body_dofs[(body_dofs >= 0).all(axis=1)]
         self._all_owned: Index = order
         if self.alone:  # all numbers are the same
             self._local = self._all_owned = self.dofs
         self.rotations = np.sort(self.local(grid.rotations)).astype(np.int32)
         self.multipliers = self.local(grid.multipliers).astype(np.int32)
-        self._parts: Array = np.empty(0 if self.alone else grid.size)  # new memory is slow
+        self._gathered: Array = np.empty(0 if self.alone else grid.size)  # new memory is slow
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 
     @cached_property
@@ -124,8 +124,8 @@ class Share:
         """Return local numbers of both components of all displacements."""
         grid = self.grid
         pairs = np.unique(np.r_[grid.dofs[:, :2], grid.dofs_of_bodies[:, :2]], axis=0)
-        found = self._local[pairs]
-        x, y = found[(found >= 0).all(axis=1)].T
+        indices = self._local[pairs]
+        x, y = indices[(indices >= 0).all(axis=1)].T
         return x, y
 
     def lengths(self) -> Array:
@@ -150,13 +150,13 @@ class Share:
 
     def local(self, dofs: Index) -> Index:
         """Return local numbers of the ``dofs`` (numbers of the grid) that this process has."""
-        found = self._local[dofs]
-        return np.asarray(found[found >= 0])
+        indices = self._local[dofs]
+        return np.asarray(indices[indices >= 0])
 
     def owns(self, dofs: Index) -> npt.NDArray[np.bool_]:
         """Return which of ``dofs`` (numbers of the grid) this process owns."""
-        found = self._local[dofs]
-        return np.asarray((found >= 0) & (found < self.num_owned))
+        indices = self._local[dofs]
+        return np.asarray((indices >= 0) & (indices < self.num_owned))
 
     def gather(self, values: Array, out: Array | None = None) -> Array:
         """Gather values of all degrees of freedom, in the order of the grid, on every process.
@@ -165,10 +165,11 @@ class Share:
         """
         if self.alone:
             return values
-        result, parts = np.empty(self.grid.size) if out is None else out, self._parts
+        result = np.empty(self.grid.size) if out is None else out
+        gathered = self._gathered
         owned = np.ascontiguousarray(values[: self.num_owned])
-        self.comm.Allgatherv(owned, [parts, self._num_owned_by])
-        result[self._all_owned] = parts
+        self.comm.Allgatherv(owned, [gathered, self._num_owned_by])
+        result[self._all_owned] = gathered
         return result
 
     def added(self, values: Array) -> Array:

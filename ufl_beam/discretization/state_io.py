@@ -29,19 +29,19 @@ class Memory:
     """
 
     def __init__(self, share: Share, state: State | None = None) -> None:
-        self._share, self._given = share, state
+        self._share, self._restored = share, state
         self._sums: dict[str, tuple[int, Index, Array]] = {}
         self._rows: defaultdict[str, list[Array]] = defaultdict(list)
-        self._one = (1, np.zeros(1, dtype=int), int(share.comm.rank == 0))
+        self._scalar = (1, np.zeros(1, dtype=int), int(share.comm.rank == 0))
         self._dofs = (share.grid.size, share.dofs, share.num_owned)
 
     def number(self, name: str, value: float) -> float:
         """Save or restore a number that is equal on all processes."""
-        return float(self._values(name, np.array([value]), *self._one)[0])
+        return float(self._values(name, np.array([value]), *self._scalar)[0])
 
     def total(self, name: str, value: float) -> float:
         """Save or restore a number of which only the sum over the processes is defined."""
-        return float(self._values(name, np.array([value]), *self._one, summed=True)[0])
+        return float(self._values(name, np.array([value]), *self._scalar, summed=True)[0])
 
     def at_dofs(self, name: str, values: Array) -> Array:
         """Save or restore values at the local degrees of freedom, equal on all processes."""
@@ -58,59 +58,59 @@ class Memory:
 
         They are equal on all processes that have a position, or addends if they are ``summed``.
         """
-        if self._given is None:
+        if self._restored is None:
             mine = len(values) if summed else owned
             self._sums[name] = size, where[:mine], values[:mine].copy()
             return values
-        here = self._found(name, (size,))[where]
+        result = self._array(name, (size,))[where]
         if summed:
-            here[owned:] = 0.0  # the owner has the sum
-        return np.asarray(here)
+            result[owned:] = 0.0  # the owner has the sum
+        return np.asarray(result)
 
-    def rows(self, name: str, numbers: Index, rows: Array, *, known: bool = False) -> Array:
+    def rows(self, name: str, indices: Index, rows: Array, *, known: bool = False) -> Array:
         """Save or restore rows by number, each on one process, or all ``known`` to all processes.
 
         Rows of one name may have different lengths.  A number that is not in the state keeps its
         present row.
         """
         columns = rows.shape[1]
-        table_of = f"{name}, {columns}"
-        if self._given is None:
+        key = f"{name}, {columns}"
+        if self._restored is None:
             if not known or self._share.comm.rank == 0:
-                self._rows[table_of].append(np.column_stack([numbers, rows]))
+                self._rows[key].append(np.column_stack([indices, rows]))
             return rows
-        if not self.has(table_of):
+        if not self.has(key):
             return rows
-        table = self._found(table_of, (-1, columns + 1))
-        found = np.minimum(np.searchsorted(table[:, 0], numbers), len(table) - 1)
-        there = table[found, 0] == numbers
-        return np.where(there[:, None], table[found, 1:], rows)
+        table = self._array(key, (-1, columns + 1))
+        positions = np.minimum(np.searchsorted(table[:, 0], indices), len(table) - 1)
+        present = table[positions, 0] == indices
+        return np.where(present[:, None], table[positions, 1:], rows)
 
     def has(self, name: str) -> bool:
         """Return whether a state is restored and has values of this name."""
-        return self._given is not None and name in self._given
+        return self._restored is not None and name in self._restored
 
-    def _found(self, name: str, shape: tuple[int, ...]) -> Array:
+    def _array(self, name: str, shape: tuple[int, ...]) -> Array:
         """Return an array of the state; :class:`ModelError` if its shape is wrong; -1 is any."""
-        values = (self._given or {}).get(name)
+        values = (self._restored or {}).get(name)
         if values is None or len(values.shape) != len(shape) or shape[-1] != values.shape[-1]:
-            found = "missing" if values is None else f"of shape {values.shape}"
-            raise ModelError(f"the array {name!r} of the state is {found}, and must be {shape}")
+            problem = "missing" if values is None else f"of shape {values.shape}"
+            raise ModelError(f"the array {name!r} of the state is {problem}, and must be {shape}")
         return values
 
     def state(self) -> State:
         """Return the saved state of all processes on each process; all call it together."""
-        here = self._sums, self._rows
-        everyone = [here] if self._share.comm.size == 1 else self._share.comm.allgather(here)
+        own = self._sums, self._rows
+        everyone = [own] if self._share.comm.size == 1 else self._share.comm.allgather(own)
         state: State = {}
         tables: defaultdict[str, list[Array]] = defaultdict(list)
         for sums, rows in everyone:
             for name, (size, where, values) in sums.items():
                 # Start from -0, which keeps the sign of a zero that is added.
                 np.add.at(state.setdefault(name, np.full(size, -0.0)), where, values)
-            for name, parts in rows.items():
-                tables[name] += parts
-        for name, parts in tables.items():
-            table = np.concatenate(parts)
+            for name, arrays in rows.items():
+                tables[name] += arrays
+        for name, arrays in tables.items():
+            table = np.concatenate(arrays)
             state[name] = table[np.argsort(table[:, 0])]
         return state

@@ -18,7 +18,7 @@ APART = 1e-6
 """Largest distance of places that a new joint may connect: fraction of the scene's size or of the
 largest velocity, or rad."""
 
-OF_CELLS = ("cells", "changes of strains")
+CELL_TABLES = ("cells", "changes of strains")
 """Tables of internal variables whose rows are numbered like cells; all others like connectors."""
 
 
@@ -46,7 +46,7 @@ class Transfer:
         for i, link in enumerate(new.scene.links):
             if candidates := known.get(_geometry(link)):
                 links[i] = candidates.pop(0)
-        self._numbers = {a: b for b, a in links.items()}
+        self._link_map = {a: b for b, a in links.items()}
         self._to = np.concatenate([news, new.multipliers[list(links)]])
         self._from = np.concatenate([olds, old.multipliers[list(links.values())]])
 
@@ -63,14 +63,14 @@ class Transfer:
             nodes = ((b, old.nodes_of(b)[0], new.nodes_of(b)[0]) for b in new.scene.beams)
             beam = next(b for b, before, now in nodes if not np.array_equal(before, now))
             raise ModelError(
-                f"start: {beam.name} has other vertices than in the solution, because something "
-                "is attached at other places; let these be corners=(s, ...) of the beam in both"
+                f"start: {beam.name} has other vertices than in the solution, because objects "
+                "are attached at other places; add these places to corners=(s, ...) of both beams"
             )
         for body in new.scene.bodies:
             if body not in old.scene.bodies:
                 raise ModelError(
-                    f"start: {body.name} is not in the scene of the solution, so that nobody knows "
-                    "where it is; let it be in both, held by supports before"
+                    f"start: {body.name} is not in the scene of the solution, so its position is "
+                    "unknown; let it be in both scenes, held by supports in the first"
                 )
 
     def state(self, q: Array) -> Array:
@@ -88,17 +88,17 @@ class Transfer:
     ) -> Array:
         mapped = np.zeros(self._new.size)
         mapped[self._to] = x[self._from]
-        missed = np.abs(mapped[self._to] - x[self._from])
-        moving = len(self._to) - len(self._numbers)
+        mismatch = np.abs(mapped[self._to] - x[self._from])
+        moving = len(self._to) - len(self._link_map)
         for c in range(3):
-            part = missed[c:moving:3]
-            if part.size and part.max() > allowed(c):
-                where = self._new.describe(int(self._to[c + 3 * int(np.argmax(part))]))
+            component = mismatch[c:moving:3]
+            if component.size and component.max() > allowed(c):
+                where = self._new.describe(int(self._to[c + 3 * int(np.argmax(component))]))
                 unit = units[c == 2]
                 raise ModelError(
-                    f"start: the new scene joins places that {how} {part.max():.3g} {unit} apart "
-                    f"at the end of the solution: {where}. Join them by springs, or where they "
-                    "are together"
+                    f"start: the new scene joins places that {how} {component.max():.3g} {unit} "
+                    f"apart at the end of the solution: {where}. Join them by springs, or where "
+                    "they are together"
                 )
         if GROUND in self._new.scene.rigid_bodies:
             mapped[self._new.node(GROUND.middle)] = 0.0
@@ -111,11 +111,11 @@ class Transfer:
             if values.ndim == 1:
                 mapped[name] = np.zeros(self._new.size)
                 mapped[name][self._to] = values[self._from]
-            elif name.rpartition(",")[0] in OF_CELLS:
+            elif name.rpartition(",")[0] in CELL_TABLES:
                 mapped[name] = values
             else:
-                kept = [row for row in values if int(row[0]) in self._numbers]
-                rows = [[self._numbers[int(row[0])], *row[1:]] for row in kept]
+                common = [row for row in values if int(row[0]) in self._link_map]
+                rows = [[self._link_map[int(row[0])], *row[1:]] for row in common]
                 if rows:
                     mapped[name] = np.array(sorted(rows, key=lambda row: row[0]))
         return mapped

@@ -36,8 +36,8 @@ class Statement(NamedTuple):
     def varies(self, work: Work) -> bool:
         """Return whether the energy of a work may change in time without motion."""
         known = () if self.energy is None else self.energy.coefficients()
-        of_time = ["t", *(name for name, number in work.numbers.items() if callable(number))]
-        return any(self.numbers[name] in known for name in of_time)
+        varying = ["t", *(name for name, number in work.numbers.items() if callable(number))]
+        return any(self.numbers[name] in known for name in varying)
 
 
 class _Same:
@@ -53,76 +53,85 @@ class _Same:
         return id(self.function)
 
 
-def statement(work: Work, of: Element, scheme: Scheme) -> Statement:
+def statement(work: Work, element: Element, scheme: Scheme) -> Statement:
     """State a work in a time scheme, once for all beams and values of parameters.
 
     Raises:
         ModelError: Its function is wrong.
     """
     names = tuple(work.numbers)
-    return _statement(type(work), work.name, _Same(work.density), names, work.degree, of, scheme)
+    return _statement(
+        type(work), work.name, _Same(work.density), names, work.degree, element, scheme
+    )
 
 
 @stated
 def _statement(
-    kind: type[Work], name: str, density: _Same, names: Sequence[str], degree: int, of: Element,
-    scheme: Scheme,
+    kind: type[Work], name: str, density: _Same, names: Sequence[str], degree: int,
+    element: Element, scheme: Scheme,
 ) -> Statement:  # fmt: skip
     work = kind(name, density.function, numbers=dict.fromkeys(names, 1.0), degree=degree)
-    state = _of_virtual_work if issubclass(kind, VirtualWork) else _of_potential
-    numbers = {name: of.in_cells() for name in ("t", "dt", GROWTH, *names)}
-    residual, *energies = state(work, of, scheme, numbers)
-    derivative = ufl.derivative(residual, of.q1, ufl.TrialFunction(of.space))
-    return Statement(residual, expand_derivatives(derivative), numbers, *energies)
+    state = _virtual_work_forms if issubclass(kind, VirtualWork) else _potential_forms
+    functions = {name: element.in_cells() for name in ("t", "dt", GROWTH, *names)}
+    residual, *energies = state(work, element, scheme, functions)
+    derivative = ufl.derivative(residual, element.q1, ufl.TrialFunction(element.space))
+    return Statement(residual, expand_derivatives(derivative), functions, *energies)
 
 
-def _of_virtual_work(
-    work: Work, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
+def _virtual_work_forms(
+    work: Work, element: Element, scheme: Scheme, functions: Mapping[str, fem.Function]
 ) -> tuple[ufl.Form]:
     """State minus the virtual work."""
-    q0, q1, w = of.q0, of.q1, of.w
-    part, v = scheme.load_weight, (q1 - q0) / numbers["dt"]
-    q = (1.0 - part) * q0 + part * q1
-    known = {"q0": q0, "q1": q1, "q": q, "v": v, "w": w, "axis": of.anywhere, **numbers}
-    density, dx = _returned(work, known, of), of.dx(work.degree)
+    q0, q1, w = element.q0, element.q1, element.w
+    weight, v = scheme.load_weight, (q1 - q0) / functions["dt"]
+    q = (1.0 - weight) * q0 + weight * q1
+    known = {"q0": q0, "q1": q1, "q": q, "v": v, "w": w, "axis": element.anywhere, **functions}
+    density, dx = _returned(work, known, element), element.dx(work.degree)
     try:
         check_form_arity(expand_derivatives(density * dx), (w,))
     except (ArityMismatch, ValueError):  # UFL's own message may raise it
         raise ModelError(
-            f"{work}: the function must return what is linear in w, such as f * w[1]"
+            f"{work}: the function must return an expression that is linear in w, such as f * w[1]"
         ) from None
-    return (-numbers[GROWTH] * density * dx,)
+    return (-functions[GROWTH] * density * dx,)
 
 
-def _of_potential(
-    work: Work, of: Element, scheme: Scheme, numbers: Mapping[str, fem.Function]
+def _potential_forms(
+    work: Work, element: Element, scheme: Scheme, functions: Mapping[str, fem.Function]
 ) -> tuple[ufl.Form, ufl.Form, ufl.Form | None]:
     """State minus the virtual work, the energy at the end of a step, and its dissipation."""
-    q0, q1, w, q, dx = of.q0, of.q1, of.w, of.configuration(), of.dx(work.degree)
-    energy = _returned(work, {"q": q, "axis": of.anywhere, **numbers}, of)
+    q0, q1, w, q, dx = (
+        element.q0,
+        element.q1,
+        element.w,
+        element.configuration(),
+        element.dx(work.degree),
+    )
+    energy = _returned(work, {"q": q, "axis": element.anywhere, **functions}, element)
     gradient = expand_derivatives(ufl.derivative(energy, q, w))
     if expand_derivatives(gradient * dx).empty():
         raise ModelError(f"{work}: the energy must depend on the configuration q")
 
-    def along(way: Expr, at: Expr) -> Expr:
-        return ufl.replace(gradient, {q: at, w: way})
+    def along(direction: Expr, at: Expr) -> Expr:
+        return ufl.replace(gradient, {q: at, w: direction})
 
     # Variation that equals the increment of q everywhere if w is the increment of the nodes.
-    axis = of.anywhere
+    axis = element.anywhere
     (_, ψ0), (_, ψ1), (w_u, w_ψ) = map(split, (q0, q1, w))
     pairs = zip(axis.at_nodes(ψ1 - ψ0), axis.at_nodes(w_ψ), strict=True)
-    turn, _ = axis.interpolate([scheme.virtual_turn(0.0, turned, way) for turned, way in pairs])
-    s = ufl.as_vector([w_u[0], w_u[1], turn])
+    rotations = [scheme.virtual_turn(0.0, change, variation) for change, variation in pairs]
+    rotation, _ = axis.interpolate(rotations)
+    s = ufl.as_vector([w_u[0], w_u[1], rotation])
     force = scheme.mean(lambda at: along(s, at), q0, q1)
     lost = None
     if scheme.alpha:
-        part, way = of.constant(scheme.alpha), q1 - q0
-        force += part * (along(s, q1) - along(s, q0))
-        lost = part * (along(way, q1) - along(way, q0)) * dx
+        α, direction = element.constant(scheme.alpha), q1 - q0
+        force += α * (along(s, q1) - along(s, q0))
+        lost = α * (along(direction, q1) - along(direction, q0)) * dx
     return force * dx, ufl.replace(energy, {q: q1}) * dx, lost
 
 
-def _returned(work: Work, known: Mapping[str, Any], of: Element) -> Expr:
+def _returned(work: Work, known: Mapping[str, Any], element: Element) -> Expr:
     """Evaluate the function of a work, or raise :class:`ModelError` naming it."""
     try:
         value = work.density(**{name: known[name] for name in work.asked})
@@ -140,9 +149,9 @@ def _returned(work: Work, known: Mapping[str, Any], of: Element) -> Expr:
             f"{work}: the function returned a tensor of shape {value.ufl_shape}; it must return a "
             "scalar, such as a product with a component of w"
         )
-    if any(domain != of.space.mesh.ufl_domain() for domain in extract_domains(value)):
+    if any(domain != element.space.mesh.ufl_domain() for domain in extract_domains(value)):
         raise ModelError(
-            f"{work}: the function uses a mesh of its own; let it use axis.x for the place, and "
-            "`numbers` for what it needs besides"
+            f"{work}: the function uses a mesh of its own; use axis.x for the place, and "
+            "`numbers` for its parameters"
         )
     return value

@@ -34,7 +34,7 @@ STATIC_ADVICE = (
     "Try a smaller dt; beyond a limit load, and where softening snaps back (limit**2/energy of "
     "a hinge, half of it if softening is linear, above the stiffness that drives it), there is "
     "no equilibrium nearby: follow the path with ub.follow(scene, ub.ArcLength(...)) or "
-    "ub.DissipationControl(...), prescribe a displacement in the place of the load, or run "
+    "ub.DissipationControl(...), prescribe a displacement instead of the load, or run "
     "dynamics"
 )
 """Advice if a static step, in which time is the load factor, finds no equilibrium."""
@@ -153,8 +153,8 @@ class _Accelerated(_AtEnd):
         lead = (a - forced1) / dt
         if known < len(self.kept):
             lead = (self.weights.α_m - self.weights.α_f) / dt * (forced1 - forced)
-        kept = (forced1, lead) if known and len(self.kept) > 1 else (forced1,)
-        return Coefficients(inertia=forced1, velocity=v1, rates=(v1, *kept))
+        further = (forced1, lead) if known and len(self.kept) > 1 else (forced1,)
+        return Coefficients(inertia=forced1, velocity=v1, rates=(v1, *further))
 
     def error_weights(self) -> tuple[float, float]:
         """Return the error of Taylor's series; a leads the forces by α_m - α_f steps."""

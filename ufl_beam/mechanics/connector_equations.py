@@ -54,7 +54,7 @@ def law_step(
     "number ..." for the numbers of the law.
     """
     law = law.of({name: at[f"number {name}"] for name in law.numbers()})
-    dt, θ, part = at["dt"], at["theta"], scheme.load_weight
+    dt, θ, load_weight = at["dt"], at["theta"], scheme.load_weight
     e0, e1 = ([at[f"{n} {i}"] for i in range(law.components)] for n in ("before", "motion"))
     pairs = list(zip(e0, e1, strict=True))
     e = law.given([(1 - θ) * x0 + θ * x1 for x0, x1 in pairs])
@@ -63,9 +63,9 @@ def law_step(
     old = State({name: at[f"state {name}"] for name in law.variables})
     changes = law.increments(e, rate, old, θ * dt) if names else {}
 
-    def after(part: Expr | float) -> State:
+    def after(fraction: Expr | float) -> State:
         """Return the variables after a fraction of the step."""
-        return State(vars(old) | {n: getattr(old, n) + part / θ * changes[n] for n in names})
+        return State(vars(old) | {n: getattr(old, n) + fraction / θ * changes[n] for n in names})
 
     end = {n: ufl.variable(ufl.as_ufl(z)) for n, z in vars(after(1.0)).items()}
     zero = ufl.as_ufl(0.0)
@@ -73,17 +73,18 @@ def law_step(
         sliding = ufl.as_ufl(law.sliding(e, rate, after(θ), dt))
         return LawStep((sliding,), zero, zero, tuple(end.values()))
     resistances = law.each(law.resistance(e, rate, after(θ), dt))
-    elastic = _elastic_forces(law, e0, e1, after(part), scheme)
+    elastic = _elastic_forces(law, e0, e1, after(load_weight), scheme)
     forces = tuple(f + ufl.as_ufl(r) for f, r in zip(elastic, resistances, strict=True))
     moved = [ufl.variable(x1) for x1 in e1]
     stored = ufl.as_ufl(law.energy(law.given(moved), State(end)))
     numerical = zero
-    if part > 0.5 and scheme.average(0.0, 1.0) != 1.0:  # works are exact increments of energy
+    if load_weight > 0.5 and scheme.average(0.0, 1.0) != 1.0:
+        # Works are exact increments of energy.
         # Loss of backward Euler: of second order, and positive for convex energies.
         each = zip(moved, pairs, strict=True)
         growth = sum(ufl.diff(stored, m) * (x1 - x0) for m, (x0, x1) in each)
         growth += sum(ufl.diff(stored, z) * (z - getattr(old, n)) for n, z in end.items())
-        numerical = (2 * part - 1) * (law.energy(law.given(e0), old) - stored + growth)
+        numerical = (2 * load_weight - 1) * (law.energy(law.given(e0), old) - stored + growth)
     return LawStep(forces, stored, numerical, tuple(end.values()))
 
 
@@ -106,41 +107,41 @@ def _elastic_forces(
         at = [ufl.variable(e[j]) for j in components]
         return ufl.diff(energy(at), at[i])
 
-    part, components = scheme.load_weight, range(len(e0))
+    load_weight, components = scheme.load_weight, range(len(e0))
     x0, x1 = ufl.as_vector(e0), ufl.as_vector(e1)
     ends = [force(x1, i) for i in components]
-    if part == 1.0:
+    if load_weight == 1.0:
         return ends
-    ways = [x1[i] - x0[i] for i in components]
+    Δe = [x1[i] - x0[i] for i in components]
     means = [scheme.mean(partial(force, i=i), x0, x1) for i in components]
     size, errors = 0, []
-    for i, (mean, end, way) in enumerate(zip(means, ends, ways, strict=True)):
+    for i, (mean, end, d) in enumerate(zip(means, ends, Δe, strict=True)):
         before = force(x0, i)
         errors.append(mean - (before + 4 * force((x0 + x1) / 2, i) + end) / 6)
-        size += (abs(before) + abs(end)) * abs(way)
-    works = [error * way for error, way in zip(errors, ways, strict=True)]
+        size += (abs(before) + abs(end)) * abs(d)
+    works = [error * d for error, d in zip(errors, Δe, strict=True)]
     smooth = ufl.le(sum(map(abs, works)), SMOOTH * size)
     growth = energy(e1) - energy(e0)
-    if len(ways) == 1:
-        exact = [growth / ways[0]]
+    if len(Δe) == 1:
+        exact = [growth / Δe[0]]
     else:
-        missing = growth - sum(mean * way for mean, way in zip(means, ways, strict=True))
-        groups = [range(2), *([range(2, 3)] if len(ways) == 3 else [])]  # displacements, rotation
-        shares = [sum(works[i] for i in group) ** 2 for group in groups]
+        missing = growth - sum(mean * d for mean, d in zip(means, Δe, strict=True))
+        groups = [range(2), *([range(2, 3)] if len(Δe) == 3 else [])]  # displacements, rotation
+        weights = [sum(works[i] for i in group) ** 2 for group in groups]
         exact = []
-        for share, group in zip(shares, groups, strict=True):
-            square = sum(ways[i] ** 2 for i in group)
+        for weight, group in zip(weights, groups, strict=True):
+            square = sum(Δe[i] ** 2 for i in group)
             square = ufl.conditional(ufl.gt(square, 0.0), square, 1.0)
-            factor = missing * share / (sum(shares) * square)
-            exact += [means[i] + factor * ways[i] for i in group]
+            factor = missing * weight / (sum(weights) * square)
+            exact += [means[i] + factor * Δe[i] for i in group]
     over_step = [ufl.conditional(smooth, *both) for both in zip(means, exact, strict=True)]
-    return [x + (2 * part - 1) * (end - x) for x, end in zip(over_step, ends, strict=True)]
+    return [x + (2 * load_weight - 1) * (end - x) for x, end in zip(over_step, ends, strict=True)]
 
 
 # -- rigid-plastic laws ----------------------------------------------------------------------------
 
 
-class Slip(NamedTuple):
+class RigidPlasticStep(NamedTuple):
     """Response of a law of slip over a step; J, forces in N or N m."""
 
     force: Values  # in the step, in the direction of the motion
@@ -151,13 +152,15 @@ class Slip(NamedTuple):
     back_force: Values  # centre of the limits after the step
 
 
-def numbers(law: SofteningLaw | ElastoPlastic) -> dict[str, Any]:
+def parameters(law: SofteningLaw | ElastoPlastic) -> dict[str, Any]:
     """Return the numbers of a law of slip by the names that :func:`slip` takes."""
-    of_law = law.numbers() if isinstance(law, SofteningLaw) else law.numbers(np.ones(()))
-    return {f"number {name}": value for name, value in of_law.items()}
+    values = law.numbers() if isinstance(law, SofteningLaw) else law.numbers(np.ones(()))
+    return {f"number {name}": value for name, value in values.items()}
 
 
-def slip(law: SofteningLaw | ElastoPlastic, at: Mapping[str, Values], scheme: Scheme) -> Slip:
+def rigid_plastic_step(
+    law: SofteningLaw | ElastoPlastic, at: Mapping[str, Values], scheme: Scheme
+) -> RigidPlasticStep:
     """Return the response of a law; its numbers come from ``at``, not from ``law``.
 
     ``at`` maps names to numbers: the slip of the step and its direction (1 or -1); accumulated slip
@@ -165,17 +168,19 @@ def slip(law: SofteningLaw | ElastoPlastic, at: Mapping[str, Values], scheme: Sc
     :func:`numbers`.
     """
     a, ξ, s, none = at["slip"], at["slipped"], at["direction"], 0 * at["slip"]
-    of_law = {n.removeprefix("number "): x for n, x in at.items() if n.startswith("number ")}
+    values = {n.removeprefix("number "): x for n, x in at.items() if n.startswith("number ")}
     if isinstance(law, SofteningLaw):
-        law = law.of(of_law)
+        law = law.of(values)
         force = s * scheme.resistance(law, ξ, a)
-        return Slip(force, a * law.mean_traction(ξ, a), none, none, law.traction(ξ + a), none)
+        return RigidPlasticStep(
+            force, a * law.mean_traction(ξ, a), none, none, law.traction(ξ + a), none
+        )
     e, θ, dt = (at[name] for name in ("start", "θ", "dt"))
     change = State({"plastic": a, "accumulated": a})
-    limit, H, B = (of_law[name] for name in ("yield_limit", "isotropic", "kinematic"))
-    bulk = law.of(np.inf, of_law)
-    resistance = limit + H * (ξ + θ * a) + of_law["viscosity"] * a / dt
-    return Slip(
+    limit, H, B = (values[name] for name in ("yield_limit", "isotropic", "kinematic"))
+    bulk = law.of(np.inf, values)
+    resistance = limit + H * (ξ + θ * a) + values["viscosity"] * a / dt
+    return RigidPlasticStep(
         s * resistance + B * (e + θ * s * a),
         bulk.dissipation(s * a, change, change, dt),
         bulk.hardening_energy(change),

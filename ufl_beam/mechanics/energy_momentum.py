@@ -20,7 +20,7 @@ from ufl_beam.mechanics.time_schemes import Coefficients, Constant
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
 
-WAY = 4
+GAUSS_POINTS = 4
 """Points of Gauss's rule over the increment of a step.
 
 The rule is exact up to degree 7, and four forces cost hardly more than a strain.
@@ -56,7 +56,7 @@ class _OverStep:
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
         """Return the mean on the straight line from q0 to q1; the work of a gradient is exact."""
-        points, weights = np.polynomial.legendre.leggauss(WAY)
+        points, weights = np.polynomial.legendre.leggauss(GAUSS_POINTS)
         values = (f(q0 + float(1 + x) / 2 * (q1 - q0)) for x in points)
         return sum((float(w) / 2 * f for w, f in zip(weights, values, strict=True)), 0)
 

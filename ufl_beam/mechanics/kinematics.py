@@ -72,7 +72,7 @@ def _pull_back(a: Expr, ψ: Expr, axis: Axis) -> tuple[Expr, Expr]:
     return along + cos_1 * along + sin * across, across + cos_1 * across - sin * along
 
 
-def turn(a: Expr) -> Expr:
+def perpendicular(a: Expr) -> Expr:
     """Return W a, the plane vector ``a`` turned by +90°."""
     return ufl.as_vector([-a[1], a[0]])
 
@@ -97,7 +97,7 @@ def strain(q: Expr, axis: Axis) -> Expr:
 def virtual_strain(q: Expr, w: Expr, axis: Axis) -> Expr:
     """Return the variation of :func:`strain` at ``q`` along (w_u, w_ψ); P(21) pulled back."""
     (u, ψ), (w_u, w_ψ) = split(q), split(w)
-    w_Σ, w_Γ = _pull_back(axis.d(w_u) - turn(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
+    w_Σ, w_Γ = _pull_back(axis.d(w_u) - perpendicular(axis.t0 + axis.d(u)) * w_ψ, ψ, axis)  # P(21)
     return ufl.as_vector([w_Σ, w_Γ, axis.d(w_ψ)])
 
 
@@ -125,10 +125,10 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     Valid for ``|Δψ| < π``, on two-node cells with a one-point rule, on other cells with any rule.
     """
     (u0, ψ0), (u1, ψ1), (w_u, w_ψ) = split(q0), split(q1), split(w)
-    turn_over_step = _turn_of_two_nodes if len(axis.nodes) == 2 else _turn_of_nodes
-    w_turn, w_K = turn_over_step(ψ0, ψ1, w_ψ, axis)
+    rotation_over_step = _two_node_rotation if len(axis.nodes) == 2 else _nodal_rotation
+    w_rotation, w_K = rotation_over_step(ψ0, ψ1, w_ψ, axis)
     φ_m = axis.t0 + axis.d((u0 + u1) / 2)
-    a = axis.d(w_u) - turn(φ_m) * w_turn
+    a = axis.d(w_u) - perpendicular(φ_m) * w_rotation
     # The mean of both frames is cos δ times the frame of the mean rotation.
     along, across = ufl.dot(a, axis.t0), ufl.dot(a, axis.n0)
     (cos_0, sin_0), (cos_1, sin_1) = frame(ψ0), frame(ψ1)
@@ -137,8 +137,8 @@ def virtual_strain_over_step(q0: Expr, q1: Expr, w: Expr, axis: Axis) -> Expr:
     return ufl.as_vector([w_Σ, w_Γ, w_K])  # P(82)!
 
 
-def _turn_of_two_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
-    """Return :func:`_turn_of_nodes` in the middle of a cell with two nodes, a shorter formula."""
+def _two_node_rotation(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
+    """Return :func:`_nodal_rotation` in the middle of a cell with two nodes, a shorter formula."""
     # Half the increments of rotation at both nodes of the cell are δ - e and δ + e.
     e = axis.h / 4 * axis.d(ψ1 - ψ0)
     sinc_e, cos_e = _sinc(e), ufl.cos(e)
@@ -152,7 +152,7 @@ def _turn_of_two_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr,
     return w + shift * axis.h * axis.d(w), stretch * axis.d(w)
 
 
-def _turn_of_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
+def _nodal_rotation(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Expr]:
     """Return virtual rotation and curvature at a point: 2 tan δ, 2 δ' if w is 2 tan δ at nodes.
 
     Both are linear in w; a uniform w gives the rotation w and no curvature, see docs/errata.md.
@@ -166,5 +166,5 @@ def _turn_of_nodes(ψ0: Expr, ψ1: Expr, w: Expr, axis: Axis) -> tuple[Expr, Exp
     ]
     y, w_K = axis.interpolate([0, *accumulate(steps)])
     ends = ((nodes[0], virtual[0], y), (nodes[-1], virtual[-1], y - sum(steps, 0)))
-    turns = [w_a + y_a * _sinc(δ - a) / (ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
-    return sum(turns, 0) / 2, w_K
+    rotations = [w_a + y_a * _sinc(δ - a) / (ufl.cos(a) * ufl.cos(δ)) for a, w_a, y_a in ends]
+    return sum(rotations, 0) / 2, w_K

@@ -39,14 +39,14 @@ def prefixed(prefix: str, names: Mapping[str, object] | tuple[str, ...]) -> tupl
 
 def inputs(layout: Layout) -> tuple[str, ...]:
     """Return the input names of the law of a point as stored; loops.h explains their order."""
-    law, numbers = layout.kind
+    law, parameters = layout.kind
     softening = layout.softening.numbers() if layout.softening is not None else {}
     return (
         *names("point_input"),
         *rows(law, "strain"), *rows(law, "before"), *rows(law, "stiffness"),
         *prefixed("state", law.variables),
         *(prefixed("new", law.variables) if law.solves else ()),
-        *prefixed("number", numbers), *prefixed("softening", softening),
+        *prefixed("number", parameters), *prefixed("softening", softening),
     )  # fmt: skip
 
 
@@ -75,14 +75,14 @@ def curved(kind: Kind) -> bool:
 
     law = kind.law
     C, e = (tuple(map(symbol, rows(law, name))) for name in ("stiffness", "strain"))
-    of_point = law.of(law.as_argument(C), {name: symbol(name) for name in kind.numbers})
+    point_law = law.of(law.as_argument(C), {name: symbol(name) for name in kind.numbers})
     state = State({name: symbol(name) for name in law.variables})
     try:
-        stress = law.as_tuple(of_point.stress(law.as_argument(e), state))
+        stress = law.as_tuple(point_law.stress(law.as_argument(e), state))
         slopes = [expand_derivatives(ufl.diff(ufl.as_ufl(σ), x)) for σ in stress for x in e]
     except Exception:
         return False  # the compilation of the law reports the reason
-    return any(one in e for slope in slopes for one in unique_pre_traversal(slope))
+    return any(node in e for slope in slopes for node in unique_pre_traversal(slope))
 
 
 class PointEquations:
@@ -95,9 +95,9 @@ class PointEquations:
 
     def law(self, at: At) -> MaterialLaw:
         """Return the law with the numbers of points."""
-        law, numbers = self._kind
+        law, parameters = self._kind
         C = tuple(at[name] for name in rows(law, "stiffness"))
-        return law.of(law.as_argument(C), {name: at[f"number {name}"] for name in numbers})
+        return law.of(law.as_argument(C), {name: at[f"number {name}"] for name in parameters})
 
     def softening(self, at: At) -> SofteningLaw | None:
         """Return the law of the discontinuity with the numbers of points."""
@@ -133,8 +133,8 @@ class PointEquations:
     def residuals(self, at: At) -> tuple[Values, ...]:
         """Return the residuals at t_n+θ of a law that solves for its variables."""
         new, dt = self.state(at, "new"), at["theta"] * at["dt"]
-        found = self.law(at).residuals(self.strain(at), self.state(at), new, dt)
-        return tuple(found[name] for name in self._names)
+        residuals = self.law(at).residuals(self.strain(at), self.state(at), new, dt)
+        return tuple(residuals[name] for name in self._names)
 
     def stored(self, at: At) -> Values:
         """Return the energy at t_n+θ stored by a law that solves for its variables."""
@@ -175,9 +175,9 @@ class PointEquations:
         growth = law.elastic_energy(law.as_argument(de), dz)
         if not law.prestressed:
             return growth
-        back, none = (State({n: k * z for n, z in vars(dz).items()}) for k in (-1.0, 0.0))
-        there = law.elastic_energy(law.as_argument(tuple(-e for e in de)), back)
-        return (growth + there) / 2 - law.elastic_energy(
+        opposite_dz, none = (State({n: k * z for n, z in vars(dz).items()}) for k in (-1.0, 0.0))
+        opposite = law.elastic_energy(law.as_argument(tuple(-e for e in de)), opposite_dz)
+        return (growth + opposite) / 2 - law.elastic_energy(
             law.as_argument(tuple(0 * e for e in de)), none
         )
 

@@ -20,12 +20,12 @@ from ufl.core.expr import Expr
 
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
-from ufl_beam.mechanics.kinematics import frame, split, turn
+from ufl_beam.mechanics.kinematics import frame, perpendicular, split
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.memory import stated
 
 
-class Numbers(NamedTuple):
+class Geometry(NamedTuple):
     """Vectors (2,) that a relative motion depends on besides the frames; m."""
 
     arm_a: Expr  # from the node to the point a
@@ -49,41 +49,41 @@ def _turned(x: Expr, ψ: Expr) -> Expr:
 def _by_turning(x: Expr, ψ: Expr) -> Expr:
     """Return (Λ(ψ) - 1) x, to the relative precision of ``ψ``."""
     cos_1, sin = frame(ψ)
-    return cos_1 * x + sin * turn(x)
+    return cos_1 * x + sin * perpendicular(x)
 
 
-def _moved(q: Pair, n: Numbers) -> Expr:
+def _moved(q: Pair, n: Geometry) -> Expr:
     """Return the displacement of point b relative to point a."""
     (u_a, ψ_a), (u_b, ψ_b) = split(q.a), split(q.b)
     return u_b - u_a + _by_turning(n.arm_b, ψ_b) - _by_turning(n.arm_a, ψ_a)
 
 
-def _between(q: Pair, n: Numbers) -> Expr:
+def _between(q: Pair, n: Geometry) -> Expr:
     """Return the vector from point a to point b."""
     return n.apart + _moved(q, n)
 
 
-def _virtually_between(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> Expr:
+def _virtually_between(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> Expr:
     """Return the variation of :func:`_between`."""
 
-    def of_point(x0: Expr, x1: Expr, w: Expr, arm: Expr) -> Expr:
+    def at_point(x0: Expr, x1: Expr, w: Expr, arm: Expr) -> Expr:
         w_u, w_ψ = split(w)
-        return w_u + w_ψ * turn(scheme.average(_turned(arm, x0[2]), _turned(arm, x1[2])))
+        return w_u + w_ψ * perpendicular(scheme.average(_turned(arm, x0[2]), _turned(arm, x1[2])))
 
-    return of_point(q0.b, q1.b, w.b, n.arm_b) - of_point(q0.a, q1.a, w.a, n.arm_a)
+    return at_point(q0.b, q1.b, w.b, n.arm_b) - at_point(q0.a, q1.a, w.a, n.arm_a)
 
 
 def _length(d: Expr) -> Expr:
     return ufl.sqrt(ufl.dot(d, d))
 
 
-def turning(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
+def turning(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
     """Return the rotation of b relative to a; rad."""
-    turn_a, turn_b = (now[2] - before[2] for before, now in zip(q0, q1, strict=True))
-    return q1.b[2] - q1.a[2], scheme.virtual_turn(turn_a, turn_b, w.b[2] - w.a[2])
+    rotation_a, rotation_b = (now[2] - before[2] for before, now in zip(q0, q1, strict=True))
+    return q1.b[2] - q1.a[2], scheme.virtual_turn(rotation_a, rotation_b, w.b[2] - w.a[2])
 
 
-def stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
+def stretching(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
     """Return the growth of the distance of the points; m."""
     # (d·d - d0·d0) / (|d| + |d0|) with d = d0 + moved; a difference of lengths would lose digits.
     moved, before, now = _moved(q1, n), _between(q0, n), _between(q1, n)
@@ -92,23 +92,23 @@ def stretching(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple
     return value, ufl.dot(along, _virtually_between(q0, q1, w, n, scheme))
 
 
-def parting(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
+def parting(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
     """Return the displacement of point b relative to a along an axis of the plane; m."""
     virtual = _virtually_between(q0, q1, w, n, scheme)
     return ufl.dot(n.axis, _moved(q1, n)), ufl.dot(n.axis, virtual)
 
 
-def sliding(q0: Pair, q1: Pair, w: Pair, n: Numbers, scheme: Scheme) -> tuple[Expr, Expr]:
+def sliding(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
     """Return the displacement of point b relative to a along an axis that turns with a; m."""
     by_turning = _by_turning(n.axis, q1.a[2])
     value = ufl.dot(by_turning, _between(q1, n)) + ufl.dot(n.axis, _moved(q1, n))
     axis = scheme.average(_turned(n.axis, q0.a[2]), _turned(n.axis, q1.a[2]))
     between = scheme.average(_between(q0, n), _between(q1, n))
     virtual = _virtually_between(q0, q1, w, n, scheme)
-    return value, ufl.dot(axis, virtual) + w.a[2] * ufl.dot(turn(axis), between)
+    return value, ufl.dot(axis, virtual) + w.a[2] * ufl.dot(perpendicular(axis), between)
 
 
-MOTIONS = {one.__name__: one for one in (turning, stretching, parting, sliding)}
+MOTIONS = {motion.__name__: motion for motion in (turning, stretching, parting, sliding)}
 """Relative motions by name."""
 
 
@@ -123,7 +123,7 @@ class ConnectorForms(NamedTuple):
     motion: ufl.Form  # the n relative motions e by cell
     rate: ufl.Form  # derivatives of the motions along ``u``
     change: ufl.Form  # derivative of the tangent along ``u``, with ``bend`` = d row[:n] / de
-    numbers: fem.Function  # :class:`Numbers` of each motion
+    geometry: fem.Function  # :class:`Geometry` of each motion
     row: fem.Function
     q0: fem.Function
     q1: fem.Function
@@ -138,42 +138,42 @@ def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -
     line = basix.ufl.element("Lagrange", "interval", 1)
     point = basix.ufl.element("DG", "interval", 0)
     space = fem.functionspace(cell, basix.ufl.mixed_element([line, line, line, *n * [point]]))
-    numbers, row, bend, of_cell = (
+    geometry, row, bend, motions_by_cell = (
         fem.Function(fem.functionspace(cell, ("DG", 0, (size,))))
         for size in (8 * n, n * (n + 2), n**3, n)
     )
     q0, q1, u = (fem.Function(space) for _ in range(3))
     (before, _), (now, λ), (w, w_λ) = map(_split, (q0, q1, ufl.TestFunction(space)))
     dx = ufl.Measure("dx", domain=cell, metadata={"quadrature_degree": 1})
-    dq, z = ufl.TrialFunction(space), ufl.TestFunction(of_cell.function_space)
+    dq, z = ufl.TrialFunction(space), ufl.TestFunction(motions_by_cell.function_space)
     e, e_w = [], []
     for k, motion in enumerate(motions):
         at = range(8 * k, 8 * k + 8, 2)
-        mine = Numbers(*(ufl.as_vector([numbers[i], numbers[i + 1]]) for i in at))
+        mine = Geometry(*(ufl.as_vector([geometry[i], geometry[i + 1]]) for i in at))
         value, variation = MOTIONS[motion](before, now, w, mine, scheme)
         e.append(value)
         e_w.append(variation)
-    de, du = ([ufl.derivative(one, q1, along) for one in e] for along in (dq, u))
-    density, of_rows, of_motions = 0, 0, 0
+    de, du = ([ufl.derivative(f, q1, along) for f in e] for along in (dq, u))
+    density, row_sum, motion_sum = 0, 0, 0
     for i in range(n):
         first = i * (n + 2)
         law = sum(row[first + j] * e[j] for j in range(n))
         density += λ[i] * e_w[i] + w_λ[i] * (law + row[first + n] * λ[i] - row[first + n + 1])
-        of_motions += e[i] * z[i]
+        motion_sum += e[i] * z[i]
         for j, k in product(range(n), repeat=2):
-            of_rows += w_λ[i] * bend[n * (n * i + j) + k] * du[k] * de[j]
-    work, by_cell = density * dx, of_motions * dx
+            row_sum += w_λ[i] * bend[n * (n * i + j) + k] * du[k] * de[j]
+    work, by_cell = density * dx, motion_sum * dx
     tangent = ufl.derivative(work, q1, dq)
-    change = ufl.derivative(tangent, q1, u) + of_rows * dx
+    change = ufl.derivative(tangent, q1, u) + row_sum * dx
     rate = ufl.derivative(by_cell, q1, u)
-    return ConnectorForms(work, tangent, by_cell, rate, change, numbers, row, q0, q1, bend, u)
+    return ConnectorForms(work, tangent, by_cell, rate, change, geometry, row, q0, q1, bend, u)
 
 
 def _split(q: Expr) -> tuple[Pair, Sequence[Expr]]:
     """Split coefficients into the configurations at both ends of a cell, and the forces."""
-    parts = ufl.split(q)
+    fields = ufl.split(q)
 
     def at(end: float) -> Expr:
-        return ufl.as_vector([x + end / 2 * ufl.grad(x)[0] for x in parts[:3]])
+        return ufl.as_vector([x + end / 2 * ufl.grad(x)[0] for x in fields[:3]])
 
-    return Pair(at(-1.0), at(1.0)), parts[3:]
+    return Pair(at(-1.0), at(1.0)), fields[3:]

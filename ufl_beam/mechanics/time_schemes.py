@@ -108,7 +108,7 @@ class Scheme(Protocol):
         """Return the variation of a relative rotation whose virtual motion is ``w``."""
 
 
-CHANGE, V, V_BEFORE, MORE = range(4)
+CHANGE, V, V_BEFORE, FURTHER = range(4)
 """Positions of the rates in C: the step or a change of velocities, velocities, ..."""
 
 
@@ -194,7 +194,7 @@ def nodal_step(scheme: Scheme, q0: Array, q1: Array, rotations: Index) -> Array:
     return np.asarray(s)
 
 
-def way_to_rest(scheme: Scheme, dt: float) -> float:
+def increment_to_rest(scheme: Scheme, dt: float) -> float:
     """Return the increment of a step that ends at rest, over its initial velocity; s.
 
     It holds for a step without a previous one.  It is zero in statics and for schemes without a
@@ -202,8 +202,8 @@ def way_to_rest(scheme: Scheme, dt: float) -> float:
     """
     if not has_inertia(scheme) or not scheme.has_mean_velocity:
         return 0.0
-    of_step, of_velocity, *_ = scheme.coefficients(dt, math.inf, 0).rates[0]
-    return -of_velocity / of_step
+    c_step, c_velocity, *_ = scheme.coefficients(dt, math.inf, 0).rates[0]
+    return -c_velocity / c_step
 
 
 def combined(row: Sequence[float], s: Array, rates: Any) -> Array:

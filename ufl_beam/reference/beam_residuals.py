@@ -46,27 +46,33 @@ class ElasticBeams(CellForce):
 
     inner = True
 
-    def __init__(self, numbers: Index, setting: Setting) -> None:
-        cells, scheme = Cells(setting.grid, numbers), setting.scheme
-        of = cells.element
-        C, e0, e1 = of.stiffness, strain(of.q0, of.axis), strain(of.q1, of.axis)
-        r, losses = scheme.resultants(C, e0, e1, of.constant), []
+    def __init__(self, indices: Index, setting: Setting) -> None:
+        cells, scheme = Cells(setting.grid, indices), setting.scheme
+        element = cells.element
+        C, e0, e1 = (
+            element.stiffness,
+            strain(element.q0, element.axis),
+            strain(element.q1, element.axis),
+        )
+        r, losses = scheme.resultants(C, e0, e1, element.constant), []
         if scheme.alpha:
-            losses.append(2 * of.constant(scheme.alpha) * elastic_energy(e1 - e0, C))
+            losses.append(2 * element.constant(scheme.alpha) * elastic_energy(e1 - e0, C))
         self._decays, self._change_before = (
             isinstance(scheme, EnergyMomentumDecaying),
-            of.at_points(3),
+            element.at_points(3),
         )
         if isinstance(scheme, EnergyMomentumDecaying):  # c C (Δe - r Δe'), Δe' of the step before
-            damped = of.constant(scheme.part) * resultants(e1 - e0 - self._change_before, C)
+            damped = element.constant(scheme.part) * resultants(e1 - e0 - self._change_before, C)
             r = r + damped
             losses.append(virtual_work(damped, e1 - e0))
-        w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
-        energy = elastic_energy(e1, C) * of.dx(1), "stored"
-        lost = (sum(losses) * of.dx(1), "numerical") if losses else None
-        super().__init__(cells, virtual_work(r, w_e) * of.dx(1), setting, stored=energy, lost=lost)
+        w_e = scheme.virtual_strain(element.q0, element.q1, element.w, element.axis)
+        energy = elastic_energy(e1, C) * element.dx(1), "stored"
+        lost = (sum(losses) * element.dx(1), "numerical") if losses else None
+        super().__init__(
+            cells, virtual_work(r, w_e) * element.dx(1), setting, stored=energy, lost=lost
+        )
         points = len(setting.grid.mesh.point_weights)
-        self._last_change: Array = np.zeros((len(numbers), points, 3))
+        self._last_change: Array = np.zeros((len(indices), points, 3))
         self._last_dt = math.inf
 
     def respond(self, step: Step, q1: Array) -> Response:
@@ -90,9 +96,9 @@ class ElasticBeams(CellForce):
         if self._decays:
             n = len(self._last_change)
             rows = self._last_change.reshape(n, -1), np.full(n, self._last_dt)
-            found = memory.rows("changes of strains", self.cells.numbers, np.column_stack(rows))
-            self._last_change = found[:, :-1].reshape(self._last_change.shape)
-            self._last_dt = float(found[0, -1])
+            restored = memory.rows("changes of strains", self.cells.numbers, np.column_stack(rows))
+            self._last_change = restored[:, :-1].reshape(self._last_change.shape)
+            self._last_dt = float(restored[0, -1])
 
 
 class YieldingBeams(CellForce):
@@ -104,13 +110,17 @@ class YieldingBeams(CellForce):
 
     inner = True
 
-    def __init__(self, numbers: Index, layout: Layout, setting: Setting) -> None:
-        cells, grid = Cells(setting.grid, numbers), setting.grid
-        of, self._hinges = cells.element, layout.hinges
-        self._r, self._b, self._D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
-        w_e = setting.scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
-        linear = self._b + ufl.dot(self._D, strain(of.q1, of.axis))
-        work, around = (virtual_work(r, w_e) * of.dx(1) for r in (self._r, linear))
+    def __init__(self, indices: Index, layout: Layout, setting: Setting) -> None:
+        cells, grid = Cells(setting.grid, indices), setting.grid
+        element, self._hinges = cells.element, layout.hinges
+        self._r, self._b, self._D = (
+            element.at_points(3),
+            element.at_points(3),
+            element.at_points(3, 3),
+        )
+        w_e = setting.scheme.virtual_strain(element.q0, element.q1, element.w, element.axis)
+        linear = self._b + ufl.dot(self._D, strain(element.q1, element.axis))
+        work, around = (virtual_work(r, w_e) * element.dx(1) for r in (self._r, linear))
         super().__init__(cells, work, setting, around=around)
         self._names = [grid.describe_cell(number) for number in cells.numbers]
         self.points = MaterialPoints(layout, grid.keys(cells.numbers), cells.lengths, setting)
@@ -148,27 +158,29 @@ class YieldingBeams(CellForce):
 
     def material(self) -> Array:
         """Return the numbers of the cells, and their data for solutions; (num_cells, 7)."""
-        kept = self.points.kept.copy()
-        kept[:, 3] *= self._hinges  # a crack of one fibre is no rotation
-        return np.column_stack([self.cells.numbers, kept])
+        data = self.points.kept.copy()
+        data[:, 3] *= self._hinges  # a crack of one fibre is no rotation
+        return np.column_stack([self.cells.numbers, data])
 
 
 def inelastic_cells(grid: Grid) -> dict[Layout, Index]:
     """Return layouts of material points that can yield or break, and their cells."""
-    sections, of_beam = grid.sections
+    sections, section_indices = grid.sections
     groups: dict[Layout, list[int]] = {}
     for number, section in enumerate(sections):
         layout = section.layout(section.hinge)
         if layout is not None and not layout.elastic:
             if grid.mesh.degree > 1:
-                beam = grid.scene.beams[int(np.argmax(of_beam == number))]
+                beam = grid.scene.beams[int(np.argmax(section_indices == number))]
                 raise ModelError(
                     f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
                     "may yield or break; use degree=1 with more cells, or an elastic section"
                 )
             groups.setdefault(layout, []).append(number)
-    of_cell = of_beam[grid.beam_of_cell]
-    return {layout: np.flatnonzero(np.isin(of_cell, one)) for layout, one in groups.items()}
+    cell_sections = section_indices[grid.beam_of_cell]
+    return {
+        layout: np.flatnonzero(np.isin(cell_sections, group)) for layout, group in groups.items()
+    }
 
 
 # -- inertia and damping -------------------------------------------------------------------------
@@ -188,12 +200,12 @@ class Mass:
         for dofs, mass, inertia in lumps(grid):
             np.add.at(diagonal, dofs, [mass, mass, inertia])
         self.matrix = cells.form(form).assembled() + csr_array(scipy.sparse.diags_array(diagonal))
-        self._of_beams = cells.form(ufl.action(form, cells.element.q1))
+        self._beam_form = cells.form(ufl.action(form, cells.element.q1))
 
     def on_nodes(self, v: Array) -> Array:
         """Return the mass matrix of the beams times a vector, on the nodes of cells."""
         self.cells.set(self.cells.element.q1, v)
-        return self.cells.on_nodes("density", self._of_beams.assembled())
+        return self.cells.on_nodes("density", self._beam_form.assembled())
 
 
 class MatrixForce(Force):
@@ -201,7 +213,7 @@ class MatrixForce(Force):
 
     Attributes:
         rate: Rate in the latest response; (size,).
-        of_step: Numbers of the scheme in the latest response.
+        coefficients: Numbers of the scheme in the latest response.
     """
 
     row: str
@@ -214,8 +226,8 @@ class MatrixForce(Force):
     def respond(self, step: Step, q1: Array) -> Response:
         """Return forces; the scheme decides whether the step of a rotation is 2 tan(Δψ/2) or Δψ."""
         scheme, before, rotations = self.scheme, self.inertia, self._rotations
-        self.of_step = scheme.coefficients(step.dt, before.last_dt, len(before.more))
-        row = getattr(self.of_step, self.row)
+        self.coefficients = scheme.coefficients(step.dt, before.last_dt, len(before.more))
+        row = getattr(self.coefficients, self.row)
         s, turned = (
             nodal_step(scheme, step.q0, q1, rotations),
             with_half_tangents(scheme, rotations),
@@ -247,15 +259,15 @@ class Inertia(MatrixForce):
 
     def after(self, s: Array) -> tuple[Array, ...]:
         """Return velocities and further rates of the scheme after the step ``s``."""
-        return tuple(combined(row, s, self) for row in self.of_step.rates)
+        return tuple(combined(row, s, self) for row in self.coefficients.rates)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Accept new velocities, and enter numerical losses."""
         self.on_nodes = self.mass.on_nodes(self.rate)
         v, *more = self.after(s)
-        if self.of_step.slip is not None:
+        if self.coefficients.slip is not None:
             change = v - self.v
-            lost = combined(self.of_step.slip, change, self) @ (self.matrix @ change)
+            lost = combined(self.coefficients.slip, change, self) @ (self.matrix @ change)
             self.ledger.lost["numerical"] += float(lost)
         self.v_before, self.v, self.more, self.last_dt = self.v, v, tuple(more), step.dt
         self.start(q1)
@@ -282,11 +294,11 @@ class RayleighForce(MatrixForce):
 
     def __init__(self, damping: Rayleigh, setting: Setting, inertia: Inertia) -> None:
         self.inertia, self._damping, cells = inertia, damping, inertia.mass.cells
-        of = cells.element
-        rest, v = of.configuration(), ufl.TrialFunction(of.space)
-        e, w_e = (virtual_strain(rest, x, of.axis) for x in (v, of.w))
-        K = virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
-        self._stiffness = cells.form(ufl.action(K, of.q1))
+        element = cells.element
+        rest, v = element.configuration(), ufl.TrialFunction(element.space)
+        e, w_e = (virtual_strain(rest, x, element.axis) for x in (v, element.w))
+        K = virtual_work(resultants(e, element.stiffness), w_e) * element.dx(1)
+        self._stiffness = cells.form(ufl.action(K, element.q1))
         matrix = damping.mass * inertia.matrix + damping.stiffness * cells.form(K).assembled()
         super().__init__(setting, inertia.scheme, csr_array(matrix))
 
@@ -302,18 +314,18 @@ class RayleighForce(MatrixForce):
 class KelvinVoigtForce(CellForce):
     """Kelvin-Voigt damping: resultants C Δe times the retardation time over the step length."""
 
-    def __init__(self, damping: KelvinVoigt, numbers: Index, setting: Setting) -> None:
-        cells = Cells(setting.grid, numbers)
-        of, self._time, self._rate = (
+    def __init__(self, damping: KelvinVoigt, indices: Index, setting: Setting) -> None:
+        cells = Cells(setting.grid, indices)
+        element, self._time, self._rate = (
             cells.element,
             damping.retardation_time,
             cells.element.constant(1.0),
         )
-        change = strain(of.q1, of.axis) - strain(of.q0, of.axis)
-        r = self._rate * resultants(change, of.stiffness)
-        w_e = setting.scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
-        lost = virtual_work(r, change) * of.dx(1), "damping"
-        super().__init__(cells, virtual_work(r, w_e) * of.dx(1), setting, lost=lost)
+        change = strain(element.q1, element.axis) - strain(element.q0, element.axis)
+        r = self._rate * resultants(change, element.stiffness)
+        w_e = setting.scheme.virtual_strain(element.q0, element.q1, element.w, element.axis)
+        lost = virtual_work(r, change) * element.dx(1), "damping"
+        super().__init__(cells, virtual_work(r, w_e) * element.dx(1), setting, lost=lost)
 
     def respond(self, step: Step, q1: Array) -> Response:
         """Return the work of the resultants at the rates of the step."""
@@ -331,12 +343,12 @@ def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:
             # Cells with a hinge are left out, so that an open hinge turns freely.
             cells = [setting.grid.cells_of(beam) for beam in beams if beam.section.hinge is None]
             if cells:
-                numbers = np.unique(np.concatenate(cells))
-                forces.append(KelvinVoigtForce(damping, numbers, setting))
+                indices = np.unique(np.concatenate(cells))
+                forces.append(KelvinVoigtForce(damping, indices, setting))
         elif inertia is None:
             raise ModelError(
-                "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
-                "use KelvinVoigt, which acts in the time of a static run"
+                "Rayleigh: it damps vibrations, and statics has no inertia. Use "
+                "KelvinVoigt, which acts in the time of a static run"
             )
         else:
             forces.append(RayleighForce(damping, setting, inertia))

@@ -71,10 +71,10 @@ class Setting:
     ledger: Ledger = field(default_factory=Ledger)
     search: Search = field(default_factory=Search)
 
-    def loses(self, *entries: str) -> None:
+    def loses(self, *names: str) -> None:
         """Make entries for losses."""
-        for entry in entries:
-            self.ledger.lost[entry] += 0.0
+        for name in names:
+            self.ledger.lost[name] += 0.0
 
 
 @dataclass
@@ -84,28 +84,28 @@ class Memory:
     Each force has a method ``remember`` that both saves and restores its variables.
 
     Attributes:
-        given: Variables to restore; other variables do not change.
-        kept: Saved variables, as lists of arrays.
+        restored: Variables to restore; other variables do not change.
+        saved: Saved variables, as lists of arrays.
     """
 
-    given: Mapping[str, Array]
-    kept: dict[str, list[Array]] = field(default_factory=lambda: defaultdict(list))
+    restored: Mapping[str, Array]
+    saved: dict[str, list[Array]] = field(default_factory=lambda: defaultdict(list))
 
     def vector(self, name: str, values: T) -> Array | T:
-        """Save values at the degrees of freedom if known; return the given values, if any."""
+        """Save values at the degrees of freedom if known; return the restored values, if any."""
         if values is not None:
-            self.kept[name].append(values)
-        return self.given.get(name, values)
+            self.saved[name].append(values)
+        return self.restored.get(name, values)
 
-    def rows(self, name: str, numbers: Index, rows: Array) -> Array:
-        """Save rows with numbers of cells or links; return them, replaced by given rows."""
-        name, found = f"{name}, {rows.shape[1]}", rows.copy()
-        self.kept[name].append(np.column_stack([numbers, rows]))
-        if name in self.given:
-            table = self.given[name]
-            _, here, there = np.intersect1d(numbers, table[:, 0], return_indices=True)
-            found[here] = table[there, 1:]
-        return found
+    def rows(self, name: str, indices: Index, rows: Array) -> Array:
+        """Save rows with numbers of cells or links; return them, replaced by restored rows."""
+        name, result = f"{name}, {rows.shape[1]}", rows.copy()
+        self.saved[name].append(np.column_stack([indices, rows]))
+        if name in self.restored:
+            table = self.restored[name]
+            _, targets, sources = np.intersect1d(indices, table[:, 0], return_indices=True)
+            result[targets] = table[sources, 1:]
+        return result
 
 
 class Force:
@@ -115,7 +115,7 @@ class Force:
         inner: True for forces between parts of the scene: cells and connectors.
         size: Number of degrees of freedom of the scene.
         stored: Energies stored in the accepted state, by entry of the ledger; J.
-        on_nodes: Forces on the cells in the accepted step, see :func:`numbers_of_cells`.
+        on_nodes: Forces on the cells in the accepted step, see :func:`end_forces`.
     """
 
     inner = False
@@ -179,12 +179,12 @@ class Form:
         K = csr_array(fem.assemble_matrix(self._matrix, self._form).to_scipy())
         return csr_array(self._joins.T @ K @ self._joins)
 
-    def joined(self, entries: Array) -> Array:
+    def joined(self, values: Array) -> Array:
         """Return the vector of the scene from entries of a linear form; shared nodes add up."""
-        return np.asarray(self._joins.T @ entries)
+        return np.asarray(self._joins.T @ values)
 
 
-def dofs_of_cells(space: fem.FunctionSpace) -> Index:
+def cell_dofs(space: fem.FunctionSpace) -> Index:
     """Return the degrees of freedom of the cells of a space; (num_cells, dofs of a cell)."""
     blocks, size = space.dofmap.list, space.dofmap.bs
     dofs = np.asarray(blocks[:, :, None] * size + np.arange(size))
@@ -193,7 +193,7 @@ def dofs_of_cells(space: fem.FunctionSpace) -> Index:
 
 def put(function: fem.Function, values: Array) -> None:
     """Set values of a function in the cells of its mesh, or at their quadrature points."""
-    dofs = dofs_of_cells(function.function_space)
+    dofs = cell_dofs(function.function_space)
     function.x.array[dofs] = values.reshape(dofs.shape)
 
 
@@ -214,18 +214,18 @@ class Cells:
         at: Number in the scene of each degree of freedom of the mesh.
     """
 
-    def __init__(self, grid: Grid, numbers: Index) -> None:
-        mesh, order = separate_cells(grid.points[grid.cells[numbers]])
-        self.numbers, self.size, self._grid = numbers[order], grid.size, grid
+    def __init__(self, grid: Grid, indices: Index) -> None:
+        mesh, order = separate_cells(grid.points[grid.cells[indices]])
+        self.numbers, self.size, self._grid = indices[order], grid.size, grid
         self.lengths, self.element = grid.lengths(self.numbers), Element(grid.mesh, mesh)
-        of, self._weights = self.element, np.asarray(grid.mesh.point_weights)
-        self._dofs = dofs_of_cells(of.space)
-        of_scene = grid.dofs[grid.nodes_of_cells[self.numbers]]  # (num_cells, nodes, 3)
+        element, self._weights = self.element, np.asarray(grid.mesh.point_weights)
+        self._dofs = cell_dofs(element.space)
+        scene_dofs = grid.dofs[grid.nodes_of_cells[self.numbers]]  # (num_cells, nodes, 3)
         self.at: Index = np.empty(self._dofs.size, dtype=np.int64)
-        self.at[self._dofs] = of_scene.transpose(0, 2, 1).reshape(self._dofs.shape)
+        self.at[self._dofs] = scene_dofs.transpose(0, 2, 1).reshape(self._dofs.shape)
         sections = [grid.scene.beams[i].section for i in grid.beam_of_cell[self.numbers]]
-        put(of.stiffness, np.array([(s.EA, s.GA, s.EI) for s in sections]))
-        put(of.inertia, np.array([(s.rhoA, s.rhoI) for s in sections]))
+        put(element.stiffness, np.array([(s.EA, s.GA, s.EI) for s in sections]))
+        put(element.inertia, np.array([(s.rhoA, s.rhoI) for s in sections]))
 
     def form(self, form: ufl.Form) -> Form:
         """Compile a form on the cells."""
@@ -243,17 +243,17 @@ class Cells:
         """Return strains (Σ, Γ, K) at quadrature points; (num_cells, points, 3); 1, 1, 1/m."""
         self.set(self.element.q1, q)
         space = self.element.at_points(3).function_space
-        weighted = self._strains.assembled()[dofs_of_cells(space)]
+        weighted = self._strains.assembled()[cell_dofs(space)]
         strains = weighted.reshape(len(self.numbers), -1, 3) / self._weights.reshape(-1, 1)
         return np.asarray(strains)
 
-    def on_nodes(self, kind: str, entries: Array) -> Array:
-        """Return a vector on the nodes of the cells, see :func:`numbers_of_cells`."""
-        forces = entries[self._dofs].reshape(len(self.numbers), 3, self._dofs.shape[1] // 3)
-        return numbers_of_cells(self._grid, kind, self.numbers, forces)
+    def on_nodes(self, kind: str, values: Array) -> Array:
+        """Return a vector on the nodes of the cells, see :func:`end_forces`."""
+        forces = values[self._dofs].reshape(len(self.numbers), 3, self._dofs.shape[1] // 3)
+        return end_forces(self._grid, kind, self.numbers, forces)
 
 
-def numbers_of_cells(grid: Grid, kind: str, cells: Index, forces: Array) -> Array:
+def end_forces(grid: Grid, kind: str, cells: Index, forces: Array) -> Array:
     """Return forces at both ends of all cells, and moments of their distribution; (9, num_cells).
 
     The rows are (X, Y, M) at the start and at the end, the couple of the load along a cell, and
@@ -265,14 +265,14 @@ def numbers_of_cells(grid: Grid, kind: str, cells: Index, forces: Array) -> Arra
         cells: Numbers of cells.
         forces: Forces on the nodes; (len(cells), 3, nodes of a cell); N, N, N m.
     """
-    numbers = np.zeros((9, len(grid.cells)))
+    table = np.zeros((9, len(grid.cells)))
     first, *between, last = grid.mesh.nodes - 0.5
-    numbers[:3, cells], numbers[3:6, cells] = forces[:, :, 0].T, forces[:, :, 1].T
+    table[:3, cells], table[3:6, cells] = forces[:, :, 0].T, forces[:, :, 1].T
     if kind != "stress":
-        numbers[6, cells] = forces[:, 2].sum(axis=1)
+        table[6, cells] = forces[:, 2].sum(axis=1)
     if kind == "density":
-        numbers[7:, cells] = (forces[:, :2] @ np.array([first, last, *between])).T
-    return numbers
+        table[7:, cells] = (forces[:, :2] @ np.array([first, last, *between])).T
+    return table
 
 
 class CellForce(Force):
@@ -285,17 +285,22 @@ class CellForce(Force):
         around: Form with the same derivative, if UFL cannot derive ``work``.
         stored: Form of the energy stored at the end of the step, and its entry.
         lost: Form of the energy lost in the step, and its entry.
-        kind: See :func:`numbers_of_cells`.
+        kind: See :func:`end_forces`.
     """
 
     def __init__(
         self, cells: Cells, work: ufl.Form, setting: Setting, *, around: ufl.Form | None = None,
         stored: Entry | None = None, lost: Entry | None = None, kind: str = "stress",
     ) -> None:  # fmt: skip
-        of = cells.element
-        self.cells, self.size, self.of, self.ledger = cells, cells.size, of, setting.ledger
-        self.work, self._kind, trial = cells.form(work), kind, ufl.TrialFunction(of.space)
-        derivative = expand_derivatives(ufl.derivative(around or work, of.q1, trial))
+        element = cells.element
+        self.cells, self.size, self.element, self.ledger = (
+            cells,
+            cells.size,
+            element,
+            setting.ledger,
+        )
+        self.work, self._kind, trial = cells.form(work), kind, ufl.TrialFunction(element.space)
+        derivative = expand_derivatives(ufl.derivative(around or work, element.q1, trial))
         self._derivative = None if derivative.empty() else cells.form(derivative)
         self._stored = {stored[1]: cells.form(stored[0])} if stored else {}
         self._lost = {lost[1]: cells.form(lost[0])} if lost else {}
@@ -303,8 +308,8 @@ class CellForce(Force):
 
     def respond(self, step: Step, q1: Array) -> Response:
         """Return the virtual work if the step ends at ``q1``, and its derivative."""
-        self.cells.set(self.of.q0, step.q0)
-        self.cells.set(self.of.q1, q1)
+        self.cells.set(self.element.q0, step.q0)
+        self.cells.set(self.element.q1, q1)
         forces = self.work.assembled()
         self.on_nodes = self.cells.on_nodes(self._kind, forces)
         none = csr_array((self.size, self.size))
@@ -313,12 +318,12 @@ class CellForce(Force):
 
     def energy(self, q: Array) -> float:
         """Return the energy stored at a configuration; J."""
-        self.cells.set(self.of.q1, q)
+        self.cells.set(self.element.q1, q)
         return sum(float(form.assembled()) for form in self._stored.values())
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
         """Enter the losses, and compute the energy at the end."""
-        self.cells.set(self.of.q1, q1)
+        self.cells.set(self.element.q1, q1)
         for name, form in self._lost.items():
             self.ledger.lost[name] += form.assembled()
         self.start(q1)
@@ -333,11 +338,12 @@ class CellForce(Force):
 
 def lumps(grid: Grid) -> list[tuple[Index, float, float]]:
     """Return dofs, mass and inertia of point masses and rigid bodies; (3,), kg, kg m²."""
-    masses = [(grid.node(one.place), one.mass, one.inertia) for one in grid.scene.masses]
-    return masses + [(grid.node(one.middle), one.mass, one.inertia) for one in grid.scene.bodies]
+    masses = [(grid.node(mass.place), mass.mass, mass.inertia) for mass in grid.scene.masses]
+    bodies = [(grid.node(body.middle), body.mass, body.inertia) for body in grid.scene.bodies]
+    return masses + bodies
 
 
 def coupled(size: int, rows: Index, columns: Index, values: Array) -> csr_array:
     """Return the matrix of the scene from entries; duplicates add up."""
-    entries = np.ravel(values), (np.ravel(rows), np.ravel(columns))
-    return csr_array(scipy.sparse.coo_array(entries, (size, size)))
+    triplets = np.ravel(values), (np.ravel(rows), np.ravel(columns))
+    return csr_array(scipy.sparse.coo_array(triplets, (size, size)))

@@ -24,14 +24,14 @@ from ufl_beam.reference.cell_forms import (
     Memory,
     Response,
     Setting,
+    cell_dofs,
     coupled,
-    dofs_of_cells,
     put,
     separate_cells,
 )
 from ufl_beam.reference.connector_updates import law_in_step
 
-NEAR = 1e-5
+GUIDE_INCREMENT = 1e-5
 """Increment of differences of the forces of guides, over the size of the scene.
 
 The differences are of second order; the round-off of the curve spoils less than 1e-10.
@@ -50,13 +50,13 @@ class Linked(Force):
 
     inner = True
 
-    def __init__(self, numbers: Index, setting: Setting) -> None:
+    def __init__(self, indices: Index, setting: Setting) -> None:
         grid, self.setting = setting.grid, setting
-        self.size, self.numbers = grid.size, numbers
-        self.links: list[Connector] = [grid.scene.links[i] for i in numbers]
-        self.dofs = grid.dofs_of_links[numbers]
+        self.size, self.numbers = grid.size, indices
+        self.links: list[Connector] = [grid.scene.links[i] for i in indices]
+        self.dofs = grid.dofs_of_links[indices]
         self.forces_at = self.dofs[:, 6]
-        self.work, self.rate, self.before, self.at_rest = np.zeros((4, len(numbers)))
+        self.work, self.rate, self.before, self.at_rest = np.zeros((4, len(indices)))
 
 
 class Connectors(Linked):
@@ -65,58 +65,58 @@ class Connectors(Linked):
     Each is a cell of unit length between both nodes, with its forces as further unknowns.
     """
 
-    def __init__(self, motions: Sequence[str], numbers: Index, setting: Setting) -> None:
-        n, k, size = len(numbers), len(motions), setting.grid.size
+    def __init__(self, motions: Sequence[str], indices: Index, setting: Setting) -> None:
+        n, k, size = len(indices), len(motions), setting.grid.size
         mesh, order = separate_cells(np.tile([[0.0, 0.0], [1.0, 0.0]], (n // k, 1, 1)))
-        super().__init__(numbers.reshape(-1, k)[order].ravel(), setting)
+        super().__init__(indices.reshape(-1, k)[order].ravel(), setting)
         self._k, self.laws = k, [law_in_step(link, setting) for link in self.links[::k]]
-        self._stated = connector_forms(motions, setting.scheme, mesh)
-        stated = self._stated
+        self._forms = connector_forms(motions, setting.scheme, mesh)
+        forms = self._forms
         self._at: Index = np.empty(n // k * (6 + k), dtype=np.int64)
-        self._at[dofs_of_cells(stated.q1.function_space)] = np.column_stack(
+        self._at[cell_dofs(forms.q1.function_space)] = np.column_stack(
             [self.dofs[::k, :6], self.forces_at.reshape(-1, k)]
         )
         self._work, self._tangent, self._motion, self._rate = (
             Form(form, self._at, size)
-            for form in (stated.work, stated.tangent, stated.motion, stated.rate)
+            for form in (forms.work, forms.tangent, forms.motion, forms.rate)
         )
-        numbers_of_links = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.links]
-        put(stated.numbers, np.reshape(numbers_of_links, (-1, 8 * k)))
-        by_cell = stated.motion.arguments()[0].ufl_function_space()
-        self._cell_dofs = dofs_of_cells(by_cell).ravel()
+        geometry = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.links]
+        put(forms.geometry, np.reshape(geometry, (-1, 8 * k)))
+        by_cell = forms.motion.arguments()[0].ufl_function_space()
+        self._cell_dofs = cell_dofs(by_cell).ravel()
         self._length = np.where([link.turns for link in self.links], 1.0, setting.grid.scene.size)
         self._rows: Array = np.zeros((n, k + 2))
         self._e0: Array = np.zeros(n)
 
     def motion(self, q: Array) -> Array:
         """Return the relative motions at ``q``; (num_links,); m or rad."""
-        self._stated.q1.x.array[:] = q[self._at]
+        self._forms.q1.x.array[:] = q[self._at]
         return np.asarray(self._motion.assembled()[self._cell_dofs])
 
     def rates(self, q: Array, v: Array) -> Array:
         """Return the rates of the motions at the velocities ``v``; (num_links,); m/s or rad/s."""
-        self._stated.q1.x.array[:], self._stated.u.x.array[:] = q[self._at], v[self._at]
+        self._forms.q1.x.array[:], self._forms.u.x.array[:] = q[self._at], v[self._at]
         return np.asarray(self._rate.assembled()[self._cell_dofs])
 
     def begin(self, step: Step) -> None:
         """Begin the step in all laws."""
-        for law, e0 in zip(self.laws, self._of_each(self._e0), strict=True):
+        for law, e0 in zip(self.laws, self._by_connector(self._e0), strict=True):
             law.begin(e0, step)
 
-    def _of_each(self, values: Array) -> list[Any]:
+    def _by_connector(self, values: Array) -> list[Any]:
         """Return values by connector: a number, or an array of numbers of its components."""
         return [*map(float, values)] if self._k == 1 else [*values.reshape(-1, self._k)]
 
     def respond(self, step: Step, q1: Array) -> Response:
         """Return forces on the nodes and residuals of the laws, and their derivative."""
-        given = map(self._of_each, (self.motion(q1), q1[self.forces_at]))
-        rows = [law.row(e, λ) for law, e, λ in zip(self.laws, *given, strict=True)]
+        arguments = map(self._by_connector, (self.motion(q1), q1[self.forces_at]))
+        rows = [law.row(e, λ) for law, e, λ in zip(self.laws, *arguments, strict=True)]
         self._rows = np.vstack([np.reshape(row, (self._k, -1)) for row in rows])
-        put(self._stated.row, self._rows.reshape(len(self.laws), -1))
-        self._stated.q0.x.array[:] = step.q0[self._at]
+        put(self._forms.row, self._rows.reshape(len(self.laws), -1))
+        self._forms.q0.x.array[:] = step.q0[self._at]
         return self._work.joined(self._work.assembled()), self._tangent.assembled()
 
-    def missed(self, q: Array, r: Array, scale: float, moved: float) -> float:
+    def relative_residual(self, q: Array, r: Array, scale: float, moved: float) -> float:
         """Return the largest residual of a row, relative to 1 % of ``moved`` or to ``scale``.
 
         The round-off of a row by motions does not count.
@@ -126,13 +126,13 @@ class Connectors(Linked):
         amplitude, weight = moved / size, np.abs(self._rows[:, k])
         slopes = np.repeat([law.slope for law in self.laws], k)
         about_motion = weight * slopes < 1 - 1e-12
-        of_motion = 0.01 * self._length * amplitude
-        wanted = np.where(about_motion, of_motion, weight * scale * size / self._length)
-        far = np.maximum(np.abs(q[self.dofs[:, :4]]).max(axis=1) / size,
+        motion_scale = 0.01 * self._length * amplitude
+        wanted = np.where(about_motion, motion_scale, weight * scale * size / self._length)
+        positions = np.maximum(np.abs(q[self.dofs[:, :4]]).max(axis=1) / size,
                          np.abs(q[self.dofs[:, 4:6]]).max(axis=1)) + amplitude  # fmt: skip
         left = np.abs(r[self.forces_at])
-        of_motions = np.abs(self._rows[:, :k]) * np.repeat(length, k, axis=0)
-        left -= 8 * of_motions.sum(axis=1) * np.spacing(far)
+        row_motions = np.abs(self._rows[:, :k]) * np.repeat(length, k, axis=0)
+        left -= 8 * row_motions.sum(axis=1) * np.spacing(positions)
         with np.errstate(divide="ignore", invalid="ignore"):
             return float(np.where(left <= 0, 0.0, left / wanted).max())
 
@@ -144,7 +144,7 @@ class Connectors(Linked):
     def change(self, step: Step, q1: Array) -> float:
         """Return the energy that connectors store, dissipate or transfer in the step; J."""
         works = self.taken(q1).reshape(-1, self._k).sum(axis=1)
-        each = zip(self.laws, self._of_each(self.motion(q1)), works, strict=True)
+        each = zip(self.laws, self._by_connector(self.motion(q1)), works, strict=True)
         return sum(law.change(e, float(work)) for law, e, work in each)
 
     def accept(self, step: Step, q1: Array, s: Array) -> None:
@@ -154,13 +154,13 @@ class Connectors(Linked):
         self.rate, self._e0 = np.asarray((e - self._e0) / step.dt), e
         self.before = q1[self.forces_at]
         works = taken.reshape(-1, self._k).sum(axis=1)
-        for law, motion, work in zip(self.laws, self._of_each(e), works, strict=True):
+        for law, motion, work in zip(self.laws, self._by_connector(e), works, strict=True):
             law.accept(motion, float(work))
 
     def start(self, q: Array) -> None:
         """Begin at the motions of ``q``."""
         self._e0 = self.motion(q)
-        each = zip(self.laws, self._of_each(self._e0), strict=True)
+        each = zip(self.laws, self._by_connector(self._e0), strict=True)
         self.at_rest = np.concatenate([np.atleast_1d(law.start(e)) for law, e in each])
 
     @property
@@ -171,9 +171,9 @@ class Connectors(Linked):
             total[name] += energy
         return total
 
-    def kept(self, q: Array) -> Array:
+    def columns(self, q: Array) -> Array:
         """Return the columns of ``Connection``; (num_links, columns)."""
-        each = zip(self.laws, self._of_each(self._e0), strict=True)
+        each = zip(self.laws, self._by_connector(self._e0), strict=True)
         e = np.ravel([law.z.get("start", e) for law, e in each])
         dissipated = np.zeros(len(self.links))
         dissipated[:: self._k] = [law.z.get("dissipated", 0.0) for law in self.laws]
@@ -218,7 +218,7 @@ class GuideForce(Linked):
         """Return the parameter of the nearest point of the curve, starting at the latest point."""
         s = nearest(self._curve, x, self._s, self._step, self._size)
         if not math.isfinite(s):
-            raise NoNumber(f"{self._place} is where no nearest point of its guide curve was found")
+            raise NoNumber(f"{self._place}: no nearest point was found on its guide curve")
         return s
 
     def _equation(self, x: Array) -> Array:
@@ -240,15 +240,15 @@ class GuideForce(Linked):
         self._s = self._nearest(x)
         r[self._λ], *direction = self._equation(x)
         r[self._x] = λ * np.array(direction)
-        ways, K = NEAR * self._size * np.eye(2), np.zeros((3, 3))  # of x, y, λ
-        slopes = [self._equation(x + way) - self._equation(x - way) for way in ways]
-        K[2, :2], *K[:2, :2] = np.transpose(slopes) / (2 * NEAR * self._size)
+        increments, K = GUIDE_INCREMENT * self._size * np.eye(2), np.zeros((3, 3))  # of x, y, λ
+        slopes = [self._equation(x + δ) - self._equation(x - δ) for δ in increments]
+        K[2, :2], *K[:2, :2] = np.transpose(slopes) / (2 * GUIDE_INCREMENT * self._size)
         K[:2, :2] *= λ
         K[:2, 2] = direction
         dofs = np.array([*self._x, self._λ])
         return r, coupled(self.size, np.repeat(dofs, 3), np.tile(dofs, 3), K)
 
-    def missed(self, q: Array, r: Array, scale: float, moved: float) -> float:
+    def relative_residual(self, q: Array, r: Array, scale: float, moved: float) -> float:
         """Return the distance, relative to 1 % of the scene."""
         round_off = 8 * np.spacing(self._size + np.abs(self._point + self._on0).max())
         return float(max(abs(r[self._λ]) - round_off, 0.0) / (0.01 * self._size))
@@ -259,7 +259,7 @@ class GuideForce(Linked):
         t = tangent(self._curve, self._s, self._step)
         self._step, self._s0 = REACH * self._size / math.hypot(*t), self._s
 
-    def kept(self, q: Array) -> Array:
+    def columns(self, q: Array) -> Array:
         """Return the columns of ``Connection``; the distance is NaN at the end of a curve."""
         self._s = self._s0
         try:
@@ -276,9 +276,9 @@ class GuideForce(Linked):
         self._on0 = row[4:]
 
 
-def connectors_of(setting: Setting) -> list[Connectors | GuideForce]:
+def all_connectors(setting: Setting) -> list[Connectors | GuideForce]:
     """Return all connectors of a scene, grouped by motion, and each guide."""
-    found: list[Connectors | GuideForce] = []
+    connectors: list[Connectors | GuideForce] = []
     kinds: dict[tuple[str, ...], list[int]] = {(motion,): [] for motion in MOTIONS}
     kinds |= {("sliding", "sliding", "turning")[:k]: [] for k in (2, 3)}
     for i, link in enumerate(setting.grid.scene.links):
@@ -286,8 +286,8 @@ def connectors_of(setting: Setting) -> list[Connectors | GuideForce]:
             continue
         k = link.law.components if isinstance(link.law, ConnectorLaw) else 1
         kinds[(link.motion,) if k == 1 else ("sliding", "sliding", "turning")[:k]].append(i)
-    for motions, numbers in kinds.items():
-        if numbers:
-            found.append(Connectors(motions, np.array(numbers), setting))
+    for motions, indices in kinds.items():
+        if indices:
+            connectors.append(Connectors(motions, np.array(indices), setting))
     guides = (i for i, x in enumerate(setting.grid.scene.links) if isinstance(x.law, Guide))
-    return [*found, *(GuideForce(i, setting) for i in guides)]
+    return [*connectors, *(GuideForce(i, setting) for i in guides)]

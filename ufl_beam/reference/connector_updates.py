@@ -17,8 +17,8 @@ import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, NoNumber
-from ufl_beam.mechanics.connector_equations import Slip, numbers, slip
-from ufl_beam.mechanics.time_schemes import Step, way_to_rest
+from ufl_beam.mechanics.connector_equations import RigidPlasticStep, parameters, rigid_plastic_step
+from ufl_beam.mechanics.time_schemes import Step, increment_to_rest
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.checks import require_returned
 from ufl_beam.model.connector_law import ConnectorLaw
@@ -48,12 +48,14 @@ It occurs only if several sticking connectors constrain the same motion, so that
 force.
 """
 
-EARLY, WEAK = 0.01, 1e-9
+REFERENCE_MOTION = 0.01
 """Motion, in rad or over the size of the scene, that weighs as much as the limit of the force.
 
-It decides whether a rigid-plastic connector slips in an iterate.  The second number is the least
-factor of motions, over EI divided by that size.
+It decides whether a rigid-plastic connector slips in an iterate.
 """
+
+LEAST_SLOPE = 1e-9
+"""Least factor of motions, over EI of the member divided by the size of the scene."""
 
 Row = tuple[float, float, float] | Array
 """α, β, γ; (k, k + 2) of the k components of a bushing."""
@@ -71,11 +73,11 @@ class LawInStep:
             beginning by yielding, slip and laws of users, J; "start" is the motion without
             round-off.
         stored: Energies in the accepted state, by entry of the ledger; J.
-        opening: Object that opens beyond a limit, or None; see ``Solver._equilibrium``.
+        opens: Object that opens beyond a limit, or None; see ``Solver._equilibrium``.
         slope: Divisor of rows about the force.
     """
 
-    part, entry, sign, saved_as = "lost", "", 1.0, ""
+    account, entry, sign, saved_as = "lost", "", 1.0, ""
     slope = 1.0
     _row: Row
 
@@ -85,7 +87,7 @@ class LawInStep:
         self.length = 1.0 if link.turns else setting.grid.scene.size  # scale of motions
         self.z: dict[str, float] = {}
         self.stored: dict[str, float] = {}
-        self.opening: Any = None
+        self.opens: Any = None
         if isinstance(self.law, ConnectorLaw):
             names = self.law.variables
             self.saved_as, self.entry = f"{type(self.law).__qualname__}{[*names]}", self.law.entry
@@ -94,7 +96,7 @@ class LawInStep:
             if self.law.elastic:
                 self.entry = ""
         if self.entry:
-            getattr(setting.ledger, self.part)[self.entry] += 0.0
+            getattr(setting.ledger, self.account)[self.entry] += 0.0
 
     def begin(self, e0: Motions, step: Step) -> None:
         """Begin a step at the motion ``e0``, and reset data of iterates."""
@@ -115,43 +117,43 @@ class LawInStep:
     def accept(self, e1: Motions, work: float) -> None:
         """Accept the end of the step, in which the connector has received ``work``."""
         if self.entry:
-            getattr(self.setting.ledger, self.part)[self.entry] += self.sign * work
+            getattr(self.setting.ledger, self.account)[self.entry] += self.sign * work
 
     def start(self, e: Motions) -> Any:
         """Begin at a motion without a step; return the force of the law there."""
         return 0.0
 
-    def state(self, given: Array | None = None) -> Array:
-        """Return the internal variables as a row, after ``given`` has replaced them."""
-        if given is not None:
-            self.z = dict(zip(self.z, map(float, given), strict=True))
+    def state(self, values: Array | None = None) -> Array:
+        """Return the internal variables as a row, after ``values`` has replaced them."""
+        if values is not None:
+            self.z = dict(zip(self.z, map(float, values), strict=True))
         return np.array([*self.z.values()])
 
-    def after(self, e1: Motions, part: float) -> tuple[Any, Any, State]:
+    def after(self, e1: Motions, fraction: float) -> tuple[Any, Any, State]:
         """Return motions and rates at the time of a user's law, and variables after a substep.
 
-        All have the form of arguments of the law; the variables grow in proportion to ``part``.
+        All have the form of arguments of the law; variables grow in proportion to ``fraction``.
         """
         θ, e0, e1 = self.setting.scheme.theta, np.atleast_1d(self.e0), np.atleast_1d(e1)
         both = (1 - θ) * e0 + θ * e1, (e1 - e0) / self.dt
         e, rate = (self.law.given([*values[:, None]]) for values in both)
         z = {name: np.array([self.z[f"state {name}"]]) for name in self.law.variables}
-        if part and z:
+        if fraction and z:
             changes = self.law.increments(e, rate, State(z), θ * self.dt)
-            z = {name: x + part / θ * changes[name] for name, x in z.items()}
+            z = {name: x + fraction / θ * changes[name] for name, x in z.items()}
         return e, rate, State(z)
 
 
-def around(forces: Callable[[Array], Any], e: Motions, ways: Motions) -> Array:
+def around(forces: Callable[[Array], Any], e: Motions, increments: Motions) -> Array:
     """Return rows of a law with ``forces`` as functions of motions, by central differences."""
-    e, ways = np.atleast_1d(e), np.diag(np.atleast_1d(ways))
+    e, increments = np.atleast_1d(e), np.diag(np.atleast_1d(increments))
     with np.errstate(all="ignore"):
-        slopes = [(forces(e + way) - forces(e - way)) / (2 * way.sum()) for way in ways]
+        slopes = [(forces(e + δ) - forces(e - δ)) / (2 * δ.sum()) for δ in increments]
         D, force = np.reshape(slopes, (len(e), -1)).T, forces(e)
     return np.column_stack([-D, np.ones(len(e)), force - D @ e])
 
 
-def small_way(e0: Motions, e1: Motions, length: Motions) -> Any:
+def small_increment(e0: Motions, e1: Motions, length: Motions) -> Any:
     """Return an increment for central differences: third root of round-off times the step."""
     least = 1e-3 * np.maximum(np.abs(e1), 1e-3 * length)
     return 6e-6 * np.maximum(np.abs(e1 - e0), least)
@@ -171,9 +173,9 @@ class _Known(LawInStep):
     }
 
     def __init__(self, link: Connector, setting: Setting) -> None:
-        held = "lost", "", 1.0, "_Held"  # a joint: no motion, no work
-        kind = held if link.law is HELD else self.KINDS[type(link.law)]
-        self.part, self.entry, self.sign, self.saved_as = kind
+        joint = "lost", "", 1.0, "_Held"  # a joint: no motion, no work
+        kind = joint if link.law is HELD else self.KINDS[type(link.law)]
+        self.account, self.entry, self.sign, self.saved_as = kind
         super().__init__(link, setting)
         self.z = {"reached": 0.0} if isinstance(self.law, PrescribedForce | Controller) else {}
 
@@ -188,8 +190,8 @@ class _Known(LawInStep):
             factor = law.viscosity / step.dt
             self._row = -factor, 1.0, -factor * e0
         else:  # a controller is called at the beginning of the step
-            asked, reached = self.setting.asked.get(link), self.z["reached"]
-            wanted = value_at(law.force, step.load_time, link) if asked is None else asked
+            controlled, reached = self.setting.asked.get(link), self.z["reached"]
+            wanted = value_at(law.force, step.load_time, link) if controlled is None else controlled
             growth = step.fraction * (-wanted - reached)
             self._row, self._end = (0.0, 1.0, reached + step.at * growth), reached + growth
 
@@ -202,14 +204,14 @@ class _Known(LawInStep):
 # -- energies, resistances and springs -----------------------------------------------------------
 
 
-class _Stated(LawInStep):
+class _EnergyLaw(LawInStep):
     """Law with an energy and a resistance, such as a stop."""
 
     def __init__(self, link: Connector, setting: Setting) -> None:
         super().__init__(link, setting)
         scheme = setting.scheme
-        self._part, self._θ = scheme.load_weight, scheme.theta
-        self._delayed = scheme.weight_of_before == 0 and self._part > 0.5
+        self._load_weight, self._θ = scheme.load_weight, scheme.theta
+        self._delayed = scheme.weight_of_before == 0 and self._load_weight > 0.5
         if self._delayed:
             setting.loses("numerical")
 
@@ -222,27 +224,27 @@ class _Stated(LawInStep):
 
     def _forces(self, e1: Array) -> Array:
         """Return forces of a step to ``e1``: elastic at the time of loads, and resistance; (k,)."""
-        e0, (*_, z) = np.atleast_1d(self.e0), self.after(e1, self._part)
+        e0, (*_, z) = np.atleast_1d(self.e0), self.after(e1, self._load_weight)
         resistance = self.law.each(self.law.resistance(*self.after(e1, self._θ), self.dt))
         elastic = end = self._elastic(e1, z)
-        if self._part != 1.0:
+        if self._load_weight != 1.0:
             # By Gauss's rule, or from the change of the energy if the forces are not smooth
-            way, mean = e1 - e0, self.setting.scheme.mean(lambda e: self._elastic(e, z), e0, e1)
+            Δe, mean = e1 - e0, self.setting.scheme.mean(lambda e: self._elastic(e, z), e0, e1)
             first, middle = (self._elastic(e, z) for e in (e0, (e0 + e1) / 2))
-            errors = (mean - (first + 4 * middle + end) / 6) * way
-            if np.abs(errors).sum() > 1e-7 * ((np.abs(first) + np.abs(end)) @ np.abs(way)):
-                missing = self._energy(e1, z) - self._energy(e0, z) - mean @ way
+            errors = (mean - (first + 4 * middle + end) / 6) * Δe
+            if np.abs(errors).sum() > 1e-7 * ((np.abs(first) + np.abs(end)) @ np.abs(Δe)):
+                missing = self._energy(e1, z) - self._energy(e0, z) - mean @ Δe
                 groups = (slice(2), slice(2, None))  # displacements, rotation
-                shares = np.array([errors[group].sum() ** 2 for group in groups])
-                for group, share in zip(groups, shares / shares.sum(), strict=True):
-                    if way[group].any():
-                        mean[group] += missing * share * way[group] / (way[group] @ way[group])
-            elastic = mean + (2 * self._part - 1) * (end - mean)
+                weights = np.array([errors[group].sum() ** 2 for group in groups])
+                for group, weight in zip(groups, weights / weights.sum(), strict=True):
+                    if Δe[group].any():
+                        mean[group] += missing * weight * Δe[group] / (Δe[group] @ Δe[group])
+            elastic = mean + (2 * self._load_weight - 1) * (end - mean)
         return elastic + [float(np.sum(force)) for force in resistance]
 
     def row(self, e1: Motions, λ: Motions) -> Row:
         lengths = np.array([self.length, self.length, 1.0])[: np.size(e1)]
-        return around(self._forces, e1, small_way(self.e0, e1, lengths))
+        return around(self._forces, e1, small_increment(self.e0, e1, lengths))
 
     def change(self, e1: Motions, work: float) -> float:
         if self.entry:
@@ -251,21 +253,23 @@ class _Stated(LawInStep):
 
     def accept(self, e1: Motions, work: float) -> None:
         """Accept the variables; work that is neither stored nor numerical loss is dissipated."""
-        (*_, old), (*_, new) = (self.after(e1, part) for part in (0.0, 1.0))
-        held, numerical = float(self._energy(e1, new)), 0.0
+        (*_, old), (*_, new) = (self.after(e1, fraction) for fraction in (0.0, 1.0))
+        stored, numerical = float(self._energy(e1, new)), 0.0
         if self._delayed:  # growth: derivative along the step, by a complex step
             z = {n: x + 1e-30j * (x - getattr(old, n)) for n, x in vars(new).items()}
             along = self._energy(e1 + 1e-30j * (e1 - self.e0), State(z))
             growth = float(np.imag(along)) / 1e-30
-            numerical = (2 * self._part - 1) * float(self._energy(self.e0, old) - held + growth)
+            numerical = (2 * self._load_weight - 1) * float(
+                self._energy(self.e0, old) - stored + growth
+            )
             self.setting.ledger.lost["numerical"] += numerical
         if self.entry:
-            lost = work - (held - self.z["held"]) - numerical
+            lost = work - (stored - self.z["held"]) - numerical
             super().accept(e1, lost)
             self.z["dissipated"] += lost
         self.z |= {f"state {name}": float(x[0]) for name, x in vars(new).items()}
-        self.z["held"] = held
-        self.stored = {"stored": held}
+        self.z["held"] = stored
+        self.stored = {"stored": stored}
 
     def start(self, e: Motions) -> Any:
         *_, z = self.after(e, 0.0)
@@ -274,7 +278,7 @@ class _Stated(LawInStep):
         return self._elastic(np.atleast_1d(e), z)
 
 
-class _Sprung(LawInStep):
+class _SpringLaw(LawInStep):
     """Spring: a material point whose strain is the motion."""
 
     saved_as = "_Sprung"
@@ -289,7 +293,7 @@ class _Sprung(LawInStep):
         )  # fmt: skip
         self._points = MaterialPoints(layout, [(0, 0)], np.ones(1), setting)
         self.stored = self._points.stored
-        self.opening = self._points if self._points.softens else None
+        self.opens = self._points if self._points.softens else None
 
     def row(self, e1: float, λ: float) -> Row:
         self._points.respond(np.array([[e1, 0.0, 0.0]]), self.dt)
@@ -310,14 +314,14 @@ class _Sprung(LawInStep):
         self.z["dissipated"] = float(self._points.kept[0, 4:].sum())
         return float(self._points.kept[0, 0])
 
-    def state(self, given: Array | None = None) -> Array:
-        return np.asarray(self._points.state(None if given is None else given[None])[0])
+    def state(self, values: Array | None = None) -> Array:
+        return np.asarray(self._points.state(None if values is None else values[None])[0])
 
 
 # -- friction and plastic hinges -----------------------------------------------------------------
 
 
-class _Rubbing(LawInStep):
+class _Friction(LawInStep):
     """Dry friction, also by laws of users: it sticks, or slips in the direction -1 or 1.
 
     The sliding force of a user's law may be below its limit, so that sticking and sliding can both
@@ -337,58 +341,62 @@ class _Rubbing(LawInStep):
         self.z = {"slip": 0.0, **self.z}
         self.excess, self.released = 0.0, False
         if isinstance(self.law, ConnectorLaw):
-            self.opening, self.stored = self, {"stored": 0.0}
+            self.opens, self.stored = self, {"stored": 0.0}
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
-        if self.opening:
+        if self.opens:
             self._limit = max(float(np.sum(self.law.limit(self.after(e0, 0.0)[2]))), 0.0)
         else:
             self._limit = self.setting.asked[self.link]
         softness = CREEP * self.length * self.setting.friction_repeats
         self._creep = softness / self._limit if self._limit > 0 else 0.0
         # With this motion the velocity at the end is zero; without motion it would return reversed.
-        self._way = way_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.link]
-        self._slip, self._against, self._guessed = self.z["slip"], False, True
+        self._rest_motion = (
+            increment_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.link]
+        )
+        self._direction, self._against, self._guessed = self.z["slip"], False, True
 
     def row(self, e1: float, λ: float) -> Row:
         """Stick while the force is below the limit; slip until the sliding velocity reverses."""
-        moved, stuck, search = e1 - self.e0, self._slip == 0, self.setting.search
-        if not self._against and self._slip * self._way > 0:
-            moved -= self._way  # rest at the end instead of a reversed velocity
-        back = not stuck and self._slip * moved < -1e-14 * self.length
+        moved, stuck, search = e1 - self.e0, self._direction == 0, self.setting.search
+        if not self._against and self._direction * self._rest_motion > 0:
+            moved -= self._rest_motion  # rest at the end instead of a reversed velocity
+        reverses = not stuck and self._direction * moved < -1e-14 * self.length
         # A stop must not generate energy; if it did, the motion is held at once in this step. The
         # force of the guess does not decide this, since it belongs to another motion.
-        gives = not self._guessed and not self._against and stuck and λ * self._way < 0
+        gives = not self._guessed and not self._against and stuck and λ * self._rest_motion < 0
         over = stuck and abs(λ) > self._limit * (1 + 1e-12)
         self._guessed, self.excess = False, 0.0
-        if self.opening and search.hold and not self.released:
-            if back or gives or over:
-                turns = back or gives or not self._limit
-                self.excess, search.over = math.inf if turns else abs(λ) / self._limit - 1, True
+        if self.opens and search.hold and not self.released:
+            if reverses or gives or over:
+                changes = reverses or gives or not self._limit
+                self.excess, search.over = math.inf if changes else abs(λ) / self._limit - 1, True
         else:
             self._against |= gives
-            if back:
-                self._slip = 0.0
+            if reverses:
+                self._direction = 0.0
             elif over:
-                self._slip = math.copysign(1.0, λ)
-        if self._slip == 0 and self._limit > 0:
-            return 1.0, -self._creep, self.e0 + (0.0 if self._against else self._way)
-        if not self.opening:
-            return 0.0, 1.0, self._slip * self._limit
+                self._direction = math.copysign(1.0, λ)
+        if self._direction == 0 and self._limit > 0:
+            return 1.0, -self._creep, self.e0 + (0.0 if self._against else self._rest_motion)
+        if not self.opens:
+            return 0.0, 1.0, self._direction * self._limit
 
         def sliding(e: Array) -> Any:
-            return self._slip * self.law.sliding(*self.after(e, self.setting.scheme.theta), self.dt)
+            return self._direction * self.law.sliding(
+                *self.after(e, self.setting.scheme.theta), self.dt
+            )
 
-        return around(sliding, e1, small_way(self.e0, e1, self.length))
+        return around(sliding, e1, small_increment(self.e0, e1, self.length))
 
     def accept(self, e1: float, work: float) -> None:
-        if self.opening:
+        if self.opens:
             new = vars(self.after(e1, 1.0)[2])
             self.z |= {f"state {name}": float(x[0]) for name, x in new.items()}
             self.z["dissipated"] += work
         super().accept(e1, work)
-        self.z["slip"] = self._slip
+        self.z["slip"] = self._direction
 
 
 class _Slipping(LawInStep):
@@ -409,8 +417,8 @@ class _Slipping(LawInStep):
 
     def __init__(self, link: Connector, setting: Setting) -> None:
         super().__init__(link, setting)
-        law, self.opening, self.slope = law_of(link), self, _slope(link, setting.grid.scene.size)
-        self._law, self._numbers = law, {name: float(x) for name, x in numbers(law).items()}
+        law, self.opens, self.slope = law_of(link), self, _slope(link, setting.grid.scene.size)
+        self._law, self._parameters = law, {name: float(x) for name, x in parameters(law).items()}
         self.z = {"slipped": 0.0, "start": 0.0, "limit": float(law.limit), "back force": 0.0}
         self.z |= {"dissipated": 0.0, "way": 0.0, "stored": 0.0}
         self.excess, self.released, self._hardens = 0.0, False, isinstance(law, ElastoPlastic)
@@ -421,11 +429,15 @@ class _Slipping(LawInStep):
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
-        self._way = int(self.z["way"])  # slip direction of the iterate; at first of the last step
+        self._direction = int(
+            self.z["way"]
+        )  # slip direction of the iterate; at first of the last step
 
-    def _slip(self, grown: Any, way: int) -> Slip:
-        at = {**self._numbers, **self.z, "θ": self.setting.scheme.theta, "dt": self.dt}
-        return slip(self._law, {**at, "slip": grown, "direction": way}, self.setting.scheme)
+    def _law_step(self, grown: Any, direction: int) -> RigidPlasticStep:
+        at = {**self._parameters, **self.z, "θ": self.setting.scheme.theta, "dt": self.dt}
+        return rigid_plastic_step(
+            self._law, {**at, "slip": grown, "direction": direction}, self.setting.scheme
+        )
 
     @np.errstate(all="ignore")
     def row(self, e1: float, λ: float) -> Row:
@@ -434,31 +446,31 @@ class _Slipping(LawInStep):
         motion, limit = e1 - z["start"], z["limit"]
         tested = λ - z["back force"] + r * motion
         over = abs(tested) > limit * (1 + 1e-12)
-        way = -1 if (tested if limit else motion) < 0 else 1
+        direction = -1 if (tested if limit else motion) < 0 else 1
         force, slope = (
             float(x[0])
             for x in derivative(
-                lambda a: self._slip(a, way).force, np.array([max(way * motion, 0)])
+                lambda a: self._law_step(a, direction).force, np.array([max(direction * motion, 0)])
             )
         )
         if limit == 0:
-            slips = True
+            flows = True
         elif search.hold and not z["way"] and not self.released:
-            slips = False
+            flows = False
             if over:
                 self.excess, search.over = abs(tested) / limit - 1, True
         else:
-            slips = over if way * motion <= 0 else way * (λ + r * motion - force) > 0
-        self._way = way * slips
-        if not slips:
+            flows = over if direction * motion <= 0 else direction * (λ + r * motion - force) > 0
+        self._direction = direction * flows
+        if not flows:
             return 1.0, 0.0, z["start"]
-        return way * slope / r, -1 / r, (way * slope * e1 - force) / r
+        return direction * slope / r, -1 / r, (direction * slope * e1 - force) / r
 
     def accept(self, e1: float, work: float) -> None:
         """Accept the slip of the step."""
-        grown, ledger = max(self._way * (e1 - self.z["start"]), 0.0), self.setting.ledger
+        grown, ledger = max(self._direction * (e1 - self.z["start"]), 0.0), self.setting.ledger
         if math.isfinite(self.z["limit"]):
-            end = self._slip(grown, self._way)
+            end = self._law_step(grown, self._direction)
             ledger.lost["hinges"] += float(end.dissipated)
             if self._loss:
                 ledger.lost["numerical"] += self._loss * float(end.lost)
@@ -466,8 +478,8 @@ class _Slipping(LawInStep):
             self.z |= {"limit": float(end.limit), "back force": float(end.back_force)}
             self.z["stored"] = float(end.stored)
         self.z["slipped"] += grown
-        self.z["way"] = float(self._way * (grown > 0))
-        self.start(self.z["start"] + self._way * grown)
+        self.z["way"] = float(self._direction * (grown > 0))
+        self.start(self.z["start"] + self._direction * grown)
 
     def start(self, e: float) -> float:
         self.z["start"] = e
@@ -486,15 +498,15 @@ def _slope(link: Connector, size: float) -> float:
     if not 0.0 < law.limit < np.inf:
         return 1.0
     steepest, _ = law.steepest
-    early = law.limit / (EARLY * (1.0 if link.turns else size))
-    least = WEAK * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
+    early = law.limit / (REFERENCE_MOTION * (1.0 if link.turns else size))
+    least = LEAST_SLOPE * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
     return float(max(early, least) + (2 * steepest if steepest < np.inf else 0.0))
 
 
 # -- functions of users --------------------------------------------------------------------------
 
 
-class _Asked(LawInStep):
+class _UserLaw(LawInStep):
     """Force law of a user: a function of motion and rate, of time and its own history."""
 
     entry, saved_as = "functions", "AskedLaws"
@@ -506,14 +518,14 @@ class _Asked(LawInStep):
 
     def begin(self, e0: float, step: Step) -> None:
         super().begin(e0, step)
-        part = step.fraction * step.at
-        t = step.load_time if part == 1.0 else step.t0 + part * (step.load_time - step.t0)
+        fraction = step.fraction * step.at
+        t = step.load_time if fraction == 1.0 else step.t0 + fraction * (step.load_time - step.t0)
         state = self.state()
         state.flags.writeable = False  # all iterates begin with the same state
         self._known = {"t": t, "dt": step.dt, "state": state}
         self._last: tuple[float, float, float, float] | None = None  # e, λ, residual, motion of law
 
-    def _respond(self, e1: float) -> tuple[float, Array]:
+    def _evaluate(self, e1: float) -> tuple[float, Array]:
         """Return force and internal variables after a step to the motion ``e1``."""
         w = self.setting.scheme.load_weight
         motion, rate = (1 - w) * self.e0 + w * e1, (e1 - self.e0) / self.dt
@@ -542,26 +554,26 @@ class _Asked(LawInStep):
         latest iterates approximates the rest of the scene.  The law is linearised at its
         intersection with this line, if that is between ``e1`` and the previous motion.
         """
-        last, at, missed = self._last, e1, self._respond(e1)[0] - λ
-        if last is not None and abs(missed) > abs(last[2]) / 2 and e1 != last[0]:
+        last, at, residual = self._last, e1, self._evaluate(e1)[0] - λ
+        if last is not None and abs(residual) > abs(last[2]) / 2 and e1 != last[0]:
             yielding = max(0.0, (last[1] - λ) / (e1 - last[0]))
 
             def excess(x: float) -> float:
-                return self._respond(x)[0] - λ + yielding * (x - e1)
+                return self._evaluate(x)[0] - λ + yielding * (x - e1)
 
             if excess(e1) * excess(last[3]) < 0:
                 at = float(scipy.optimize.brentq(excess, e1, last[3], xtol=1e-300, maxiter=2000))
-        ε = float(small_way(self.e0, at, self.length))
-        near = 6e-6 * max(abs(at), 0.0 if last is None else abs(last[3]))
-        if 0.0 < near < ε:  # near zero, where the slope may be infinite
-            low, here, high = (self._respond(at + x)[0] for x in (-near, 0.0, near))
-            ε = near if abs(high - low) > 1e-8 * abs(here) else ε
-        self._last = e1, λ, missed, at
-        return around(lambda e: self._respond(float(e[0]))[0], at, ε)
+        ε = float(small_increment(self.e0, at, self.length))
+        ε_motion = 6e-6 * max(abs(at), 0.0 if last is None else abs(last[3]))
+        if 0.0 < ε_motion < ε:  # near zero, where the slope may be infinite
+            low, middle, high = (self._evaluate(at + x)[0] for x in (-ε_motion, 0.0, ε_motion))
+            ε = ε_motion if abs(high - low) > 1e-8 * abs(middle) else ε
+        self._last = e1, λ, residual, at
+        return around(lambda e: self._evaluate(float(e[0]))[0], at, ε)
 
     def accept(self, e1: float, work: float) -> None:
         """Enter the work that is not stored, and accept the internal variables."""
-        before, (_, after) = self.stored["stored"], self._respond(e1)
+        before, (_, after) = self.stored["stored"], self._evaluate(e1)
         self.state(after)
         self.start(e1)
         super().accept(e1, work - (self.stored["stored"] - before))
@@ -570,14 +582,14 @@ class _Asked(LawInStep):
         """Compute the recoverable energy; J."""
         if self.law.stored is not None:
             value = self.law.stored(e, **dict.fromkeys(self.law.asked_by_stored, self.state()))
-            of, at = f"{self.link}: the energy", f"motion = {e:.6g}"
-            self.stored = {"stored": require_returned(value, of, at, finite=True)}
+            subject, at = f"{self.link}: the energy", f"motion = {e:.6g}"
+            self.stored = {"stored": require_returned(value, subject, at, finite=True)}
         return 0.0
 
 
 LAWS: dict[type, type[LawInStep]] = {
-    **dict.fromkeys(_Known.KINDS, _Known), ConnectorLaw: _Stated, Spring: _Sprung,
-    Coulomb: _Rubbing, RigidPlastic: _Slipping, ForceLaw: _Asked,
+    **dict.fromkeys(_Known.KINDS, _Known), ConnectorLaw: _EnergyLaw, Spring: _SpringLaw,
+    Coulomb: _Friction, RigidPlastic: _Slipping, ForceLaw: _UserLaw,
 }  # fmt: skip
 """Classes of laws in a step, by the class of a record or its base."""
 
@@ -585,5 +597,5 @@ LAWS: dict[type, type[LawInStep]] = {
 def law_in_step(link: Connector, setting: Setting) -> LawInStep:
     """Return the law of a connector in a step."""
     if isinstance(link.law, ConnectorLaw) and link.law.holds:
-        return _Rubbing(link, setting)
+        return _Friction(link, setting)
     return next(LAWS[kind] for kind in type(link.law).__mro__ if kind in LAWS)(link, setting)

@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.work_forms import GROWTH, statement
-from ufl_beam.mechanics.kinematics import split, turn
+from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_schemes import Step, acting, has_inertia
 from ufl_beam.model.bodies import GROUND, carries
 from ufl_beam.model.functions import value_at
@@ -28,8 +28,8 @@ from ufl_beam.reference.cell_forms import (
     Response,
     Setting,
     coupled,
+    end_forces,
     lumps,
-    numbers_of_cells,
 )
 
 AT_REST = 1e300
@@ -90,22 +90,22 @@ class DeadLoad(LoadForce):
         super().__init__(load, setting)
         grid = setting.grid
         scene, self._vector = grid.scene, np.zeros(grid.size)
-        of_beams = np.zeros((len(scene.beams), 3))
+        per_beam = np.zeros((len(scene.beams), 3))
         if isinstance(load, PointLoad) and carries(load.place):  # else Scene.links has connectors
             np.add.at(self._vector, grid.node(load.place), [*load.force, load.moment])
         elif isinstance(load, LineLoad):
-            of_beams[scene.beams.index(load.beam)] = *load.force, load.moment
+            per_beam[scene.beams.index(load.beam)] = *load.force, load.moment
         elif isinstance(load, Gravity):
-            of_beams[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
+            per_beam[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
             for dofs, mass, _ in lumps(grid):
                 np.add.at(self._vector, dofs[:2], mass * np.array(load.acceleration))
         elif not isinstance(load, PointLoad):
             raise TypeError(f"{type(load).__name__} is not a dead load")
         cells, (first, *between, last) = np.arange(len(grid.cells)), grid.mesh.parts
-        total = of_beams[grid.beam_of_cell] * grid.lengths(cells)[:, None]
+        total = per_beam[grid.beam_of_cell] * grid.lengths(cells)[:, None]
         along = total[:, :, None] * np.array([first, last, *between])  # (num_cells, 3, nodes)
         np.add.at(self._vector, grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1), along)
-        self.along = numbers_of_cells(grid, "density", cells, -along)
+        self.along = end_forces(grid, "density", cells, -along)
 
     def forces(self, q: Array) -> Response:
         """Return the consistent nodal forces."""
@@ -117,16 +117,16 @@ class Follower(LoadForce):
 
     def __init__(self, load: FollowerLoad, setting: Setting) -> None:
         super().__init__(load, setting)
-        self._dofs, self._given = setting.grid.node(load.place), (*load.force, load.moment)
+        self._dofs, self._unit_force = setting.grid.node(load.place), (*load.force, load.moment)
 
     def forces(self, q: Array) -> Response:
         """Return (F_x, F_y, M) turned by the rotation."""
-        (x, y, M), ψ, force = self._given, q[self._dofs[2]], np.zeros(self.size)
+        (x, y, M), ψ, force = self._unit_force, q[self._dofs[2]], np.zeros(self.size)
         c, s = math.cos(ψ), math.sin(ψ)
         x, y = c * x - s * y, s * x + c * y
         np.add.at(force, self._dofs, [x, y, M])
-        turn = np.repeat(self._dofs[2], 2)
-        return force, coupled(self.size, self._dofs[:2], turn, np.array([-y, x]))
+        rotations = np.repeat(self._dofs[2], 2)
+        return force, coupled(self.size, self._dofs[:2], rotations, np.array([-y, x]))
 
 
 class FrameForce(LoadForce):
@@ -137,17 +137,17 @@ class FrameForce(LoadForce):
 
     def __init__(self, frame: RotatingFrame, setting: Setting, mass: Mass) -> None:
         super().__init__(frame, setting)
-        grid, self._Ω, self._mass, of = setting.grid, frame.rate, mass, mass.cells.element
+        grid, self._Ω, self._mass, element = setting.grid, frame.rate, mass, mass.cells.element
         self._double = 2 * self._Ω * has_inertia(setting.scheme)
-        self._no_turn: Array = np.ones(grid.size)
-        self._no_turn[grid.rotations] = 0.0
-        self._pull = csr_array(mass.matrix.multiply(self._Ω**2 * self._no_turn[:, None]))
+        self._translational: Array = np.ones(grid.size)
+        self._translational[grid.rotations] = 0.0
+        self._pull = csr_array(mass.matrix.multiply(self._Ω**2 * self._translational[:, None]))
         nodes = np.concatenate([grid.dofs_of_bodies, grid.dofs])
         self._pairs = np.unique(nodes[:, :2], axis=0)  # degrees of freedom u, v of the nodes
         # Mass times a quarter turn; Coriolis' force is 2 Ω times it times the velocities.
-        (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
-        density = of.inertia[0] * ufl.dot(turn(u), w_u)
-        G = mass.cells.form(density * of.dx_of_mass()).assembled()
+        (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
+        density = element.inertia[0] * ufl.dot(perpendicular(u), w_u)
+        G = mass.cells.form(density * element.dx_of_mass()).assembled()
         for (i, j, _), m, _ in lumps(grid):
             G = G + coupled(grid.size, np.array([i, j]), np.array([j, i]), m * np.array([-1, 1]))
         self._gyro = csr_array(self._double * G)
@@ -169,7 +169,7 @@ class FrameForce(LoadForce):
         """Enter the work, and keep mass times the accelerations of the frame in the beams."""
         super().accept(step, q1, s)
         v = (q1 - step.q0) / step.dt
-        a = -self.factor * self._Ω**2 * self._no_turn * (self._places + self.place(step, q1))
+        a = -self.factor * self._Ω**2 * self._translational * (self._places + self.place(step, q1))
         a[self._pairs[:, 0]] -= self._double * v[self._pairs[:, 1]]
         a[self._pairs[:, 1]] += self._double * v[self._pairs[:, 0]]
         self.on_nodes = self._mass.on_nodes(a)
@@ -184,14 +184,14 @@ class WorkForce(CellForce):
 
     def __init__(self, work: Work, setting: Setting, t0: float) -> None:
         grid, scheme, supplied = setting.grid, setting.scheme, setting.ledger.supplied
-        numbers = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
-        cells = Cells(grid, numbers)
-        self._stated = stated = statement(work, cells.element, scheme)
-        energy = None if stated.energy is None else (stated.energy, work.name)
-        lost = None if stated.lost is None else (stated.lost, "numerical")
-        super().__init__(cells, stated.residual, setting, stored=energy, lost=lost, kind="work")
+        indices = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
+        cells = Cells(grid, indices)
+        self._forms = forms = statement(work, cells.element, scheme)
+        energy = None if forms.energy is None else (forms.energy, work.name)
+        lost = None if forms.lost is None else (forms.lost, "numerical")
+        super().__init__(cells, forms.residual, setting, stored=energy, lost=lost, kind="work")
         self._work, self._scheme = work, scheme
-        self._varies, self._is_potential = stated.varies(work), isinstance(work, Potential)
+        self._varies, self._is_potential = forms.varies(work), isinstance(work, Potential)
         self._t, self._grown = t0, 0.0
         self.force: Array = np.zeros(grid.size)
         self._before: Array = self.force
@@ -202,10 +202,10 @@ class WorkForce(CellForce):
 
     def _put(self, t: float, **clock: float) -> None:
         """Set time, growth, step length, and the numbers of the work in the forms."""
-        numbers = self._work.numbers.items()
-        values = {n: value_at(x, t, self._work) if callable(x) else x for n, x in numbers}
+        parameters = self._work.numbers.items()
+        values = {n: value_at(x, t, self._work) if callable(x) else x for n, x in parameters}
         for name, value in {"t": t, **clock, **values}.items():
-            self._stated.numbers[name].x.array[:] = value
+            self._forms.numbers[name].x.array[:] = value
         self._at = t
 
     def respond(self, step: Step, q1: Array) -> Response:
@@ -213,9 +213,9 @@ class WorkForce(CellForce):
 
         Substeps take the same fraction as for loads.
         """
-        part, growth = step.fraction, step.fraction * (1.0 - self._grown)
-        self._end = self._t + part * (step.motion_time - self._t), self._grown + growth
-        t = self._t + step.at * part * (step.load_time - self._t)
+        fraction, growth = step.fraction, step.fraction * (1.0 - self._grown)
+        self._end = self._t + fraction * (step.motion_time - self._t), self._grown + growth
+        t = self._t + step.at * fraction * (step.load_time - self._t)
         self._put(t, **{"dt": min(step.dt, AT_REST), GROWTH: self._grown + step.at * growth})
         r, K = super().respond(step, q1)
         self.force = -r
@@ -226,13 +226,13 @@ class WorkForce(CellForce):
         name, supplied, at = self._work.name, self.ledger.supplied, np.array(self._at)
         if not self._is_potential:
             supplied[name] += float(acting(self._scheme, self._before, self.force) @ s)
-        held, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
+        stored, t = self.stored.get(name, 0.0), float(acting(self._scheme, np.array(self._t), at))
         self._before, (self._t, self._grown) = self.force, self._end
         super().accept(step, q1, s)
         if self._varies:  # supply by time: the change except its part by the motion
             self._put(t)
             moved = self.energy(q1) - self.energy(step.q0)
-            supplied[self._work.in_time] += self.stored[name] - held - moved
+            supplied[self._work.in_time] += self.stored[name] - stored - moved
 
     def start(self, q: Array) -> None:
         """Compute the energy of a potential."""
@@ -243,8 +243,8 @@ class WorkForce(CellForce):
     def equilibrium(self, t: float, q: Array, v: Array | None) -> Array:
         """Return the forces at ``q``, as at the end of a second with constant velocities."""
         self._t, self._grown = t, 1.0
-        self.cells.set(self.of.q0, q if v is None else q - v)
-        self.cells.set(self.of.q1, q)
+        self.cells.set(self.element.q0, q if v is None else q - v)
+        self.cells.set(self.element.q1, q)
         self._put(t, **{"dt": AT_REST if v is None else 1.0, GROWTH: 1.0})
         self.force = self._before = -self.work.joined(self.work.assembled())
         return self.force
@@ -255,17 +255,17 @@ class WorkForce(CellForce):
             self._before = memory.vector(f"work of {self._work.name}", self._before)
 
 
-def loads_of(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce | WorkForce]:
+def all_loads(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce | WorkForce]:
     """Return all loads and works of a scene."""
-    found: list[LoadForce | WorkForce] = []
+    loads: list[LoadForce | WorkForce] = []
     for load in setting.grid.scene.loads:
         if isinstance(load, RotatingFrame):
-            found.append(FrameForce(load, setting, mass or Mass(setting.grid)))
+            loads.append(FrameForce(load, setting, mass or Mass(setting.grid)))
         elif isinstance(load, FollowerLoad):
-            found.append(Follower(load, setting))
+            loads.append(Follower(load, setting))
         else:
-            found.append(DeadLoad(load, setting))
-    return [*found, *(WorkForce(work, setting, t0) for work in setting.grid.scene.works)]
+            loads.append(DeadLoad(load, setting))
+    return [*loads, *(WorkForce(work, setting, t0) for work in setting.grid.scene.works)]
 
 
 # -- supports ------------------------------------------------------------------------------------
@@ -276,7 +276,7 @@ class Supports:
 
     Attributes:
         axes: Orthogonal matrix from the axes of the plane to those of the supports.
-        held: Constrained or prescribed degrees of freedom, in the axes of the supports.
+        constrained: Constrained or prescribed degrees of freedom, in the axes of the supports.
         free: All other degrees of freedom: the unknowns of a step.
         reactions: Forces of the supports in the latest residual, in their axes; (size,).
         before: Reactions of the accepted step.
@@ -286,29 +286,29 @@ class Supports:
         self._grid, self._scheme = setting.grid, setting.scheme
         grid, self._supplied = setting.grid, setting.ledger.supplied
         axes = scipy.sparse.eye_array(grid.size).tolil()
-        held: dict[int, None] = {}
+        constrained: dict[int, None] = {}
         if GROUND in grid.scene.rigid_bodies:
-            held = {int(dof): None for dof in grid.node(GROUND.middle)}
+            constrained = {int(dof): None for dof in grid.node(GROUND.middle)}
         self._motions = []
         for support in grid.scene.supports:
             dofs = grid.node(support.place)
             if support.angle:
                 c, s, (i, j) = math.cos(support.angle), math.sin(support.angle), dofs[:2]
                 axes[i, i], axes[i, j], axes[j, i], axes[j, j] = c, s, -s, c
-            held |= {int(dofs[component]): None for component in support.held}
+            constrained |= {int(dofs[component]): None for component in support.held}
             for component, motion in support.moving.items():
                 self._motions.append((int(dofs[component]), motion, support))
         self.axes = csr_array(axes.tocsr())
-        self.held = np.array(sorted(held), dtype=np.int64)
-        self.free = np.setdiff1d(np.arange(grid.size), self.held)
+        self.constrained = np.array(sorted(constrained), dtype=np.int64)
+        self.free = np.setdiff1d(np.arange(grid.size), self.constrained)
         self.before: Array = np.zeros(grid.size)
-        self.note(self.before)
+        self.store_reactions(self.before)
         if self._motions:
             self._supplied["supports"] += 0.0
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
         """Set the constrained and prescribed values in ``x`` for the step that begins at ``x0``."""
-        x[self.held] = x0[self.held]
+        x[self.constrained] = x0[self.constrained]
         for dof, motion, support in self._motions:
             wanted = value_at(motion, step.motion_time, support)
             x[dof] = x0[dof] + step.fraction * (wanted - x0[dof])
@@ -317,13 +317,13 @@ class Supports:
         """Return velocities with zeros at fixed supports; else they would oscillate."""
         x = self.axes @ v
         moving = [dof for dof, *_ in self._motions]
-        x[np.setdiff1d(self.held, moving)] = 0.0
+        x[np.setdiff1d(self.constrained, moving)] = 0.0
         return np.asarray(self.axes.T @ x)
 
-    def note(self, r: Array) -> None:
+    def store_reactions(self, r: Array) -> None:
         """Store the reactions of a residual in the axes of the supports."""
         self.reactions: Array = np.zeros(len(r))
-        self.reactions[self.held] = r[self.held]
+        self.reactions[self.constrained] = r[self.constrained]
 
     def accept(self, s: Array) -> None:
         """Enter the work of moving supports in a nodal step."""
@@ -334,10 +334,10 @@ class Supports:
 
     def forces(self) -> Array:
         """Return the forces of each support on the scene, in its held components; (num, 3)."""
-        found = np.zeros((len(self._grid.scene.supports), 3))
-        for force, support in zip(found, self._grid.scene.supports, strict=True):
-            held = [*support.held]
-            force[held] = self.before[self._grid.node(support.place)[held]]
+        forces = np.zeros((len(self._grid.scene.supports), 3))
+        for force, support in zip(forces, self._grid.scene.supports, strict=True):
+            components = [*support.held]
+            force[components] = self.before[self._grid.node(support.place)[components]]
             c, s = math.cos(support.angle), math.sin(support.angle)
             force[:2] = c * force[0] - s * force[1], s * force[0] + c * force[1]
-        return found
+        return forces

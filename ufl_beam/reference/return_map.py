@@ -95,9 +95,9 @@ class MaterialPoints:
         scheme, self._search = setting.scheme, setting.search
         cells, n, self._law = len(keys), len(layout.weights), layout.kind.law
         self.at = at = {name: np.zeros((cells, n)) for name in inputs(layout)}
-        of = (rows(self._law, name) for name in ("strain", "before", "stiffness"))
-        self._e, self._e0, self._C = of
-        self._z, self._z1 = (prefixed(one, self._law.variables) for one in ("state", "new"))
+        names = (rows(self._law, name) for name in ("strain", "before", "stiffness"))
+        self._e, self._e0, self._C = names
+        self._z, self._z1 = (prefixed(prefix, self._law.variables) for prefix in ("state", "new"))
         self._variables = *self._z, "jump", "opening", *self._e0, "traction", "flows"
         for name, C in zip(self._C, np.reshape(layout.stiffness, (n, -1)).T, strict=True):
             at[name][:] = C
@@ -123,13 +123,13 @@ class MaterialPoints:
         # step.
         over_step = scheme.average(0.0, 1.0) != 1.0
         releases = over_step and (self.softens or curved(layout.kind))
-        entries = {"plastic": layout.yields, "hinges": self.softens}
-        entries["numerical"] = bool(scheme.alpha) or releases
-        self._lost = [name for name, there in entries.items() if there]
+        losses = {"plastic": layout.yields, "hinges": self.softens}
+        losses["numerical"] = bool(scheme.alpha) or releases
+        self._lost = [name for name, occurs in losses.items() if occurs]
         setting.loses(*self._lost)
         self.stored = {"stored": 0.0, **({"hardening": 0.0} if layout.yields else {})}
 
-    def _of_points(self, strains: Array) -> Array:
+    def _at_points(self, strains: Array) -> Array:
         """Return strains of the points, by component, from cell strains; (d, cells, n)."""
         return np.asarray(np.einsum("nak,ck->acn", self._B, strains))
 
@@ -147,17 +147,17 @@ class MaterialPoints:
         """
         at, θ, w = self.at, self._scheme.theta, self._layout.weights
         self.strains, at["dt"][:] = strains.copy(), dt
-        for name, values in zip(self._e, self._of_points(strains), strict=True):
+        for name, values in zip(self._e, self._at_points(strains), strict=True):
             at[name][:] = values
         at["growth"][:] = at["direction"][:] = 0.0
         stress, slope = self._bulk(at)
         first = stress[0]  # the only component of points that can open
         over = np.abs(first) > at["traction"]  # P(51)
-        held = over & (at["flows"] == CLOSED) & (at["traction"] > 0) & self._search.hold
-        held &= np.logical_not(self.released)
-        self.excess = np.where(held, np.abs(first) / at["traction"] - 1, 0.0)
-        self._search.over |= bool(held.any())
-        opens = over & ~held
+        closed = over & (at["flows"] == CLOSED) & (at["traction"] > 0) & self._search.hold
+        closed &= np.logical_not(self.released)
+        self.excess = np.where(closed, np.abs(first) / at["traction"] - 1, 0.0)
+        self._search.over |= bool(closed.any())
+        opens = over & ~closed
         if opens.any():
             at["direction"][:] = np.where(opens, np.where(first < 0, -1.0, 1.0), 0.0)
             at["growth"][:] = self._growth(first, opens)
@@ -202,15 +202,15 @@ class MaterialPoints:
             digits = 4 * EPS * (by_z + np.einsum("ij...,j...->i...", abs(E), abs(ε)))
             sizes = by_δ + digits
             ends = done | ((abs(R) <= digits) | (abs(δ) <= 1e-9 * abs(z))).all(axis=0)
-            before = _part_of(R, sizes)
-            part: Array = np.ones(done.shape)
+            before = _largest_ratio(R, sizes)
+            fraction: Array = np.ones(done.shape)
             for _ in range(HALVINGS):
-                for name, value in zip(self._z1, z - part * δ, strict=True):
+                for name, value in zip(self._z1, z - fraction * δ, strict=True):
                     at[name][:] = np.where(done, at[name], value)
-                falls = _part_of(self._residuals(at), sizes) <= (1 - part / 10) * before
+                falls = _largest_ratio(self._residuals(at), sizes) <= (1 - fraction / 10) * before
                 if (falls | ends).all():
                     break
-                part = np.where(falls | ends, part, part / 2)
+                fraction = np.where(falls | ends, fraction, fraction / 2)
             done = ends
             if done.all():
                 return
@@ -235,7 +235,7 @@ class MaterialPoints:
         bound += np.finfo(float).tiny
         digits = np.maximum(np.abs(at["before"]), np.abs(at["strain"])) * length
         digits = 4 * EPS * (bound + digits + np.abs(at["jump"]))
-        found, last = np.full_like(stress, np.nan), np.full_like(stress, np.inf)
+        roots, last = np.full_like(stress, np.nan), np.full_like(stress, np.inf)
         low, high = np.zeros_like(stress), np.full_like(stress, np.inf)
         over, slope = excess(low)
         none = np.logical_not(np.logical_and(opens, over > 0))  # or over the limit by round-off
@@ -246,15 +246,15 @@ class MaterialPoints:
             better = a - over / slope
             step = np.abs(better - a)
             # The step after this relative step would be its square, below round-off.
-            ends = np.isnan(found) & ((step <= 1e-9 * a) | (step <= digits))
-            found = np.where(ends, np.where(better > 0, better, a), found)
-            if (none | ~np.isnan(found)).all():
+            ends = np.isnan(roots) & ((step <= 1e-9 * a) | (step <= digits))
+            roots = np.where(ends, np.where(better > 0, better, a), roots)
+            if (none | ~np.isnan(roots)).all():
                 break
             halved = np.where(np.isfinite(high), (low + high) / 2, 2 * a)
             wanders = ((before > 0) != (over > 0)) & (step > last / 2) & np.isfinite(high)
             within, last = (better > low) & (better < high) & ~wanders, step
             a = np.where(within, better, halved)
-        return np.where(none, 0.0, found)
+        return np.where(none, 0.0, roots)
 
     # -- the end of a step -----------------------------------------------------------------------
 
@@ -269,11 +269,11 @@ class MaterialPoints:
 
         _, slopes = jacobian(stored, self.at, self._z1)
         own, size = self._equations.own_dissipation(self.at, tuple(slopes[0]))
-        part = np.nan_to_num(own / size)
-        worst = int(np.argmin(part))
-        if part.flat[worst] < -NO_ENERGY:
+        ratio = np.nan_to_num(own / size)
+        worst = int(np.argmin(ratio))
+        if ratio.flat[worst] < -NO_ENERGY:
             raise StepFailed(
-                f"{type(self._law).__name__} of {names[worst // part.shape[1]]} has a negative "
+                f"{type(self._law).__name__} of {names[worst // ratio.shape[1]]} has a negative "
                 "dissipation in the step: its equations have several solutions, or it stores "
                 "energy that it does not state. A law that is to give energy has active = True, "
                 "see docs/extending_laws.md"
@@ -288,9 +288,9 @@ class MaterialPoints:
         end = self._equations.end(self.at)
         bulk = end.worked + end.elastic + end.hardening + end.missed + end.relaxed
         change = np.sum(self._volume * bulk) + np.sum(self._layout.weights * end.broken)
-        return float(change + self._of_rest(self.strains)) - sum(self.stored.values())
+        return float(change + self._rest_energy(self.strains)) - sum(self.stored.values())
 
-    def _of_rest(self, strains: Array) -> float:
+    def _rest_energy(self, strains: Array) -> float:
         """Return the elastic energy of the stiffness without points; J."""
         return float(np.sum(strains**2 @ self._layout.rest / 2 * self.at["length"][:, 0]))
 
@@ -302,7 +302,7 @@ class MaterialPoints:
         plastic = np.sum(self._volume * end.worked, axis=1)
         broken = np.sum(self._layout.weights * (end.broken + 0 * at["length"]), axis=1)
         self.kept[:, 4:] += np.column_stack([plastic, broken])
-        numerical = 2 * α * self._of_rest(self.strains - self.strains0)
+        numerical = 2 * α * self._rest_energy(self.strains - self.strains0)
         numerical += np.sum(self._volume * (2 * α * end.lost + end.missed))
         for name, grown in zip(self._z, end.changes, strict=True):
             at[name] += grown
@@ -313,10 +313,10 @@ class MaterialPoints:
         # Broken points bear no stress; their elastic strain becomes part of the jump.
         breaks = np.isfinite(at["traction"])
         at["traction"][breaks] = (end.resistance + 0 * at["length"])[breaks]
-        gone = at["traction"] == 0
+        separated = at["traction"] == 0
         for relieved, name in zip(end.stress, self._C, strict=True):
-            at["jump"] += np.where(gone, relieved / at[name] * at["length"], 0.0)
-        numerical += np.sum(np.where(gone, self._volume * (end.elastic - end.left), 0.0))
+            at["jump"] += np.where(separated, relieved / at[name] * at["length"], 0.0)
+        numerical += np.sum(np.where(separated, self._volume * (end.elastic - end.left), 0.0))
         lost = {"plastic": plastic.sum(), "hinges": broken.sum(), "numerical": numerical}
         for entry in self._lost:
             self._ledger.lost[entry] += float(lost[entry])
@@ -332,30 +332,30 @@ class MaterialPoints:
     def _hold(self, strains: Array) -> None:
         """Compute forces and stored energies from the variables at these strains."""
         at, w = self.at, self._layout.weights
-        self.strains0, of_points = strains, self._of_points(strains)
-        for name, values in zip(self._e0, of_points, strict=True):
+        self.strains0, point_strains = strains, self._at_points(strains)
+        for name, values in zip(self._e0, point_strains, strict=True):
             at[name][:] = values
         law, z = self._equations.law(at), self._equations.state(at)
-        e = law.as_argument(tuple(of_points - at["jump"] / at["length"]))
+        e = law.as_argument(tuple(point_strains - at["jump"] / at["length"]))
         stress = self._array(law.as_tuple(law.stress(e, z))) * (at["traction"] != 0)
         self.kept[:, :3] = self._layout.rest * strains
         self.kept[:, :3] += np.einsum("n,acn,nak->ck", w, stress, self._B)
         self.kept[:, 3] = at["jump"][:, -1]
         energies = law.elastic_energy(e, z), law.hardening_energy(z)
         elastic, hardening = (float(np.sum(self._volume * x)) for x in energies)
-        of_entries = {"stored": elastic + self._of_rest(strains), "hardening": hardening}
-        self.stored = {entry: of_entries[entry] for entry in self.stored}
+        by_entry = {"stored": elastic + self._rest_energy(strains), "hardening": hardening}
+        self.stored = {entry: by_entry[entry] for entry in self.stored}
 
-    def state(self, given: Array | None = None) -> Array:
-        """Return the accepted internal variables, (cells, k), after ``given`` has replaced them.
+    def state(self, values: Array | None = None) -> Array:
+        """Return the accepted internal variables, (cells, k), after ``values`` has replaced them.
 
         Forces and stored energies follow from :meth:`start`.
         """
-        if given is not None:
+        if values is not None:
             n = self.at["length"].shape[1]
             for i, name in enumerate(self._variables):
-                self.at[name][:] = given[:, i * n : (i + 1) * n]
-            self.kept = given[:, -11:-5].copy()
+                self.at[name][:] = values[:, i * n : (i + 1) * n]
+            self.kept = values[:, -11:-5].copy()
         stored = np.zeros((len(self.kept), 2))
         # The energy of all cells together; the owner does not matter.
         stored[:1] = self.stored["stored"], self.stored.get("hardening", 0.0)
@@ -363,7 +363,7 @@ class MaterialPoints:
         return np.asarray(np.hstack([*variables, self.kept, self.strains0, stored]))
 
 
-def _part_of(residuals: Array, sizes: Array) -> Array:
+def _largest_ratio(residuals: Array, sizes: Array) -> Array:
     """Return the largest ratio of residuals of a law to their sizes; infinite instead of NaN."""
-    part = np.where(residuals == 0, 0.0, np.abs(residuals) / sizes)
-    return np.asarray(np.nan_to_num(part, nan=np.inf, posinf=np.inf).max(axis=0))
+    ratio = np.where(residuals == 0, 0.0, np.abs(residuals) / sizes)
+    return np.asarray(np.nan_to_num(ratio, nan=np.inf, posinf=np.inf).max(axis=0))

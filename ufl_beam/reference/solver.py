@@ -39,45 +39,46 @@ from ufl_beam.reference.beam_residuals import (
     inelastic_cells,
 )
 from ufl_beam.reference.cell_forms import Force, Memory, Response, Setting
-from ufl_beam.reference.connector_residuals import Connectors, connectors_of
-from ufl_beam.reference.load_vectors import Supports, loads_of
+from ufl_beam.reference.connector_residuals import Connectors, all_connectors
+from ufl_beam.reference.load_vectors import Supports, all_loads
 
-LARGEST_TURN = 0.75 * math.pi
+LARGEST_ROTATION = 0.75 * math.pi
 """Largest rotation of a node in a step before it is cut; the algorithmic strains end at π."""
 
-MOST_PARTS = 2**12
+MOST_SUBSTEPS = 2**12
 """Largest number of substeps of a step."""
 
-SURE = 1e-4
+FIRST_TOLERANCE = 1e-4
 """Fraction of the tolerance that first iterates have to meet."""
 
-PATIENCE = 8
+STALL_LIMIT = 8
 """Iterations without halving the least residual after which Newton's method stops."""
 
 FIRST = 1 / 16
 """Fraction of the first step whose end accelerations serve as initial accelerations."""
 
-APPLYING, APPLYING_TURN, SHORT_PART = 1 / 8, 0.02, 512
-"""Fraction of the first step in which loads that act from the start are applied.
+APPLYING = 1 / 8
+"""Fraction of the first step in which loads that act from the start are applied."""
 
-The second number is the largest rotation of a node in a substep of this fraction (rad).  Substeps
-that are shorter by the third number have no such limit.
-"""
+APPLYING_ROTATION = 0.02
+"""Largest rotation of a node in a substep while these loads are applied; rad."""
 
-FALL, TIE = 0.7, 1e-9
-"""Factor, for each repetition, of the largest excess over a limit from which on points open.
+SHORT_SUBSTEP = 512
+"""Ratio of that fraction of the step to a substep from which on the rotation has no limit."""
 
-The second number is a difference of excesses that does not matter.
-"""
+EXCESS_DECAY = 0.7
+"""Factor, for each repetition, of the largest excess over a limit from which on points open."""
 
-FAR, KINK = 1e3, 1e-6
-"""Largest motion in a static step that is no mechanism, over the size of the scene, or rad.
+EXCESS_TOLERANCE = 1e-9
+"""Difference of excesses that does not matter."""
 
-The second number is the work that a kink of a law may leave unexplained, over the energy that went
-through.
-"""
+LARGEST_MOTION = 1e3
+"""Largest motion in a static step that is no mechanism, over the size of the scene, or rad."""
 
-MISSED = 1e-9
+KINK_WORK = 1e-6
+"""Work that a kink of a law may leave unexplained, over the energy that went through."""
+
+SAMPLE_TOLERANCE = 1e-9
 """Fraction of a sample time by which the end of a step may miss it."""
 
 REASONS = PETSc.SNES.ConvergedReason
@@ -108,9 +109,9 @@ class Solver(PresentState):
         self.t, self.q, self.q_before, self.last_dt = t, q, q, math.inf
         self.parts = self.iterations = 0
         asked = [link for link in scene.links if isinstance(link.law, Controller | Coulomb)]
-        rubbing = [link for link in scene.links if rubs(link.law)]
+        frictional = [link for link in scene.links if rubs(link.law)]
         self.asked: dict[Connector, float] = dict.fromkeys(asked, 0.0)
-        self.rates: dict[Connector, float] = dict.fromkeys([*asked, *rubbing], 0.0)
+        self.rates: dict[Connector, float] = dict.fromkeys([*asked, *frictional], 0.0)
         self.samples: dict[Connector, tuple[float, int]] = {}  # first time, last number
         laws = {link: link.law for link in asked if isinstance(link.law, Controller)}
         self._sampled = {link: law.sample for link, law in laws.items() if law.sample}
@@ -125,19 +126,19 @@ class Solver(PresentState):
             rest = np.setdiff1d(rest, cells)
         elastic = [ElasticBeams(rest, setting)] if len(rest) else []
         self.beams = [*self.yielding, *elastic]
-        self.connectors = connectors_of(setting)
+        self.connectors = all_connectors(setting)
         self.inertia = None
         if has_inertia(scheme):
             self.inertia = Inertia(setting, scheme, self.supports.stop(v))
         inertia = [] if self.inertia is None else [self.inertia]
         mass = None if self.inertia is None else self.inertia.mass
-        self.loads = loads_of(setting, mass, t)
+        self.loads = all_loads(setting, mass, t)
         self.inner: list[Force] = [*self.beams, *self.connectors]
         damping = damping_forces(setting, self.inertia)
         self.forces: list[Force] = [*self.inner, *self.loads, *inertia, *damping]
-        self._groups = [one for one in self.connectors if isinstance(one, Connectors)]
-        openings = (law.opening for one in self._groups for law in one.laws)
-        self._open: list[Any] = [one for one in openings if one is not None]
+        self._groups = [group for group in self.connectors if isinstance(group, Connectors)]
+        candidates = (law.opens for group in self._groups for law in group.laws)
+        self._open: list[Any] = [candidate for candidate in candidates if candidate is not None]
         self._open += [beams.points for beams in self.yielding if beams.points.softens]
 
         self._weights: Array = np.ones(grid.size)  # make forces and moments comparable
@@ -155,23 +156,23 @@ class Solver(PresentState):
 
         ``same`` means that the scene and the time are as at its end, so that no force has jumped.
         """
-        scheme, given = self.scheme, dict(internal or {})
+        scheme, variables = self.scheme, dict(internal or {})
         self._continues = internal is not None
         v = None if self.inertia is None else self.inertia.v
         loads: Array = np.zeros(self.grid.size)
         if self._continues or (has_inertia(scheme) and scheme.kept):
             loads = sum((load.equilibrium(self.t, self.q, v) for load in self.loads), loads)
-        known = same and "reactions" in given
+        known = same and "reactions" in variables
         if not same:  # rates and forces of the last step belong to the forces before the jump
-            lasting = (n for n, x in given.items() if x.ndim == 2 or n == "reactions")
-            given = {n: given[n] for n in lasting if not n.startswith("changes of strains")}
-        self.internal(given)
+            lasting = (n for n, x in variables.items() if x.ndim == 2 or n == "reactions")
+            variables = {n: variables[n] for n in lasting if not n.startswith("changes of strains")}
+        self.internal(variables)
         for force in self.forces:
             force.start(self.q)
         if not self._continues:
             self.q = self.q.copy()
-            for one in self.connectors:
-                self.q[one.forces_at] = one.before = one.at_rest
+            for group in self.connectors:
+                self.q[group.forces_at] = group.before = group.at_rest
         # Forces of beams at rest, in a step too short for viscous flow.
         short = Step.of(scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
         for beam in self.beams:
@@ -180,17 +181,17 @@ class Solver(PresentState):
         if self.inertia is None:
             step = Step.of(scheme, self.t, self.t + 1.0, self.t + 1.0, self.q)
             step = step._replace(load_time=self.t, motion_time=self.t)
-            for one in self.connectors:
-                one.begin(step)
-                self._inner_before = self._inner_before + one.respond(step, self.q)[0]
+            for group in self.connectors:
+                group.begin(step)
+                self._inner_before = self._inner_before + group.respond(step, self.q)[0]
             if not known:
-                self.supports.note(self.supports.axes @ (self._inner_before - loads))
+                self.supports.store_reactions(self.supports.axes @ (self._inner_before - loads))
                 self.supports.before = self.supports.reactions
         self._sum_energies()
 
-    def internal(self, given: Mapping[str, Array] | None = None) -> dict[str, Array]:
-        """Return all data for later steps, by name, after ``given`` has replaced its entries."""
-        memory, supports = Memory(given or {}), self.supports
+    def internal(self, variables: Mapping[str, Array] | None = None) -> dict[str, Array]:
+        """Return data for later steps, by name, after ``variables`` has replaced its entries."""
+        memory, supports = Memory(variables or {}), self.supports
         supports.before = supports.reactions = memory.vector("reactions", supports.before)
         for force in self.forces:
             force.remember(memory)
@@ -201,7 +202,7 @@ class Solver(PresentState):
             self.asked[link] = float(row[0])
             if math.isfinite(row[1]) and row[3] == self.t:
                 self.samples[link] = float(row[1]), int(row[2])
-        together = {name: np.concatenate(parts) for name, parts in memory.kept.items()}
+        together = {name: np.concatenate(arrays) for name, arrays in memory.saved.items()}
         return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
 
     # -- a step, and its substeps ----------------------------------------------------------------
@@ -220,27 +221,27 @@ class Solver(PresentState):
             if frames or scene.works or any(f(self.t) != 0 for _, f in scene.time_functions()):
                 # Loads that act at the beginning are applied before the first step.
                 begin, end = self.t, self.t + APPLYING * (t1 - self.t)
-                self._in_parts(end, partial(self._attempt, end=end, at_rest=begin))
+                self._in_substeps(end, partial(self._attempt, end=end, at_rest=begin))
                 self.last_dt = math.inf  # the next guess does not extrapolate these substeps
         while self.t != t1:
             end = self._next_sample(t1)
-            self._in_parts(end, partial(self._attempt, end=end))
+            self._in_substeps(end, partial(self._attempt, end=end))
 
-    def _in_parts(self, t1: float, attempt: Callable[[float], None]) -> None:
+    def _in_substeps(self, t1: float, attempt: Callable[[float], None]) -> None:
         """Go to ``t1`` at once, or in substeps: halves, quarters, and so on."""
-        t0, done, part = self.t, 0, MOST_PARTS
-        while done < MOST_PARTS:
-            last = done + part == MOST_PARTS
+        t0, done, substep = self.t, 0, MOST_SUBSTEPS
+        while done < MOST_SUBSTEPS:
+            last = done + substep == MOST_SUBSTEPS
             try:
-                attempt(t1 if last else t0 + (t1 - t0) * (done + part) / MOST_PARTS)
+                attempt(t1 if last else t0 + (t1 - t0) * (done + substep) / MOST_SUBSTEPS)
             except StepFailed:
-                if part == 1:
+                if substep == 1:
                     raise
-                part //= 2
+                substep //= 2
                 continue
-            done += part
-            if done % (2 * part) == 0 and part < MOST_PARTS:
-                part *= 2  # a larger substep can begin here
+            done += substep
+            if done % (2 * substep) == 0 and substep < MOST_SUBSTEPS:
+                substep *= 2  # a larger substep can begin here
 
     def _attempt(self, t1: float, end: float, at_rest: float | None = None) -> None:
         """Take the step to ``t1``, in a whole step to ``end``, if there is an equilibrium.
@@ -255,14 +256,14 @@ class Solver(PresentState):
             q1, s = self._solve(Step.of(self.scheme, self.t, t, t1, self.q))
             inertia.more = inertia.after(s)[1:]
             self.supports.before = self.supports.reactions
-            for one in self.connectors:
-                one.before = q1[one.forces_at]
+            for group in self.connectors:
+                group.before = q1[group.forces_at]
         step = Step.of(self.scheme, self.t, t1, end, self.q)
         if at_rest is not None:
             step = step._replace(load_time=at_rest, motion_time=at_rest)
         q1, s = self._solve(step)
-        short = at_rest is None or SHORT_PART * step.dt <= end - at_rest
-        if not short and self._turn(q1) > APPLYING_TURN:
+        short = at_rest is None or SHORT_SUBSTEP * step.dt <= end - at_rest
+        if not short and self._largest_rotation(q1) > APPLYING_ROTATION:
             raise StepFailed("a node turns too far while the loads at the beginning are applied")
         self._accept(step, q1, s)
 
@@ -276,17 +277,21 @@ class Solver(PresentState):
         q1 = np.asarray(axes.T @ self._equilibrium(guess, step))
         s = nodal_step(self.scheme, q0, q1, self.grid.rotations)
         s[self.grid.multipliers] = 0.0
-        if self.scheme.limits_turn and not (turn := self._turn(q1)) <= LARGEST_TURN:
+        if (
+            self.scheme.limits_turn
+            and not (rotation := self._largest_rotation(q1)) <= LARGEST_ROTATION
+        ):
             raise StepFailed(
-                f"a node turns by {turn:.3g} rad in the step, and |Δψ| must stay below π; reduce dt"
+                f"a node turns by {rotation:.3g} rad in the step, and |Δψ| must stay below π; "
+                "reduce dt"
             )
         in_beams = sum(beam.change(step, q1) for beam in self.beams)
-        in_connectors = sum(one.change(step, q1) for one in self.connectors)
+        in_connectors = sum(group.change(step, q1) for group in self.connectors)
         if self.inertia is None:
             self._require_path(q1, s, in_beams, in_connectors)
         return q1, s
 
-    def _turn(self, q1: Array) -> float:
+    def _largest_rotation(self, q1: Array) -> float:
         """Return the largest rotation of a node in the step to ``q1``; rad."""
         return float(np.abs(q1 - self.q)[self.grid.rotations].max(initial=0.0))
 
@@ -298,15 +303,15 @@ class Solver(PresentState):
         """
         moves = np.abs(s) / self.scene.size
         moves[self.grid.rotations] *= self.scene.size
-        if not moves.max(initial=0.0) <= FAR:
-            raise StepFailed("what yields and what has opened leave a mechanism")
+        if not moves.max(initial=0.0) <= LARGEST_MOTION:
+            raise StepFailed("points that yield or have opened leave a mechanism")
         if math.isinf(self.scheme.slack):
             return
         work = float(acting(self.scheme, self._inner_before, self._inner) @ s)
         size = abs(work) + abs(in_beams)
-        size += sum(float(np.abs(one.taken(q1)).sum()) for one in self._groups)
-        entries = (abs(x) for part in vars(self.ledger).values() for x in part.values())
-        slack = self.scheme.slack * size + KINK * sum(entries) + sys.float_info.min
+        size += sum(float(np.abs(group.taken(q1)).sum()) for group in self._groups)
+        energies = (abs(x) for account in vars(self.ledger).values() for x in account.values())
+        slack = self.scheme.slack * size + KINK_WORK * sum(energies) + sys.float_info.min
         slack += float(self._round_off(self.supports.axes @ q1) @ np.abs(s))
         change = in_beams + in_connectors
         if abs(work - change) > slack:
@@ -347,9 +352,10 @@ class Solver(PresentState):
         self.search.hold, self.search.over = True, False
         try:
             x, times = self._newton(guess), 0
-            while excess := max(float(np.max(one.excess)) for one in self._open):
-                for one in self._open:
-                    one.released |= (one.excess > 0) & (one.excess >= FALL**times * excess - TIE)
+            while excess := max(float(np.max(candidate.excess)) for candidate in self._open):
+                least = EXCESS_DECAY**times * excess - EXCESS_TOLERANCE
+                for candidate in self._open:
+                    candidate.released |= (candidate.excess > 0) & (candidate.excess >= least)
                 x, times = self._newton(x), times + 1
             return x
         except StepFailed:
@@ -357,8 +363,8 @@ class Solver(PresentState):
                 raise  # nothing would open
         finally:
             self.search.hold = False
-            for one in self._open:
-                one.released = False
+            for candidate in self._open:
+                candidate.released = False
         self.begin(step)
         return self._newton(guess)
 
@@ -367,8 +373,8 @@ class Solver(PresentState):
     def begin(self, step: Step) -> None:
         """Begin a step, and reset data of iterates."""
         self._step = step
-        for one in self.connectors:
-            one.begin(step)
+        for group in self.connectors:
+            group.begin(step)
 
     def respond(self, x: Array) -> Response:
         """Return the residual at ``x`` and its derivative, in the axes of the supports."""
@@ -377,7 +383,7 @@ class Solver(PresentState):
         n, none = len(self.inner), np.zeros(len(x))
         self._inner = sum((r for r, _ in responses[:n]), none)
         r = np.asarray(axes @ sum((r for r, _ in responses[n:]), self._inner))
-        self.supports.note(r)
+        self.supports.store_reactions(r)
         K = sum((K for _, K in responses), csr_array((len(x), len(x))))
         return r, csr_array(axes @ K @ axes.T)
 
@@ -472,28 +478,30 @@ class Solver(PresentState):
     def _converged(self, snes: PETSc.SNES, iteration: int, norms: Any) -> Any:
         """Stop if the residual is small relative to the forces, or as small as round-off allows."""
         x, r = self._all(snes.getSolution()), self._r.copy()
-        r[self.supports.held] = 0.0
+        r[self.supports.constrained] = 0.0
         size = self._norm(r)
         if not math.isfinite(size):
             return REASONS.DIVERGED_FNORM_NAN
         scale = self._norm(self._inner) + sum(self._norm(load.force) for load in self.loads)
         moved = min(float(np.max(np.abs(x) * (self._weights > 0), initial=0.0)), self.scene.size)
         q1 = self.supports.axes.T @ x
-        missed = max((c.missed(q1, r, scale, moved) for c in self.connectors), default=0.0)
+        residual = max(
+            (c.relative_residual(q1, r, scale, moved) for c in self.connectors), default=0.0
+        )
         # A guess that just meets the tolerance would miss a small load beside large ones.
         least = 1 if self.inertia is not None else 2
-        enough = self._rtol * scale * (SURE if iteration < least else 1.0)
-        if size <= enough and missed <= self._rtol:
+        enough = self._rtol * scale * (FIRST_TOLERANCE if iteration < least else 1.0)
+        if size <= enough and residual <= self._rtol:
             return REASONS.CONVERGED_FNORM_ABS
         digits = 8 * self._norm(self._round_off(x)) if iteration > 1 else 0.0
         # Newton's method no longer halves a residual of round-off.
         stays = size <= digits and size > self._last / 2
-        if iteration > 1 and stays and missed <= max(self._rtol, 1e-10):
+        if iteration > 1 and stays and residual <= max(self._rtol, 1e-10):
             return REASONS.CONVERGED_FNORM_ABS
         self._last, self._slow = size, self._slow + 1
         if size <= self._best / 2:
             self._best, self._slow = size, 0
-        return REASONS.DIVERGED_DTOL if self._slow > PATIENCE else REASONS.CONVERGED_ITERATING
+        return REASONS.DIVERGED_DTOL if self._slow > STALL_LIMIT else REASONS.CONVERGED_ITERATING
 
     def _norm(self, forces: Array) -> float:
         """Return the norm of forces, and of moments over the size of the scene; N."""
@@ -507,7 +515,7 @@ class Solver(PresentState):
     def _failure(self, reason: int) -> StepFailed:
         names = {v: k for k, v in vars(REASONS).items() if isinstance(v, int)}
         r = np.abs(self._r) * self._weights
-        r[self.supports.held] = 0.0
+        r[self.supports.constrained] = 0.0
         failure = StepFailed(
             f"Newton's method did not converge ({names.get(reason, reason)}); residual "
             f"{np.linalg.norm(r):.3e} N"
@@ -527,15 +535,15 @@ class Solver(PresentState):
             if due is not None:
                 self.samples[link] = due
         if self.inertia is not None:
-            rubbing = (one for one in self._groups if self.rates.keys() & {*one.links})
-            for one in rubbing:
-                rates = one.rates(self.q, self.inertia.v)
-                self.rates.update(zip(one.links, map(float, rates), strict=True))
+            groups = (group for group in self._groups if self.rates.keys() & {*group.links})
+            for group in groups:
+                rates = group.rates(self.q, self.inertia.v)
+                self.rates.update(zip(group.links, map(float, rates), strict=True))
 
     def _due(self, link: Connector) -> tuple[float, int]:
         """Return the first sample time of a controller, s, and the number of the due sample."""
         sample, (first, _) = self._sampled[link], self.samples.get(link, (self.t, -1))
-        digits = MISSED * sample + 4 * math.ulp(max(self.t, first, key=abs))
+        digits = SAMPLE_TOLERANCE * sample + 4 * math.ulp(max(self.t, first, key=abs))
         return first, math.floor((self.t - first + digits) / sample)
 
     def _next_sample(self, end: float) -> float:
@@ -544,7 +552,11 @@ class Solver(PresentState):
         for link, sample in self._sampled.items():
             first, number = self._due(link)
             at = first + (number + 1) * sample
-            if self.t < at < stop - MISSED * sample - 4 * math.ulp(max(at, stop, key=abs)):
+            if (
+                self.t
+                < at
+                < stop - SAMPLE_TOLERANCE * sample - 4 * math.ulp(max(at, stop, key=abs))
+            ):
                 stop = at
         return stop
 
@@ -553,8 +565,8 @@ class Solver(PresentState):
     def connections(self) -> Array:
         """Return the columns of ``Connection`` for all links; (num_links, columns)."""
         table = np.zeros((len(self.scene.links), len(Connection._fields)))
-        for one in self.connectors:
-            table[one.numbers] = one.kept(self.q)
+        for group in self.connectors:
+            table[group.numbers] = group.columns(self.q)
         return table
 
     @property
@@ -563,12 +575,12 @@ class Solver(PresentState):
         reactions = np.array(self.supports.forces())
         for k, support in enumerate(self.scene.supports):  # in its axes
             reactions[k, :2] = turned(reactions[k, :2], np.full(1, -support.angle))[0]
-        rows = np.concatenate([np.zeros((0, 7)), *(one.material() for one in self.yielding)])
+        rows = np.concatenate([np.zeros((0, 7)), *(beams.material() for beams in self.yielding)])
         state = {"t": np.array(self.t), "q": self.q, "reactions": reactions}
         if self.inertia is not None:
             state["v"] = self.inertia.v
-        for part, entries in vars(self.ledger).items():
-            state |= {f"{part}: {name}": np.array(value) for name, value in entries.items()}
+        for account, energies in vars(self.ledger).items():
+            state |= {f"{account}: {name}": np.array(value) for name, value in energies.items()}
         state |= {
             "connectors": self.connections(), "material": rows[np.argsort(rows[:, 0]), 1:],
             FORCES: np.zeros((9, len(self.grid.cells))) + self.on_nodes,

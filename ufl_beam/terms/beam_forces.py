@@ -31,7 +31,7 @@ from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, beginning, entering
 
 
-class OfForms(Term):
+class FormForces(Term):
     """Forces of a virtual work on cells, with forms of the energy lost in a step."""
 
     _entry: str  # of the losses in the ledger
@@ -50,7 +50,7 @@ class OfForms(Term):
         self.loops = loop("add_cells", force.cells), loop("add_cells", tangent.cells)
         self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
         self._losses = [fields.kernel(form, self._q1) for form in losses]
-        self._of_step = [force, *(loss for loss in self._losses if not loss.share(force))]
+        self._step_kernels = [force, *(loss for loss in self._losses if not loss.share(force))]
         if losses:
             ledger.lost[self._entry] += 0.0
 
@@ -58,18 +58,18 @@ class OfForms(Term):
         """Return loops over the cells that begin and accept a step."""
         lost = self._ledger.lost
         accept = [entering(loss, lost.pointer(self._entry)) for loss in self._losses]
-        return Phases(beginning(self._of_step, self._q0), accept)
+        return Phases(beginning(self._step_kernels, self._q0), accept)
 
 
 # -- static steps ----------------------------------------------------------------------------------
 
 
 @stated
-def _linear_strains(of: Element) -> tuple[ufl.Form, fem.Function]:
+def _linear_strains(element: Element) -> tuple[ufl.Form, fem.Function]:
     """Return strains at the points, linearised about a configuration, and this configuration."""
-    about = of.configuration()
-    e_about = strain(about, of.axis)
-    return of.sampled(e_about + ufl.derivative(e_about, about, of.q1)), about
+    about = element.configuration()
+    e_about = strain(about, element.axis)
+    return element.sampled(e_about + ufl.derivative(e_about, about, element.q1)), about
 
 
 def predicted_strains(fields: Fields) -> Any:
@@ -169,31 +169,31 @@ class ElasticForms(NamedTuple):
 
 
 @stated
-def elastic_forms(of: Element, scheme: Scheme) -> ElasticForms:
+def elastic_forms(element: Element, scheme: Scheme) -> ElasticForms:
     """Return the forms of a step of a time scheme."""
-    q0, q1, w, C, dx = of.q0, of.q1, of.w, of.stiffness, of.dx(1)
-    e0, e1 = strain(q0, of.axis), strain(q1, of.axis)
-    r = scheme.resultants(C, e0, e1, of.constant)
-    w_e = scheme.virtual_strain(q0, q1, w, of.axis)
+    q0, q1, w, C, dx = element.q0, element.q1, element.w, element.stiffness, element.dx(1)
+    e0, e1 = strain(q0, element.axis), strain(q1, element.axis)
+    r = scheme.resultants(C, e0, e1, element.constant)
+    w_e = scheme.virtual_strain(q0, q1, w, element.axis)
     stored = elastic_energy(e1, C) * dx
-    lost = 2 * of.constant(scheme.alpha) * elastic_energy(e1 - e0, C) * dx  # P(90)
+    lost = 2 * element.constant(scheme.alpha) * elastic_energy(e1 - e0, C) * dx  # P(90)
     return ElasticForms(virtual_work(r, w_e) * dx, stored, [lost] if scheme.alpha else [])
 
 
 @stated
-def _static_tangent(of: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function]:
+def _static_tangent(element: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function]:
     """Return the tangent of elastic cells with given strains in its forces; these strains."""
-    q0, q1, C = of.q0, of.q1, of.stiffness
-    e0, e1, e = strain(q0, of.axis), strain(q1, of.axis), of.at_points(3)
-    w_e = scheme.virtual_strain(q0, q1, of.w, of.axis)
-    acting = partial(scheme.resultants, C, e0, constant=of.constant)
-    change = ufl.TrialFunction(of.space)
+    q0, q1, C = element.q0, element.q1, element.stiffness
+    e0, e1, e = strain(q0, element.axis), strain(q1, element.axis), element.at_points(3)
+    w_e = scheme.virtual_strain(q0, q1, element.w, element.axis)
+    acting = partial(scheme.resultants, C, e0, constant=element.constant)
+    change = ufl.TrialFunction(element.space)
     geometric = virtual_work(acting(e), ufl.derivative(w_e, q1, change))
     material = virtual_work(ufl.derivative(acting(e1), q1, change), w_e)
-    return (geometric + material) * of.dx(1), e
+    return (geometric + material) * element.dx(1), e
 
 
-class ElasticBeams(OfForms, Cells):
+class ElasticBeams(FormForces, Cells):
     """Virtual work of the resultants of elastic cells, P(12).
 
     In statics the tangent uses the forces of the :func:`predicted_strains`.
@@ -215,10 +215,10 @@ class ElasticBeams(OfForms, Cells):
         self._work_form, self._stored = forms.work, fields.kernel(forms.stored, q1)
         self._stored.share(self._force)
         if tangent is not None:
-            self._of_step.append(tangent)
+            self._step_kernels.append(tangent)
             self.loops = self.loops[0], loop("add_static_tangent", self._static)
         # Both configurations of a step determine the forces.
-        self.in_cells = [one._replace(q0=self._q0) for one in self.in_cells]
+        self.in_cells = [forces._replace(q0=self._q0) for forces in self.in_cells]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the cells."""
@@ -231,7 +231,7 @@ class ElasticBeams(OfForms, Cells):
 
 # -- beams with material points --------------------------------------------------------------------
 
-KEPT_WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
+WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
 """Factors of :attr:`Points.kept` if its jump is a crack of a fibre instead of a hinge."""
 
 
@@ -247,12 +247,12 @@ class InelasticForms(NamedTuple):
 
 
 @stated
-def inelastic_forms(of: Element, scheme: Scheme) -> InelasticForms:
+def inelastic_forms(element: Element, scheme: Scheme) -> InelasticForms:
     """Return the forms of a step of a time scheme."""
-    r, b, D = of.at_points(3), of.at_points(3), of.at_points(3, 3)
-    w_e, dx = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis), of.dx(1)
-    around = virtual_work(b + ufl.dot(D, strain(of.q1, of.axis)), w_e) * dx
-    tangent = ufl.derivative(around, of.q1, ufl.TrialFunction(of.space))
+    r, b, D = element.at_points(3), element.at_points(3), element.at_points(3, 3)
+    w_e, dx = scheme.virtual_strain(element.q0, element.q1, element.w, element.axis), element.dx(1)
+    around = virtual_work(b + ufl.dot(D, strain(element.q1, element.axis)), w_e) * dx
+    tangent = ufl.derivative(around, element.q1, ufl.TrialFunction(element.space))
     return InelasticForms(virtual_work(r, w_e) * dx, around, tangent, r, b, D)  # P(34)
 
 
@@ -274,7 +274,7 @@ class InelasticBeams(Cells):
         search: Index,
     ) -> None:  # fmt: skip
         self._A, self._ledger = A, ledger
-        self.kept_factors = np.ones(6) if layout.hinges else KEPT_WITHOUT_JUMP
+        self.kept_factors = np.ones(6) if layout.hinges else WITHOUT_JUMP
         self.predicted = None if has_inertia(scheme) else predicted_strains(fields)
         self._cells = fields.share.cells[fields.order]
         self._strains = Strains(fields)
@@ -301,8 +301,8 @@ class InelasticBeams(Cells):
         )  # fmt: skip
         if self.predicted is not None:
             forces, last_b, last_D = np.zeros((3, len(lengths), 9))
-            of_tangent = {"forces": forces, "last_b": last_b, "last_D": last_D}
-            fill(self._in_c, predicted=self.predicted, **of_tangent)
+            tangents = {"forces": forces, "last_b": last_b, "last_D": last_D}
+            fill(self._in_c, predicted=self.predicted, **tangents)
         names, force = ("add_inelastic_force", "add_inelastic_tangent"), self._force
         self.loops = loop(names[0], self._in_c), loop(names[1], self._in_c)
         self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]

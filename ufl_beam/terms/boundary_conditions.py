@@ -39,26 +39,26 @@ class Supports:
 
     def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
         turned: list[tuple[Any, ...]] = []
-        held: list[int] = []
+        constrained: list[int] = []
         self._motions: list[tuple[int, TimeFunction, Support]] = []
         if GROUND in share.grid.scene.rigid_bodies:
-            held.extend(share.local(share.grid.node(GROUND.middle)))
+            constrained.extend(share.local(share.grid.node(GROUND.middle)))
         for support in share.grid.scene.supports:
             dofs = share.grid.node(support.place)
             if support.angle and len(share.local(dofs[:2])):
                 turned.append(_turned_axes(share.local(dofs[:2]), support.angle, A))
             for component, motion in support.held.items():
-                here = share.local(dofs[[component]])
-                held.extend(here)
+                local_dofs = share.local(dofs[[component]])
+                constrained.extend(local_dofs)
                 if component in support.moving:
-                    self._motions.extend((dof, motion, support) for dof in here)
+                    self._motions.extend((dof, motion, support) for dof in local_dofs)
         self.turned, self.axes, self._alive = len(turned), ffi.new("turned_axes[]", turned), turned
-        self.dofs = np.array(sorted(held), dtype=np.int64)
+        self.dofs = np.array(sorted(constrained), dtype=np.int64)
         self.moving = np.array([dof for dof, *_ in self._motions], dtype=np.int64)
-        is_held = np.zeros(A.size, dtype=bool)
-        is_held[self.dofs] = True
-        of_columns, of_rows = np.flatnonzero(is_held[A.indices]), A.entries_of(self.dofs)
-        self.entries = np.union1d(of_columns, of_rows), A.positions(self.dofs, self.dofs)
+        is_constrained = np.zeros(A.size, dtype=bool)
+        is_constrained[self.dofs] = True
+        columns, rows = np.flatnonzero(is_constrained[A.indices]), A.entries_of(self.dofs)
+        self.entries = np.union1d(columns, rows), A.positions(self.dofs, self.dofs)
         self.pivots: Array = np.ones(len(self.dofs))
         self._scheme, self._ledger = scheme, ledger
         # True if values depend on time anywhere in the scene
@@ -100,9 +100,9 @@ class Supports:
         entry = self._ledger.supplied.pointer("supports") if self.work else ffi.NULL
         return struct(
             "moving_supports", held=len(self.dofs), hold=self.dofs.astype(np.int32),
-            moving=len(moves), dof=self.moving.astype(np.int32), motion=callbacks.of_time(moves),
-            reactions=self.reactions, before=self._before, work=entry,
-            weight_of_before=self._scheme.weight_of_before,
+            moving=len(moves), dof=self.moving.astype(np.int32),
+            motion=callbacks.time_functions(moves), reactions=self.reactions,
+            before=self._before, work=entry, weight_of_before=self._scheme.weight_of_before,
         )  # fmt: skip
 
     def hold(self, r: Array) -> None:
@@ -147,5 +147,5 @@ def _turned_axes(dofs: Index, angle: float, A: Csr) -> tuple[Any, ...]:
     rows = [np.arange(A.indptr[d], A.indptr[d + 1], dtype=np.int32) for d in dofs]
     # Both dofs belong to the same cells, so their rows and columns have the same sparsity.
     columns = [np.flatnonzero(A.indices == d).astype(np.int32) for d in dofs]
-    sizes, entries = (len(rows[0]), len(columns[0])), map(integers, (*rows, *columns))
-    return *map(int, dofs), *sizes, math.cos(angle), math.sin(angle), *entries
+    sizes, indices = (len(rows[0]), len(columns[0])), map(integers, (*rows, *columns))
+    return *map(int, dofs), *sizes, math.cos(angle), math.sin(angle), *indices

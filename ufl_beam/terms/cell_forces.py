@@ -33,59 +33,59 @@ class CellForces:
             load factors, which are equal on all processes.
     """
 
-    def __init__(self, share: Share, parts: Sequence[InCells], loads: Any = ffi.NULL) -> None:
+    def __init__(self, share: Share, forces: Sequence[InCells], loads: Any = ffi.NULL) -> None:
         self._share, self._space = share, np.zeros(share.size)
-        self._alive: list[Any] = [parts]
+        self._alive: list[Any] = [forces]
         self._unmade = list[tuple[InCells, Any]]()
-        self._of_ends: list[tuple[Kernel, fem.Function, Any, Array]] = []
+        self._step_forms: list[tuple[Kernel, fem.Function, Any, Array]] = []
         self.vectors, self.entries = list[Any](), list[tuple[Any, int]]()
         self.factors = list[tuple[Any, int]]()
-        self._forces = ffi.new("force_in_cells[]", len(parts))
+        self._forces = ffi.new("force_in_cells[]", len(forces))
         vectors: dict[Any, Any] = {}  # latest vectors: accepted vectors, as pointers
-        for c, one in zip(self._forces, parts, strict=True):
-            c.kind, c.factor, c.number = one.kind, one.factor, len(one.order)
-            if not np.array_equal(one.order, np.arange(len(share.cells))):
-                order = one.order.astype(np.int32)
+        for c, force in zip(self._forces, forces, strict=True):
+            c.kind, c.factor, c.number = force.kind, force.factor, len(force.order)
+            if not np.array_equal(force.order, np.arange(len(share.cells))):
+                order = force.order.astype(np.int32)
                 c.cell = integers(order)
                 self._alive.append(order)
-            accepted, other = ffi.addressof(c, "accepted"), np.zeros(share.size)
-            if one.vector is not None:
-                if one.vector not in vectors:
-                    c.latest, vectors[one.vector] = one.vector, accepted
+            accepted, accepted_values = ffi.addressof(c, "accepted"), np.zeros(share.size)
+            if force.vector is not None:
+                if force.vector not in vectors:
+                    c.latest, vectors[force.vector] = force.vector, accepted
                     self.vectors.append(accepted)
-                c.vector = vectors[one.vector]
-                self._unmade.append((one, c))
+                c.vector = vectors[force.vector]
+                self._unmade.append((force, c))
             else:
-                form = one.form()
-                each, c.lanes, other = form.keep_entries()
+                form = force.form()
+                each, c.lanes, accepted_values = form.keep_entries()
                 c.entries = accepted
                 self._alive.append(each)
-                if one.q0 is None:
+                if force.q0 is None:
                     c.latest = each
-                    self.entries.append((accepted, other.size))
+                    self.entries.append((accepted, accepted_values.size))
                 else:
                     each[0] = ffi.NULL
-                    self._of_ends.append((form, one.q0, each, other))
-            c.accepted = doubles(other)
-            self._alive.append(other)
+                    self._step_forms.append((form, force.q0, each, accepted_values))
+            c.accepted = doubles(accepted_values)
+            self._alive.append(accepted_values)
         if loads != ffi.NULL:
             self.factors.append((ffi.addressof(loads, "accepted"), loads.vectors))
-        self.asks_for_before = any(form.uses(q0) for form, q0, *_ in self._of_ends)
+        self.asks_for_before = any(form.uses(q0) for form, q0, *_ in self._step_forms)
         first, *between, last = share.grid.mesh.nodes - 0.5
         from_middle = np.array([first, last, *between])
         self.c = fill(
             ffi.new("cell_forces *"), cells=len(share.cells), nodes=2 + len(between),
-            forces=len(parts), force=self._forces, loads=loads, from_middle=from_middle,
+            forces=len(forces), force=self._forces, loads=loads, from_middle=from_middle,
         )  # fmt: skip
 
     def accept(self) -> None:
         """Accept the forces of the latest residual."""
         lib.accept_cell_forces(self.c)
 
-    def begin(self, numbers: Array | None) -> None:
-        """Begin with given numbers, or with only the stresses of the latest residual."""
-        if numbers is not None:
-            fill(self.c, given=numbers)
+    def begin(self, values: Array | None) -> None:
+        """Begin with these values, or with only the stresses of the latest residual."""
+        if values is not None:
+            fill(self.c, given=values)
             return
         for c in self._forces:
             if c.kind == lib.STRESS and c.latest:
@@ -97,10 +97,10 @@ class CellForces:
         ``q`` and ``before`` are the configurations at the end and at the beginning of the step.
         """
         self._make()
-        for of_ends, q0, each, entries in self._of_ends:
-            latest, each[0] = each[0], doubles(entries)
-            of_ends.set(q0, before)
-            of_ends.add(np.ascontiguousarray(q), self._space)
+        for form, q0, each, values in self._step_forms:
+            latest, each[0] = each[0], doubles(values)
+            form.set(q0, before)
+            form.add(np.ascontiguousarray(q), self._space)
             each[0] = latest
         out: Array = np.empty((lib.CELL_NUMBERS, self.c.cells))
         lib.find_cell_forces(self.c, 0, doubles(out))
@@ -108,8 +108,8 @@ class CellForces:
 
     def _make(self) -> None:
         """Make the forms that only cell forces need, once."""
-        for one, c in self._unmade:
-            form = one.form()
+        for force, c in self._unmade:
+            form = force.form()
             each, c.lanes, _ = form.keep_entries()
             c.entries, c.form = each, form.cells
             self._alive.append((form, each))
@@ -122,10 +122,10 @@ class CellForces:
     def keep_latest(self) -> None:
         """Keep all entries of the latest residual from now on, for requests after each step."""
         self._make()
-        of_ends = (c for c in self._forces if not c.latest and not c.vector)
-        for c, (*_, each, entries) in zip(of_ends, self._of_ends, strict=True):
+        structs = (c for c in self._forces if not c.latest and not c.vector)
+        for c, (*_, each, values) in zip(structs, self._step_forms, strict=True):
             if not c.tee:
-                latest = np.zeros(entries.shape)
+                latest = np.zeros(values.shape)
                 self._alive.append(latest)
                 c.tee, each[0] = each, doubles(latest)
 
@@ -133,21 +133,21 @@ class CellForces:
 
     def of_record(self, record: Array, q: Array, before: Array) -> Array:
         """Return the numbers of a call from saved vectors, entries and factors, in this order."""
-        kept = [*((one, self._share.size) for one in self.vectors), *self.entries, *self.factors]
-        given, now, at = self.c.given, [place[0] for place, _ in kept], 0
+        arrays = [*((x, self._share.size) for x in self.vectors), *self.entries, *self.factors]
+        values, addresses, at = self.c.given, [place[0] for place, _ in arrays], 0
         record = np.array(record)
         try:
             self.c.given = ffi.NULL
-            for place, n in kept:
+            for place, n in arrays:
                 place[0] = doubles(record[at : at + n])
                 at += n
             return self(q, before)
         finally:
-            self.c.given = given
-            for (place, _), old in zip(kept, now, strict=True):
+            self.c.given = values
+            for (place, _), old in zip(arrays, addresses, strict=True):
                 place[0] = old
 
     def remember(self, memory: Memory, q: Array, before: Array) -> None:
         """Save or restore the forces of the accepted step."""
-        numbers = memory.rows("forces of cells", self._share.cells, self(q, before).T)
-        fill(self.c, given=np.ascontiguousarray(numbers.T))
+        values = memory.rows("forces of cells", self._share.cells, self(q, before).T)
+        fill(self.c, given=np.ascontiguousarray(values.T))

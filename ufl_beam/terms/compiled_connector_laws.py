@@ -37,8 +37,8 @@ from ufl_beam.terms.term import Callbacks
 def inputs(law: ConnectorLaw) -> tuple[str, ...]:
     """Return the names of the inputs of a compiled law; loops.h explains their order."""
     motions = (f"{when} {i}" for when in ("motion", "before") for i in range(law.components))
-    of_law = (*(f"state {name}" for name in law.variables), *(f"number {n}" for n in law.numbers()))
-    return (*motions, "dt", "theta", *of_law)
+    data = (*(f"state {name}" for name in law.variables), *(f"number {n}" for n in law.numbers()))
+    return (*motions, "dt", "theta", *data)
 
 
 class LawForms:
@@ -56,14 +56,14 @@ class LawForms:
         self._at = at | {name: ufl.variable(at[name]) for name in motions}
         self._motions = [self._at[name] for name in motions]
         try:
-            forces, *numbers, variables = law_step(law, self._at, scheme)
+            forces, *energies, variables = law_step(law, self._at, scheme)
             self.force = self._compile(*forces, *self._slopes(forces))
-            by_name = dict(zip(("stored", "numerical"), numbers, strict=True))
+            by_name = dict(zip(("stored", "numerical"), energies, strict=True))
             end = in_order("law_output", by_name, "law_")
             self.end = self._compile(*end, *variables)
             old = State({name: at[f"state {name}"] for name in law.variables})
-            numbers_of_law = {name: at[f"number {name}"] for name in law.numbers()}
-            self.limit = self._compile(ufl.as_ufl(law.of(numbers_of_law).limit(old)))
+            parameters = {name: at[f"number {name}"] for name in law.numbers()}
+            self.limit = self._compile(ufl.as_ufl(law.of(parameters).limit(old)))
         except Exception as error:
             raise ModelError(
                 f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
@@ -84,7 +84,7 @@ class LawForms:
     def _compile(self, *outputs: Expr) -> Any:
         """Compile a function; return a null pointer if all its outputs are zero."""
         outputs = tuple(map(expand_derivatives, outputs))
-        zero = all(isinstance(one, Zero) for one in outputs)
+        zero = all(isinstance(output, Zero) for output in outputs)
         return ffi.NULL if zero else self._pointwise.compile(*outputs)
 
 
@@ -111,17 +111,17 @@ class CompiledLaws(Response):
         for name, value in law.variables.items():
             at[f"state {name}"][:] = value
         for name in law.numbers():
-            at[f"number {name}"][:] = [getattr(one, name) for one in self._laws[::k]]
-        self._held, lost = np.zeros(n), np.zeros(n * k)  # losses, in the first component
+            at[f"number {name}"][:] = [getattr(x, name) for x in self._laws[::k]]
+        self._stored, lost = np.zeros(n), np.zeros(n * k)  # losses, in the first component
         self.dissipated = (lost,)
         variables = [at[f"state {name}"] for name in law.variables]
-        self._variables = [*variables, self._held, lost[::k]]
+        self._variables = [*variables, self._stored, lost[::k]]
         self._forms = _law_forms(law.of(dict.fromkeys(law.numbers(), 1.0)), scheme)
         outputs = int(lib.LAW_OUTPUTS) + len(law.variables)
         self._c = struct(
             "connector_laws", number=n, width=len(columns), variables=len(law.variables),
             components=k, force=self._forms.force, end=self._forms.end, loses=not law.elastic, w=w,
-            stored=self._held, lost=lost, rows=np.zeros((n, k * (k + 2))),
+            stored=self._stored, lost=lost, rows=np.zeros((n, k * (k + 2))),
             answer=np.zeros(outputs), sum=np.zeros(2),
         )  # fmt: skip
         self.in_c = {"laws": self._c}
@@ -140,16 +140,16 @@ class CompiledLaws(Response):
         k = self._components
         self._w[:, :k] = e1.reshape(-1, k)
         bends = np.zeros((len(self._w), k**3))
-        for w, of in zip(self._w, bends, strict=True):
-            lib.ask_law(self._forms.frozen[1], doubles(w), k**3, doubles(of))
+        for w, bend in zip(self._w, bends, strict=True):
+            lib.ask_law(self._forms.frozen[1], doubles(w), k**3, doubles(bend))
         return -bends
 
     def _accepted_state(self) -> tuple[ConnectorLaw, list[Array], State]:
         """Return the law with the numbers of all connectors, their motions and their variables."""
         law, at = self._law, self._at
-        numbers = law.of({name: at[f"number {name}"] for name in law.numbers()})
+        laws = law.of({name: at[f"number {name}"] for name in law.numbers()})
         motions = [at[f"before {i}"] for i in range(law.components)]
-        return numbers, motions, State({name: at[f"state {name}"] for name in law.variables})
+        return laws, motions, State({name: at[f"state {name}"] for name in law.variables})
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""
@@ -157,7 +157,7 @@ class CompiledLaws(Response):
         self._w[:, k : 2 * k] = e.reshape(-1, k)
         with np.errstate(all="ignore"):
             law, motions, variables = self._accepted_state()
-            self._held[:] = law.energy(law.given(motions), variables)
+            self._stored[:] = law.energy(law.given(motions), variables)
 
     def borne(self) -> Array | None:
         """Return the elastic forces at the motions of :meth:`start`; None if laws hold."""
@@ -174,7 +174,7 @@ class CompiledLaws(Response):
 
 # -- functions of a user ---------------------------------------------------------------------------
 
-MISSED = 0.5
+OVERSHOOT = 0.5
 """Ratio of residuals of successive iterates above which an iteration has overshot."""
 
 DIGITS = 1e-8
@@ -189,11 +189,11 @@ class Iterate(NamedTuple):
 
     e: float  # motion; m or rad
     λ: float  # force; N or N m
-    missed: float  # residual: force of the law at the motion, less λ
+    residual: float  # force of the law at the motion, less λ
     at: float  # motion about which the law was linearised
 
 
-class Asked:
+class UserLaw:
     """Functions of the law of a connector in a step.
 
     Attributes:
@@ -205,9 +205,9 @@ class Asked:
     def __init__(
         self, link: Connector, law: ForceLaw, size: float, load_weight: float, state: Array
     ) -> None:
-        self._link, self._law, self._asked = link, law.force, law.asked
+        self._link, self._law, self._arguments = link, law.force, law.asked
         self._small, self._weight = 1e-3 * size, load_weight
-        self.energy, self._asked_by_stored = law.stored, law.asked_by_stored
+        self.energy, self._stored_arguments = law.stored, law.asked_by_stored
         self._e0, self._dt, self._known = 0.0, 1.0, dict[str, Any]()
         self.last: Iterate | None = None
         self.state = state
@@ -231,10 +231,10 @@ class Asked:
         """Return force and internal variables if the step ends at the motion ``e1``."""
         motion = (1.0 - self._weight) * self._e0 + self._weight * e1
         rate, state = (e1 - self._e0) / self._dt, self.state
-        if not self._asked:
+        if not self._arguments:
             value = self._law(motion, rate)
         else:
-            value = self._law(motion, rate, **{name: self._known[name] for name in self._asked})
+            value = self._law(motion, rate, **{name: self._known[name] for name in self._arguments})
             if state.size:
                 value, state = self._pair(value)
         if isinstance(value, float) and math.isfinite(value) and not self.state.size:
@@ -261,7 +261,7 @@ class Asked:
         """Return the recoverable energy; J."""
         if self.energy is None:
             return 0.0
-        value = self.energy(motion, **dict.fromkeys(self._asked_by_stored, self.state.copy()))
+        value = self.energy(motion, **dict.fromkeys(self._stored_arguments, self.state.copy()))
         t = f", t = {self._known['t']:.9g} s" if self._known else ""
         at = f"motion = {motion:.6g}{t}"
         return require_returned(value, f"{self._link}: the energy", at, finite=True)
@@ -271,12 +271,12 @@ class Asked:
     def line(self, e: float, λ: float) -> tuple[float, float]:
         """Return slope and intercept of the law around an iterate."""
         force, last = self.force(e), self.last
-        missed, at = force - λ, e
-        if last is not None and abs(missed) > MISSED * abs(last.missed) and e != last.e:
+        residual, at = force - λ, e
+        if last is not None and abs(residual) > OVERSHOOT * abs(last.residual) and e != last.e:
             at = self._meeting(e, λ, last)
             force = force if at == e else self.force(at)
         slope = self._slope(at, force)
-        self.last = Iterate(e, λ, missed, at)
+        self.last = Iterate(e, λ, residual, at)
         return slope, force - slope * at
 
     def _meeting(self, e: float, λ: float, last: Iterate) -> float:
@@ -292,8 +292,8 @@ class Asked:
         def excess(x: float) -> float:
             return self.force(x) - λ + yielding * (x - e)
 
-        here, there = excess(e), excess(last.at)
-        if not (here < 0.0 < there or there < 0.0 < here):
+        excess_now, excess_last = excess(e), excess(last.at)
+        if not (excess_now < 0.0 < excess_last or excess_last < 0.0 < excess_now):
             return e
         return float(scipy.optimize.brentq(excess, e, last.at, xtol=1e-300, maxiter=2000))
 
@@ -305,11 +305,11 @@ class Asked:
         leaves digits.
         """
         ε = DIFFERENCE * max(abs(e - self._e0), 1e-3 * max(abs(e), self._small))
-        near = DIFFERENCE * max(abs(e), 0.0 if self.last is None else abs(self.last.at))
-        if 0.0 < near < ε:
-            change = self.force(e + near) - self.force(e - near)
+        ε_motion = DIFFERENCE * max(abs(e), 0.0 if self.last is None else abs(self.last.at))
+        if 0.0 < ε_motion < ε:
+            change = self.force(e + ε_motion) - self.force(e - ε_motion)
             if abs(change) > DIGITS * abs(force):
-                return change / (2 * near)
+                return change / (2 * ε_motion)
         return (self.force(e + ε) - self.force(e - ε)) / (2 * ε)
 
     def bend(self, e: float) -> float:
@@ -324,7 +324,7 @@ class Asked:
         return -sum(forces) / (12 * ε**2)
 
 
-class AskedLaws(Response):
+class UserLaws(Response):
     """Forces by functions; all laws have the same number of internal variables."""
 
     def __init__(self, law: ForceLaw, links: Sequence[Connector], setting: Setting) -> None:
@@ -335,12 +335,12 @@ class AskedLaws(Response):
         self._in_steps["sign"] = 1.0
         states, weight = np.zeros((n, len(law.state))), setting.scheme.load_weight
         self._variables = list(states.T)
-        numbers = zip(links, self._laws, self._lengths, states, strict=True)
-        self._each = [Asked(link, one, size, weight, x) for link, one, size, x in numbers]
-        self.asks_at_ends = any(one.state.size or one.energy for one in self._each)
-        self._held, self._force, self._rows = np.zeros(1), np.zeros(n), np.zeros((n, 3))
+        arguments = zip(links, self._laws, self._lengths, states, strict=True)
+        self._each = [UserLaw(link, record, size, weight, x) for link, record, size, x in arguments]
+        self.asks_at_ends = any(law.state.size or law.energy for law in self._each)
+        self._stored, self._force, self._rows = np.zeros(1), np.zeros(n), np.zeros((n, 3))
         self._rows[:, 1] = 1.0
-        self._c = struct("asked_laws", force=self._force, rows=self._rows, held=self._held)
+        self._c = struct("asked_laws", force=self._force, rows=self._rows, held=self._stored)
         self.in_c = {"asked": self._c}
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
@@ -356,38 +356,38 @@ class AskedLaws(Response):
         self._e0, self._e1 = couplings.motions
 
     def _begin(self, t: float, dt: float) -> None:
-        for one, e0 in zip(self._each, self._e0.tolist(), strict=True):
-            one.begin(e0, t, dt)
+        for law, e0 in zip(self._each, self._e0.tolist(), strict=True):
+            law.begin(e0, t, dt)
 
     def _again(self) -> None:
-        for one in self._each:
-            one.last = None
+        for law in self._each:
+            law.last = None
 
     def _find_rows(self) -> None:
         """Write the laws around the iterate to the rows of C."""
         self._rows[:, 2] = math.nan  # where a law has no value
         motions = zip(self._each, self._e1.tolist(), self._force.tolist(), strict=True)
-        for row, (one, e1, λ) in zip(self._rows, motions, strict=True):
-            slope, intercept = one.line(e1, λ)
+        for row, (law, e1, λ) in zip(self._rows, motions, strict=True):
+            slope, intercept = law.line(e1, λ)
             row[0], row[2] = -slope, intercept
 
     def bends(self, e1: Array) -> Array:
         """Return the derivatives of the slopes."""
-        return np.array([one.bend(e1[i]) for i, one in enumerate(self._each)])
+        return np.array([law.bend(e1[i]) for i, law in enumerate(self._each)])
 
     def take(self, e1: Array) -> None:
         """Accept the internal variables after a step to the motions, and enter stored energies."""
-        states = [one.end(float(x))[1] for one, x in zip(self._each, e1, strict=True)]
-        before = float(self._held[0])
-        for one, state in zip(self._each, states, strict=True):
-            one.state[:] = state
+        states = [law.end(float(x))[1] for law, x in zip(self._each, e1, strict=True)]
+        before = float(self._stored[0])
+        for law, state in zip(self._each, states, strict=True):
+            law.state[:] = state
         self.start(e1)
         account, entry = self._work
-        account[entry] -= float(self._held[0]) - before
+        account[entry] -= float(self._stored[0]) - before
 
     def start(self, e: Array) -> None:
         """Compute the stored energy at these motions."""
-        self._held[0] = sum([one.stored(float(x)) for one, x in zip(self._each, e, strict=True)])
+        self._stored[0] = sum([law.stored(float(x)) for law, x in zip(self._each, e, strict=True)])
 
     def restore(self, rows: Array) -> None:
         """Restore the internal variables of :meth:`state`, at the accepted motions."""

@@ -28,8 +28,14 @@ from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import HELD, ForceLaw, Guide, Law, RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import REACH, parameter_step
-from ufl_beam.terms.compiled_connector_laws import AskedLaws, CompiledLaws
-from ufl_beam.terms.connector_rows import GivenLaws, Response, RigidPlasticLaws, Setting, Springs
+from ufl_beam.terms.compiled_connector_laws import CompiledLaws, UserLaws
+from ufl_beam.terms.connector_rows import (
+    PrescribedLaws,
+    Response,
+    RigidPlasticLaws,
+    Setting,
+    Springs,
+)
 from ufl_beam.terms.term import Callbacks, Phases, Term, beginning
 
 
@@ -37,8 +43,8 @@ def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
     """Make the response of connectors whose laws are of the kind of ``law``."""
     if isinstance(law, ConnectorLaw):
         return CompiledLaws(law, links, setting)
-    kinds: dict[type, Any] = {Spring: Springs, RigidPlastic: RigidPlasticLaws, ForceLaw: AskedLaws}
-    made: Response = kinds.get(type(law), GivenLaws)(law, links, setting)
+    kinds: dict[type, Any] = {Spring: Springs, RigidPlastic: RigidPlasticLaws, ForceLaw: UserLaws}
+    made: Response = kinds.get(type(law), PrescribedLaws)(law, links, setting)
     return made
 
 
@@ -56,10 +62,10 @@ class Links(Term):
 
     kind = "connectors"
 
-    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
-        self.numbers: Index = share.links[here]
+    def __init__(self, share: Share, positions: Index, setting: Setting, A: Csr) -> None:
+        self.numbers: Index = share.links[positions]
         self.links: list[Connector] = [share.grid.scene.links[i] for i in self.numbers]
-        self._dofs = share.link_dofs[here].astype(np.int32)
+        self._dofs = share.link_dofs[positions].astype(np.int32)
         self.forces_at: Index = self._dofs[:, 6]
         self._A = A
         self._callbacks: Callbacks  # set when the phases are made
@@ -128,7 +134,7 @@ def _kind(law: Law) -> object:
 
 
 @stated
-def _one_cell() -> meshes.Mesh:
+def _unit_cell() -> meshes.Mesh:
     return line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
 
 
@@ -144,24 +150,24 @@ class Couplings(Links):
         motions: Motions in the accepted state and in the latest iterate, as C has them.
     """
 
-    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
-        super().__init__(share, here, setting, A)
+    def __init__(self, share: Share, positions: Index, setting: Setting, A: Csr) -> None:
+        super().__init__(share, positions, setting, A)
         links, scheme = self.links, setting.scheme
         motions = _motions_with(links[0])
         k, n = len(motions), len(links)
         self._cells = n // k
         self._dofs = np.column_stack([self._dofs[::k, :6], self.forces_at.reshape(-1, k)])
-        self.forms = forms = connector_forms(motions, scheme, _one_cell())
-        numbers = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links]
-        self._numbers = np.reshape(numbers, (self._cells, 8 * k))
-        of_step = forms.work, forms.tangent, forms.motion
-        work, tangent, value = (self._form(one) for one in of_step)
+        self.forms = forms = connector_forms(motions, scheme, _unit_cell())
+        geometry = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links]
+        self._geometry = np.reshape(geometry, (self._cells, 8 * k))
+        step_forms = forms.work, forms.tangent, forms.motion
+        work, tangent, value = (self._form(form) for form in step_forms)
         tangent.place(A)
-        self._of_step = work, tangent
+        self._step_kernels = work, tangent
         self._now, self._rows = np.zeros(n), np.zeros((n, k + 2))
         self.motions = self._e, self._now
         self._rows[:, 0] = 1.0  # constrained, unless a law changes the row
-        for kernel in self._of_step:
+        for kernel in self._step_kernels:
             kernel.put(forms.row, self._rows.reshape(self._cells, -1))
         self._in_c = struct(
             "couplings", number=self._cells, components=k,
@@ -182,36 +188,40 @@ class Couplings(Links):
         """Return a kernel of a form on the connectors, with their numbers."""
         unit = np.tile([[0.0, 0.0], [1.0, 0.0]], (self._cells, 1, 1))
         kernel = Kernel(form, self.forms.q1, self._dofs, unit)
-        if kernel.uses(self.forms.numbers):
-            kernel.put(self.forms.numbers, self._numbers)
+        if kernel.uses(self.forms.geometry):
+            kernel.put(self.forms.geometry, self._geometry)
         return kernel
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the connectors, with callbacks for laws of a user with a history."""
         self._callbacks, response = callbacks, self.response
-        of_law = response.in_steps(callbacks)
+        law_fields = response.in_steps(callbacks)
         fields = {name for name, _ in ffi.typeof("coupling_term").fields}
-        mine = {name: x for name, x in of_law.items() if name in fields}
-        points = struct("inelastic_term", **{k: x for k, x in of_law.items() if k not in fields})
+        mine = {name: x for name, x in law_fields.items() if name in fields}
+        points = struct(
+            "inelastic_term", **{k: x for k, x in law_fields.items() if k not in fields}
+        )
         c = struct("coupling_term", links=self._in_c, points=points, **mine)
 
-        begin = beginning(self._of_step, self.forms.q0)
+        begin = beginning(self._step_kernels, self.forms.q0)
         phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")
         first, accept, state = ([loop(name, c)] for name in phases)
         admits = loop("springs_dissipate", c) if response.must_dissipate else None
         change, opens, again = loop("change_of_couplings", c), None, None
         if response.asks_at_ends:
 
-            def ask(step: Any, q1: Any, s: Any) -> None:
+            def accept_user_laws(step: Any, q1: Any, s: Any) -> None:
                 """Let laws of a user accept the end of a step, before all other terms."""
                 lib.find_motions(self._in_c, q1)
                 response.take(self._now)
 
-            accept.insert(0, callbacks.phase(ask))
+            accept.insert(0, callbacks.phase(accept_user_laws))
         if response.opens:
-            parts, of = ("points", "slips", "rubs", "way_before"), response.in_c
-            found = {**of, "slips": of.get("rigid_plastic"), "rubs": of.get("friction"), **of_law}
-            opens = {name: found[name] for name in parts if found.get(name) is not None}
+            wanted, laws = ("points", "slips", "rubs", "way_before"), response.in_c
+            data = {
+                **laws, "slips": laws.get("rigid_plastic"), "rubs": laws.get("friction"), **law_fields
+            }  # fmt: skip
+            opens = {name: data[name] for name in wanted if data.get(name) is not None}
             if "way_before" in opens:
                 opens["way_before"] = integers(opens["way_before"])
         if response.in_c.keys() & {"rigid_plastic", "friction", "asked"}:
@@ -226,22 +236,22 @@ class Couplings(Links):
         return self._now.copy()
 
     @cached_property
-    def rate_of_motion(self) -> Kernel:
+    def motion_rate(self) -> Kernel:
         """Kernel of the rates of the motions, for friction."""
         return self._form(self.forms.rate)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Set minus the change of the motions for rows about the force."""
-        of_force = self.rows(q)[:, -2]
-        about_force = of_force != 0.0
-        factors = np.divide(-1.0, of_force, out=np.zeros(len(of_force)), where=about_force)
+        β = self.rows(q)[:, -2]
+        about_force = β != 0.0
+        factors = np.divide(-1.0, β, out=np.zeros(len(β)), where=about_force)
         if self.response.sticks is not None:
             about_force = self.response.sticks == 0
             factors = np.where(about_force, -1.0, 0.0)
         if about_force.any():
             rates = np.zeros(len(self.links))
-            self.rate_of_motion.set(self.forms.u, v)
-            self.rate_of_motion.add(q, rates)
+            self.motion_rate.set(self.forms.u, v)
+            self.motion_rate.add(q, rates)
             at = self.forces_at
             works[at] = np.where(about_force, factors * rates, works[at])
 
@@ -296,8 +306,8 @@ class Guides(Links):
     computed in guide_curves.c, which calls Python for points of the curves.
     """
 
-    def __init__(self, share: Share, here: Index, setting: Setting, A: Csr) -> None:
-        super().__init__(share, here, setting, A)
+    def __init__(self, share: Share, positions: Index, setting: Setting, A: Csr) -> None:
+        super().__init__(share, positions, setting, A)
         n, size = len(self.links), setting.size
         self._curves = [link.law.curve for link in self.links if isinstance(link.law, Guide)]
         x, y, λ = self._x, self._y, _ = [self._dofs[:, k] for k in (1, 3, 6)]
@@ -330,7 +340,7 @@ class Guides(Links):
 
     def _report(self) -> None:
         place = self.links[self._c.lost].b
-        raise NoNumber(f"{place} is where no nearest point of its guide curve was found")
+        raise NoNumber(f"{place}: no nearest point was found on its guide curve")
 
     def motion(self, q: Array) -> Array:
         """Return the distances from the curves; m."""
@@ -345,8 +355,8 @@ class Guides(Links):
         The curves are Python functions, so it is a difference of fourth order over a hundredth of
         the scene.  Curvatures are known to 1e-8, which leaves 1e-6.
         """
-        way = np.abs(u[np.r_[self._x, self._y]]).max(initial=0.0)
-        ε = 1e-2 * self._size / way if way > 0 else 1.0
+        increment = np.abs(u[np.r_[self._x, self._y]]).max(initial=0.0)
+        ε = 1e-2 * self._size / increment if increment > 0 else 1.0
         data = self._A.data
         before, change = data.copy(), np.zeros_like(data)
         for k, weight in ((-2, 1), (-1, -8), (1, 8), (2, -1)):
@@ -357,10 +367,10 @@ class Guides(Links):
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore points on curves, their parameters, and parameter steps for tangents."""
-        numbers = (self._e, self._s, self._s0, self._steps)
-        rows = memory.rows("guides", self.numbers, np.column_stack([*numbers, self._on0]))
-        for mine, column in zip(numbers, rows.T, strict=False):
-            mine[:] = column
+        arrays = (self._e, self._s, self._s0, self._steps)
+        rows = memory.rows("guides", self.numbers, np.column_stack([*arrays, self._on0]))
+        for array, column in zip(arrays, rows.T, strict=False):
+            array[:] = column
         self._on0[:] = rows[:, 4:]
 
 
@@ -381,6 +391,7 @@ def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
             made.append(Couplings(share, np.array(groups[key]), setting, A))
         elif link.motion in MOTIONS:
             respond(link.law, (), setting)
-    if here := [i for i, number in enumerate(share.links) if isinstance(links[number].law, Guide)]:
-        made.append(Guides(share, np.array(here), setting, A))
+    guides = [i for i, number in enumerate(share.links) if isinstance(links[number].law, Guide)]
+    if guides:
+        made.append(Guides(share, np.array(guides), setting, A))
     return made

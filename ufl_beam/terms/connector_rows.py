@@ -22,7 +22,7 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, stated
-from ufl_beam.mechanics.connector_equations import numbers, slip
+from ufl_beam.mechanics.connector_equations import parameters, rigid_plastic_step
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import (
@@ -43,7 +43,7 @@ from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import Account, Ledger
-from ufl_beam.terms.material_points import NOTHING, SPENT, Points, expect_entries
+from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, expect_entries
 from ufl_beam.terms.term import Callbacks
 
 CREEP = 1e-12
@@ -100,30 +100,30 @@ class Response:
         self.way: Index = np.zeros(len(links), dtype=np.int32)
         self.in_c: dict[str, Any] = {}
         self._in_steps: dict[str, Any] = {}
-        self._of_time: dict[str, list[tuple[TimeFunction, object]]] = {}
-        self._entries: dict[str, tuple[Account, str]] = {}
+        self._time_functions: dict[str, list[tuple[TimeFunction, object]]] = {}
+        self._accounts: dict[str, tuple[Account, str]] = {}
         # Internal variables, one for each connector with all its components
         self._variables: list[npt.NDArray[Any]] = []
         self._components = 1
 
-    def _enter(self, **entries: tuple[Account, str]) -> None:
+    def _enter(self, **accounts: tuple[Account, str]) -> None:
         """Make entries of the ledger; C finds them by these names."""
-        self._entries.update(entries)
-        for account, name in entries.values():
+        self._accounts.update(accounts)
+        for account, name in accounts.values():
             account[name] += 0.0
 
-    def _rub(self, limits: list[Any], **of_laws: Any) -> None:
+    def _rub(self, limits: list[Any], **law_fields: Any) -> None:
         """Let connectors stick or slip; ``limits`` are addresses of the limits of the forces."""
         n, setting = len(self._links), self._setting
         # Direction of slip, or 0, in the step and in the accepted state
-        self._slip, self._accepted, way, creep = np.zeros((4, n))
+        self._direction, self._accepted, distance, creep = np.zeros((4, n))
         self.sticks, against = np.zeros((2, n), dtype=np.int32)
         softness = CREEP if setting.friction_repeats else 0.0
         friction = self.in_c["friction"] = struct(
-            "friction", number=n, limit=ffi.new("double *[]", limits), slip=self._slip,
-            accepted=self._accepted, way=way, creep=creep, softness=softness * self._lengths,
+            "friction", number=n, limit=ffi.new("double *[]", limits), slip=self._direction,
+            accepted=self._accepted, way=distance, creep=creep, softness=softness * self._lengths,
             tiny=1e-14 * self._lengths, sticks=self.sticks, against=against,
-            switched=setting.switched, force=np.zeros(n), rows=np.zeros((n, 3)), **of_laws,
+            switched=setting.switched, force=np.zeros(n), rows=np.zeros((n, 3)), **law_fields,
         )  # fmt: skip
         if self.opens:
             search, free = setting.search, np.zeros(n, dtype=np.int32)
@@ -134,14 +134,15 @@ class Response:
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
         """Return fields of ``coupling_term`` and of its ``inelastic_term``, see loops.h."""
-        places = {field: account.pointer(name) for field, (account, name) in self._entries.items()}
-        of_time = {field: callbacks.of_time(some) for field, some in self._of_time.items()}
-        return {**self._in_steps, **of_time, **places}
+        places = {field: account.pointer(name) for field, (account, name) in self._accounts.items()}
+        wanted = self._time_functions.items()
+        functions = {field: callbacks.time_functions(some) for field, some in wanted}
+        return {**self._in_steps, **functions, **places}
 
     def know(self, couplings: Any) -> None:
         """Set the arrays and forms of connectors that the laws need."""
         if self.sticks is not None:
-            rate, v = couplings.rate_of_motion, couplings.forms.u
+            rate, v = couplings.motion_rate, couplings.forms.u
             fill(self.in_c["friction"], rate=rate.cells, at_v=rate.position(v))
 
     def take(self, e1: Array) -> None:
@@ -171,10 +172,10 @@ class Response:
 
     def restore(self, rows: Array) -> None:
         """Restore the internal variables of :meth:`state`."""
-        for mine, values in zip(self._variables, rows[:: self._components].T, strict=True):
-            mine[:] = values
+        for variable, values in zip(self._variables, rows[:: self._components].T, strict=True):
+            variable[:] = values
         if self.sticks is not None:
-            self._slip[:] = self._accepted
+            self._direction[:] = self._accepted
 
     def start(self, e: Array) -> None:
         """Begin at motions that no step has led to."""
@@ -189,7 +190,7 @@ class Response:
 
 # -- laws that give a motion or a force ------------------------------------------------------------
 
-GIVEN = {
+PRESCRIBED = {
     PrescribedMotion: ("_Driven", "supplied", "motors", -1.0),
     PrescribedForce: ("_Pushed", "supplied", "loads", -1.0),
     Controller: ("_Controlled", "supplied", "controllers", -1.0),
@@ -199,24 +200,26 @@ GIVEN = {
 """Name in files, part and entry of the ledger for the work of the forces, and its sign."""
 
 
-class GivenLaws(Response):
+class PrescribedLaws(Response):
     """Laws that prescribe the motion, the force or its limit: motors, dampers, dry friction, ...
 
     Joints and guides constrain a motion, without work.
     """
 
     def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
-        held = law is HELD or isinstance(law, Guide)
-        name, part, entry, sign = ("_Held", "", "", 0.0) if held else GIVEN[type(law)]
+        constrained = law is HELD or isinstance(law, Guide)
+        name, account, entry, sign = (
+            ("_Held", "", "", 0.0) if constrained else PRESCRIBED[type(law)]
+        )
         super().__init__(links, setting, name)
-        if not held:
-            self._enter(entry=(getattr(setting.ledger, part), entry))
+        if not constrained:
+            self._enter(entry=(getattr(setting.ledger, account), entry))
             self._in_steps["sign"] = sign
         both = list(zip(self._laws, links, strict=True))
-        if isinstance(law, PrescribedMotion) and not held:
-            self._of_time["wanted_motion"] = [(one.motion, link) for one, link in both]
+        if isinstance(law, PrescribedMotion) and not constrained:
+            self._time_functions["wanted_motion"] = [(motor.motion, link) for motor, link in both]
         elif isinstance(law, Damper):
-            self._in_steps["viscosity"] = np.array([one.viscosity for one in self._laws])
+            self._in_steps["viscosity"] = np.array([damper.viscosity for damper in self._laws])
         elif isinstance(law, Coulomb):
             self._rub([setting.asked(link) for link in links])
         elif isinstance(law, PrescribedForce | Controller):
@@ -225,7 +228,7 @@ class GivenLaws(Response):
             self._in_steps.update(end=end, reached=reached)
             self._variables = [reached]
             if isinstance(law, PrescribedForce):
-                self._of_time["wanted_force"] = [(one.force, link) for one, link in both]
+                self._time_functions["wanted_force"] = [(load.force, link) for load, link in both]
             else:  # the values of controllers at the beginning of the step
                 self._always = np.zeros(1)
                 wanted = ffi.new("time_function[]", len(links))
@@ -314,14 +317,14 @@ the scheme.  Numbers of the law follow.
 """
 
 
-class SlipForms:
+class RigidPlasticForms:
     """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
 
     def __init__(self, law: SofteningLaw | ElastoPlastic, scheme: Scheme) -> None:
-        self._pointwise = pointwise = Pointwise((*INPUTS, *numbers(law)))
+        self._pointwise = pointwise = Pointwise((*INPUTS, *parameters(law)))
         at = {**pointwise.at, "slip": ufl.variable(pointwise.at["slip"])}
         with traced(law):
-            end = slip(law, at, scheme)._asdict()
+            end = rigid_plastic_step(law, at, scheme)._asdict()
             force = end.pop("force")
             slope = ufl.diff(force, at["slip"])
         self._response = force, slope
@@ -331,20 +334,19 @@ class SlipForms:
     @cached_property
     def spent(self) -> Any:
         """Force and its derivative, reduced to almost zero."""
-        return self._pointwise.compile(*(NOTHING * x for x in self._response))
+        return self._pointwise.compile(*(FREED_STIFFNESS * x for x in self._response))
 
 
-_slip_forms = stated(SlipForms)
+_rigid_plastic_forms = stated(RigidPlasticForms)
 
 
-EARLY = 0.01
+REFERENCE_MOTION = 0.01
 """Motion, in rad or over the size of the scene, that weighs as much as the limit of the force.
 
 It decides whether a connector slips in an iterate; solutions do not depend on it.
 """
 
-
-WEAK = 1e-9
+LEAST_SLOPE = 1e-9
 """Least factor of motions, over EI of the member divided by the size of the scene."""
 
 
@@ -358,8 +360,8 @@ def _slope(link: Connector, size: float) -> float:
     if not 0.0 < law.limit < np.inf:
         return 1.0
     steepest, _ = law.steepest
-    early = law.limit / (EARLY * (1.0 if link.turns else size))
-    least = WEAK * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
+    early = law.limit / (REFERENCE_MOTION * (1.0 if link.turns else size))
+    least = LEAST_SLOPE * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
     return float(max(early, least)) + (2 * steepest if steepest < np.inf else 0.0)
 
 
@@ -382,25 +384,25 @@ class RigidPlasticLaws(Response):
             self._enter(hardening=(ledger.state, "hardening"))
         if loss:
             self._enter(numerical=(ledger.lost, "numerical"))
-        inputs = (*INPUTS, *numbers(law.law))
+        inputs = (*INPUTS, *parameters(law.law))
         self._storage = np.zeros((n, len(inputs)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(inputs)}
         for i, link in enumerate(links):
-            for name, value in numbers(law_of(link)).items():
+            for name, value in parameters(law_of(link)).items():
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
-        self._given_limit = self._at["number yield_limit" if self._hardens else "number limit"]
-        self._limit = self._given_limit.copy()
+        self._initial_limit = self._at["number yield_limit" if self._hardens else "number limit"]
+        self._limit = self._initial_limit.copy()
         back_force, dissipated, excess = np.zeros((3, n))
-        self._slipped, self.way, self._way_before = np.zeros((3, n), dtype=np.int32)
+        self._slipped, self.way, self._direction_before = np.zeros((3, n), dtype=np.int32)
         self._stored = np.zeros(1)  # of all together; the owner does not matter
         at = self._at["slipped"], self._at["start"]
-        self._variables = [*at, self._limit, back_force, dissipated, self._way_before]
+        self._variables = [*at, self._limit, back_force, dissipated, self._direction_before]
         # Motions without the round-off of constraints
         self.motion, self.dissipated = self._at["start"], (dissipated,)
 
         kind = ElastoPlastic(1.0) if isinstance(law.law, ElastoPlastic) else law.law.kind()
-        self._forms = _slip_forms(kind, scheme)
+        self._forms = _rigid_plastic_forms(kind, scheme)
         self._c = struct(
             "rigid_plastic", number=n, width=len(inputs), w=self._storage,
             force=self._forms.force, end=self._forms.end, search=setting.search,
@@ -410,7 +412,7 @@ class RigidPlasticLaws(Response):
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
         self._in_steps = {
-            "dt_of_law": INPUTS.index("dt"), "way_before": self._way_before,
+            "dt_of_law": INPUTS.index("dt"), "way_before": self._direction_before,
             "hardened": self._stored, "loss": loss,
         }  # fmt: skip
 
@@ -428,7 +430,7 @@ class RigidPlasticLaws(Response):
     def restore(self, rows: Array) -> None:
         """Take over the variables of :meth:`state`."""
         super().restore(rows[:, :-1])
-        self._slipped[:] = np.abs(self._way_before)
+        self._slipped[:] = np.abs(self._direction_before)
         self._stored[0] = rows[:, -1].sum()
 
     def start(self, e: Array) -> None:
@@ -437,7 +439,7 @@ class RigidPlasticLaws(Response):
 
     def freeze(self) -> None:
         """Hold connectors from now on, and free those with exhausted limits."""
-        spent = self._limit <= SPENT * self._given_limit
+        spent = self._limit <= EXHAUSTED * self._initial_limit
         self._limit[:] = np.where(spent, 0.0, np.inf)
         if not self._hardens:
             self._c.force = self._forms.spent

@@ -19,8 +19,8 @@ from ufl_beam.model.connector_law import ENTRIES
 EXPLAINED = 0.1
 """Fraction of an imbalance above which an estimate of round-off explains it."""
 
-NOTHING_HELD = 1e-3
-"""Ratio of energies held and lost to works up to which the works are round-off."""
+ROUND_OFF_ENERGY = 1e-3
+"""Ratio of stored and lost energies to works up to which the works are round-off."""
 
 
 class Account(Mapping[str, float]):
@@ -45,7 +45,9 @@ class Account(Mapping[str, float]):
         at = self._at.setdefault(name, len(self._at))
         if at == len(self.numbers):
             if self._fixed:
-                raise RuntimeError(f"the entry {name!r} comes after C has learnt where all are")
+                raise RuntimeError(
+                    f"the entry {name!r} must be made before C gets addresses of entries"
+                )
             self.numbers = np.append(self.numbers, np.zeros(at))
         self.numbers[at] = value
 
@@ -79,8 +81,8 @@ class Ledger:
 
     def size(self) -> float:
         """Return the sum of the absolute values of all entries; J."""
-        parts = self.state, self.supplied, self.lost
-        return float(sum(np.abs(part.numbers).sum() for part in parts))
+        accounts = self.state, self.supplied, self.lost
+        return float(sum(np.abs(account.numbers).sum() for account in accounts))
 
     def remember(self, memory: Memory) -> None:
         """Save or restore the works and losses since the beginning."""
@@ -102,7 +104,7 @@ class Entries(dict[str, Array]):
 
     def __missing__(self, name: str) -> Array:
         raise KeyError(
-            f"the ledger has no entry {name!r} here: the scene has nothing that makes it. "
+            f"the ledger has no entry {name!r}: no object of the scene makes it. "
             f"Entries: {', '.join(map(repr, self._known)) or 'none'}"
         )
 
@@ -133,23 +135,23 @@ class Energy(Mapping[str, Array], Rich):
     __eq__, __hash__ = object.__eq__, object.__hash__  # arrays are not compared
 
     def __post_init__(self) -> None:
-        names = [name for part in self._parts for name in part]
-        for part in ("state", "supplied", "lost"):
-            object.__setattr__(self, part, Entries(getattr(self, part), names))
+        names = [name for account in self._accounts for name in account]
+        for kind in ("state", "supplied", "lost"):
+            object.__setattr__(self, kind, Entries(getattr(self, kind), names))
 
     def __getitem__(self, name: str) -> Array:
         """Return the entry ``name``; (n+1,); J.  Effects that the scene lacks have no entries."""
-        return next((part for part in self._parts if name in part), self.state)[name]
+        return next((account for account in self._accounts if name in account), self.state)[name]
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the names of the entries: state, supplied, lost."""
-        return (name for part in self._parts for name in part)
+        return (name for account in self._accounts for name in account)
 
     def __len__(self) -> int:
-        return sum(map(len, self._parts))
+        return sum(map(len, self._accounts))
 
     @property
-    def _parts(self) -> tuple[dict[str, Array], ...]:
+    def _accounts(self) -> tuple[dict[str, Array], ...]:
         return self.state, self.supplied, self.lost
 
     @property
@@ -170,10 +172,10 @@ class Energy(Mapping[str, Array], Rich):
     def throughput(self) -> float:
         """Energy that went through: maximum energy in the scene plus all work on or by it; J."""
         works = sum(float(np.sum(np.abs(np.diff(work)))) for work in self.supplied.values())
-        return float(np.max(self._held)) + works
+        return float(np.max(self._in_scene)) + works
 
     @property
-    def _held(self) -> Array:
+    def _in_scene(self) -> Array:
         """Energy in the scene, with changes of a user's potentials, whose zero is arbitrary."""
         sizes = {n: e if n in ENTRIES else np.abs(e - e[0]) for n, e in self.state.items()}
         return _sum(sizes)
@@ -196,27 +198,28 @@ class Energy(Mapping[str, Array], Rich):
             return ""
         if self.worst <= claimed:
             return ""
-        part = round_off / self.throughput
-        held = float(np.max(self._held)) + sum(float(lost[-1]) for lost in self.lost.values())
-        if part >= 1.0 and held <= NOTHING_HELD * self.throughput:
+        fraction = round_off / self.throughput
+        stored = float(np.max(self._in_scene))
+        lost = sum(float(losses[-1]) for losses in self.lost.values())
+        if fraction >= 1.0 and stored + lost <= ROUND_OFF_ENERGY * self.throughput:
             return ""  # all works are round-off, as in rigid motion by supports
         reason = (
-            ", the last digits of positions times the largest stiffness; less stiffness of what "
-            "hardly deforms, or fewer cells, close it"
-            if part >= EXPLAINED * self.worst
+            ", the last digits of positions times the largest stiffness; lower the stiffness of "
+            "members that hardly deform, or use fewer cells"
+            if fraction >= EXPLAINED * self.worst
             else " and does not explain it; a smaller rtol of Newton may, or a force that the "
             "ledger does not know"
         )
         return (
             f"the energy ledger is open by {self.worst:.1e} of the energy that went through, and "
-            f"the scheme claims {claimed:.0e}: round-off is estimated at {part:.1e}{reason}"
+            f"the scheme claims {claimed:.0e}: round-off is estimated at {fraction:.1e}{reason}"
         )
 
     def entries(self) -> list[tuple[str, str, float]]:
         """Return part ("in scene", "supplied" or "lost"), name and value of all entries; J."""
         return [
             (kind, name, float(values[-1]))
-            for kind, entries in zip(("in scene", "supplied", "lost"), self._parts, strict=True)
+            for kind, entries in zip(("in scene", "supplied", "lost"), self._accounts, strict=True)
             for name, values in entries.items()
         ]
 

@@ -33,7 +33,7 @@ from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_schemes import (
-    MORE,
+    FURTHER,
     V_BEFORE,
     Coefficients,
     DynamicScheme,
@@ -43,7 +43,7 @@ from ufl_beam.mechanics.time_schemes import (
     with_half_tangents,
 )
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
-from ufl_beam.terms.beam_forces import OfForms
+from ufl_beam.terms.beam_forces import FormForces
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, knowing
 
@@ -54,9 +54,9 @@ BEFORE = "velocity before"
 @lru_cache(maxsize=1024)  # rounded times give about ten lengths for a constant step
 def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coefficients:
     """Return the coefficients of a step as lists of numbers."""
-    found = scheme.coefficients(dt, last_dt, known)
-    inertia, velocity, *rates = (list(map(float, row)) for row in (*found[:2], *found.rates))
-    slip = None if found.slip is None else list(map(float, found.slip))
+    c = scheme.coefficients(dt, last_dt, known)
+    inertia, velocity, *rates = (list(map(float, row)) for row in (*c[:2], *c.rates))
+    slip = None if c.slip is None else list(map(float, c.slip))
     return Coefficients(inertia, velocity, rates, slip)
 
 
@@ -69,30 +69,30 @@ def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
     known: Any = scheme
     number = len(scheme.kept)
     try:
-        found = _coefficients(known, 1.0, 1.0, number)
-        rows = found.inertia, found.velocity, *found.rates, *([found.slip] if found.slip else [])
-        right = len(found.rates) == 1 + number and {len(row) for row in rows} == {MORE + number}
-        right = right and bool(np.isfinite(rows).all()) and found.rates[0][0] != 0.0
+        c = _coefficients(known, 1.0, 1.0, number)
+        rows = c.inertia, c.velocity, *c.rates, *([c.slip] if c.slip else [])
+        right = len(c.rates) == 1 + number and {len(row) for row in rows} == {FURTHER + number}
+        right = right and bool(np.isfinite(rows).all()) and c.rates[0][0] != 0.0
     except (TypeError, ValueError, AttributeError):
         right = False
-    if not right or MORE + number > lib.MOST_RATES:
+    if not right or FURTHER + number > lib.MOST_RATES:
         raise ModelError(
             f"{scheme!r}: coefficients(dt, last_dt, known) must return Coefficients with rows of "
             f"3 + known numbers, {1 + number} of them in rates, see docs/extending.md"
         )
-    return found
+    return c
 
 
 @ffi.def_extern(error=0)  # type: ignore[misc, untyped-decorator, unused-ignore]
-def numbers_in_python(handle: Any, numbers: Any) -> int:
+def numbers_in_python(handle: Any, c: Any) -> int:
     """Callback of C: write ``scheme_numbers`` of loops.h for a step."""
     scheme, number = ffi.from_handle(handle)
-    of = _coefficients(scheme, numbers.dt, numbers.last_dt, numbers.more)
-    rows = of.inertia, of.velocity, of.slip or [0.0] * MORE, *of.rates
-    places = numbers.inertia, numbers.velocity, numbers.slip, *numbers.rates
+    inertia, velocity, rates, slip = _coefficients(scheme, c.dt, c.last_dt, c.more)
+    rows = inertia, velocity, slip or [0.0] * FURTHER, *rates
+    places = c.inertia, c.velocity, c.slip, *c.rates
     for place, row in zip(places, rows, strict=False):
         place[0:number] = [*row, *[0.0] * (number - len(row))]
-    numbers.gives = len(of.rates) - 1
+    c.gives = len(rates) - 1
     return 1
 
 
@@ -121,7 +121,7 @@ class Inertia(Term):
         self.loops, at = self._times.loops, (fields.order, self._times.rate)
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at)]
         self._ledger, self._A, self.scheme = ledger, A, scheme
-        size, number = len(v), MORE + len(scheme.kept)
+        size, number = len(v), FURTHER + len(scheme.kept)
         self.slips = checked_coefficients(scheme).slip is not None
         # Changes are stored elsewhere.  Velocities before the last step are not computed anew; if
         # nothing needs them, new velocities use their memory.
@@ -150,9 +150,9 @@ class Inertia(Term):
         """Return loops over the matrix and the velocities."""
         lost = self._ledger.lost.pointer("numerical") if self.slips else ffi.NULL
         kinetic = self._ledger.state.pointer("kinetic")
-        of = self.times(self._times, kept=kinetic, lost=lost)
-        begin, accept = loop("begin_inertia", of), loop("accept_inertia", of)
-        return Phases([begin], [accept], [loop("add_kinetic_energy", of)])
+        c = self.times(self._times, kept=kinetic, lost=lost)
+        begin, accept = loop("begin_inertia", c), loop("accept_inertia", c)
+        return Phases([begin], [accept], [loop("add_kinetic_energy", c)])
 
     # -- the rates -----------------------------------------------------------------------------
 
@@ -173,12 +173,12 @@ class Inertia(Term):
     @property
     def more(self) -> tuple[Array, ...]:
         """Known further rates of the scheme."""
-        return tuple(self._rate(MORE + k).copy() for k in range(self.c.more))
+        return tuple(self._rate(FURTHER + k).copy() for k in range(self.c.more))
 
     def keep(self, *more: Array) -> None:
         """Set the further rates of the scheme; a step can begin with any, or if none are needed."""
         for k, rate in enumerate(more):
-            self._rate(MORE + k)[:] = rate
+            self._rate(FURTHER + k)[:] = rate
         self.c.more, self.c.ready = len(more), bool(more) or not self.scheme.kept
 
     def take(self, v: Array, v_before: Array, last_dt: float) -> None:
@@ -191,11 +191,11 @@ class Inertia(Term):
         rows = _coefficients(known, dt, self.c.last_dt, self.c.more).rates
         return [combined(row, s, self) for row in rows]
 
-    def times(self, product: StepProduct, **entries: Any) -> Any:
+    def times(self, product: StepProduct, **pointers: Any) -> Any:
         """Return ``matrix_of_rates`` of loops.h for a matrix, with entries of the ledger."""
         v, momentum = np.zeros(self.c.size), np.zeros(len(self._slip))
-        of = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **entries)
-        return fill(of, rates=self.c)
+        c = struct("matrix_of_rates", product=product.c, v=v, momentum=momentum, **pointers)
+        return fill(c, rates=self.c)
 
     # -- in files ------------------------------------------------------------------------------
 
@@ -222,23 +222,23 @@ class Inertia(Term):
 
 
 def _work_and_loss(
-    of: Element, scheme: Scheme | EnergyMomentumDecaying, factor: Expr, before: Expr
+    element: Element, scheme: Scheme | EnergyMomentumDecaying, factor: Expr, before: Expr
 ) -> tuple[ufl.Form, ufl.Form]:
     """Return forms of resultants ``factor C (Δe - before)`` with the change Δe of the strains."""
-    change = strain(of.q1, of.axis) - strain(of.q0, of.axis)
-    r = factor * resultants(change - before, of.stiffness)
-    w_e = scheme.virtual_strain(of.q0, of.q1, of.w, of.axis)
-    return virtual_work(r, w_e) * of.dx(1), virtual_work(r, change) * of.dx(1)
+    change = strain(element.q1, element.axis) - strain(element.q0, element.axis)
+    r = factor * resultants(change - before, element.stiffness)
+    w_e = scheme.virtual_strain(element.q0, element.q1, element.w, element.axis)
+    return virtual_work(r, w_e) * element.dx(1), virtual_work(r, change) * element.dx(1)
 
 
 @stated
-def _viscous_forms(of: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
+def _viscous_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
     """Return forms of virtual work and lost energy, and the retardation time over the step."""
-    rate = of.at_points()
-    return *_work_and_loss(of, scheme, rate, ufl.zero(3)), rate
+    rate = element.at_points()
+    return *_work_and_loss(element, scheme, rate, ufl.zero(3)), rate
 
 
-class KelvinVoigtForces(OfForms):
+class KelvinVoigtForces(FormForces):
     """Resultants in proportion to the rates of the strains, P(89) with a weight of time over dt."""
 
     kind = _entry = "damping"
@@ -254,17 +254,18 @@ class KelvinVoigtForces(OfForms):
         """Return loops over the cells; the step length is a number of the forms."""
         begin, accept, *_ = super().phases(callbacks)
         c = struct(
-            "viscous_forms", **knowing(self._of_step, self._rate), of_cell=len(self._rate.x.array),
-            time=self._time, dt=self._dt,
+            "viscous_forms", **knowing(self._step_kernels, self._rate),
+            of_cell=len(self._rate.x.array), time=self._time, dt=self._dt,
         )  # fmt: skip
         return Phases([*begin, loop("begin_viscous_forms", c)], accept)
 
 
 @stated
-def _reference_stiffness(of: Element) -> ufl.Form:
-    rest = of.configuration()
-    e, w_e = (virtual_strain(rest, w, of.axis) for w in (ufl.TrialFunction(of.space), of.w))
-    return virtual_work(resultants(e, of.stiffness), w_e) * of.dx(1)
+def _reference_stiffness(element: Element) -> ufl.Form:
+    rest = element.configuration()
+    motions = ufl.TrialFunction(element.space), element.w
+    e, w_e = (virtual_strain(rest, w, element.axis) for w in motions)
+    return virtual_work(resultants(e, element.stiffness), w_e) * element.dx(1)
 
 
 class RayleighForces(Term):
@@ -295,46 +296,46 @@ class RayleighForces(Term):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the matrix and the velocities."""
-        of = self._rates.times(self._times, lost=self._ledger.lost.pointer("damping"))
-        return Phases([loop("begin_rayleigh", of)], [loop("accept_rayleigh", of)])
+        c = self._rates.times(self._times, lost=self._ledger.lost.pointer("damping"))
+        return Phases([loop("begin_rayleigh", c)], [loop("accept_rayleigh", c)])
 
 
 def damping_forces(
-    of: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
+    damping: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
     rates: Inertia | None,
 ) -> list[Term]:  # fmt: skip
     """Return the forces of a damping on the cells of a process; none without such cells."""
     ledger.lost["damping"] += 0.0
-    if isinstance(of, Rayleigh):
+    if isinstance(damping, Rayleigh):
         if rates is None:
             raise ModelError(
-                "Rayleigh: it damps vibrations, in proportion to mass, too, and statics has none; "
-                "use KelvinVoigt, which acts in the time of a static run"
+                "Rayleigh: it damps vibrations, and statics has no inertia. Use "
+                "KelvinVoigt, which acts in the time of a static run"
             )
-        return [RayleighForces(of, fields, scheme, A, ledger, rates)]
+        return [RayleighForces(damping, fields, scheme, A, ledger, rates)]
     grid = fields.share.grid
-    beams = grid.scene.beams if of.beams is None else of.beams
+    beams = grid.scene.beams if damping.beams is None else damping.beams
     pairs = (zip(grid.cells_of(beam), grid.hinges(beam), strict=True) for beam in beams)
-    cells = [cell for of_beam in pairs for cell, hinge in of_beam if hinge is None]
-    part = np.flatnonzero(np.isin(fields.share.cells, cells))
-    if not len(part):
+    cells = [cell for beam_cells in pairs for cell, hinge in beam_cells if hinge is None]
+    positions = np.flatnonzero(np.isin(fields.share.cells, cells))
+    if not len(positions):
         return []
-    return [KelvinVoigtForces(of, Fields(fields.share, part), scheme, A, ledger)]
+    return [KelvinVoigtForces(damping, Fields(fields.share, positions), scheme, A, ledger)]
 
 
-# -- of schemes ----------------------------------------------------------------------------------
+# -- numerical damping -----------------------------------------------------------------------------
 
 
 @stated
 def _change_forms(
-    of: Element, scheme: EnergyMomentumDecaying
+    element: Element, scheme: EnergyMomentumDecaying
 ) -> tuple[ufl.Form, ufl.Form, fem.Function]:
     """Return forms of virtual work and lost energy, and changes of strains in the last step."""
-    before = of.at_points(3)
-    return *_work_and_loss(of, scheme, of.constant(scheme.part), before), before
+    before = element.at_points(3)
+    return *_work_and_loss(element, scheme, element.constant(scheme.part), before), before
 
 
-class SecondDifferences(OfForms):
+class SecondDifferences(FormForces):
     """Resultants c C (Δe - r Δe'), see :class:`EnergyMomentumDecaying`."""
 
     kind, _entry = "beams", "numerical"
@@ -354,8 +355,8 @@ class SecondDifferences(OfForms):
         begin, accept, *_ = super().phases(callbacks)
         c = struct(
             "second_differences", strains=self._strains.kernel.cells, weight=self._strains.weights,
-            of_cell=len(self._strains.weights), **knowing(self._of_step, self._before), e=self._e,
-            change=self._change, space=np.zeros(self._e.shape), last_dt=self._last_dt,
+            of_cell=len(self._strains.weights), **knowing(self._step_kernels, self._before),
+            e=self._e, change=self._change, space=np.zeros(self._e.shape), last_dt=self._last_dt,
         )  # fmt: skip
         before, after = (loop(f"{name}_second_differences", c) for name in ("begin", "accept"))
         return Phases([*begin, before], [*accept, after])

@@ -25,7 +25,7 @@ from ufl_beam.discretization.function_spaces import (
 )
 from ufl_beam.discretization.partition import Share
 from ufl_beam.discretization.state_io import Memory
-from ufl_beam.mechanics.kinematics import split, turn
+from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.functions import value_at
@@ -106,7 +106,7 @@ class DeadLoads(_AtDofs):
         self._vectors = [vector[self.dofs] for vector in whole]
         # Factors of the vectors: now, at the end of the step, at the end of the last step, and in
         # the equation of the last step.
-        self._parts: Array = np.zeros((4, len(vectors)))
+        self._factors: Array = np.zeros((4, len(vectors)))
         self._along = [in_cells.get(key) for key in vectors]
         self.loops = loop("subtract_vector", self.vector), None
 
@@ -114,12 +114,12 @@ class DeadLoads(_AtDofs):
         """Return ``loads_in_cells`` of loops.h; null if nothing acts along beams."""
         if not any(along is not None for along in self._along):
             return ffi.NULL
-        along = [ffi.NULL if one is None else doubles(one) for one in self._along]
+        along = [ffi.NULL if forces is None else doubles(forces) for forces in self._along]
         c = struct(
             "loads_in_cells", vectors=len(along), vector=ffi.new("double *[]", along),
-            latest=self._parts[0], accepted=self._parts[3],
+            latest=self._factors[0], accepted=self._factors[3],
         )  # fmt: skip
-        return ffi.gc(c, lambda _, kept=(c, along): None)  # solutions outlive the term
+        return ffi.gc(c, lambda _, alive=(c, along): None)  # solutions outlive the term
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the vectors."""
@@ -127,8 +127,8 @@ class DeadLoads(_AtDofs):
         c = self._c = struct(
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=number,
             force=self._forces[0], end=self._forces[1], before=self._forces[2],
-            parts=[doubles(part) for part in self._parts[:3]],
-            factors=np.full(number, math.nan), factor=callbacks.of_time(self._in_time),
+            parts=[doubles(row) for row in self._factors[:3]],
+            factors=np.full(number, math.nan), factor=callbacks.time_functions(self._in_time),
             vector=ffi.new("double *[]", [doubles(vector) for vector in self._vectors]),
             work=self._ledger.supplied.pointer("loads"),
             weight_of_before=self._scheme.weight_of_before,
@@ -137,16 +137,16 @@ class DeadLoads(_AtDofs):
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
         """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them."""
-        self._parts[:3] = factors = self._factors_at(t)
+        self._factors[:3] = factors = self._factors_at(t)
         self._forces[:] = sum(f * vector for f, vector in zip(factors, self._vectors, strict=True))
         return self._whole(self._forces[0])
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore the forces at the end of the last step."""
         self._forces[:] = memory.added("dead loads", self._whole(self._forces[2]))[self.dofs]
-        for k, part in enumerate(self._parts[2]):
+        for k, factor in enumerate(self._factors[2]):
             self._c.factors[k] = math.nan
-            self._parts[2, k] = memory.number(f"part of dead loads {k}", part)
+            self._factors[2, k] = memory.number(f"part of dead loads {k}", factor)
 
 
 def _add_forces(load: Load, share: Share, forces: Array) -> Array | None:
@@ -159,8 +159,8 @@ def _add_forces(load: Load, share: Share, forces: Array) -> Array | None:
     if isinstance(load, PointLoad):
         at_places = [(load.place, (*load.force, load.moment))]
     elif isinstance(load, LineLoad):
-        here = [beam is load.beam for beam in grid.scene.beams]
-        per_beam = np.outer(here, [*load.force, load.moment])
+        loaded = [beam is load.beam for beam in grid.scene.beams]
+        per_beam = np.outer(loaded, [*load.force, load.moment])
     elif isinstance(load, Gravity):
         g_x, g_y = load.acceleration
         at_places = [(at, (mass * g_x, mass * g_y, 0.0)) for at, mass, _ in lumps(grid.scene)]
@@ -186,9 +186,9 @@ class FollowerLoads(_AtDofs):
         self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
         self._ledger = ledger
-        here = [i for i, load in enumerate(loads) if share.computes(load.place)]
-        owners = [loads[i] for i in here]
-        self._numbers: Index = np.array(here, dtype=np.int64)
+        indices = [i for i, load in enumerate(loads) if share.computes(load.place)]
+        owners = [loads[i] for i in indices]
+        self._indices: Index = np.array(indices, dtype=np.int64)
         places = [share.local(share.grid.node(load.place)) for load in owners]
         dofs = np.array(places, dtype=np.int32).reshape(-1, 3)
         x, y, self._turning = np.ascontiguousarray(dofs.T)
@@ -196,15 +196,15 @@ class FollowerLoads(_AtDofs):
         loaded[dofs] = 1.0
         # Forces in the latest residual, and in the residual of the last step.
         self._load(share, loaded, owners, rows=2)
-        given = [[*load.force, load.moment] for load in owners]
-        self._given = np.array(given, dtype=np.float64).reshape(-1, 3)
+        forces = [[*load.force, load.moment] for load in owners]
+        self._unit_forces = np.array(forces, dtype=np.float64).reshape(-1, 3)
         # In the equation, at the end of the step, and at the end of the last step.
-        self._sizes = np.zeros((3, *self._given.shape))
-        self._turns, self._A = np.zeros(len(here)), A
+        self._sizes = np.zeros((3, *self._unit_forces.shape))
+        self._rotations, self._A = np.zeros(len(indices)), A
         self._c = struct(
-            "follower_loads", number=len(here), size=len(self.dofs), dof=self.dofs,
-            at=np.searchsorted(self.dofs, dofs).astype(np.int32), given=self._given,
-            turning=self._turning, turn0=self._turns, part=scheme.load_weight,
+            "follower_loads", number=len(indices), size=len(self.dofs), dof=self.dofs,
+            at=np.searchsorted(self.dofs, dofs).astype(np.int32), given=self._unit_forces,
+            turning=self._turning, turn0=self._rotations, part=scheme.load_weight,
             now=self._sizes[0], end=self._sizes[1], before=self._sizes[2],
             x=A.positions(x, self._turning), y=A.positions(y, self._turning),
             force=self._forces[0], force_before=self._forces[1],
@@ -215,14 +215,14 @@ class FollowerLoads(_AtDofs):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the loads."""
-        c = fill(self._c, factor=callbacks.of_time(self._in_time))
+        c = fill(self._c, factor=callbacks.time_functions(self._in_time))
         c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
         """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them."""
-        self._sizes[:] = self._given * self._factors_at(t).reshape(-1, 1)
-        self._turns[:] = q[self._turning]
+        self._sizes[:] = self._unit_forces * self._factors_at(t).reshape(-1, 1)
+        self._rotations[:] = q[self._turning]
         self.add_residual(q, np.zeros(self._size))
         self._forces[1] = self._forces[0]
         return self._whole(self._forces[0])
@@ -230,13 +230,13 @@ class FollowerLoads(_AtDofs):
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore the forces in the equation of the last step, and their sizes."""
         self._forces[:] = memory.added("follower loads", self._whole(self._forces[1]))[self.dofs]
-        self._sizes[:] = memory.rows("follower loads", self._numbers, self._sizes[2])
+        self._sizes[:] = memory.rows("follower loads", self._indices, self._sizes[2])
 
 
 @stated
-def _turned_mass(of: Element) -> ufl.Form:
-    (u, _), (w_u, _) = split(ufl.TrialFunction(of.space)), split(of.w)
-    return of.inertia[0] * ufl.dot(turn(u), w_u) * of.dx_of_mass()
+def _turned_mass(element: Element) -> ufl.Form:
+    (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
+    return element.inertia[0] * ufl.dot(perpendicular(u), w_u) * element.dx_of_mass()
 
 
 class FrameForces(LoadTerm):
@@ -262,7 +262,7 @@ class FrameForces(LoadTerm):
         S.data *= frame.rate**2
         G.data *= coriolis
         self._matrices, self._A = (Product(S), Product(G)), A
-        x, y = (np.ascontiguousarray(of, dtype=np.int32) for of in share.translations())
+        x, y = (np.ascontiguousarray(axis, dtype=np.int32) for axis in share.translations())
         # Vectors from the axis to the places of all displacements.  Beams come last: beams joined
         # to the ground share its displacement, not the place of its centre.
         grid, from_axis = share.grid, np.zeros(share.grid.size)

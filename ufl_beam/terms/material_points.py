@@ -56,8 +56,11 @@ DIGITS = 16 * float(np.finfo(float).eps)
 """Round-off of dissipated energies over elastic energies of the strains."""
 
 
-SPENT, NOTHING = 1e-6, 1e-30
-"""Fraction of its limit below which an open hinge is a joint; factor of the joint's stiffness."""
+EXHAUSTED = 1e-6
+"""Fraction of its limit below which an open hinge is a joint."""
+
+FREED_STIFFNESS = 1e-30
+"""Factor of the stiffness of such a joint."""
 
 
 def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
@@ -124,14 +127,14 @@ class PointForms:
                     *answer,
                     *self._derivatives(stress, unknown),
                 ]
-            *numbers, stress, changes = equations.end(at)
+            *energies, stress, changes = equations.end(at)
             self.own = ffi.NULL
             if law.must_dissipate:
                 stored = ufl.as_ufl(equations.stored(at))
                 slopes = tuple(self._derivatives((stored,), unknown))
                 self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
         self.law = pointwise.compile(*answer)
-        end = in_order("point_output", dict(zip(End._fields, numbers, strict=False)))
+        end = in_order("point_output", dict(zip(End._fields, energies, strict=False)))
         self.end = pointwise.compile(*end, *stress, *changes)
 
     @cached_property
@@ -140,9 +143,9 @@ class PointForms:
         stress = tuple(map(ufl.as_ufl, self._equations.elastic_stress(self._at)))
         return self._pointwise.compile(*stress, *self._derivatives(stress, self._strains))
 
-    def _derivatives(self, of: tuple[Expr, ...], by: tuple[str, ...]) -> list[Expr]:
+    def _derivatives(self, functions: tuple[Expr, ...], by: tuple[str, ...]) -> list[Expr]:
         """Return derivatives, a row for each function."""
-        return [ufl.diff(f, self._at[name]) for f in of for name in by]
+        return [ufl.diff(f, self._at[name]) for f in functions for name in by]
 
 
 _point_forms = stated(PointForms)
@@ -191,12 +194,12 @@ class Points:
         self._yields, self.softens = layout.yields, layout.softening is not None
         self._releases = releases(layout, scheme)
         self.names, law = inputs(layout), layout.kind.law
-        cells, of_cell, width = len(length), len(layout.weights), len(self.names)
-        self._storage = storage = np.zeros((cells, of_cell, width))
+        cells, per_cell, width = len(length), len(layout.weights), len(self.names)
+        self._storage = storage = np.zeros((cells, per_cell, width))
         self._at = {name: storage[:, :, i] for i, name in enumerate(self.names)}
         # Internal variables, and further data of an accepted state for the next step
         others = ("jump", "opening", *rows(law, "before"), "traction", "flows")
-        self._kept = (*prefixed("state", law.variables), *others)
+        self._state_names = (*prefixed("state", law.variables), *others)
         self._components = len(law.resultants or "x")
         softening = layout.softening and layout.softening.kind()
         self._equations = PointEquations(layout.kind, softening, scheme)
@@ -228,7 +231,7 @@ class Points:
         arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
         self.c = struct(
-            "points", cells=cells, of_cell=of_cell, width=width, w=storage,
+            "points", cells=cells, of_cell=per_cell, width=width, w=storage,
             theta=scheme.theta, length=np.ascontiguousarray(length), **arrays,
             law=forms.law, resistance=forms.resistance, end=forms.end, solves=law.solves,
             components=self._components, variables=len(law.variables),
@@ -237,7 +240,7 @@ class Points:
             own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search,
         )  # fmt: skip
         if predicts and self._components == 1 and self._yields:
-            lines = np.zeros((2, cells, of_cell, int(lib.LINE)))
+            lines = np.zeros((2, cells, per_cell, int(lib.LINE)))
             fill(self.c, line=lines[0], predicted=lines[1])
 
     def __getitem__(self, name: str) -> Array:
@@ -248,7 +251,7 @@ class Points:
         """Return the names of the components of a strain or stiffness."""
         return rows(self._layout.kind.law, name)
 
-    def _of_points(self, strains: Array) -> tuple[Array, ...]:
+    def _at_points(self, strains: Array) -> tuple[Array, ...]:
         """Return strains of the points by component, (cells, n) each, from strains of the cells."""
         d = self._components
         return tuple(strains @ self._layout.strains[k::d].T for k in range(d))
@@ -264,7 +267,7 @@ class Points:
     def start(self, strains: Array) -> None:
         """Begin at these strains of the cells, not the accepted strains; (cells, 3); 1, 1, 1/m."""
         self._e0[:] = strains
-        for name, values in zip(self._rows("before"), self._of_points(strains), strict=True):
+        for name, values in zip(self._rows("before"), self._at_points(strains), strict=True):
             self[name][:] = values
         self._resist()
 
@@ -302,7 +305,7 @@ class Points:
         """Return the remaining fraction of elastic stiffness for small ``change``; (cells,)."""
         layout, theta = self._layout, self["theta"][0, 0]
         elastic = theta * change**2 @ layout.rest
-        for name, by_point in zip(self._rows("stiffness"), self._of_points(change), strict=True):
+        for name, by_point in zip(self._rows("stiffness"), self._at_points(change), strict=True):
             elastic += (theta * self[name] * by_point**2) @ layout.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
@@ -355,8 +358,8 @@ class Points:
         breaking, softening = self._layout.breaking, self._layout.softening
         if softening is not None:
             borne, limit = self["traction"][:, breaking], softening.limit
-            spent = np.isfinite(limit) & (borne <= SPENT * limit)
-            self["stiffness"][:, breaking] *= np.where(spent, NOTHING, 1.0)
+            spent = np.isfinite(limit) & (borne <= EXHAUSTED * limit)
+            self["stiffness"][:, breaking] *= np.where(spent, FREED_STIFFNESS, 1.0)
         self["traction"][:] = np.inf
         self.c.law, self.c.solves = self._forms.elastic, False
 
@@ -375,9 +378,9 @@ class Points:
             "numerical": (bool(self._alpha), lost, "numerical"),
             "released": (self._releases, lost, "numerical"),
         }  # fmt: skip
-        entries = {k: part.pointer(name) for k, (has, part, name) in kinds.items() if has}
+        pointers = {k: account.pointer(name) for k, (has, account, name) in kinds.items() if has}
         copy = {} if self._dynamic else {"copy": self._copy()}
-        return {"dt": self.dt, "alpha": self._alpha, **entries, **copy}
+        return {"dt": self.dt, "alpha": self._alpha, **pointers, **copy}
 
     # -- the state -----------------------------------------------------------------------------
 
@@ -385,16 +388,16 @@ class Points:
         """Return the internal variables of the accepted state; (cells, k); a copy."""
         stored = np.zeros((len(self.kept), 2))
         stored[:1] = self.sums[3:5]  # of all cells together; the owner does not matter
-        return np.hstack([*(self[name] for name in self._kept), self.kept, self._e0, stored])
+        return np.hstack([*(self[name] for name in self._state_names), self.kept, self._e0, stored])
 
     def restore(self, rows: Array) -> None:
         """Restore the variables of :meth:`state`.
 
         Call :meth:`start` and :meth:`refresh` afterwards if strains or laws differ from that state.
         """
-        ends = np.arange(1, len(self._kept) + 1) * self._storage.shape[1]
+        ends = np.arange(1, len(self._state_names) + 1) * self._storage.shape[1]
         *variables, kept, e0, stored = np.split(rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
-        for name, values in zip(self._kept, variables, strict=True):
+        for name, values in zip(self._state_names, variables, strict=True):
             self[name][:] = values
         self.kept[:], self._e0[:] = kept, e0
         self.sums[3:5] = stored.sum(axis=0)
@@ -404,11 +407,11 @@ class Points:
         layout, length, law = self._layout, self["length"][:, :1], self._equations.law(self._at)
         state, volume = self._equations.state(self._at), layout.weights * length
         relieved = self["jump"] / self["length"]
-        e = law.as_argument(tuple(x - relieved for x in self._of_points(strains)))
+        e = law.as_argument(tuple(x - relieved for x in self._at_points(strains)))
         self.kept[:, :3] = layout.rest * strains
         for k, stress in enumerate(law.as_tuple(law.stress(e, state))):
-            of_points = (layout.weights * stress) @ layout.strains[k :: self._components]
-            self.kept[:, :3] += of_points
-        of_rest = strains**2 @ layout.rest / 2 * length[:, 0]
-        self.sums[3] = np.sum(volume * law.elastic_energy(e, state)) + np.sum(of_rest)
+            forces = (layout.weights * stress) @ layout.strains[k :: self._components]
+            self.kept[:, :3] += forces
+        rest_energy = strains**2 @ layout.rest / 2 * length[:, 0]
+        self.sums[3] = np.sum(volume * law.elastic_energy(e, state)) + np.sum(rest_energy)
         self.sums[4] = np.sum(volume * law.hardening_energy(state))

@@ -136,10 +136,10 @@ class Callbacks:
 
     # -- functions, with their data ---------------------------------------------------------------
 
-    def of_time(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
+    def time_functions(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
         """Return ``time_function`` of loops.h for functions with their owners, see value_at."""
-        of_time = ffi.new("time_function[]", len(functions))
-        for place, (function, owner) in zip(of_time, functions, strict=True):
+        functions_in_c = ffi.new("time_function[]", len(functions))
+        for place, (function, owner) in zip(functions_in_c, functions, strict=True):
             if function is steady:
                 function = Constant(1.0)
             if isinstance(function, Constant):
@@ -151,7 +151,7 @@ class Callbacks:
             else:
                 place.ask = lib.time_in_python
                 place.handle = self.handle(partial(value_at, function, owner=owner))
-        return of_time
+        return functions_in_c
 
     def phase(self, function: Callable[[Any, Any, Any], None]) -> Loop:
         """Return a phase of C that calls ``function(step, q1, s)`` with pointers."""
@@ -181,7 +181,7 @@ class Callbacks:
         return self._alive[-1]
 
 
-def _note(kind: type, error: BaseException, traceback: Any) -> None:
+def _record_error(kind: type, error: BaseException, traceback: Any) -> None:
     """Keep an exception of a callback, and let C end the step on all processes.
 
     An interrupt may come before the first line of the callback has run.
@@ -201,7 +201,7 @@ def from_c(
 ) -> Callable[[Callable[..., Any]], Any]:
     """Decorate a callback of C, declared in c_library.py; it returns ``error`` if it raises."""
     more = {} if error is None else {"error": error}
-    declared: Any = ffi.def_extern(name=name, onerror=_note, **more)
+    declared: Any = ffi.def_extern(name=name, onerror=_record_error, **more)
     return declared  # type: ignore[no-any-return]
 
 
@@ -232,14 +232,14 @@ for _name in ("run", "begin", "phase"):
 def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
     """Return loops that set the initial configuration of a step in kernels that use it."""
     return [
-        loop("begin_forms", struct("form_of_step", form=one.cells, at=one.position(q0)))
-        for one in kernels if one.uses(q0)
+        loop("begin_forms", struct("form_of_step", form=kernel.cells, at=kernel.position(q0)))
+        for kernel in kernels if kernel.uses(q0)
     ]  # fmt: skip
 
 
 def knowing(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
     """Return fields of a struct for forms in which a phase sets the values of a function."""
-    forms = [(one.cells, one.position(function)) for one in kernels]
+    forms = [(kernel.cells, kernel.position(function)) for kernel in kernels]
     return {"forms": len(forms), "form": ffi.new("form_of_step[]", forms)}
 
 

@@ -40,14 +40,14 @@ class Acting:
     """
 
     def __init__(
-        self, work: Work, stated: Statement, fields: Fields, scheme: Scheme, A: Csr
+        self, work: Work, work_forms: Statement, fields: Fields, scheme: Scheme, A: Csr
     ) -> None:
-        self._work, self._stated, self._fields, self._A = work, stated, fields, A
+        self._work, self._forms, self._fields, self._A = work, work_forms, fields, A
         self.order = fields.order
         self.passes_on = work.takes_rates and bool(scheme.weight_of_before)
         self._saved_as = f"work of {work.name}"
-        tangent = None if stated.tangent.empty() else stated.tangent
-        forms = stated.residual, tangent, stated.energy, stated.lost
+        tangent = None if work_forms.tangent.empty() else work_forms.tangent
+        forms = work_forms.residual, tangent, work_forms.energy, work_forms.lost
         try:
             made: list[Any] = [form and fields.kernel(form, fields.element.q1) for form in forms]
         except Exception as error:
@@ -56,31 +56,31 @@ class Acting:
         self.tangent, self._energy, self._lost = made[1:]
         if self.tangent is not None:
             self.tangent.place(A)
-        self._numbers: Array = np.full(len(stated.numbers), math.nan)
+        self._values: Array = np.full(len(work_forms.numbers), math.nan)
         # Forces of a virtual work in the equation of the last step
         self._before = np.zeros(0 if self._energy else fields.share.size)
 
     def in_c(self, ledger: Ledger, callbacks: Callbacks) -> Any:
         """Return ``user_work`` of loops.h, with entries of the ledger."""
-        work, q0, numbers = self._work, self._fields.element.q0, self._stated.numbers.values()
+        work, q0, functions = self._work, self._fields.element.q0, self._forms.numbers.values()
         kernels = [self.residual, self.tangent, self._energy, self._lost]
         forms = [one for one in kernels if one is not None]
-        at = [_position(form, number) for form in forms for number in numbers]
-        given = [x if callable(x) else Constant(x) for x in work.numbers.values()]
-        entries: dict[str, Any] = {}
+        at = [_position(form, function) for form in forms for function in functions]
+        values = [x if callable(x) else Constant(x) for x in work.numbers.values()]
+        pointers: dict[str, Any] = {}
         if self._energy is None:
-            entries["supplied"] = ledger.supplied.pointer(work.name)
+            pointers["supplied"] = ledger.supplied.pointer(work.name)
         else:
-            _, entries["energy"] = entering(self._energy, ledger.state.pointer(work.name))
-            if self._stated.varies(work):
-                entries["supplied"] = ledger.supplied.pointer(work.in_time)
+            _, pointers["energy"] = entering(self._energy, ledger.state.pointer(work.name))
+            if self._forms.varies(work):
+                pointers["supplied"] = ledger.supplied.pointer(work.in_time)
         if self._lost is not None:
-            _, entries["lost"] = entering(self._lost, ledger.lost.pointer("numerical"))
+            _, pointers["lost"] = entering(self._lost, ledger.lost.pointer("numerical"))
         return struct(
-            "user_work", residual=self.residual.cells, forms=len(forms), numbers=len(numbers),
+            "user_work", residual=self.residual.cells, forms=len(forms), numbers=len(functions),
             form=ffi.new("form_of_step[]", [(one.cells, _position(one, q0)) for one in forms]),
-            at=np.array(at, dtype=np.int32), number=self._numbers, before=self._before,
-            of_time=callbacks.of_time([(number, work) for number in given]), **entries,
+            at=np.array(at, dtype=np.int32), number=self._values, before=self._before,
+            of_time=callbacks.time_functions([(value, work) for value in values]), **pointers,
         )  # fmt: skip
 
     def take(self, q: Array, past: Memory | None) -> Array:
@@ -101,22 +101,22 @@ class Acting:
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
-        change, u_of_form = self._change
+        change, direction = self._change
         if change is not None:
-            for function, value in zip(self._stated.numbers.values(), self._numbers, strict=True):
+            for function, value in zip(self._forms.numbers.values(), self._values, strict=True):
                 if change.uses(function):
                     change.put(function, np.array([value]))
-            change.set(u_of_form, u)
+            change.set(direction, u)
             change.add(q1, self._A.data)
 
     @cached_property
     def _change(self) -> tuple[Kernel | None, fem.Function]:
-        of = self._fields.element
-        u = of.configuration()
-        form = expand_derivatives(ufl.derivative(self._stated.tangent, of.q1, u))
+        element = self._fields.element
+        u = element.configuration()
+        form = expand_derivatives(ufl.derivative(self._forms.tangent, element.q1, u))
         if form.empty():
             return None, u
-        change = self._fields.kernel(form, of.q1)
+        change = self._fields.kernel(form, element.q1)
         change.place(self._A)
         return change, u
 
@@ -140,40 +140,40 @@ class Works(LoadTerm):
         self._ledger = ledger
         share, self._A = fields.share, A
         grid = share.grid
-        self._parts: list[Acting] = []
+        self._works: list[Acting] = []
         for work in grid.scene.works:
-            stated = statement(work, element_of(grid.mesh), scheme)
+            work_forms = statement(work, element_of(grid.mesh), scheme)
             # Make entries also on processes without such cells
-            of_energy = isinstance(work, Potential)
-            (ledger.state if of_energy else ledger.supplied)[work.name] += 0.0
-            if stated.varies(work):
+            potential = isinstance(work, Potential)
+            (ledger.state if potential else ledger.supplied)[work.name] += 0.0
+            if work_forms.varies(work):
                 ledger.supplied[work.in_time] += 0.0
-            if stated.lost is not None:
+            if work_forms.lost is not None:
                 ledger.lost["numerical"] += 0.0
             cells = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
-            part = np.flatnonzero(np.isin(share.cells, cells))
-            if len(part):
-                of = fields if len(part) == len(share.cells) else Fields(share, part)
-                self._parts.append(Acting(work, stated, of, scheme, A))
+            positions = np.flatnonzero(np.isin(share.cells, cells))
+            if len(positions):
+                subset = fields if len(positions) == len(share.cells) else Fields(share, positions)
+                self._works.append(Acting(work, work_forms, subset, scheme, A))
         self._force, space = np.zeros((2, share.size))
         self.vector = struct("vector", size=share.size, values=self._force)
         self._c = struct(
-            "user_works", size=share.size, works=len(self._parts), t=t0, force=self._force,
+            "user_works", size=share.size, works=len(self._works), t=t0, force=self._force,
             space=space, weight_of_before=scheme.weight_of_before,
         )  # fmt: skip
-        tangents = [part.tangent for part in self._parts if part.tangent is not None]
-        self._calls = [_calls([part.residual for part in self._parts]), _calls(tangents)]
+        tangents = [work.tangent for work in self._works if work.tangent is not None]
+        self._calls = [_calls([work.residual for work in self._works]), _calls(tangents)]
         force, tangent = (loop("add_calls", calls) for calls, _ in self._calls)
         self.loops = force, tangent
         self.in_cells = [
-            InCells(lambda of=one: of.residual, lib.WORK, one.order)  # type: ignore[misc]
-            for one in self._parts
+            InCells(lambda work=work: work.residual, lib.WORK, work.order)  # type: ignore[misc]
+            for work in self._works
         ]
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the works."""
         self._callbacks = callbacks
-        self._in_c = [one.in_c(self._ledger, callbacks) for one in self._parts]
+        self._in_c = [work.in_c(self._ledger, callbacks) for work in self._works]
         fill(self._c, work=ffi.new("user_work *[]", self._in_c))
         begin, accept = loop("begin_works", self._c), loop("accept_works", self._c)
         return Phases([begin], [accept], [loop("add_energy_of_works", self._c)])
@@ -187,27 +187,27 @@ class Works(LoadTerm):
         step = struct("time_step", q0=before, dt=dt, **times)
         lib.begin_works(self._c, step, ffi.NULL, ffi.NULL)
         self._callbacks.settle()
-        self._force[:] = sum(one.take(q, past) for one in self._parts)
+        self._force[:] = sum(work.take(q, past) for work in self._works)
         return self._force.copy()
 
     def pass_on(self, memory: Memory) -> None:
         """Save the forces of works that depend on the motion of the last step."""
-        for one in self._parts:
-            if one.passes_on:
-                one.remember(memory)
+        for work in self._works:
+            if work.passes_on:
+                work.remember(memory)
 
     def remember(self, memory: Memory, q: Array) -> None:
         """Save or restore time and growth of the works, and their forces in the last equation."""
         self._c.t = memory.number("time of works", self._c.t)
         self._c.grown = memory.number("growth of works", self._c.grown)
         self._force[:] = memory.added("works", self._force)
-        for one in self._parts:
-            one.remember(memory)
+        for work in self._works:
+            work.remember(memory)
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
-        for one in self._parts:
-            one.add_tangent_change(q1, u)
+        for work in self._works:
+            work.add_tangent_change(q1, u)
 
 
 def _calls(kernels: list[Kernel]) -> tuple[Any, Any]:
