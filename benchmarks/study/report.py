@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from advice import TARGETS, advice, cheapest, overall
@@ -39,7 +40,7 @@ def save(study: dict[str, Any], docs: Path) -> None:
         *(f"Without {name}: {_cut(why)}\n" for name, why in study["failed"].items()),
         "## What to choose when",
         "",
-        *advice(cases),
+        *(fill(line, 155, subsequent_indent="  ") for line in advice(cases)),
         "",
         "Time of each scheme relative to the fastest one: the geometric mean over the scenes in "
         "which it reaches the error, and their number:",
@@ -49,8 +50,8 @@ def save(study: dict[str, Any], docs: Path) -> None:
         "## Each setting by itself",
         "",
         "One setting is varied at a time, from the base that the tables of the scenes name. Time "
-        "and error are ratios to the base; the change is that of the result by this setting "
-        "alone.",
+        "and error are ratios to the base; the change is that of the result\n"
+        "by this setting alone.",
         "",
         "![Time and error as each setting is varied](pictures/study_dials.png)",
         "",
