@@ -231,8 +231,9 @@ figure.savefig(output / "slider_crank_known.png")
 
 # %%
 runs = ((driven, "motion given", orange), (controlled, "controlled", blue))
-with ub.picture((10, 10)) as figure:
-    (speeds, torques), (pushes, loops), (gone, balance) = figure.subplots(3, 2)
+with ub.picture((10, 7)) as press, ub.picture((10, 5)) as energies:
+    (speeds, torques), (pushes, loops) = press.subplots(2, 2)
+    gone, balance = energies.subplots(1, 2)
     for one, label, color in runs:
         T = -one.run.connector(one.motor).force
         style = {"color": color, "lw": 1.6, "label": label}
@@ -258,7 +259,7 @@ with ub.picture((10, 10)) as figure:
     )  # fmt: skip
     balance.plot(t, energy["controllers"], color=ink, label="supplied: motor")
     balance.set_title("where the energy is, controlled (J)")
-    balance.legend(loc="lower right")
+    energies.legend(*balance.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     for axes in (speeds, torques, pushes, gone, balance):
         axes.set_xlim(0, t[-1])
         axes.set_xlabel("time (s)")
@@ -266,7 +267,8 @@ with ub.picture((10, 10)) as figure:
         axes.set_title(axes.get_title(), loc="left")
         axes.set_title("")
     speeds.legend(loc="lower right")
-figure.savefig(output / "slider_crank_press.png")
+press.savefig(output / "slider_crank_press.png")
+energies.savefig(output / "slider_crank_energy.png")
 turn = 2 * math.pi / speed
 shapes = ub.plot(controlled.run, "shapes", times=np.linspace(0.4, 0.4 + 0.5 * turn, 6))
 shapes.savefig(output / "slider_crank_shapes.png")

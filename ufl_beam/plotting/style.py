@@ -126,19 +126,20 @@ def _save(figure: Figure, *args: Any, **options: Any) -> None:
 
 
 def _label_logarithmic(axis: Axis) -> None:
-    """Label powers of ten; if fewer than three are in view, also 2 and 5, or else equal steps."""
+    """Label powers of ten; if fewer than three are in view, also 2 and 5, else equal steps."""
     from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
     low, high = sorted(axis.get_view_interval())
-    for locator in (LogLocator(), LogLocator(subs=(1.0, 2.0, 5.0)), MaxNLocator(5)):
-        if sum(low <= tick <= high for tick in locator.tick_values(low, high)) > 2:
+    equal = MaxNLocator(5, steps=[1, 2, 5, 10])
+    for locator, least in ((LogLocator(), 3), (LogLocator(subs=(1.0, 2.0, 5.0)), 2), (equal, 0)):
+        if sum(low <= tick <= high for tick in locator.tick_values(low, high)) >= least:
             break
     axis.set_major_locator(locator)
     axis.set_major_formatter("{x:g}" if low > 5e-5 and high < 2e5 else _power_of_ten)
     axis.set_minor_formatter(NullFormatter())
 
 
-def _power_of_ten(value: float, _: int) -> str:
+def _power_of_ten(value: float, _: float) -> str:
     """Write a number as a multiple of a power of ten."""
     factor, power = f"{value:.3e}".split("e")
     before = f"{float(factor):g}\\cdot" if float(factor) != 1.0 else ""
