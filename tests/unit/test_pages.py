@@ -4,7 +4,7 @@
 import re
 
 import pytest
-from pages import DOCS, blocks_of
+from pages import DOCS, blocks_of, pictures_of
 
 PAGES = [
     *sorted(DOCS.glob("extending*.md")),
@@ -39,5 +39,4 @@ def test_pictures_of_a_page_are_those_of_its_script(page):
     """A picture that a page shows is saved by its script under the same name."""
     scripts = "".join(blocks_of(page) + blocks_of(page, "py"))
     saved = re.findall(r'(?:savefig|SaveScreenshot)\("(\w+\.png)"', scripts)
-    shown = re.findall(r"\]\(pictures/(\w+\.png)\)", page.read_text(encoding="utf-8"))
-    assert set(shown) <= set(saved)
+    assert {*pictures_of(page)} <= {*saved}
