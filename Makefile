@@ -77,7 +77,11 @@ test-notebook: ## the notebook in a kernel of Jupyter
 check-docs: ## the built site in Chromium, on a desk and on a phone; builds a root with Chromium once, 0.9 GB
 	@tests/browser/check
 
-docs-pictures: docs ## pictures of the site in docs/pictures/site
+docs-pictures: docs ## pictures in docs/pictures: of pages, demos, stored measurements, and the site
+	@./env python3 tests/unit/pages.py
+	@./env python3 benchmarks/study --report
+	@./env python3 benchmarks/peers/report.py
+	@cp demos/output/emergency_stop.png demos/output/swing_shapes.png docs/pictures
 	@tests/browser/check
 	@mkdir -p docs/pictures/site
 	@for page in first_page gallery demo reference_page; do cp output/site/$${page}_*.png docs/pictures/site; done

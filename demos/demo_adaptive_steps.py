@@ -16,9 +16,6 @@
 # SPDX-License-Identifier: MIT
 from pathlib import Path
 
-from mpi4py import MPI
-
-import matplotlib.pyplot as plt
 import numpy as np
 
 import ufl_beam as ub
@@ -127,32 +124,26 @@ assert hitting.energy.worst < 1e-9
 # ## Pictures
 
 # %%
-figure, (top, bottom) = plt.subplots(2, 1, figsize=(8, 7), layout="constrained")
-for one, label in ((chosen, "links that snap at 0.64 s"), (hitting, "a stop at 0.12 m")):
-    top.semilogy(one.times[1:], np.diff(one.times), ".-", ms=3, lw=0.8, label=label)
-for event in events.found:
-    top.axvline(event.time, color="0.8", lw=0.5, zorder=0)
-for kink in push.times[1:]:
-    top.axvline(kink, color="C2", lw=0.8, ls="--", zorder=0)
-top.set(
-    xlabel="t  [s]",
-    ylabel="step  [s]",
-    title="The step follows the motion (dashed: kinks of the load, grey: impacts)",
-)
-top.legend(loc="lower left", frameon=False)
+with ub.picture((9, 4.8)) as steps:
+    axes = steps.subplots()
+    for one, label in ((chosen, "links that snap at 0.64 s"), (hitting, "a stop at 0.12 m")):
+        axes.semilogy(one.times[1:], np.diff(one.times), ".-", ms=3, lw=0.8, label=label)
+    for event in events.found:
+        axes.axvline(event.time, color="0.8", lw=0.5, zorder=0)
+    for kink in push.times[1:]:
+        axes.axvline(kink, color="0.2", lw=0.8, ls="--", zorder=0)
+    axes.set(xlabel="time (s)", ylabel="step (s)")
+    axes.set_title("dashed: kinks of the load; grey: impacts", loc="left")
+    axes.legend(loc="lower left")
+steps.savefig(output / "adaptive_steps_lengths.png")
 
-for runs, style, label in ((equal, "s--", "equal steps"), (adaptive, "o-", "adaptive steps")):
-    bottom.loglog([one.parts for one in runs], [error(one) for one in runs], style, label=label)
-bottom.set(
-    xlabel="steps",
-    ylabel="error of position at 0.64 s  [m]",
-    title="The same accuracy with fewer steps",
-)
-bottom.legend(frameon=False)
-for axes in (top, bottom):
-    axes.grid(alpha=0.3)
-if MPI.COMM_WORLD.rank == 0:
-    figure.savefig(output / "adaptive_steps.png", dpi=150)
+with ub.picture((8, 4.8)) as errors:
+    axes = errors.subplots()
+    for runs, style, label in ((equal, "s--", "equal steps"), (adaptive, "o-", "adaptive steps")):
+        axes.loglog([one.parts for one in runs], [error(one) for one in runs], style, label=label)
+    axes.set(xlabel="steps", ylabel="error of position at 0.64 s (m)")
+    axes.legend()
+errors.savefig(output / "adaptive_steps_errors.png")
 
 # %% [markdown]
 # ## Try this

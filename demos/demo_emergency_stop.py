@@ -103,6 +103,7 @@ ub.print_once(
 
 # %%
 from matplotlib import colormaps
+from matplotlib.cm import ScalarMappable
 from matplotlib.colors import ListedColormap, Normalize
 
 ink, grey, blue, sky, orange, red = "#222222", "0.6", "#0072B2", "#56B4E9", "#E69F00", "#D55E00"
@@ -137,16 +138,23 @@ def balance(axes, energy):
         labels=[name for _, name in shares.values()],
     )  # fmt: skip
     axes.plot(t, energy["supports"], color=ink, label="supplied by the drive")
-    axes.set(ylabel="energy (J)", ylim=(0, 50), xlabel="time t (s)")
+    axes.set(ylabel="energy (J)", ylim=(0, 50))
 
 
-with ub.picture((13, 10.5)) as figure:
-    rows = figure.subplots(3, 2, height_ratios=(2.2, 1, 1))
-    strobe(rows[0, 0], bent, rigid_arm)
-    strobe(rows[0, 1], saved, arm)
-    rows[0, 0].set_title("without the joint: the hub holds the arm, and bends it", loc="left")
-    rows[0, 1].set_title("with the joint: the arm swings on", loc="left")
-    moments, jumps = rows[1]
+pictures = {
+    "emergency_stop": (saved, arm, "with the joint: the arm swings on"),
+    "emergency_stop_bent": (bent, rigid_arm, "without the joint: the hub bends the arm"),
+}
+for name, (solution, beam, title) in pictures.items():
+    with ub.picture((9, 6.6)) as figure:
+        axes = figure.subplots()
+        strobe(axes, solution, beam)
+        axes.set_title(title, loc="left")
+        figure.colorbar(ScalarMappable(of_time, colors), ax=axes, label="time (s)", shrink=0.85)
+    figure.savefig(output / f"{name}.png")
+
+with ub.picture((9, 6.5)) as figure:
+    moments, jumps = figure.subplots(2, 1, sharex=True)
     moments.plot(t, M_without, color=grey, label="without")
     moments.plot(t, M, color=red, label="with the joint")
     for level, name in ((M_yield, "yield of the tube"), (M_u, "$M_u$ of the joint")):
@@ -159,13 +167,20 @@ with ub.picture((13, 10.5)) as figure:
     jumps.axhline(1.0, color="0.3", ls=":", lw=1.2)
     jumps.set_ylabel("the joint")
     jumps.legend(loc="upper left")
-    balance(rows[2, 0], bent.energy)
-    balance(rows[2, 1], saved.energy)
-    for axes in rows[1:].ravel():
-        axes.set_xlim(0, t[-1])
-    handles, labels = rows[2, 1].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=5)
-figure.savefig(output / "emergency_stop.png")
+    jumps.set(xlabel="time (s)", xlim=(0, t[-1]))
+    figure.align_ylabels()
+figure.savefig(output / "emergency_stop_moments.png")
+
+with ub.picture((9, 6.5)) as figure:
+    without, protected = figure.subplots(2, 1, sharex=True)
+    balance(without, bent.energy)
+    balance(protected, saved.energy)
+    without.set_title("without the joint", loc="left")
+    protected.set_title("with the joint", loc="left")
+    protected.set(xlabel="time (s)", xlim=(0, t[-1]))
+    handles, labels = protected.get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3)
+figure.savefig(output / "emergency_stop_energy.png")
 ub.plot(saved, "hinge", arm.start).savefig(output / "emergency_stop_hinge.png")
 ub.print_once(
     "\npictures and data:", *sorted(str(p) for p in output.glob("emergency*")), sep="\n  "

@@ -298,7 +298,7 @@ def curve(axes, column, cells, *args, **options):
     axes.plot(psi / L, np.array(M) / kNcm, *args, **options)
 
 
-with ub.picture((11, 7.5)) as laws:
+with ub.picture((10, 7.5)) as laws:
     panels = laws.subplots(2, 2, sharex=True).ravel()
     titles = (
         "linear elasticity", "isotropic hardening",
@@ -335,7 +335,7 @@ laws.savefig(output / "end_rotation_laws.png")
 # curvature.
 
 # %%
-with ub.picture((13, 8)) as softening:
+with ub.picture((10, 8)) as softening:
     top, bottom = softening.subplots(2, 2)
     top[0].plot(psi_closed, M_closed / kNcm, color=grey, lw=6, label="closed form")
     styles = (("-", colors[0]), ("--", "#E69F00"), (":", ink))

@@ -158,26 +158,28 @@ for name, curve in curves.items():
 # ## Pictures
 
 # %%
-ub.plot(fatigue, "cycles", spots[first]).savefig(output / "fatigue_cycles.png")
+ub.plot(fatigue, "cycles", spots[first]).savefig(output / "fatigue_rainflow.png")
 ub.plot(extremes, "M").savefig(output / "fatigue_envelope.png")
 
 blue, red = "#0072B2", "#D55E00"
 t, sway = storm.times, 1e3 * storm.displacement(upper.at(0.5))[:, 0]
-with ub.picture((13, 5.5)) as figure:
-    axes = figure.subplot_mosaic([["wind", "damage"], ["sway", "damage"]], width_ratios=(1.6, 1))
-    axes["wind"].plot(t, [speed(x) for x in t], color=blue, lw=0.7)
-    axes["wind"].set_title("wind (m/s)", loc="left")
-    axes["sway"].plot(t, sway, color=red, lw=0.7)
-    axes["sway"].set_title("tank, to the lee (mm)", loc="left")
-    axes["sway"].set_xlabel("time t (s)")
-    for name in ("wind", "sway"):
-        axes[name].set_xlim(0, duration)
+with ub.picture((9, 5.5)) as storm_over_time:
+    wind, lee = storm_over_time.subplots(2, 1, sharex=True)
+    wind.plot(t, [speed(x) for x in t], color=blue, lw=0.7)
+    wind.set_title("wind (m/s)", loc="left")
+    lee.plot(t, sway, color=red, lw=0.7)
+    lee.set_title("tank, to the lee (mm)", loc="left")
+    lee.set(xlabel="time (s)", xlim=(0, duration))
+storm_over_time.savefig(output / "fatigue_storm.png")
+
+with ub.picture((8, 4)) as welds:
+    axes = welds.subplots()
     damages = [1e3 * fatigue.damage(spot) for spot in spots.values()]
     colors = [red if name == first else "0.7" for name in spots]
-    axes["damage"].barh(list(spots), damages, color=colors)
-    axes["damage"].invert_yaxis()
-    axes["damage"].set_title("damage in ten minutes, in thousandths", loc="left")
-figure.savefig(output / "fatigue_storm.png")
+    axes.barh(list(spots), damages, color=colors)
+    axes.invert_yaxis()
+    axes.set_xlabel("damage in ten minutes (thousandths)")
+welds.savefig(output / "fatigue_welds.png")
 
 # %% [markdown]
 # ## Verification

@@ -222,9 +222,9 @@ with ub.picture((9, 5.5)) as forces:
     upper.set_ylabel("N at mid-span (N)")
     lower.legend(frameon=False, loc="lower right")
     lower.set_ylabel("energy (mJ)")
-    lower.set_xlabel("t (s)")
+    lower.set_xlabel("time (s)")
 
-with ub.picture((11, 8)) as hinges:
+with ub.picture((10, 8)) as hinges:
     (jumps, losses), (paths, totals) = hinges.subplots(2, 2)
     at_ends = {
         "A": hinged_decaying.material_at(hinged_beam.start),
@@ -238,7 +238,7 @@ with ub.picture((11, 8)) as hinges:
     jumps.legend()
     losses.axhline(1e6 * G_f, color="0.3", ls=":", lw=1.2)
     losses.text(300, 1e6 * G_f - 0.8, "$G_f$", color="0.3")
-    losses.set(xlim=(0, 400), xlabel="t (ms)")
+    losses.set(xlim=(0, 400), xlabel="time (ms)")
     losses.set_title("dissipated by the hinges (µJ)", loc="left")
     for solution, place, label, style in (
         (decaying, middle, "revolute joints", {"color": "#E69F00", "lw": 5, "alpha": 0.6}),
@@ -248,10 +248,10 @@ with ub.picture((11, 8)) as hinges:
         totals.plot(solution.times, 1e3 * solution.energy.total, label=label, **style)
     paths.set(aspect="equal", xlabel="x (m)", ylabel="y (m)")
     paths.set_title("path of the mass", loc="left")
-    paths.legend(loc="center left", fontsize=10.5)
+    paths.legend(loc="center left")
     totals.set_title("energy (mJ)", loc="left")
     for axes in (jumps, totals):
-        axes.set_xlabel("t (s)")
+        axes.set_xlabel("time (s)")
 
 pictures = {
     "swing_shapes": shapes, "swing_forces": forces, "swing_energy": energies,

@@ -106,8 +106,8 @@ ub.print_once(f"{jumped:.2f} J of the {held:.2f} J that the beam holds at the pe
 # ## Pictures
 
 # %%
-with ub.picture((12, 5)) as figure:
-    left, right = figure.subplots(1, 2)
+with ub.picture((9, 5.5)) as displacements, ub.picture((8, 5)) as dissipation:
+    left, right = displacements.subplots(), dissipation.subplots()
     for ratio, (beam, energy, path) in paths.items():
         color = steepness[ratio]
         δ, F = path.displacement(beam.end)[:, 1], path.factor * M_u / L
@@ -130,8 +130,9 @@ with ub.picture((12, 5)) as figure:
     right.set_xlabel("dissipated part of the fracture energy")
     right.set_ylabel("load (kN)")
     right.set_ylim(0, 5.6)
-figure.savefig(output / "hinge_snapback.png")
-ub.print_once("\npicture:", output / "hinge_snapback.png")
+displacements.savefig(output / "hinge_snapback_displacement.png")
+dissipation.savefig(output / "hinge_snapback_dissipation.png")
+ub.print_once("\npictures:", *sorted(map(str, output.glob("hinge_snap*.png"))), sep="\n  ")
 
 # %% [markdown]
 # ## Verification

@@ -146,19 +146,27 @@ points = solution.grid.points
 at = points[solution.grid.cells]
 fastest = max(speed.max() for speed in speeds)
 
-with ub.picture((12, 3.3)) as waves:
-    for ax, t, speed in zip(waves.subplots(1, 4), solution.times[1:], speeds, strict=True):
-        lines = LineCollection(at, linewidths=60 / bays, cmap="YlGnBu")
-        lines.set_array(speed)
-        lines.set_norm(LogNorm(1e-3 * fastest, fastest, clip=True))
-        ax.add_collection(lines)
-        ax.set_xlim(0, bays * bay)
-        ax.set_ylim(0, bays * bay)
-        ax.set_aspect("equal")
-        ax.set_xticks(())
-        ax.set_yticks(())
-        ax.set_title(f"{1e3 * t:.1f} ms", fontsize="medium")
-    waves.colorbar(lines, ax=waves.axes, label="speed (m/s)", shrink=0.8, pad=0.01)
+
+def draw(ax, t, speed):
+    """Draw the speed of each cell."""
+    lines = LineCollection(at, linewidths=60 / bays, cmap="YlGnBu")
+    lines.set_array(speed)
+    lines.set_norm(LogNorm(1e-3 * fastest, fastest, clip=True))
+    ax.add_collection(lines)
+    size = bays * bay
+    ax.set(xlim=(0, size), ylim=(0, size), aspect="equal", xticks=(), yticks=())
+    ax.set_title(f"{1e3 * t:.1f} ms")
+    return lines
+
+
+with ub.picture((7, 6)) as last:
+    colors = draw(last.subplots(), solution.times[-1], speeds[-1])
+    last.colorbar(colors, label="speed (m/s)", shrink=0.8)
+last.savefig(output / "lattice_last.png")
+with ub.picture((10, 9)) as waves:
+    for ax, t, speed in zip(waves.subplots(2, 2).flat, solution.times[1:], speeds, strict=True):
+        colors = draw(ax, t, speed)
+    waves.colorbar(colors, ax=waves.axes, label="speed (m/s)", shrink=0.8)
 waves.savefig(output / "lattice_waves.png")
 ub.print_once("\npictures and data:", *sorted(str(p) for p in output.glob("lattice*")), sep="\n  ")
 

@@ -90,43 +90,46 @@ for P_turn, v_turn in zip(P_turns, v_turns, strict=True):
 
 # %%
 BLUE, ORANGE, GREY, INK = "#0072b2", "#d55e00", "#aaaaaa", "#333333"
-with ub.picture((12, 5.2)) as figure:
-    left, right = figure.subplots(1, 2, width_ratios=(1.15, 1))
-    left.axhline(0, color=GREY, lw=0.8)
-    left.plot(-v, P, color=BLUE, label="v, down")
-    left.plot(u, P, color=ORANGE, label="u, to the right")
+with ub.picture((8, 6)) as loads:
+    axes = loads.subplots()
+    axes.axhline(0, color=GREY, lw=0.8)
+    axes.plot(-v, P, color=BLUE, label="v, down")
+    axes.plot(u, P, color=ORANGE, label="u, to the right")
     limits = [point.n for point in path.critical]
     for moves in (-v, u):
-        left.plot(moves[limits], P[limits], "o", color=INK, ms=7)
-    left.plot(v_turns, P_turns, "s", color=INK, mfc="white", ms=7)
+        axes.plot(moves[limits], P[limits], "o", color=INK, ms=7)
+    axes.plot(v_turns, P_turns, "s", color=INK, mfc="white", ms=7)
     below = (-v[limits][1] - 2, P[limits][1] - 1.6)
-    left.annotate(
+    axes.annotate(
         f"limit {P[limits][0]:.2f} kN", (-v[limits][0], P[limits][0]), (2, 9), fontsize=12,
         textcoords="offset points",
     )  # fmt: skip
-    left.annotate(f"minimum −{-P[limits][1]:.2f} kN", below, ha="right", fontsize=12)
-    left.annotate("v turns", (v_turns[0], P_turns[0]), (8, -3), textcoords="offset points")
-    left.annotate("v turns", (v_turns[1], P_turns[1]), (-8, -4), textcoords="offset points",
+    axes.annotate(f"minimum −{-P[limits][1]:.2f} kN", below, ha="right", fontsize=12)
+    axes.annotate("v turns", (v_turns[0], P_turns[0]), (8, -3), textcoords="offset points")
+    axes.annotate("v turns", (v_turns[1], P_turns[1]), (-8, -4), textcoords="offset points",
                   ha="right")  # fmt: skip
-    left.set_xlabel("displacement of the loaded point (cm)")
-    left.set_ylabel("load (kN)")
-    left.set_ylim(-12, 21)
-    left.legend(loc="lower left", bbox_to_anchor=(0, 0.12))
+    axes.set_xlabel("displacement of the loaded point (cm)")
+    axes.set_ylabel("load (kN)")
+    axes.set_ylim(-12, 21)
+    axes.legend(loc="lower left", bbox_to_anchor=(0, 0.12))
+loads.savefig(output / "lee_frame_loads.png")
 
-    right.set_aspect("equal")
-    right.axis("off")
+with ub.picture((8, 6)) as shapes:
+    axes = shapes.subplots()
+    axes.set_aspect("equal")
+    axes.axis("off")
     load_n = [0, *limits, len(P) - 1]
     colors = [GREY, BLUE, ORANGE, INK]
     names = ["unloaded", "limit", "minimum", f"end, {P[-1]:.1f} kN"]
     for n, color, name in zip(load_n, colors, names, strict=True):
         for beam, label in zip(scene.beams, (name, None), strict=True):
             x, y = path.shape(beam, n).T
-            right.plot(100 * x, 100 * y, color=color, lw=2.6, label=label)
-        right.plot(*(100 * path.position(place)[n]), "o", color=color, ms=7)
-    right.plot([0, 100 * L], [0, 100 * L], "^", color=INK, ms=11, zorder=0)
-    right.legend(loc="lower right")
-figure.savefig(output / "lee_frame.png")
-ub.print_once("\npicture:", output / "lee_frame.png")
+            axes.plot(100 * x, 100 * y, color=color, lw=2.6, label=label)
+        axes.plot(*(100 * path.position(place)[n]), "o", color=color, ms=7)
+    axes.plot([0, 100 * L], [0, 100 * L], "^", color=INK, ms=11, zorder=0)
+    axes.legend(loc="lower right")
+shapes.savefig(output / "lee_frame_shapes.png")
+ub.print_once("\npictures:", *sorted(map(str, output.glob("lee_frame*.png"))), sep="\n  ")
 
 # %% [markdown]
 # ## Verification

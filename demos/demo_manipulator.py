@@ -185,6 +185,8 @@ def strobe(axes):
         axes.plot(*hinged.motion.position(hinged.elbow)[n], "o", ms=8, mfc="white", mec=color)
     axes.plot(0, 0, "s", ms=10, color=ink, zorder=5)
     axes.set_title("the first 0.63 s; the rigid arm is thick", loc="left")
+    bar = axes.figure.colorbar(ScalarMappable(of_time, colors), ax=axes, shrink=0.85)
+    bar.set_label("time (s)")
 
 
 def paths(axes):
@@ -195,22 +197,19 @@ def paths(axes):
     axes.plot(5 * np.cos(circle), 5 * np.sin(circle), ":", color=grey, lw=1.2, label="elbow")
     axes.plot(0, 0, "s", ms=10, color=ink, zorder=5)
     axes.set_title("the tip, 1 s to 3 s", loc="left")
-    axes.legend(loc="upper right", fontsize=10.5)
+    axes.legend(loc="upper right")
 
 
-with ub.picture((13, 12)) as figure:
-    upper, lower = figure.subfigures(2, 1, height_ratios=(1.15, 1.0))
-    left, right = upper.subplots(1, 2)
-    strobe(left)
-    paths(right)
-    bar = left.inset_axes([0.60, 0.06, 0.36, 0.03])
-    upper.colorbar(ScalarMappable(of_time, colors), cax=bar, orientation="horizontal")
-    bar.set_title("time t (s)", fontsize=11)
-    bar.tick_params(labelsize=10)
-    for axes in (left, right):
+figures = {}
+for name, draw in (("shapes", strobe), ("paths", paths)):
+    with ub.picture((8, 7)) as figures[name]:
+        axes = figures[name].subplots()
+        draw(axes)
         limits = (-10.6, 10.6)
         axes.set(aspect="equal", xlabel="x (m)", ylabel="y (m)", xlim=limits, ylim=limits)
-    (moments, dissipation), (components, differences) = lower.subplots(2, 2)
+
+with ub.picture((9, 6.5)) as figures["hinge"]:
+    moments, dissipation = figures["hinge"].subplots(2, 1, sharex=True)
     for run, style in ((hinged.softening, "-"), (hinged.motion, "-")):
         at_hinge = run.material_at(hinged.root)
         moments.plot(run.times, at_hinge.forces[:, 2], style, color=red)
@@ -228,7 +227,11 @@ with ub.picture((13, 12)) as figure:
     dissipation.text(1.55, 0.3 * G_f, "nothing more is lost", color="0.4")
     for axes in (moments, dissipation):
         axes.axvspan(0.0, t_joint, color="0.94", zorder=0)
-        axes.set(xlim=(0.0, t_end), xlabel="time t (s)")
+        axes.set_xlim(0.0, t_end)
+    dissipation.set_xlabel("time (s)")
+
+with ub.picture((9, 4.8)) as figures["meshes"]:
+    components = figures["meshes"].subplots()
     for number, (n, marker, every) in enumerate(((1, "x", 60), (2, "o", 60), (4, ".", 60))):
         style = {"ls": "none", "color": ink, "mfc": "none", "ms": 6}
         where = (20 * number, every)
@@ -239,19 +242,22 @@ with ub.picture((13, 12)) as figure:
             )
     components.plot(times, by_cells[8].path[:, 0], color=blue, lw=1.4, label="8 cells, x")
     components.plot(times, by_cells[8].path[:, 1], color=green, lw=1.4, label="8 cells, y")
-    components.set(xlim=(t_joint, t_end), xlabel="time t (s)", ylim=(-11, 19))
+    components.set(xlim=(t_joint, t_end), xlabel="time (s)", ylim=(-11, 19))
     components.set_title("tip on four meshes (m)", loc="left")
-    components.legend(ncols=3, loc="upper center", fontsize=10.5)
+    components.legend(ncols=3, loc="upper center")
+
+with ub.picture((8, 4.8)) as figures["difference"]:
+    differences = figures["difference"].subplots()
     cells = np.array(list(apart))
     differences.loglog(1e3 * cells, 1e3 * np.array(list(apart.values())), "o-", color=blue)
-    differences.loglog(1e3 * cells, 1e3 * cells * apart[0.01] / 0.01, ":", color=grey)
+    slope = 1e3 * cells * apart[0.01] / 0.01
+    differences.loglog(1e3 * cells, slope, ":", color=grey, label="slope 1")
     differences.set_title("hinge and joint: tips apart (mm)", loc="left")
     differences.set_xlabel("length of the cell beside the hinge (mm)")
-    differences.text(12, 180, "slope 1", color="0.4")
-    differences.set_xticks([10, 20, 40], ["10", "20", "40"])
-    differences.set_yticks([50, 100, 200], ["50", "100", "200"])
-    differences.minorticks_off()
-figure.savefig(output / "manipulator.png")
+    differences.legend()
+
+for name, figure in figures.items():
+    figure.savefig(output / f"manipulator_{name}.png")
 ub.print_once(
     "\npictures and data:", *sorted(str(p) for p in output.glob("manipulator*")), sep="\n  "
 )

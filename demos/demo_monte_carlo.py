@@ -166,11 +166,8 @@ ub.print_once(
 # %%
 BLUE, RED, GREY = "#0072B2", "#D55E00", "#909090"
 
-with ub.picture((9, 7.2)) as figure:
-    grid = figure.add_gridspec(2, 2, height_ratios=(1.05, 1))
-    over_time = figure.add_subplot(grid[0, :])
-    spread, convergence = (figure.add_subplot(grid[1, i]) for i in (0, 1))
-
+with ub.picture((9, 4.5)) as histories:
+    over_time = histories.subplots()
     t = np.linspace(0, end, len(study["displacement"][0]))
     u = 1e3 * study["displacement"]
     for row in u[1:]:
@@ -185,6 +182,8 @@ with ub.picture((9, 7.2)) as figure:
         loc="left",
     )
 
+with ub.picture((9, 4.5)) as statistics:
+    spread, convergence = statistics.subplots(1, 2)
     bins = np.arange(np.floor(drift.min()), drift.max() + 1.5, 1.5)
     spread.axvspan(*np.percentile(drift, (5, 95)), color=RED, alpha=0.1, lw=0)
     spread.hist(drift, bins, color=RED, alpha=0.5, edgecolor="white")
@@ -206,7 +205,8 @@ with ub.picture((9, 7.2)) as figure:
     convergence.set_title("their means and 95 %", loc="left")
     convergence.legend()
 
-figure.savefig(output / "monte_carlo.png")
+histories.savefig(output / "monte_carlo_histories.png")
+statistics.savefig(output / "monte_carlo_statistics.png")
 names = sorted(str(path) for path in output.glob("monte_carlo*"))
 ub.print_once("\npictures and data:", *names, sep="\n  ")
 

@@ -191,7 +191,7 @@ ink, grey, blue, sky, orange, red, green = (
     "#222222", "0.6", "#0072B2", "#56B4E9", "#E69F00", "#D55E00", "#009E73",
 )  # fmt: skip
 
-with ub.picture((13, 8.5)) as figure:
+with ub.picture((10, 7)) as figure:
     (angles, slides), (forces, energies) = figure.subplots(2, 2, sharex=True)
     at = list(reference)
     dots = {
@@ -216,13 +216,13 @@ with ub.picture((13, 8.5)) as figure:
     forces.plot(known.times, across, color=orange, lw=1.4, label="elbow, across the rod")
     forces.plot(known.times, in_guide.force[:, 1], color=green, lw=1.4, label="guide")
     forces.set_title("forces on the rod (N)", loc="left")
-    forces.legend(loc="lower left", fontsize=10.5)
+    forces.legend(loc="lower left")
     energies.plot(known.times, 1e3 * kinetic, color=blue)
     energies.axhline(1e3 * plateau, color=ink, ls=":", lw=1.2)
     energies.text(2.0, 1e3 * plateau - 3.5, f"reference {1e3 * plateau} mJ")
     energies.set_title("kinetic energy (mJ)", loc="left")
     for axes in (forces, energies):
-        axes.set_xlabel("time t (s)")
+        axes.set_xlabel("time (s)")
     for axes in (angles, slides, forces, energies):
         axes.axvspan(0.0, t_off, color="0.94", zorder=0)
         axes.set_xlim(0, 3)
@@ -231,8 +231,9 @@ figure.savefig(output / "slider_crank_known.png")
 
 # %%
 runs = ((driven, "motion given", orange), (controlled, "controlled", blue))
-with ub.picture((13, 10.5)) as figure:
-    (speeds, torques), (pushes, loops), (gone, balance) = figure.subplots(3, 2)
+with ub.picture((10, 7)) as press, ub.picture((10, 5)) as energies:
+    (speeds, torques), (pushes, loops) = press.subplots(2, 2)
+    gone, balance = energies.subplots(1, 2)
     for one, label, color in runs:
         T = -one.run.connector(one.motor).force
         style = {"color": color, "lw": 1.6, "label": label}
@@ -258,15 +259,16 @@ with ub.picture((13, 10.5)) as figure:
     )  # fmt: skip
     balance.plot(t, energy["controllers"], color=ink, label="supplied: motor")
     balance.set_title("where the energy is, controlled (J)")
-    balance.legend(loc="lower right", fontsize=10)
+    energies.legend(*balance.get_legend_handles_labels(), loc="outside lower center", ncols=3)
     for axes in (speeds, torques, pushes, gone, balance):
         axes.set_xlim(0, t[-1])
-        axes.set_xlabel("time t (s)")
+        axes.set_xlabel("time (s)")
     for axes in (speeds, torques, pushes, loops, gone, balance):
         axes.set_title(axes.get_title(), loc="left")
         axes.set_title("")
     speeds.legend(loc="lower right")
-figure.savefig(output / "slider_crank_press.png")
+press.savefig(output / "slider_crank_press.png")
+energies.savefig(output / "slider_crank_energy.png")
 turn = 2 * math.pi / speed
 shapes = ub.plot(controlled.run, "shapes", times=np.linspace(0.4, 0.4 + 0.5 * turn, 6))
 shapes.savefig(output / "slider_crank_shapes.png")

@@ -4,6 +4,7 @@
 What differs between the files as they are read in a repository and as pages of the site is here.
 """
 
+import logging
 import os
 import re
 import sys
@@ -22,6 +23,7 @@ import ufl_beam as ub
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))  # for "conf.read_demo"
 os.environ["TQDM_DISABLE"] = "1"  # progress bars would be text on pages
+logging.getLogger("traitlets").setLevel(logging.WARNING)  # of kernels of notebooks
 
 project = "ufl_beam"
 author = "The ufl_beam developers"
@@ -203,9 +205,24 @@ def parsable(app, what, name, obj, options, signature, returns):
     if signature:
         signature = signature.replace("<factory>", "...")
         signature = re.sub(
-            r"<function ([\w.]+)(?:\.<locals>[^>]*)? at 0x[0-9a-f]+>", r"\1", signature
+            r"<function ([\w.]+)(?:\.<locals>[^>]*)?(?: at 0x[0-9a-f]+)?>", r"\1", signature
         )
+        signature = without_checks(signature)
     return signature, returns
+
+
+def without_checks(signature):
+    """Replace each ``Annotated[type, check]`` in a signature by its type."""
+    while found := re.search(r"(~?typing\.)?Annotated\[", signature):
+        commas, depth, end = [], 1, found.end()
+        while depth:
+            depth += {"[": 1, "(": 1, "]": -1, ")": -1}.get(signature[end], 0)
+            if signature[end] == "," and depth == 1:
+                commas.append(end)
+            end += 1
+        kind = signature[found.end() : commas[0]]
+        signature = signature[: found.start()] + kind + signature[end:]
+    return signature
 
 
 class NamesAreLinks(SphinxTransform):

@@ -109,5 +109,5 @@ FACTOR = Parameter(
     "load factor {}",
     "a change of the load factor by {}",
     "load factor [-]",
-    "way along the path, root mean square of the nodes (m)",
+    "path length (m)",
 )

@@ -6,9 +6,10 @@ import statistics
 from itertools import groupby
 from pathlib import Path
 
-import matplotlib as mpl
 from claims import claims, front, unit
-from matplotlib import pyplot as plt
+
+import ufl_beam as ub
+from ufl_beam.plotting.style import BLUE, INK, RED
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "benchmarks" / "results" / "bench_peers.jsonl"
@@ -19,8 +20,7 @@ NAMES = {
     "P1": "Roll-up", "P2": "Flying beam", "P3": "Swing", "P4": "Portal", "P5": "Cantilever",
 }  # fmt: skip
 PROGRAMS = {"ufl_beam": "ufl_beam", "exudyn": "Exudyn", "opensees": "OpenSees", "c": "C loop"}
-COLOURS = {"ufl_beam": "#D55E00", "exudyn": "#0072B2", "opensees": "#222222"}
-"""Two of Okabe and Ito's palette and a black: apart for the colour-blind, and in print."""
+COLOURS = {"ufl_beam": RED, "exudyn": BLUE, "opensees": INK}
 STYLES = ("o-", "s--", "^:", "v-.", "D-", "P--")
 
 
@@ -107,29 +107,23 @@ def draw(records):
     settings = {
         name: sorted({r["label"] for r in drawn if r["program"] == name}) for name in COLOURS
     }
-    mpl.use("Agg")
-    figure, axes = plt.subplots(
-        1, len(problems), figsize=(4.6 * len(problems), 5.0), layout="constrained", squeeze=False
-    )
-    for ax, problem in zip(axes.flat, problems, strict=True):
+    with ub.picture((10.0, 4.3 * len(problems))) as figure:
+        panels = figure.subplots(len(problems), 1, squeeze=False).flat
+    for ax, problem in zip(panels, problems, strict=True):
         here = [r for r in drawn if r["problem"] == problem]
         curves = sorted({(r["program"], r["label"]) for r in here}, reverse=True)
         for program, label in curves:
             some = [r for r in here if (r["program"], r["label"]) == (program, label)]
             style, colour = STYLES[settings[program].index(label)], COLOURS[program]
             dots = [(statistics.median(r["wall"]), r["measures"]["error"]) for r in some]
-            ax.loglog(*zip(*dots, strict=True), style[0], color=colour, ms=3, alpha=0.3)
+            ax.loglog(*zip(*dots, strict=True), style[0], color=colour, ms=4, alpha=0.3)
             name = f"{PROGRAMS[program]}, {label}"
-            ax.loglog(*zip(*front(some), strict=True), style, color=colour, ms=5, label=name)
-        ax.set_title(NAMES[problem])
-        ax.set_xlabel("time of the loop (s)")
+            ax.loglog(*zip(*front(some), strict=True), style, color=colour, ms=6, label=name)
+        ax.set_title(NAMES[problem], loc="left")
+        ax.set(xlabel="time of the loop (s)", ylabel="error (m)")
         ax.grid(which="major", color="0.9")
-        ax.spines[["top", "right"]].set_visible(False)
-        ax.legend(frameon=False, fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.14))
-    axes[0, 0].set_ylabel("error (m)")
-    PICTURE.parent.mkdir(exist_ok=True)
-    figure.savefig(PICTURE, dpi=120)
-    plt.close(figure)
+        ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
+    figure.savefig(PICTURE)
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 from advice import TARGETS, advice, cheapest, overall
@@ -42,7 +43,7 @@ def save(study: dict[str, Any], docs: Path) -> None:
         "Each line has the fastest setting for an error, and the times of other schemes for the "
         'same error, relative to it; "as long" is within 15 %.',
         "",
-        *advice(cases),
+        *(fill(line, 155, subsequent_indent="  ") for line in advice(cases)),
         "",
         "Time of each scheme for an error, relative to the fastest scheme: the geometric mean over "
         "the scenes in which it reaches the error, and the number of these scenes:",

@@ -1,8 +1,9 @@
 # SPDX-License-Identifier: MIT
-"""Opens pages of the site in Chromium, as wide as on a desk and on a phone, and says what is wrong.
+"""Opens all pages of the site in Chromium as wide as on a phone, some also as on a desk.
 
-python3 look.py SITE FOLDER: pictures of the pages go to the folder.  Wrong are: errors in the
-console, pictures that are not there, pages wider than the window, a search that finds nothing.
+python3 look.py SITE FOLDER: prints the faults, saves pictures of some pages in the folder.  Faults
+are an error of the server or in the console, a picture that is missing, a page wider than the
+window, a printed memory address or markup, a search that finds nothing.
 """
 
 import functools
@@ -22,6 +23,7 @@ PAGES = {
     "demo_lee_frame": "demos/demo_lee_frame.html",
     "reference": "reference.html",
     "reference_page": "api/Softening.html",
+    "section": "api/Section.html",
     "theory": "theory.html",
     "start": "start.html",
     "notebook": "notebooks/first_steps.html",
@@ -33,6 +35,8 @@ WIDTHS = {"desk": (1280, 900), "phone": (390, 844)}
 
 BROKEN = "return [...document.images].filter(i => i.complete && !i.naturalWidth).map(i => i.src)"
 WIDTH = "return document.documentElement.scrollWidth"
+STATUS = "return performance.getEntriesByType('navigation')[0].responseStatus"
+MARKUP = r"return document.body.innerText.match(/\b0x[0-9a-f]{6,}|<function |<class '|:::/g) || []"
 FOUND = "return document.querySelectorAll('#search-results li').length"
 LOAD_ALL = "document.querySelectorAll('img').forEach(i => i.loading = 'eager')"
 LOADED = "return [...document.images].every(i => i.complete)"
@@ -55,8 +59,8 @@ def browser():
     return webdriver.Chrome(options=options, service=service)
 
 
-def look(driver, site, name, page, width, folder):
-    """Open a page, take its picture; what is wrong with it."""
+def look(driver, site, page, width, picture=None):
+    """Open a page, save its picture if a path is given; return its faults."""
     wide, high = WIDTHS[width]
     metrics = {"width": wide, "height": high, "deviceScaleFactor": 1, "mobile": width == "phone"}
     driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
@@ -65,7 +69,10 @@ def look(driver, site, name, page, width, folder):
     wait = WebDriverWait(driver, 20)
     wait.until(lambda driver: driver.execute_script(LOADED))
     wrong = [f"picture {source}" for source in driver.execute_script(BROKEN)]
-    if name == "search":
+    wrong += [f"text {found}" for found in driver.execute_script(MARKUP)]
+    if (status := driver.execute_script(STATUS)) != 200:
+        wrong.append(f"status {status}")
+    if page.startswith("search.html?"):
         try:
             wait.until(lambda driver: driver.execute_script(FOUND) > 3)
         except Exception:
@@ -73,27 +80,30 @@ def look(driver, site, name, page, width, folder):
     if (broad := driver.execute_script(WIDTH)) > wide:
         wrong.append(f"{broad} pixels wide, the window has {wide}")
     wrong += [f"console: {entry['message']}" for entry in driver.get_log("browser")]
-    driver.save_screenshot(str(folder / f"{name}_{width}.png"))
+    if picture:
+        driver.save_screenshot(str(picture))
     return [f"{page}, {width}: {what}" for what in wrong]
 
 
 def main():
     """Look at all pages."""
     root, folder = map(Path, sys.argv[1:])
+    all_pages = [str(page.relative_to(root)) for page in root.rglob("*.html")]
     handler = functools.partial(Quiet, directory=root)
     server = ThreadingHTTPServer(("127.0.0.1", 0), handler)
     threading.Thread(target=server.serve_forever, daemon=True).start()
     driver, site = browser(), f"http://127.0.0.1:{server.server_port}"
     try:
-        wrong = [
-            line
+        views = [(page, "phone", None) for page in sorted({*all_pages} - {*PAGES.values()})]
+        views += [
+            (page, width, folder / f"{name}_{width}.png")
             for name, page in PAGES.items()
             for width in WIDTHS
-            for line in look(driver, site, name, page, width, folder)
         ]
+        wrong = [line for view in views for line in look(driver, site, *view)]
     finally:
         driver.quit()
-    print(f"{len(PAGES) * len(WIDTHS)} views, {len(wrong)} faults", *wrong, sep="\n")
+    print(f"{len(views)} views of {len(all_pages)} pages, {len(wrong)} faults", *wrong, sep="\n")
     sys.exit(bool(wrong))
 
 

@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from pages import DOCS, blocks_of, shown_in
+from pages import DOCS, blocks_of, pictures_of, shown_in
 
 import ufl_beam as ub
 
@@ -44,8 +44,7 @@ def test_pictures_of_a_page_are_those_of_its_script(page):
     """A picture that a page shows is saved by its script under the same name."""
     scripts = "".join(blocks_of(page) + blocks_of(page, "py"))
     saved = re.findall(r'(?:savefig|SaveScreenshot)\("(\w+\.png)"', scripts)
-    shown = re.findall(r"\]\(pictures/(\w+\.png)\)", page.read_text(encoding="utf-8"))
-    assert set(shown) <= set(saved)
+    assert {*pictures_of(page)} <= {*saved}
 
 
 @pytest.mark.parametrize("reference", [False, True], ids=["compiled", "reference"])

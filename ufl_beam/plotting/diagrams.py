@@ -150,9 +150,10 @@ def draw_frame(
     sections = [beam.section for beam, _ in diagrams]
     stiffness = [{"N": s.EA, "V": s.GA, "M": s.EI / s.depth}[what] for s in sections]
     name, when = title
-    unit = f"({prefix}{RESULTANTS[what][1]}) " if diagrams else ""
+    unit = f"({prefix}{RESULTANTS[what][1]})".replace(" ", "\N{NO-BREAK SPACE}") if diagrams else ""
+    heading = " ".join(filter(None, (name, unit, when)))
     with style.panel(ax, MOST) as axes:
-        style.plane_axes(axes, f"{name} {unit}{when}")
+        style.plane_axes(axes, heading)
         draw_undeformed(axes, solution, shape.canvas)
         peaks: list[Peak] = []
         if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # more than rounding

@@ -22,6 +22,7 @@ from ufl_beam.parallel import active_comm
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.axis import Axis
     from matplotlib.figure import Figure
 
 # Okabe and Ito's palette, which colour-blind readers can distinguish.
@@ -90,7 +91,8 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 
     Only the first process saves it, as all processes run the same script.  The user's settings and
     styles of Matplotlib, such as ``plt.style.use("dark_background")``, have priority.  A notebook
-    cell that ends with the figure shows it.
+    cell that ends with the figure shows it.  Logarithmic axes get labels such as 1, 2, 5, 10, or
+    powers of ten, unless ticks are set.
 
     Args:
         size: Width and height; inch.
@@ -116,7 +118,32 @@ def picture(size: tuple[float, float]) -> Iterator[Figure]:
 def _save(figure: Figure, *args: Any, **options: Any) -> None:
     """Save a figure on the first process only, as all processes run the same script."""
     if active_comm().rank == 0:
+        for axes in figure.axes:
+            for axis in (axes.xaxis, axes.yaxis):
+                if axis.get_scale() == "log" and axis.isDefault_majloc:
+                    _label_logarithmic(axis)
         type(figure).savefig(figure, *args, **options)
+
+
+def _label_logarithmic(axis: Axis) -> None:
+    """Label powers of ten; if fewer than three are in view, also 2 and 5, else equal steps."""
+    from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
+
+    low, high = sorted(axis.get_view_interval())
+    equal = MaxNLocator(5, steps=[1, 2, 5, 10])
+    for locator, least in ((LogLocator(), 3), (LogLocator(subs=(1.0, 2.0, 5.0)), 2), (equal, 0)):
+        if sum(low <= tick <= high for tick in locator.tick_values(low, high)) >= least:
+            break
+    axis.set_major_locator(locator)
+    axis.set_major_formatter("{x:g}" if low > 5e-5 and high < 2e5 else _power_of_ten)
+    axis.set_minor_formatter(NullFormatter())
+
+
+def _power_of_ten(value: float, _: float) -> str:
+    """Write a number as a multiple of a power of ten."""
+    factor, power = f"{value:.3e}".split("e")
+    before = f"{float(factor):g}\\cdot" if float(factor) != 1.0 else ""
+    return f"${before}10^{{{int(power)}}}$"
 
 
 def png(figure: Figure) -> tuple[bytes, dict[str, int]]:

@@ -109,3 +109,33 @@ def test_settings_of_matplotlib_are_used_and_not_changed(damaged):
     assert not same_color(figure.axes[0].spines["left"].get_edgecolor(), "red")
     assert same_color(figure.axes[0].lines[-1].get_color(), BLUE)
     assert mpl.rcParams["font.size"] == mpl.rcParamsDefault["font.size"]  # left as they were
+
+
+def labels_of(axis):
+    """Labels of major and minor ticks in view."""
+    low, high = axis.get_view_interval()
+    minor = axis.get_minor_formatter().format_ticks(axis.get_minorticklocs())
+    assert not any(minor)
+    at = [tick for tick in axis.get_majorticklocs() if low <= tick <= high]
+    return axis.get_major_formatter().format_ticks(at)
+
+
+@pytest.mark.parametrize(
+    ("limits", "labels"),
+    [
+        ((1e-3, 10.0), ["0.001", "0.01", "0.1", "1", "10"]),
+        ((0.3, 3.0), ["0.5", "1", "2"]),
+        ((0.026, 0.056), ["0.03", "0.035", "0.04", "0.045", "0.05", "0.055"]),
+        ((9e-6, 1.1), [f"$10^{{{power}}}$" for power in range(-5, 1)]),
+        ((9e-7, 9e-6), [r"$10^{-6}$", r"$2\cdot10^{-6}$", r"$5\cdot10^{-6}$"]),
+    ],
+)
+def test_labels_of_logarithmic_axes(tmp_path, limits, labels):
+    """They are few and readable; ticks that the user sets stay."""
+    with ub.picture((6, 4)) as figure:
+        axes = figure.subplots()
+        axes.set(xscale="log", yscale="log", xlim=limits, ylim=(1, 100))
+        axes.set_yticks([3, 30], ["three", "thirty"])
+    figure.savefig(tmp_path / "log.png")
+    assert labels_of(axes.xaxis) == labels
+    assert [text.get_text() for text in axes.get_yticklabels()] == ["three", "thirty"]

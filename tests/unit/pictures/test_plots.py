@@ -84,7 +84,7 @@ def test_extreme_values_are_those_of_the_solution(portal, what):
     assert bold == expected
     assert set(texts(figure)) <= {number(x / factor) for x in values}
     title = figure.axes[0].get_title(loc="left")
-    assert f" {what} ({prefix}{UNIT[what]}) at t = 1 s" in title
+    assert f" {what} ({prefix}{UNIT[what]}) at t = 1 s" in title.replace("\N{NO-BREAK SPACE}", " ")
 
 
 @pytest.mark.parametrize("what", ["N", "V", "M"])
