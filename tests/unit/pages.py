@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Scripts of the pages in docs/; as a program, this module draws the pictures of the pages again."""
+"""Scripts of the pages in docs/; as a program, this module draws their pictures again."""
 
 import os
 import re

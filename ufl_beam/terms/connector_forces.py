@@ -218,9 +218,8 @@ class Couplings(Links):
             accept.insert(0, callbacks.phase(accept_user_laws))
         if response.opens:
             wanted, laws = ("points", "slips", "rubs", "way_before"), response.in_c
-            data = {
-                **laws, "slips": laws.get("rigid_plastic"), "rubs": laws.get("friction"), **law_fields
-            }  # fmt: skip
+            data = {**laws, "slips": laws.get("rigid_plastic"), "rubs": laws.get("friction")}
+            data |= law_fields
             opens = {name: data[name] for name in wanted if data.get(name) is not None}
             if "way_before" in opens:
                 opens["way_before"] = integers(opens["way_before"])
