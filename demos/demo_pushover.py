@@ -119,8 +119,8 @@ INK, BLUE, ORANGE, GREY = "#222222", "#0072B2", "#D55E00", "#999999"
 moments = ListedColormap(colormaps["Oranges"](np.linspace(0.0, 0.75, 256)))
 circle = {"marker": "o", "ls": "", "ms": 12, "mec": ORANGE, "mew": 1.8, "zorder": 4}
 offsets = [(13, -1), (13, -1), (13, -19), (-13, -19), (13, -19), (-13, -19)]  # of texts; points
-columns = [0.0, 8.8, 17.2]  # places of the three states; m
-titles = ["A: largest push, {} kN", "B: hinges soften, {} kN", "C: joints, {} kN"]
+columns = [0.0, 9.2, 18.0]  # places of the three states; m
+titles = ["A: {} kN, largest", "B: {} kN, softening", "C: {} kN, joints"]
 
 
 def draw_state(axes, n, x0):
@@ -145,8 +145,8 @@ def draw_state(axes, n, x0):
         axes.annotate("", head, tail, arrowprops={"color": BLUE, "lw": 2.5, **style})
 
 
-with ub.picture((14, 4.8)) as figure:
-    shapes, curve = figure.subplots(1, 2, width_ratios=(2.2, 1))
+with ub.picture((11.5, 4.2)) as figure:
+    shapes, curve = figure.subplots(1, 2, width_ratios=(2.3, 1))
     shapes.set_aspect("equal")
     shapes.axis("off")
     for title, n, x0 in zip(titles, states_shown, columns, strict=True):
@@ -158,12 +158,12 @@ with ub.picture((14, 4.8)) as figure:
         shapes.plot([], [], mfc=moments(share), label=text, **circle)
     shapes.legend(loc="lower left", bbox_to_anchor=(0.03, 0.96), ncols=3, handletextpad=0.1)
     curve.axhline(0, color=GREY, lw=0.8)
-    curve.plot(sway, push_of_mechanism(sway), "--", color=GREY, label="rigid members, closed form")
+    curve.plot(sway, push_of_mechanism(sway), "--", color=GREY, label="plastic theory")
     curve.plot(sway, P, color=BLUE, lw=3, label="computed")
     for letter, n in zip("ABC", states_shown, strict=True):
         curve.plot(sway[n], P[n], "o", ms=10, color=INK, zorder=3)
         curve.annotate(letter, (sway[n], P[n]), (8, 8), textcoords="offset points", fontsize=15)
-    curve.set(xlabel="sway of the roof (m)", ylabel="push (kN)", xlim=(0, 3.9), ylim=(-65, 150))
+    curve.set(xlabel="sway of the roof (m)", ylabel="push (kN)", xlim=(0, 4.1), ylim=(-65, 150))
     curve.legend(loc="upper right")
 figure.savefig(output / "pushover.png")
 ub.print_once("\npicture:", output / "pushover.png")
