@@ -200,10 +200,10 @@ class Grid:
     def sections(self) -> tuple[list[Any], Index]:
         """Sections of the beams, each object once, and the number of each beam's section."""
         indices: dict[int, int] = {}
-        section_numbers = [
+        section_indices = [
             indices.setdefault(id(b.section), len(indices)) for b in self.scene.beams
         ]
-        beam_sections = np.array(section_numbers, dtype=np.int32)
+        beam_sections = np.array(section_indices, dtype=np.int32)
         firsts = np.unique(beam_sections, return_index=True)[1]
         return [self.scene.beams[i].section for i in firsts], beam_sections
 

@@ -74,10 +74,10 @@ class Share:
         hinge_dofs, hinge_cells = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
         np.minimum.at(owner, hinge_dofs, cell_ranks[hinge_cells][:, None])
         link_dofs = grid.dofs_of_links
-        link_ranks = owner[link_dofs].min(axis=1, initial=comm.size) % comm.size
-        np.minimum.at(owner, link_dofs, link_ranks[:, None])
+        connector_ranks = owner[link_dofs].min(axis=1, initial=comm.size) % comm.size
+        np.minimum.at(owner, link_dofs, connector_ranks[:, None])
         owner[owner == comm.size] = 0  # bodies without attachments
-        self.links = np.flatnonzero(link_ranks == comm.rank)
+        self.links = np.flatnonzero(connector_ranks == comm.rank)
         order = np.argsort(owner, kind="stable")
         number = np.empty(grid.size, dtype=np.int32)  # of PETSc
         number[order] = np.arange(grid.size, dtype=np.int32)

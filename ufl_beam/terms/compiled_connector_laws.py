@@ -375,7 +375,7 @@ class UserLaws(Response):
         """Return the derivatives of the slopes."""
         return np.array([law.bend(e1[i]) for i, law in enumerate(self._each)])
 
-    def take(self, e1: Array) -> None:
+    def accept_end(self, e1: Array) -> None:
         """Accept the internal variables after a step to the motions, and enter stored energies."""
         states = [law.end(float(x))[1] for law, x in zip(self._each, e1, strict=True)]
         before = float(self._stored[0])

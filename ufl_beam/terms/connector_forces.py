@@ -213,7 +213,7 @@ class Couplings(Links):
             def accept_user_laws(step: Any, q1: Any, s: Any) -> None:
                 """Let laws of a user accept the end of a step, before all other terms."""
                 lib.find_motions(self._in_c, q1)
-                response.take(self._now)
+                response.accept_end(self._now)
 
             accept.insert(0, callbacks.phase(accept_user_laws))
         if response.opens:

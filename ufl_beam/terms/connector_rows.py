@@ -78,7 +78,7 @@ class Response:
         must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
             accepted.
         opens: True if connectors yield beyond a limit.
-        asks_at_ends: True if :meth:`take` must be called when a step is accepted.
+        asks_at_ends: True if :meth:`accept_end` must be called when a step is accepted.
         motion: Motions of the accepted state in solutions, (num_links,); None if they are the
             motions of the nodes.
         way: Direction of plastic slip in the latest iterate, 1 or -1; 0 without slip.
@@ -145,7 +145,7 @@ class Response:
             rate, v = couplings.motion_rate, couplings.forms.u
             fill(self.in_c["friction"], rate=rate.cells, at_v=rate.position(v))
 
-    def take(self, e1: Array) -> None:
+    def accept_end(self, e1: Array) -> None:
         """Accept the end of a step at the motions ``e1``, before C does; this may raise."""
 
     def dissipation(self, e1: Array, λ: Array) -> float:

@@ -64,7 +64,7 @@ class Acting:
         """Return ``user_work`` of loops.h, with entries of the ledger."""
         work, q0, functions = self._work, self._fields.element.q0, self._forms.numbers.values()
         kernels = [self.residual, self.tangent, self._energy, self._lost]
-        forms = [one for one in kernels if one is not None]
+        forms = [kernel for kernel in kernels if kernel is not None]
         at = [_position(form, function) for form in forms for function in functions]
         values = [x if callable(x) else Constant(x) for x in work.numbers.values()]
         pointers: dict[str, Any] = {}
@@ -78,12 +78,12 @@ class Acting:
             _, pointers["lost"] = entering(self._lost, ledger.lost.pointer("numerical"))
         return struct(
             "user_work", residual=self.residual.cells, forms=len(forms), numbers=len(functions),
-            form=ffi.new("form_of_step[]", [(one.cells, _position(one, q0)) for one in forms]),
+            form=ffi.new("form_of_step[]", [(form.cells, _position(form, q0)) for form in forms]),
             at=np.array(at, dtype=np.int32), number=self._values, before=self._before,
             of_time=callbacks.time_functions([(value, work) for value in values]), **pointers,
         )  # fmt: skip
 
-    def take(self, q: Array, past: Memory | None) -> Array:
+    def initial_forces(self, q: Array, past: Memory | None) -> Array:
         """Return the forces at ``q`` or in ``past``, and keep them for the next step."""
         force = np.zeros(len(q))
         self.residual.add(q, force)
@@ -187,7 +187,7 @@ class Works(LoadTerm):
         step = struct("time_step", q0=before, dt=dt, **times)
         lib.begin_works(self._c, step, ffi.NULL, ffi.NULL)
         self._callbacks.settle()
-        self._force[:] = sum(work.take(q, past) for work in self._works)
+        self._force[:] = sum(work.initial_forces(q, past) for work in self._works)
         return self._force.copy()
 
     def pass_on(self, memory: Memory) -> None:
