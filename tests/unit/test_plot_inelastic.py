@@ -165,7 +165,7 @@ def test_damage_marks_hinges_by_the_broken_part(bent, arm):
     (hinge,) = open_hinges(bent, -1, bent.grid.points)
     assert hinge.beam is arm
     np.testing.assert_array_equal(hinge.at, (0, 0))
-    assert hinge.part == bent.material_at(arm.start).hinge[-1] / FRACTURE
+    assert hinge.fraction == bent.material_at(arm.start).hinge[-1] / FRACTURE
 
 
 def test_no_marks_before_anything_happens(bent):

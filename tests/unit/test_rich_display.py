@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.display import html_of
+from ufl_beam.display import html_page
 from ufl_beam.plotting import plots
 
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
@@ -144,7 +144,7 @@ def test_errors_of_pictures_leave_the_text(solution, monkeypatch):
 
 
 def test_other_objects_are_shown_by_their_text():
-    assert html_of("<b>") == "<pre>&lt;b&gt;</pre>"
+    assert html_page("<b>") == "<pre>&lt;b&gt;</pre>"
 
 
 @pytest.mark.serial
