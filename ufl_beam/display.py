@@ -30,8 +30,8 @@ class _Short(reprlib.Repr):
         if isinstance(x, FunctionType):
             return x.__name__
         if type(x).__name__ == "ndarray":
-            one_row = x.ndim == 1 and x.size <= FEW
-            return self.repr_list([*x], level) if one_row else f"array of shape {x.shape}"
+            short = x.ndim == 1 and x.size <= FEW
+            return self.repr_list([*x], level) if short else f"array of shape {x.shape}"
         return super().repr1(x, level)
 
 
@@ -39,7 +39,7 @@ _SHORT = _Short()
 _SHORT.maxother = _SHORT.maxstring = 120
 
 
-def one_line(record: Any) -> str:
+def compact_repr(record: Any) -> str:
     """Write a record, ``Mesh(refine=2)``, without fields that have their default or are empty."""
     fields = []
     for name, parameter in signature(type(record)).parameters.items():
@@ -50,8 +50,8 @@ def one_line(record: Any) -> str:
 
 
 def in_one_line(kind: type[T]) -> type[T]:
-    """Give instances of a class, such as a named tuple, the text of :func:`one_line`."""
-    kind.__repr__ = one_line  # type: ignore[method-assign]
+    """Give instances of a class, such as a named tuple, the text of :func:`compact_repr`."""
+    kind.__repr__ = compact_repr  # type: ignore[method-assign]
     return kind
 
 
@@ -62,14 +62,14 @@ def bracketed(named: Any) -> str:
 
 def counted(*things: tuple[int, str, str]) -> str:
     """Write numbers of things, without zeros: ``1 beam, 8 cells``."""
-    return ", ".join(f"{n} {one if n == 1 else many}" for n, one, many in things if n)
+    return ", ".join(f"{n} {singular if n == 1 else plural}" for n, singular, plural in things if n)
 
 
 # -- notebooks -----------------------------------------------------------------------------------
 
 
 @singledispatch
-def html_of(shown: object) -> str:
+def html_page(shown: object) -> str:
     """Write an object as HTML: its text by default; a class may register another function."""
     return f"<pre>{html.escape(str(shown))}</pre>"
 
@@ -78,7 +78,7 @@ class Rich:
     """Base of models and results that a notebook shows as tables and a picture."""
 
     def _repr_html_(self) -> str:
-        return html_of(self)
+        return html_page(self)
 
 
 # -- the parameter of a solution -----------------------------------------------------------------

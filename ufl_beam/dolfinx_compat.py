@@ -37,13 +37,13 @@ except ImportError as error:  # pragma: no cover - depends on the machine
         f"ufl_beam needs DOLFINx 0.9 or newer with PETSc, which is not on PyPI ({error}). {WAYS}"
     ) from error
 
-VERSION = tuple(int(part) for part in dolfinx.__version__.split(".")[:2])
+VERSION = tuple(int(number) for number in dolfinx.__version__.split(".")[:2])
 VERSIONS = f"DOLFINx {dolfinx.__version__} and FFCx {ffcx.__version__}"
 if VERSION < (0, 9):
     raise ImportError(f"ufl_beam needs DOLFINx 0.9 or newer, this is {dolfinx.__version__}. {WAYS}")
 if np.dtype(PETSc.ScalarType) != np.float64:
     raise ImportError(
-        "ufl_beam needs PETSc with real numbers of double precision; those of this PETSc are "
+        "ufl_beam needs PETSc with real numbers of double precision; this PETSc has "
         f"{np.dtype(PETSc.ScalarType)}. Debian: python3-dolfinx-real; conda: petsc=*=real*"
     )
 

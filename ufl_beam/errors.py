@@ -24,7 +24,7 @@ LONGEST = 80
 BYTES_PER_CELL = 400
 """Least memory of a cell on each process, for its vertices and the numbering of its unknowns."""
 
-MEMORY = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+RAM = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
 """Memory of this machine; B."""
 
 PACKAGE = os.path.join(os.path.dirname(__file__), "")
@@ -303,7 +303,7 @@ def closed(instead: str) -> Callable[[type[T]], type[T]]:
         def refuse(cls: type, **_: object) -> None:
             raise ModelError(
                 f"{cls.__name__}: {kind.__name__} has no subclasses, because computations would "
-                f"ignore what is theirs; {instead}"
+                f"ignore their methods and fields; {instead}"
             )
 
         kind.__init_subclass__ = classmethod(refuse)  # type: ignore[assignment, method-assign, arg-type]
@@ -329,22 +329,22 @@ def require_switch(value: Any, what: str) -> None:
         raise ArgumentTypeError(f"{what} = {shorten(value)} must be True or False")
 
 
-def require_function(value: Any, what: str, of: str) -> None:
+def require_function(value: Any, what: str, arguments: str) -> None:
     """Raise :class:`ArgumentError` naming ``what`` unless ``value`` is a function."""
     if not callable(value):
-        raise ArgumentTypeError(f"{what} = {shorten(value)} must be a function of {of}")
+        raise ArgumentTypeError(f"{what} = {shorten(value)} must be a function of {arguments}")
 
 
-def require_memory(cells: int, what: str) -> None:
+def require_capacity(cells: int, what: str) -> None:
     """Raise :class:`ArgumentError` naming ``what`` if memory or indices are too small for cells.
 
     Each process stores the numbering of the whole scene.
     """
     needed = cells * BYTES_PER_CELL
-    if needed > MEMORY:
+    if needed > RAM:
         raise ArgumentError(
             f"{what} would take {needed / 1e9:.3g} GB of memory; this machine has "
-            f"{MEMORY / 1e9:.3g} GB. Take fewer cells"
+            f"{RAM / 1e9:.3g} GB. Take fewer cells"
         )
     if 3 * cells >= 2**31:
         raise ArgumentError(

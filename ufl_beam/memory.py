@@ -19,9 +19,9 @@ import numpy as np
 
 T = TypeVar("T", bound=tuple[Any, ...])
 P = ParamSpec("P")
-Stated = TypeVar("Stated")
+Cached = TypeVar("Cached")
 
-KEPT = 64
+MOST_CACHED = 64
 """Results that are kept of each function."""
 
 LARGEST = 2**16
@@ -31,9 +31,9 @@ That are some 500 cells, of which a hundred steps take longer than all of the bu
 """
 
 
-def stated(function: Callable[P, Stated]) -> Callable[P, Stated]:
+def stated(function: Callable[P, Cached]) -> Callable[P, Cached]:
     """Call a function that states forms once in a process with the same arguments."""
-    return cast("Callable[P, Stated]", lru_cache(maxsize=128)(function))
+    return cast("Callable[P, Cached]", lru_cache(maxsize=128)(function))
 
 
 def of_structure(function: Callable[..., T]) -> Callable[..., T]:
@@ -44,11 +44,11 @@ def of_structure(function: Callable[..., T]) -> Callable[..., T]:
     """
 
     def locked(result: T) -> T:
-        for one in result:
-            one.flags.writeable = False
+        for x in result:
+            x.flags.writeable = False
         return result
 
-    @lru_cache(maxsize=KEPT)
+    @lru_cache(maxsize=MOST_CACHED)
     def kept(*keys: Any) -> T:
         # Of an array the type, the shape and the bytes, which have a hash
         arguments = (
@@ -59,12 +59,12 @@ def of_structure(function: Callable[..., T]) -> Callable[..., T]:
 
     @wraps(function)
     def call(*arguments: Any) -> T:
-        sizes = (one.nbytes if isinstance(one, np.ndarray) else one for one in arguments)
+        sizes = (x.nbytes if isinstance(x, np.ndarray) else x for x in arguments)
         if sum(sizes) > LARGEST:
             return locked(function(*arguments))
         keys = (
-            (one.dtype.str, one.shape, one.tobytes()) if isinstance(one, np.ndarray) else one
-            for one in arguments
+            (x.dtype.str, x.shape, x.tobytes()) if isinstance(x, np.ndarray) else x
+            for x in arguments
         )
         return kept(*keys)
 

@@ -86,8 +86,8 @@ def duplicate(comm: MPI.Intracomm) -> MPI.Intracomm:
     if known is None:
         known = comm.Dup()
         comm.Set_attr(_DUPLICATE, known)
-    found: MPI.Intracomm = known
-    return found
+    copy: MPI.Intracomm = known
+    return copy
 
 
 # -- exceptions that all processes raise -----------------------------------------------------------
@@ -283,7 +283,7 @@ times as fast at 6 000; see benchmarks/README.md.
 INTERVAL = 256
 """Largest number of steps between comparisons."""
 
-PATIENCE = 20.0
+LONGEST_WAIT = 20.0
 """Time for which a process waits for the other processes before it warns; s."""
 
 _left: list[tuple[MPI.Request, Array]] = []
@@ -317,7 +317,7 @@ class Copies:
         self._weights: Array = share.grid.scales[share.dofs] * random
         self._sum = self._size = self._times = 0.0
         self._steps, self._compared = 0, 0
-        _left[:] = [one for one in _left if not one[0].Test()]
+        _left[:] = [pair for pair in _left if not pair[0].Test()]
 
     def note(self, t: float, q: Array) -> None:
         """Add the state after a step to the comparison; raise if an earlier comparison failed."""
@@ -342,7 +342,7 @@ class Copies:
         if self._open:
             before, self._open = self._pending, False
             self._post(failed=1.0)
-            _left.extend(one for one in (before, self._pending) if one is not None)
+            _left.extend(pair for pair in (before, self._pending) if pair is not None)
             self._pending = None
 
     def _post(self, failed: float = 0.0) -> None:
@@ -357,7 +357,7 @@ class Copies:
         if self._pending is None:
             return
         (request, ends), self._pending = self._pending, None
-        end = time.monotonic() + PATIENCE
+        end = time.monotonic() + LONGEST_WAIT
         while not request.Test():
             time.sleep(0.0)  # another process may need this core
             if time.monotonic() > end:
@@ -365,7 +365,7 @@ class Copies:
                 warn(
                     f"process {self._comm.rank} of {self._comm.size} waits for the others to "
                     "compute the same scene. Let all processes run it, or pass comm=MPI.COMM_SELF "
-                    "where one alone does"
+                    "where one process runs it alone"
                 )
         apart, (size, failed) = ends[:3] + ends[3:6], ends[6:]
         allowed = TOLERANCE * np.array([size, abs(ends[1]) + abs(ends[4]), 0.0])
@@ -373,7 +373,7 @@ class Copies:
             self._open = False
             what = "find different motions"
             if failed:
-                what = "go on differently: one of them has failed"
+                what = "continue differently: one of them has failed"
             raise CopiesDiffer(
                 f"the {self._comm.size} processes, each of which computes this small scene, "
                 f"{what}, seen by process {self._comm.rank} after {self._steps} steps. Something "

@@ -272,7 +272,7 @@ WRONG = {
     ),
     "results": ("study", changed("results/row", lambda x: x[:-1]), "'row' is float64 of shape"),
     "seconds of members": ("study", changed("seconds", lambda x: x[0]), "'seconds' is float64"),
-    "errors": ("study", changed("errors", lambda x: x[1:]), "has not one 'errors' for each"),
+    "errors": ("study", changed("errors", lambda x: x[1:]), "'errors' lacks an entry"),
     "cases": ("study", changed("cases", lambda x: ["{"] * 3), "JSONDecodeError"),
     "no member": ("study", lambda content: content.pop("member"), "KeyError('member')"),
     "state": ("checkpoint", changed("state/q", lambda q: q[1:]), "'q' of the state is of shape"),

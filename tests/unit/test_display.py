@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 import ufl_beam as ub
-from ufl_beam.display import counted, html_of, one_line
+from ufl_beam.display import compact_repr, counted, html_page
 from ufl_beam.model.supports import still
 from ufl_beam.plotting import plots
 
@@ -38,26 +38,26 @@ class Pair(NamedTuple):
 
 
 def test_empty_fields_and_default_values_are_left_out():
-    assert one_line(Pair(2)) == "Pair(first=2)"
-    assert one_line(Pair({}, 2)) == "Pair(second=2)"
+    assert compact_repr(Pair(2)) == "Pair(first=2)"
+    assert compact_repr(Pair({}, 2)) == "Pair(second=2)"
     assert repr(ub.Newton()) == "Newton()"
     assert repr(ub.Newton(rtol=1e-8)) == "Newton(rtol=1e-08)"
 
 
 def test_numbers_have_six_digits():
-    assert one_line(Pair(math.pi, np.float64(1) / 3)) == "Pair(first=3.14159, second=0.333333)"
-    assert one_line(Pair((0.1 + 0.2, 1))) == "Pair(first=(0.3, 1))"
+    assert compact_repr(Pair(math.pi, np.float64(1) / 3)) == "Pair(first=3.14159, second=0.333333)"
+    assert compact_repr(Pair((0.1 + 0.2, 1))) == "Pair(first=(0.3, 1))"
     assert repr(ub.Mesh(refine=Fraction(3, 2))) == "Mesh(refine=3/2)"
 
 
 def test_functions_have_their_names():
-    assert one_line(Pair(still)) == "Pair(first=still)"
+    assert compact_repr(Pair(still)) == "Pair(first=still)"
 
 
 def test_long_arrays_have_their_shapes():
-    assert one_line(Pair(np.arange(3.0))) == "Pair(first=[0, 1, 2])"
-    assert one_line(Pair(np.zeros((9, 3)))) == "Pair(first=array of shape (9, 3))"
-    assert one_line(Pair([*range(9)])) == "Pair(first=[0, 1, 2, 3, 4, 5, ...])"
+    assert compact_repr(Pair(np.arange(3.0))) == "Pair(first=[0, 1, 2])"
+    assert compact_repr(Pair(np.zeros((9, 3)))) == "Pair(first=array of shape (9, 3))"
+    assert compact_repr(Pair([*range(9)])) == "Pair(first=[0, 1, 2, 3, 4, 5, ...])"
 
 
 def test_parts_of_a_scene_are_counted():
@@ -194,7 +194,7 @@ def test_errors_of_pictures_leave_the_text(solution, monkeypatch):
 
 
 def test_other_objects_are_shown_by_their_text():
-    assert html_of("<b>") == "<pre>&lt;b&gt;</pre>"
+    assert html_page("<b>") == "<pre>&lt;b&gt;</pre>"
 
 
 @pytest.mark.serial

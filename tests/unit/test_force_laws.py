@@ -283,12 +283,12 @@ def test_the_reference_path():
 @pytest.mark.parametrize(
     ("make", "says"),
     [
-        (lambda: ub.ForceLaw(lambda x, v, z: x), "force has a parameter 'z', which nobody knows"),
+        (lambda: ub.ForceLaw(lambda x, v, z: x), "force has a parameter 'z', which is unknown"),
         (
             lambda: ub.ForceLaw(lambda x, v, state: x),
-            "parameter 'state', which nobody knows; there are t, dt, with ForceLaw(..., state=",
+            "parameter 'state', which is unknown; there are t, dt, with ForceLaw(..., state=",
         ),
-        (lambda: ub.ForceLaw(lambda x, v: x, [0.0]), "the function does not ask for the state"),
+        (lambda: ub.ForceLaw(lambda x, v: x, [0.0]), "the function has no parameter for the state"),
         (lambda: ub.ForceLaw(lambda x, v: x, 3.0), "ForceLaw: state has shape ()"),
         (lambda: ub.ForceLaw(lambda x, v: x, ["a"]), "ForceLaw: state = ['a'] must be numbers"),
         (lambda: ub.ForceLaw(lambda x, v: x, stored=3), "ForceLaw: stored = 3 must be a function"),

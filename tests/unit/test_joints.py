@@ -132,7 +132,7 @@ def test_redundant_loops_are_refused_by_name():
     with pytest.raises(ub.ArgumentError) as refused:
         ub.Simulation(parallelogram(3), ub.EnergyMomentum())
     message = str(refused.value)
-    assert "constraints repeat or contradict each other: 1 of those of" in message
+    assert "constraints repeat or contradict each other: 1 of the constraints of" in message
     for x in range(3):
         assert f"Revolute(ground ({x}, 0), crank {x} ({x}, 0))" in message
         assert f"Revolute(crank {x} ({x}, 1), coupler ({x}, 1))" in message

@@ -245,7 +245,7 @@ def test_the_same_joint_twice():
     a, b = beam(name="a"), beam((1, 0), (2, 0), name="b")
     joint = ub.Revolute(a.end, b.start)
     for second in (joint, ub.Revolute(a.end, b.start), ub.Revolute(b.start, a.end)):
-        with raises("Scene: Revolute(", "is there twice, as joints[0] and joints[1]; remove one"):
+        with raises("Scene: Revolute(", "occurs twice, as joints[0] and joints[1]; remove one"):
             ub.Scene([a, b], joints=[joint, second])
 
 
@@ -262,7 +262,7 @@ def test_the_same_joint_twice():
 def test_the_same_record_twice(part, make):
     one = beam()
     record = make(one)
-    with raises("is there twice", f"{part}[0] and {part}[2]"):
+    with raises("occurs twice", f"{part}[0] and {part}[2]"):
         ub.Scene([one], **{part: [record, make(one), record]})
     ub.Scene([one], **{part: [record, make(one)]})
 

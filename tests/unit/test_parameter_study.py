@@ -317,8 +317,8 @@ def test_wrong_calls_are_refused(member, cases, says):
         ({"u": "1"}, ("returned u = '1', which is no number",)),
         ({"u": [[1], [1, 2]]}, ("returned u = [[1], [1, 2]]",)),
         ({"u": 1j}, ("returned u = 1j",)),
-        ({1: 1.0}, ("returned 1, which is no name",)),
-        ({"a/b": 1.0}, ("returned 'a/b', which is no name",)),
+        ({1: 1.0}, ("returned 1, which names no result",)),
+        ({"a/b": 1.0}, ("returned 'a/b', which names no result",)),
     ],
 )
 def test_what_members_return(returned, says):

@@ -568,4 +568,4 @@ def test_a_leap_is_no_critical_point(leap):
     found, reached = path._locate(before, path._seek(1.0), 1.0)
     assert reached == pytest.approx(0.4, abs=2e-7)
     assert found.passed(before) == (leap == 0)
-    assert leap == 0 or path._part == (1.0 - reached) / 2
+    assert leap == 0 or path._fraction == (1.0 - reached) / 2

@@ -260,7 +260,7 @@ class Renamed(Dashpot):
         (Shadowing(1.0), "Shadowing: a field cannot have the name C or numbers"),
         (Renamed(1.0), "Renamed.numbers has the name C"),
         (Half(), "Half has neither increments nor residuals"),
-        (Misspelt(), "Misspelt.increments: what it returns lacks p and has q"),
+        (Misspelt(), "Misspelt.increments: the returned dict lacks p and has q"),
         (Unknown(), "Unknown.increments fails .* no internal variable 'plastic'; .*: p"),
         (Short(), r"Short.residuals returns .* must return a dict with the names p"),
         (Both(), "Both has both increments and residuals"),

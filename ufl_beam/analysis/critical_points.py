@@ -18,7 +18,7 @@ from scipy.sparse import block_array, coo_array, csr_array, diags_array
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Share
-from ufl_beam.display import bracketed, one_line
+from ufl_beam.display import bracketed, compact_repr
 from ufl_beam.errors import ArgumentError, StepFailed
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.stepper import Trial
@@ -49,7 +49,7 @@ class Branch:
     state: Solution
     mode: Array
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import one_line
+from ufl_beam.display import compact_repr
 from ufl_beam.errors import ArgumentError, require_array, require_number, require_row
 
 
@@ -38,7 +38,7 @@ class Envelope:
     rate_95: float
     rms: float
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     def __str__(self) -> str:
         return (

@@ -142,7 +142,7 @@ class Study(Rich):
             for name, values in results.items():
                 require_arrays(results, {name: (len(cases), *values.shape[1:])})
             if len(content["errors"]) != len(cases):
-                raise ArgumentError("the file is damaged: 'errors' has not an entry for each case")
+                raise ArgumentError("the file is damaged: 'errors' lacks an entry for a case")
             made = tuple(map(json.loads, cases))
             return cls(str(content["member"]), made, results, failed, content["seconds"])
 

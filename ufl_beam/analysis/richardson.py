@@ -16,7 +16,7 @@ import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import one_line
+from ufl_beam.display import compact_repr
 
 # Roache's safety factors on the error of the finest level: for an observed order that agrees with
 # theory, and for an order that does not or is unknown because there are only two levels.
@@ -44,7 +44,7 @@ class Convergence:
     lacks: Array  # limit minus value of each level and of the limit (zero); (levels + 1, ...)
     error_bound: float  # bound of the error of the limit; unit of the quantity
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     @classmethod
     def estimate(cls, values: Sequence[Array], coarsest: int, method: float) -> Convergence:
@@ -114,7 +114,7 @@ class SelfConvergence:
     limit: Array  # extrapolated value
     uncertainty: float  # of the limit; unit of the quantity
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     @classmethod
     def extrapolate(cls, value: Array, cells: Convergence, steps: Convergence) -> SelfConvergence:

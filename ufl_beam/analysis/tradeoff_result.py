@@ -13,7 +13,7 @@ import numpy as np
 
 from ufl_beam.analysis.richardson import SelfConvergence, pareto, size
 from ufl_beam.arrays import Array
-from ufl_beam.display import Rich, bracketed, one_line
+from ufl_beam.display import Rich, bracketed, compact_repr
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.beams import Mesh
 from ufl_beam.solvers.newton_options import Newton
@@ -49,8 +49,9 @@ class Setting:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def __str__(self) -> str:
-        step = f"dt={self.dt:.4g}" if isinstance(self.dt, float | int) else one_line(self.dt)
-        return ", ".join([one_line(self.scheme), step, one_line(self.mesh), one_line(self.newton)])
+        step = f"dt={self.dt:.4g}" if isinstance(self.dt, float | int) else compact_repr(self.dt)
+        scheme, mesh, newton = map(compact_repr, (self.scheme, self.mesh, self.newton))
+        return ", ".join([scheme, step, mesh, newton])
 
     __repr__ = bracketed
 

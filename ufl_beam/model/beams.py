@@ -16,19 +16,19 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import one_line
+from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError, shorten, warn
 from ufl_beam.model.bodies import TOGETHER, Member, Place
 from ufl_beam.model.checks import (
+    require_capacity,
     require_count,
     require_kind,
-    require_memory,
     require_number,
     require_sequence,
     require_vector,
 )
 from ufl_beam.model.connector_laws import HingeLaw, require_hinge_law
-from ufl_beam.model.functions import Arc, Curve, Point, Polyline, Straight, point_of
+from ufl_beam.model.functions import Arc, Curve, Point, Polyline, Straight, curve_point
 from ufl_beam.model.records import Instance, Record, Text
 from ufl_beam.model.sections import Section
 
@@ -84,7 +84,7 @@ class Beam(Record, Member):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        require_memory(self.cells, f"{self.name}: cells = {self.cells}")
+        require_capacity(self.cells, f"{self.name}: cells = {self.cells}")
         for s in self.corners:
             require_number(s, f"{self.name}: corner")
             if not 0.0 < s < 1.0:
@@ -98,10 +98,10 @@ class Beam(Record, Member):
             length = math.dist(first, last)
         else:
             at = sorted({*self.corners, *(i / self.cells for i in range(self.cells + 1))})
-            points = [point_of(self.curve, s, f"{self.name}: curve") for s in at]
-            for s, there, end in zip((0, 1), (points[0], points[-1]), self.ends, strict=True):
-                if math.dist(there, end) > 1e-9 * max(math.hypot(*there), math.hypot(*end)):
-                    raise ModelError(f"{self.name}: curve({s}) = {there} is not the end {end}")
+            points = [curve_point(self.curve, s, f"{self.name}: curve") for s in at]
+            for s, point, end in zip((0, 1), (points[0], points[-1]), self.ends, strict=True):
+                if math.dist(point, end) > 1e-9 * max(math.hypot(*point), math.hypot(*end)):
+                    raise ModelError(f"{self.name}: curve({s}) = {point} is not the end {end}")
             length = sum(math.dist(p, q) for p, q in pairwise(points))
         depth = self.section.depth
         if depth > math.sqrt(12) * length > 0.0:  # the radius of gyration is larger
@@ -185,7 +185,7 @@ class Beam(Record, Member):
         cells: int = 8, name: str = "beam", hinges: Mapping[float, HingeLaw | None] = {},
     ) -> Beam:  # fmt: skip
         """Create a beam along any curve ``s -> (x, y)``, ``s`` from 0 to 1; m."""
-        a, b = (point_of(curve, s, f"{name}: curve") for s in (0.0, 1.0))
+        a, b = (curve_point(curve, s, f"{name}: curve") for s in (0.0, 1.0))
         return cls(a, b, section, cells=cells, name=name, curve=curve, hinges=hinges)
 
 
@@ -218,7 +218,7 @@ class Mesh:
     degree: int = 1
     lumped: bool = False
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     def __post_init__(self) -> None:
         require_kind(self.lumped, bool, "Mesh: lumped")
@@ -251,14 +251,14 @@ class Mesh:
         at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)
         return np.asarray(1 / (p * (p + 1) * at**2))
 
-    def weights(self, part: npt.ArrayLike) -> Array:
-        """Evaluate the Lagrange polynomials at ``part`` of a cell, from 0 to 1; (..., nodes)."""
-        powers = np.power.outer(part, np.arange(self.degree + 1))
+    def weights(self, s: npt.ArrayLike) -> Array:
+        """Evaluate the Lagrange polynomials at ``s`` of a cell, from 0 to 1; (..., nodes)."""
+        powers = np.power.outer(s, np.arange(self.degree + 1))
         return np.asarray(powers @ self._polynomials)
 
-    def slopes(self, part: npt.ArrayLike) -> Array:
-        """Evaluate the derivatives of :meth:`weights` by ``part``; (..., nodes)."""
-        powers = np.arange(1, self.degree + 1) * np.power.outer(part, np.arange(self.degree))
+    def slopes(self, s: npt.ArrayLike) -> Array:
+        """Evaluate the derivatives of :meth:`weights` by ``s``; (..., nodes)."""
+        powers = np.arange(1, self.degree + 1) * np.power.outer(s, np.arange(self.degree))
         return np.asarray(powers @ self._polynomials[1:])
 
     @cached_property
@@ -272,21 +272,21 @@ class Mesh:
         Raises:
             ModelError: ``refine`` gives no whole number of cells between two of these places.
         """
-        given = beam.vertices(attached)
+        vertices = beam.vertices(attached)
         if self.refine == 1:
-            return given
+            return vertices
         places = sorted({0.0, 1.0, *beam.corners, *attached})
-        kept = sorted({int(np.abs(np.subtract(given, s)).argmin()) for s in places})
+        kept = sorted({int(np.abs(np.subtract(vertices, s)).argmin()) for s in places})
         for first, last in pairwise(kept):
             if (last - first) * self.refine % 1:
                 common = math.gcd(*(b - a for a, b in pairwise(kept)))
                 least = f"Fraction(1, {common})" if common > 1 else "1"
                 raise ModelError(
                     f"Mesh: refine = {self.refine} makes no whole number of the {last - first} "
-                    f"cells between {beam.at(given[first])} and {beam.at(given[last])}, which "
-                    f"must be vertices; {beam.name} can take multiples of {least}"
+                    f"cells between {beam.at(vertices[first])} and {beam.at(vertices[last])}, "
+                    f"which must be vertices; {beam.name} can take multiples of {least}"
                 )
-        number = int((len(given) - 1) * self.refine)
-        require_memory(number, f"Mesh: refine = {self.refine} of {beam.name}, {number} cells,")
+        number = int((len(vertices) - 1) * self.refine)
+        require_capacity(number, f"Mesh: refine = {self.refine} of {beam.name}, {number} cells,")
         at = np.arange(number + 1) * self.refine.denominator / self.refine.numerator
-        return [float(s) for s in np.interp(at, np.arange(len(given)), given)]
+        return [float(s) for s in np.interp(at, np.arange(len(vertices)), vertices)]

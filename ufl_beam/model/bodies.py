@@ -250,43 +250,45 @@ def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
         return k
 
     for group in groups:
-        numbers = [3 * number.setdefault(of, len(number)) + component for of, component in group]
-        dofs.update(zip(numbers, group, strict=True))
-        for other in numbers[1:]:
-            a, b = root(numbers[0]), root(other)
+        indices = [
+            3 * number.setdefault(moved, len(number)) + component for moved, component in group
+        ]
+        dofs.update(zip(indices, group, strict=True))
+        for x in indices[1:]:
+            a, b = root(indices[0]), root(x)
             if a != b:
                 parent[b] = a
     return Representatives((dofs[k], dofs[root(above)]) for k, above in parent.items())
 
 
-def node(anchor: Anchor) -> Node:
-    """Return the cross-section of a beam, or the body, to which an anchor is fixed."""
-    return anchor.body if isinstance(anchor, Spot) else anchor
+def node(place: Anchor) -> Node:
+    """Return the cross-section of a beam, or the body, to which a place is fixed."""
+    return place.body if isinstance(place, Spot) else place
 
 
-def arm(anchor: Anchor, point: Point | None = None) -> Point:
-    """Return the vector from the node of an anchor to a point, by default the anchor; m.
+def arm(place: Anchor, point: Point | None = None) -> Point:
+    """Return the vector from the node of a place to a point, by default the place; m.
 
     It is zero for points of the ground, which do not move.
     """
-    if node(anchor) is GROUND:
+    if node(place) is GROUND:
         return 0.0, 0.0
-    x, y = point or anchor.point
-    nx, ny = anchor.body.center if isinstance(anchor, Spot) else anchor.point
+    x, y = point or place.point
+    nx, ny = place.body.center if isinstance(place, Spot) else place.point
     return x - nx, y - ny
 
 
-def carries(anchor: Anchor) -> bool:
-    """Return whether an anchor and its node have the same displacement."""
-    return isinstance(anchor, Place) or math.hypot(*arm(anchor)) == 0.0
+def carries(place: Anchor) -> bool:
+    """Return whether a place and its node have the same displacement."""
+    return isinstance(place, Place) or math.hypot(*arm(place)) == 0.0
 
 
 def require_anchors(owner: str, *anchors: object) -> None:
     """Raise :class:`ModelError` naming ``owner`` unless all are attachment points."""
-    for anchor in anchors:
-        if not isinstance(anchor, Place | Spot):
+    for place in anchors:
+        if not isinstance(place, Place | Spot):
             raise ModelError(
-                f"{owner}: {shorten(anchor)} is not a place; use beam.start, .end or .at(s), "
+                f"{owner}: {shorten(place)} is not a place; use beam.start, .end or .at(s), "
                 "body.at(x, y) or ground(x, y)"
             )
 

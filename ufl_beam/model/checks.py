@@ -14,7 +14,7 @@ P = ParamSpec("P")
 T = TypeVar("T")
 
 
-def of_model(check: Callable[P, T]) -> Callable[P, T]:
+def raising_model_errors(check: Callable[P, T]) -> Callable[P, T]:
     """Make a check raise :class:`ModelError`."""
 
     @wraps(check)
@@ -27,16 +27,16 @@ def of_model(check: Callable[P, T]) -> Callable[P, T]:
     return checked
 
 
-require_all = of_model(errors.require_all)
-require_array = of_model(errors.require_array)
-require_count = of_model(errors.require_count)
-require_function = of_model(errors.require_function)
-require_kind = of_model(errors.require_kind)
-require_memory = of_model(errors.require_memory)
-require_number = of_model(errors.require_number)
-require_returned = of_model(errors.require_returned)
-require_row = of_model(errors.require_row)
-require_sequence = of_model(errors.require_sequence)
-require_switch = of_model(errors.require_switch)
-require_text = of_model(errors.require_text)
-require_vector = of_model(errors.require_vector)
+require_all = raising_model_errors(errors.require_all)
+require_array = raising_model_errors(errors.require_array)
+require_count = raising_model_errors(errors.require_count)
+require_function = raising_model_errors(errors.require_function)
+require_kind = raising_model_errors(errors.require_kind)
+require_capacity = raising_model_errors(errors.require_capacity)
+require_number = raising_model_errors(errors.require_number)
+require_returned = raising_model_errors(errors.require_returned)
+require_row = raising_model_errors(errors.require_row)
+require_sequence = raising_model_errors(errors.require_sequence)
+require_switch = raising_model_errors(errors.require_switch)
+require_text = raising_model_errors(errors.require_text)
+require_vector = raising_model_errors(errors.require_vector)

@@ -187,25 +187,25 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     require_fields(law, ConnectorLaw, what)
     for name, value in law.numbers().items():
         require_number(value, f"{what}: {name}")
-    stated = {n for n in CALLED if getattr(type(law), n) is not getattr(ConnectorLaw, n)}
-    if not stated & {"energy", "resistance", "limit"}:
+    defined = {n for n in CALLED if getattr(type(law), n) is not getattr(ConnectorLaw, n)}
+    if not defined & {"energy", "resistance", "limit"}:
         raise ModelError(
             f"{what} has neither energy nor resistance, nor a limit; define one of these methods"
         )
-    if law.holds and (stated & {"energy", "resistance"} or law.components > 1):
+    if law.holds and (defined & {"energy", "resistance"} or law.components > 1):
         raise ModelError(
             f"{what} has a limit, which is for laws of one component without energy and "
             "resistance; let another connector beside it have these"
         )
-    if "sliding" in stated and not law.holds:
+    if "sliding" in defined and not law.holds:
         raise ModelError(f"{what} has a sliding force and no limit; define this method")
-    if law.variables and "increments" not in stated:
+    if law.variables and "increments" not in defined:
         raise ModelError(f"{what} has variables and no increments; define this method")
     require_text(law.entry, f"{what}.entry")
     if not law.entry or (law.entry in ENTRIES and law.entry not in LOSSES):
         raise ModelError(
-            f"{what}.entry = {law.entry!r} is no name for what is lost; there are "
-            f"{', '.join(LOSSES)}, or take a name of your own"
+            f"{what}.entry = {law.entry!r} is no name of a loss; there are "
+            f"{', '.join(LOSSES)}, or use a name of your own"
         )
     for name, value in law.variables.items():
         require_number(value, f"{what}.variables[{name!r}]")
@@ -217,33 +217,33 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     for name, arguments in calls.items():
         try:
             with np.errstate(all="ignore"):
-                found = getattr(law, name)(*arguments)
+                result = getattr(law, name)(*arguments)
         except Exception as error:
             raise ModelError(
                 f"{what}.{name} fails at no motion: {error}{stated_at(law)}"
             ) from error
         if name == "increments":
-            require_names(found, law, f"{what}.{name}")
+            require_names(result, law, f"{what}.{name}")
         if name == "resistance" and law.components > 1:
-            if not isinstance(found, tuple | list) or len(found) != law.components:
+            if not isinstance(result, tuple | list) or len(result) != law.components:
                 raise ModelError(
-                    f"{what}.resistance returns {shorten(found)}; it must return a tuple of "
+                    f"{what}.resistance returns {shorten(result)}; it must return a tuple of "
                     f"{law.components} forces{stated_at(law)}"
                 )
-            values = [("", force) for force in found]
+            values = [("", force) for force in result]
         else:
-            values = list(found.items()) if name == "increments" else [("", found)]
-        for of, value in values:
+            values = list(result.items()) if name == "increments" else [("", result)]
+        for variable, value in values:
             number = isinstance(value, Real) or np.shape(value) == (1,)
             if not number or not np.all(np.isfinite(value)):
                 raise ModelError(
-                    f"{what}.{name} returns {f'{of} = ' * bool(of)}{shorten(value)} at no motion; "
-                    f"it must return a number there{stated_at(law)}"
+                    f"{what}.{name} returns {f'{variable} = ' * bool(variable)}{shorten(value)} "
+                    f"at no motion; it must return a number there{stated_at(law)}"
                 )
             if name in ("limit", "sliding") and np.any(np.asarray(value) < 0):
                 raise ModelError(
                     f"{what}.{name} returns {shorten(value)} at no motion; it must return the size "
-                    f"of a force, whose sign comes by itself{stated_at(law)}"
+                    f"of a force without a sign{stated_at(law)}"
                 )
 
 
@@ -337,18 +337,18 @@ class ForceLaw(Record):
         (True, True)
     """
 
-    force: Annotated[Callable[..., Any], partial(require_function, of="(motion, rate)")]
+    force: Annotated[Callable[..., Any], partial(require_function, arguments="(motion, rate)")]
     state: Annotated[Sequence[float], _require_state] = ()
     stored: Annotated[
         Callable[..., float] | None,
-        partial(require_function, of="the motion, or (motion, state)"),
+        partial(require_function, arguments="the motion, or (motion, state)"),
     ] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.state and "state" not in self.asked:
             raise ModelError(
-                "ForceLaw: the function does not ask for the state; let it have a parameter state, "
+                "ForceLaw: the function has no parameter for the state; give it a parameter state, "
                 "and return the force and the state after the step"
             )
         _ = self.asked, self.asked_by_stored  # raises for unknown names

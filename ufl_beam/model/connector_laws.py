@@ -113,7 +113,7 @@ class Controller(Record):
         True
     """
 
-    force: Annotated[Callable[[Any], float], partial(require_function, of="the simulation")]
+    force: Annotated[Callable[[Any], float], partial(require_function, arguments="the simulation")]
     sample: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def ask(self, simulation: Running, link: object) -> float:
@@ -324,8 +324,8 @@ class Clearance(Record, ConnectorLaw):
         _, damped, x, y = self._contact(motion, rate)
         if not self.rubs:
             return damped * x, damped * y
-        rubbing = self.stiffness * state.deflection
-        return damped * x - rubbing * y, damped * y + rubbing * x, rubbing * self.radius
+        friction = self.stiffness * state.deflection
+        return damped * x - friction * y, damped * y + friction * x, friction * self.radius
 
     def increments(self, motion: Any, rate: Any, state: State, dt: Values) -> Mapping[str, Values]:
         """Move the deflection with the surface of the pin, up to the limit of friction."""
@@ -333,8 +333,8 @@ class Clearance(Record, ConnectorLaw):
             return {}
         elastic, damped, x, y = self._contact(motion, rate)
         limit = self.friction * (elastic + damped) / self.stiffness
-        way = dt * (x * rate[1] - y * rate[0] + self.radius * rate[2])
-        moved = smaller(larger(state.deflection + way, -limit), limit)
+        increment = dt * (x * rate[1] - y * rate[0] + self.radius * rate[2])
+        moved = smaller(larger(state.deflection + increment, -limit), limit)
         return {"deflection": moved - state.deflection}
 
 
@@ -409,7 +409,7 @@ def require_hinge_law(law: object, what: str) -> None:
         if type(law) is not ElastoPlastic:
             raise ModelError(
                 f"{what}: {type(law).__name__} is a subclass of ElastoPlastic, and a hinge of zero "
-                f"length would ignore what is its own; {OWN_HINGE}"
+                f"length would ignore its own methods; {OWN_HINGE}"
             )
         require_number(law.limit, f"{what}: limit", at_least=0.0, infinite=True)
         if isinstance(law.viscosity, DuvautLions):
@@ -450,7 +450,7 @@ class Guide(Record):
     """Constraint of a point to a curve of the plane, free along it; see :class:`Guided`."""
 
     # ``s -> (x, y)``, smooth, for all s that the motion may reach; m
-    curve: Annotated[Curve, partial(require_function, of="s that returns (x, y)")]
+    curve: Annotated[Curve, partial(require_function, arguments="s that returns (x, y)")]
 
 
 Law = (

@@ -321,7 +321,7 @@ def plastic_hinges(
         if 0.0 < place.s < 1.0:
             return True
         dof = same[place, 2]
-        others = [other for other in members.get(dof, ()) if other != place]
+        others = [x for x in members.get(dof, ()) if x != place]
         between = len(others) > 0 and (dof in acted or not _outlasts(place, others, laws))
         return dof in borne or between
 
@@ -352,7 +352,7 @@ def _outlasts(place: Place, others: Sequence[Node], laws: Mapping[Place, HingeLa
     """Return whether the only other member at a joint yields first, or is listed first."""
     if len(others) > 1 or not isinstance(others[0], Place) or others[0] not in laws:
         return False
-    here, there, order = laws[place], laws[others[0]], list(laws)
-    if here.limit == there.limit and here.bounded and there.bounded:
+    own, next_law, order = laws[place], laws[others[0]], list(laws)
+    if own.limit == next_law.limit and own.bounded and next_law.bounded:
         return order.index(others[0]) < order.index(place)
-    return there.bounded and there.limit <= here.limit
+    return next_law.bounded and next_law.limit <= own.limit

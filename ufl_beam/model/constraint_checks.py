@@ -57,7 +57,7 @@ def require_masses(scene: Scene) -> None:
             if free and getattr(body, name) == 0.0:
                 raise ModelError(
                     f"{body.name}: {name} = 0, but dynamics needs it to be positive; use RigidLink "
-                    "or Link for what has no mass"
+                    "or Link for a rod without mass"
                 )
 
 
@@ -68,14 +68,14 @@ def require_inertia(scene: Scene) -> None:
     of motion are singular.
     """
     inertias = [(s.rhoA, s.rhoA, s.rhoA or s.rhoI) for s in (beam.section for beam in scene.beams)]
-    inertias += [(one.mass, one.mass, one.inertia) for one in scene.bodies]
+    inertias += [(body.mass, body.mass, body.inertia) for body in scene.bodies]
     loose = np.flatnonzero(np.array(inertias) == 0.0)  # in the order of (u, v, size ψ) of all parts
     if not loose.size:
         return
     masses = [
-        (one.place, component)
-        for one in scene.masses
-        for component, inertia in enumerate((one.mass, one.mass, one.inertia))
+        (mass.place, component)
+        for mass in scene.masses
+        for component, inertia in enumerate((mass.mass, mass.mass, mass.inertia))
         if inertia
     ]
 
@@ -128,13 +128,13 @@ def require_independent(scene: Scene) -> None:
     ]
     rigid = any(isinstance(getattr(owner, "law", None), RigidPlastic) for owner in owners)
     raise ModelError(
-        f"constraints repeat or contradict each other: {within.shape[1]} of those of "
+        f"constraints repeat or contradict each other: {within.shape[1]} of the constraints of "
         f"{'; '.join(names)} can be left out. Remove one, or make it elastic: "
         + (
             "a RigidPlastic connector holds its motion until it yields, and a "
             "Spring(stiffness, law=...) yields, too; of two in parallel make one of both limits"
             if rigid
-            else "a Spring, or a Beam in the place of a rigid part"
+            else "a Spring, or a Beam instead of a rigid part"
         )
     )
 
@@ -144,7 +144,7 @@ def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
     same = scene.representatives
     supports = {same[node(s.place), c]: s for s in scene.supports for c in s.held if not s.angle}
     for row in rows:
-        ends = [same[of, c] for of, factors in row for c in range(3) if factors[c]]
+        ends = [same[moved, c] for moved, factors in row for c in range(3) if factors[c]]
         yield from (supports[dof] for dof in ends if dof in supports)
         twice = {dof for dof in ends if ends.count(dof) > 1}
         for joint in scene.joints:
@@ -154,11 +154,11 @@ def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
 
 def friction_repeats(scene: Scene) -> bool:
     """Return whether constraints of sticking friction are redundant."""
-    rubbing = any(rubs(link.law) for link in scene.links)
-    return rubbing and _dependences(scene, rubbing=True)[1].shape[1] > 0
+    friction = any(rubs(link.law) for link in scene.links)
+    return friction and _dependences(scene, friction=True)[1].shape[1] > 0
 
 
-def _dependences(scene: Scene, rubbing: bool = False) -> tuple[list[tuple[object, Row]], Array]:
+def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[object, Row]], Array]:
     """Find dependent constraints of laws, of supports in rotated axes and of sticking friction.
 
     Returns candidate constraints with their owners, and in columns the combinations of them that
@@ -167,7 +167,7 @@ def _dependences(scene: Scene, rubbing: bool = False) -> tuple[list[tuple[object
     """
 
     def holds(link: Connector) -> bool:
-        return isinstance(link.law, (*HOLDING, RigidPlastic)) or (rubbing and rubs(link.law))
+        return isinstance(link.law, (*HOLDING, RigidPlastic)) or (friction and rubs(link.law))
 
     if not any(map(holds, scene.links)):
         return [], np.zeros((0, 0))
@@ -178,9 +178,9 @@ def _dependences(scene: Scene, rubbing: bool = False) -> tuple[list[tuple[object
     users: dict[NodeDof, set[int]] = defaultdict(set)
     for number, (_, row) in enumerate(rows):
         sums: dict[NodeDof, float] = defaultdict(float)
-        for of, factors in row:
+        for carrier, factors in row:
             for component, factor in enumerate(factors):
-                sums[same[of, component]] += factor
+                sums[same[carrier, component]] += factor
         # If both ends are one node, only round-off is left.
         moved.append({dof: x for dof, x in sums.items() if abs(x) > 1e-12 and dof not in fixed})
         for dof in moved[-1]:
@@ -198,12 +198,12 @@ def _dependences(scene: Scene, rubbing: bool = False) -> tuple[list[tuple[object
         return [], np.zeros((0, 0))
     numbers = sorted(left)
     columns: dict[NodeDof, int] = {}
-    entries = [
+    terms = [
         (columns.setdefault(dof, len(columns)), column, factor)
         for column, number in enumerate(numbers)
         for dof, factor in moved[number].items()
     ]
-    gradients = _sparse(entries, (max(len(columns), 1), len(numbers)))
+    gradients = _sparse(terms, (max(len(columns), 1), len(numbers)))
     return [rows[number] for number in numbers], _null_space(gradients)
 
 
@@ -231,11 +231,11 @@ def require_no_mechanism(scene: Scene) -> str:
     return said
 
 
-def _center(part: Member | Body) -> Point:
+def _center(member: Member | Body) -> Point:
     """Return the reference point for the rigid motion of a beam or body."""
-    if isinstance(part, Body):
-        return part.center
-    (xa, ya), (xb, yb) = part.start.point, part.end.point
+    if isinstance(member, Body):
+        return member.center
+    (xa, ya), (xb, yb) = member.start.point, member.end.point
     return (xa + xb) / 2, (ya + yb) / 2
 
 
@@ -266,30 +266,32 @@ def _constraints(
     """
     unit = np.eye(3)
     rows: list[Row] = [
-        [(first, -unit[component]), (other, unit[component])]
+        [(first, -unit[component]), (second, unit[component])]
         for (first, component), *others in scene.shared_by_joints
-        for other, _ in others
+        for second, _ in others
     ]
     rows += (row for _, row in _rows(scene, acts, scene.supports))
     worked = (beam.start for work in scene.works for beam in work.on(scene.beams))
     also = (*also, *((place, component) for place in worked for component in range(3)))
     rows += ([(node(place), unit[component])] for place, component in also)
-    parts: dict[object, int] = {part: i for i, part in enumerate((*scene.beams, *scene.bodies))}
-    entries: list[tuple[int, int, float]] = []
+    parts: dict[object, int] = {member: i for i, member in enumerate((*scene.beams, *scene.bodies))}
+    terms: list[tuple[int, int, float]] = []
     for i, row in enumerate(rows):
-        for of, factors in row:
-            if of is not GROUND:
-                part, (px, py) = (of, of.center) if isinstance(of, Body) else (of.beam, of.point)
-                cx, cy = _center(part)
+        for moved, factors in row:
+            if moved is not GROUND:
+                member, (px, py) = (
+                    (moved, moved.center) if isinstance(moved, Body) else (moved.beam, moved.point)
+                )
+                cx, cy = _center(member)
                 x, y = (px - cx) / scene.size, (py - cy) / scene.size
-                demand = factors @ np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
-                entries += ((i, 3 * parts[part] + k, demand[k]) for k in range(3))
-    return _sparse(entries, (max(len(rows), 1), 3 * len(parts)))
+                gradient = factors @ np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
+                terms += ((i, 3 * parts[member] + k, gradient[k]) for k in range(3))
+    return _sparse(terms, (max(len(rows), 1), 3 * len(parts)))
 
 
-def _sparse(entries: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
+def _sparse(terms: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
     """Build a sparse matrix of entries (row, column, value); duplicates are added."""
-    rows, columns, values = np.array(entries).reshape(-1, 3).T
+    rows, columns, values = np.array(terms).reshape(-1, 3).T
     return csr_array((values, (rows.astype(int), columns.astype(int))), shape=shape)
 
 
@@ -309,17 +311,17 @@ def _moving(scene: Scene, mode: Array) -> list[str]:
     """Describe the motions of beams and bodies in a mode."""
     parts: list[tuple[str, Member | Body]] = [(f"beam {i}", b) for i, b in enumerate(scene.beams)]
     parts += [(f"body {i}", body) for i, body in enumerate(scene.bodies)]
-    found = []
+    texts = []
     motions = (mode / np.abs(mode).max()).reshape(-1, 3)
-    for (kind, part), (u, v, ψ) in zip(parts, motions, strict=True):
+    for (kind, member), (u, v, ψ) in zip(parts, motions, strict=True):
         if abs(ψ) >= 1e-6:
-            cx, cy = _center(part)
+            cx, cy = _center(member)
             center = (cx - v / ψ * scene.size, cy + u / ψ * scene.size)
             x, y = (scene.size * round(c / scene.size, 9) for c in center)
-            found.append(f"{part.name} ({kind}) can turn about ({x:.4g}, {y:.4g})")
+            texts.append(f"{member.name} ({kind}) can turn about ({x:.4g}, {y:.4g})")
         elif max(abs(u), abs(v)) > 1e-6:
-            found.append(f"{part.name} ({kind}) can shift along ({u:.3g}, {v:.3g})")
-    return found
+            texts.append(f"{member.name} ({kind}) can shift along ({u:.3g}, {v:.3g})")
+    return texts
 
 
 def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
@@ -336,12 +338,12 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
     for beam in scene.beams:
         if (layout := beam.section.layout(None)) is not None:
             first = np.cumsum([0, *(n for _, n in layout.laws)])
-            stiffness, of_points = (
+            stiffness, points = (
                 np.reshape(x, (len(layout.weights), -1))
                 for x in (layout.stiffness, np.abs(layout.strains) @ [1.0, 1.0, 1.0 / size])
             )
             laws += [
-                (beam.name, law, stiffness[k], of_points[k])
+                (beam.name, law, stiffness[k], points[k])
                 for (law, _), k in zip(layout.laws, first[:-1], strict=True)
             ]
     for link in scene.links:
@@ -350,8 +352,8 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
             moved = LAST_DIGITS * (1.0 if link.turns else size)
             ends = (rest, [*rest[:i], rest[i] + moved, *rest[i + 1 :]])
             state = initial_state(link.law)
-            here, there = (link.law.elastic_forces(e, state)[i][0] for e in ends)
-            if abs(here) > abs(there - here):
+            at_rest, strained = (link.law.elastic_forces(e, state)[i][0] for e in ends)
+            if abs(at_rest) > abs(strained - at_rest):
                 raise ModelError(
                     f"{what}: {type(link.law).__name__} of {link} bears a force at no motion, "
                     f"so that the undeformed scene is not in equilibrium; {instead}"
@@ -380,10 +382,10 @@ def require_rates(scene: Scene, scheme: Rated) -> None:
                 f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
                 "here; use EnergyMomentum() or EnergyMomentumDecaying()"
             )
-    given = [str(c) for c in scene.links if isinstance(c.law, HOLDING)]
-    given += [f"the support of {s.place}" for s in scene.supports if s.moving]
-    if given and scheme.rings:
+    prescribed = [str(c) for c in scene.links if isinstance(c.law, HOLDING)]
+    prescribed += [f"the support of {s.place}" for s in scene.supports if s.moving]
+    if prescribed and scheme.rings:
         raise ModelError(
-            f"{name}: {given[0]} prescribes a motion, whose accelerations ring for ever "
+            f"{name}: {prescribed[0]} prescribes a motion, whose accelerations ring for ever "
             "without numerical damping; use GeneralizedAlpha(0.8), or EnergyMomentum()"
         )

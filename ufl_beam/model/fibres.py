@@ -15,7 +15,7 @@ import numpy.typing as npt
 import scipy  # its parts are loaded when they are used
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import one_line
+from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.checks import require_count, require_kind
 from ufl_beam.model.law_functions import Values
@@ -138,7 +138,7 @@ class PlacedFibres:
     y: Array  # distances from the axis, positive to the left of its direction; (n,); m
     A: Array  # areas; (n,); m²
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     @classmethod
     def layers(

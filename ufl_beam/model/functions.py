@@ -13,7 +13,7 @@ from typing import Annotated
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import one_line
+from ufl_beam.display import compact_repr
 from ufl_beam.errors import ModelError, NoNumber, closed, shorten
 from ufl_beam.model.checks import (
     require_function,
@@ -83,8 +83,8 @@ class Polyline:
     def __call__(self, s: float) -> Point:
         """Return the point at the fraction ``s`` of the length."""
         i = bisect_left(self.at, s, 1, len(self.at) - 1) - 1
-        part = (s - self.at[i]) / (self.at[i + 1] - self.at[i])
-        return between(self.points[i], self.points[i + 1], part)
+        fraction = (s - self.at[i]) / (self.at[i + 1] - self.at[i])
+        return between(self.points[i], self.points[i + 1], fraction)
 
 
 def between(p: Point, q: Point, s: float) -> Point:
@@ -92,7 +92,7 @@ def between(p: Point, q: Point, s: float) -> Point:
     return p[0] * (1 - s) + q[0] * s, p[1] * (1 - s) + q[1] * s
 
 
-def point_of(curve: Curve, s: float, what: str) -> Point:
+def curve_point(curve: Curve, s: float, what: str) -> Point:
     """Evaluate a user's curve, or raise :class:`ModelError` naming ``what``."""
     require_function(curve, what, "s that returns (x, y)")
     try:
@@ -107,8 +107,8 @@ def points_along(curves: Sequence[Curve], parameters: Sequence[Sequence[float] |
     ends = [(*c.a, *c.b) if isinstance(c, Straight) else (0.0,) * 4 for c in curves]
     counts = [len(s) for s in parameters]
     s = np.concatenate([np.empty(0), *parameters])
-    of_points = np.repeat(np.reshape(ends, (-1, 4)), counts, axis=0)
-    points: Array = of_points[:, :2] * (1 - s)[:, None] + of_points[:, 2:] * s[:, None]
+    segments = np.repeat(np.reshape(ends, (-1, 4)), counts, axis=0)
+    points: Array = segments[:, :2] * (1 - s)[:, None] + segments[:, 2:] * s[:, None]
     first = np.append(0, np.cumsum(counts, dtype=np.int64))
     for i, curve in enumerate(curves):
         if not isinstance(curve, Straight):
@@ -142,13 +142,13 @@ def parameter_step(curve: Curve, s: float, length: float) -> float:
     """
     step = 1e-6
     for _ in range(60):
-        way = math.dist(curve(s + step), curve(s - step)) / 2
-        if not math.isfinite(way):
+        distance = math.dist(curve(s + step), curve(s - step)) / 2
+        if not math.isfinite(distance):
             step /= 1e3
-        elif abs(way / (REACH * length) - 1) < 0.5:
+        elif abs(distance / (REACH * length) - 1) < 0.5:
             break
         else:
-            step *= min(max(REACH * length / way, 1e-3), 1e3) if way else 1e3
+            step *= min(max(REACH * length / distance, 1e-3), 1e3) if distance else 1e3
     return step
 
 
@@ -176,14 +176,14 @@ def enclosing_diameter(points: Array) -> float:
     """
     points = points - points.mean(axis=0)
     distances = np.hypot(*points.T)
-    slack, held = 1e-12 * float(distances.max()), [int(np.argmax(distances))]
-    center, radius = points[held[0]], 0.0
+    slack, chosen = 1e-12 * float(distances.max()), [int(np.argmax(distances))]
+    center, radius = points[chosen[0]], 0.0
     while True:
         distances = np.hypot(*(points - center).T)
         outside = int(np.argmax(distances))
         if distances[outside] <= radius + slack:
             return 2 * radius
-        held, center, larger = _circle_around(points, [*held, outside])
+        chosen, center, larger = _circle_around(points, [*chosen, outside])
         if larger <= radius:  # by round-off
             return 2 * radius
         radius = larger
@@ -192,12 +192,12 @@ def enclosing_diameter(points: Array) -> float:
 def _circle_around(points: Array, few: list[int]) -> tuple[list[int], Array, float]:
     """Find the smallest circle around at most four points: points on it, centre, radius."""
     circles = []
-    for held in (*combinations(few, 2), *combinations(few, 3)):
-        first, *others = points[list(held)]
+    for chosen in (*combinations(few, 2), *combinations(few, 3)):
+        first, *others = points[list(chosen)]
         ways = np.array(others) - first
         # at equal distance from all; if they are collinear, a least-squares centre
         center = first + np.linalg.lstsq(2 * ways, (ways**2).sum(axis=1), rcond=None)[0]
-        circles.append((float(np.hypot(*(points[few] - center).T).max()), list(held), center))
+        circles.append((float(np.hypot(*(points[few] - center).T).max()), list(chosen), center))
     radius, through, center = min(circles, key=lambda circle: circle[0])
     return through, center, radius
 
@@ -257,7 +257,7 @@ class Table:
     times: Sequence[float]
     values: Sequence[float]
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):

@@ -23,7 +23,7 @@ from ufl_beam.model.bodies import (
 from ufl_beam.model.checks import require_kind, require_switch, require_text
 from ufl_beam.model.connector_laws import HELD, Bearing, Guide
 from ufl_beam.model.connectors import Component, Connector, require_apart, unit_axis
-from ufl_beam.model.functions import Curve, Point, point_of
+from ufl_beam.model.functions import Curve, Point, curve_point
 
 
 class Joint(Bearing, ABC):
@@ -97,10 +97,10 @@ class _AtPoint(Joint):
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
-        return _held_at_point(self, self.multipliers, self.joined)
+        return _constraints_at_point(self, self.multipliers, self.joined)
 
 
-def _held_at_point(
+def _constraints_at_point(
     joint: Joint, multipliers: bool, joined: tuple[int, ...]
 ) -> tuple[Connector, ...]:
     """Return connectors for anchors that do not move like nodes, or for all with multipliers."""
@@ -112,8 +112,8 @@ def _held_at_point(
         motions.append(("turning", (1.0, 0.0)))
     kind = type(joint).__name__
     return tuple(
-        Component(kind, motion, base, other, HELD, axis)
-        for other in others
+        Component(kind, motion, base, second, HELD, axis)
+        for second in others
         for motion, axis in motions
     )
 
@@ -315,14 +315,14 @@ class Guided(Joint):
 
     @cached_property
     def _start(self) -> Spot:
-        return ground(*point_of(self.curve, 0.0, f"Guided({self.place}): curve"))
+        return ground(*curve_point(self.curve, 0.0, f"Guided({self.place}): curve"))
 
     @cached_property
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
         """Connector that holds the distance from the curve."""
         law, name = Guide(self.curve), f"Guided({self.place}): curve"
         start = self._start
-        (x0, y0), (x1, y1) = (point_of(self.curve, s, name) for s in NEAR_START)
+        (x0, y0), (x1, y1) = (curve_point(self.curve, s, name) for s in START_INTERVAL)
         length = math.hypot(x1 - x0, y1 - y0)
         if length == 0.0:
             raise ModelError(f"Guided({self.place}): the curve stands still at s = 0")
@@ -330,7 +330,7 @@ class Guided(Joint):
         return (Component("Guided", "guided", start, self.place, law, across),)
 
 
-NEAR_START = (-1e-6, 1e-6)
+START_INTERVAL = (-1e-6, 1e-6)
 """Parameters of two points that give the direction of a guide curve at s = 0."""
 
 
@@ -388,10 +388,12 @@ class Release(Joint):
     def holders(self) -> tuple[Connector, ...]:  # type: ignore[override]
         """Connectors that hold the components that are not released, along the axes of the beam."""
         if 0 in self._joined:
-            return _held_at_point(self, self.multipliers, self._joined)
+            return _constraints_at_point(self, self.multipliers, self._joined)
         x, y = self.a.direction
         axes = {"N": (x, y), "V": (-y, x)}
-        held = [self._hold("sliding", axis) for name, axis in axes.items() if name not in self.free]
+        constraints = [
+            self._hold("sliding", axis) for name, axis in axes.items() if name not in self.free
+        ]
         if self.multipliers and 2 in self._joined:
-            held.append(self._hold("turning", (1.0, 0.0)))
-        return tuple(held)
+            constraints.append(self._hold("turning", (1.0, 0.0)))
+        return tuple(constraints)

@@ -141,12 +141,12 @@ class MaterialLaw(ABC):
         """True if laws of this class may bear stress at zero strain, for some parameters."""
         law = copy.copy(self)  # with irrational parameters, whose terms do not cancel
         vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(vars(self))})
-        one = uniform(self, 1.0)
-        return any(np.any(σ != 0) for σ in _at_no_strain(law.of(one, {})))
+        unit = uniform(self, 1.0)
+        return any(np.any(σ != 0) for σ in _at_no_strain(law.of(unit, {})))
 
     def stressed(self, C: tuple[Values, ...], least: tuple[Values, ...]) -> bool:
         """Return whether the stress at zero strain exceeds ``C`` times ``least``."""
-        stresses = _at_no_strain(_with_numbers(self, C))
+        stresses = _at_no_strain(_sample(self, C))
         return any(np.any(abs(σ) > c * e) for σ, c, e in zip(stresses, C, least, strict=True))
 
     @property
@@ -168,7 +168,7 @@ def uniform(law: MaterialLaw, value: Values) -> Values:
     return law.as_argument(tuple(value for _ in law.resultants or "x"))
 
 
-def _with_numbers(law: MaterialLaw, C: tuple[Values, ...] = ()) -> MaterialLaw:
+def _sample(law: MaterialLaw, C: tuple[Values, ...] = ()) -> MaterialLaw:
     """Return a law at points of stiffness ``C``, 1 by default, with 1 instead of random values."""
     at = law.as_argument(C) if C else uniform(law, np.ones(1))
     numbers = law.numbers(at).items()
@@ -222,33 +222,35 @@ def require_law(law: object, what: str) -> None:
         raise ModelError(f"{kind} has {has}; define one of both methods")
     numbers = law.numbers(uniform(law, np.ones(1)))
     if "C" in numbers:
-        raise ModelError(f"{kind}.numbers has the name C, that of the elastic stiffness")
+        raise ModelError(f"{kind}.numbers has the name C, the name of the elastic stiffness")
     for name, value in numbers.items():
         if not hasattr(value, "draw"):
             require_field(value, f"{kind}: {name}", Real | np.ndarray)
-    tried, state = _with_numbers(law), initial_state(law)
+    tried, state = _sample(law), initial_state(law)
     strain = uniform(law, np.zeros(1))
-    way = (*ways, "increments")[0]
+    method = (*ways, "increments")[0]
     calls = {
         "stress": (strain, state),
         "elastic_energy": (strain, state),
         "hardening_energy": (state,),
-        way: (strain, state, *([state] if way == "residuals" else []), 1.0),
+        method: (strain, state, *([state] if method == "residuals" else []), 1.0),
         "dissipation": (strain, state, state, 1.0),
     }
     for name, arguments in calls.items():
         try:
             with np.errstate(all="ignore"):
-                found = getattr(tried, name)(*arguments)
+                result = getattr(tried, name)(*arguments)
         except Exception as error:
             raise ModelError(
                 f"{kind}.{name} fails at no strain: {error}{raised_at(error)}"
             ) from error
-        if name == way:
-            require_names(found, law, f"{kind}.{name}")
-        elif name == "stress" and not np.all(np.isfinite(law.as_tuple(found))):
-            raise ModelError(f"{kind}.stress is {shorten(found)} at no strain; it must be a number")
-        elif name == "stress" and len(law.as_tuple(found)) != len(law.resultants or "x"):
+        if name == method:
+            require_names(result, law, f"{kind}.{name}")
+        elif name == "stress" and not np.all(np.isfinite(law.as_tuple(result))):
+            raise ModelError(
+                f"{kind}.stress is {shorten(result)} at no strain; it must be a number"
+            )
+        elif name == "stress" and len(law.as_tuple(result)) != len(law.resultants or "x"):
             raise ModelError(f"{kind}.stress must return one stress for each of {law.resultants}")
 
 
@@ -295,21 +297,21 @@ def traced(law: object) -> Iterator[None]:
         ) from error
 
 
-def require_names(found: object, law: Any, what: str) -> None:
+def require_names(result: object, law: Any, what: str) -> None:
     """Raise :class:`ModelError` unless a method returned the variables of a law by name."""
-    if not isinstance(found, Mapping):
+    if not isinstance(result, Mapping):
         raise ModelError(
-            f"{what} returns {shorten(found)}; it must return a dict with the names "
+            f"{what} returns {shorten(result)}; it must return a dict with the names "
             f"{', '.join(law.variables)}"
         )
     missing, unknown = (
-        sorted(set(one) - set(other))
-        for one, other in ((law.variables, found), (found, law.variables))
+        sorted(set(first) - set(second))
+        for first, second in ((law.variables, result), (result, law.variables))
     )
     if missing or unknown:
         wrong = [f"lacks {', '.join(missing)}"] * bool(missing)
         wrong += [f"has {', '.join(unknown)}, which `variables` does not name"] * bool(unknown)
-        raise ModelError(f"{what}: what it returns {' and '.join(wrong)}")
+        raise ModelError(f"{what}: the returned dict {' and '.join(wrong)}")
 
 
 def judges_dissipation(law: MaterialLaw) -> bool:
@@ -318,21 +320,21 @@ def judges_dissipation(law: MaterialLaw) -> bool:
     It is if the law states its dissipation, or if energies are quadratic.  Otherwise the entry has
     an integration error, of either sign.  An active law may supply energy.
     """
-    stated = type(law).dissipation is not MaterialLaw.dissipation
-    return not law.active and (stated or has_quadratic_energies(law))
+    defined = type(law).dissipation is not MaterialLaw.dissipation
+    return not law.active and (defined or has_quadratic_energies(law))
 
 
 def has_quadratic_energies(law: MaterialLaw) -> bool:
     """Return whether the energies of a law are quadratic in strains and variables."""
-    tried = _with_numbers(law)
+    tried = _sample(law)
 
     def energies(factor: float) -> list[float]:
         draw = np.random.default_rng(0).uniform
         strain = law.as_argument(tuple(factor * draw(-1.0, 1.0, 1) for _ in law.resultants or "x"))
         state = State({name: factor * draw(-1.0, 1.0, 1) for name in law.variables})
         with np.errstate(all="ignore"):
-            found = tried.elastic_energy(strain, state), tried.hardening_energy(state)
-        return [float(np.sum(x)) for x in found]
+            pair = tried.elastic_energy(strain, state), tried.hardening_energy(state)
+        return [float(np.sum(x)) for x in pair]
 
     return quadratic(energies)
 

@@ -98,7 +98,7 @@ def _require_modulus(value: Any, what: str) -> None:
 
 Limit = Annotated[Any, partial(_require_limit, positive=True)]
 Modulus = Annotated[float, _require_modulus]
-AtLeastOne = Annotated[float, partial(require_number, at_least=1.0)]
+Exponent = Annotated[float, partial(require_number, at_least=1.0)]
 
 
 class _Plastic(Record, MaterialLaw):
@@ -219,7 +219,7 @@ class RambergOsgood(_Plastic):
 
     yield_limit: Limit
     offset: Positive
-    exponent: AtLeastOne
+    exponent: Exponent
     variables: ClassVar[Mapping[str, float]] = {"plastic": 0.0, "largest": 0.0}
 
     def residuals(self, strain: Values, old: State, new: State, dt: Values) -> Mapping[str, Values]:
@@ -308,7 +308,7 @@ class BoucWen(Record, MaterialLaw):
 
     yield_limit: Limit
     hardening: Annotated[float, partial(require_number, at_least=0.0, at_most=0.999)] = 0.0
-    exponent: AtLeastOne = 1.0
+    exponent: Exponent = 1.0
     shape: Annotated[float, partial(require_number, at_least=0.5, at_most=1.0)] = 0.5
     strength: NotNegative = 0.0
     variables: ClassVar[Mapping[str, float]] = {"slip": 0.0, "strain": 0.0, "energy": 0.0}
@@ -325,15 +325,15 @@ class BoucWen(Record, MaterialLaw):
         z, z0, dx = strain - new.slip, self.yield_limit / self.C, strain - old.strain
         before = old.strain - old.slip
         size = smaller(absolute(z), 2 * larger(z0, absolute(before)))
-        slips = dx + before - sign(z) * size
-        weaker = 1 + self.strength * (old.energy + positive(sign(z) * size * slips) / z0**2)
+        sliding = dx + before - sign(z) * size
+        weaker = 1 + self.strength * (old.energy + positive(sign(z) * size * sliding) / z0**2)
         bends = 1 - self.shape + self.shape * sign(z * dx)
         flow = dx * weaker * (size / z0) ** self.exponent * bends
-        slip = new.slip - old.slip
+        increment = new.slip - old.slip
         return {
-            "slip": slip - flow,
+            "slip": increment - flow,
             "strain": new.strain - strain,
-            "energy": new.energy - old.energy - z * slip / z0**2,
+            "energy": new.energy - old.energy - z * increment / z0**2,
         }
 
     def elastic_energy(self, strain: Values, state: State) -> Values:
@@ -397,10 +397,10 @@ class AxialBending(Record, MaterialLaw):
         w, m, flow = self.rounding, M / self.bending, new.flow - old.flow
         by_m = m / sqrt(m**2 + w**2) / (sqrt(1 + w**2) - w)
         γ = where(below(flow, 0.0), 0.0, flow)
-        back = (flow - γ) * (EA / self.axial**2 + EI / self.bending**2)
+        correction = (flow - γ) * (EA / self.axial**2 + EI / self.bending**2)
         outside = below(-self.excess(*self.stress(strain, old)), 0.0)
         return {
             "stretch": new.stretch - old.stretch - γ * 2 * N / self.axial**2,
             "curvature": new.curvature - old.curvature - γ * by_m / self.bending,
-            "flow": where(outside, self.excess(N, M) - back, flow),
+            "flow": where(outside, self.excess(N, M) - correction, flow),
         }

@@ -21,7 +21,7 @@ from typing import (
 )
 from weakref import WeakKeyDictionary
 
-from ufl_beam.display import one_line
+from ufl_beam.display import compact_repr
 from ufl_beam.errors import (
     ArgumentError,
     ModelError,
@@ -57,7 +57,7 @@ class Record:
     """Error of wrong fields; it is ArgumentError for records that do not belong to a model."""
 
     def __repr__(self) -> str:
-        return one_line(self)  # for dataclasses with ``repr=False``
+        return compact_repr(self)  # for dataclasses with ``repr=False``
 
     def __post_init__(self) -> None:
         for name, word, default, check in _checks(type(self)):  # type: ignore[arg-type]
@@ -80,7 +80,7 @@ class Record:
 @cache
 def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., object]]]:
     """Return name, name in messages, default and check of each field with a check."""
-    found = []
+    checks = []
     hints = get_type_hints(record, include_extras=True)
     for field in fields(record):
         if get_origin(hint := hints[field.name]) is Annotated:
@@ -88,8 +88,8 @@ def _checks(record: type[Any]) -> list[tuple[str, str, object, Callable[..., obj
             if check is require_kind:
                 kinds = tuple(k for k in get_args(kind) if k is not type(None))
                 check = partial(require_kind, kind=kinds or kind)
-            found.append((field.name, *(word or [field.name]), field.default, check))
-    return found
+            checks.append((field.name, *(word or [field.name]), field.default, check))
+    return checks
 
 
 # -- signatures of users' functions and objects -------------------------------------------------
@@ -122,33 +122,33 @@ def parameters_by_name(
     for p in named:
         if p.name not in known and p.default is p.empty:
             raise ModelError(
-                f"{what} has a parameter {p.name!r}, which nobody knows; there are "
+                f"{what} has a parameter {p.name!r}, which is unknown; there are "
                 f"{', '.join(known)}{more}"
             )
     return tuple(p.name for p in named if p.name in known)
 
 
 @lru_cache(maxsize=32)
-def members(of: type) -> dict[str, Callable[..., Any] | None]:
+def members(protocol: type) -> dict[str, Callable[..., Any] | None]:
     """Return public methods by name of a protocol or an abstract class; attributes are None."""
-    found: dict[str, Callable[..., Any] | None] = {}
-    for base in reversed([base for base in of.__mro__ if base not in NO_MEMBERS]):
+    methods: dict[str, Callable[..., Any] | None] = {}
+    for base in reversed([base for base in protocol.__mro__ if base not in NO_MEMBERS]):
         for name, thing in (dict.fromkeys(inspect.get_annotations(base)) | vars(base)).items():
             if not name.startswith("_"):
-                found[name] = thing if inspect.isfunction(thing) else None
-    return found
+                methods[name] = thing if inspect.isfunction(thing) else None
+    return methods
 
 
-def unlike(value: object, of: type) -> str:
+def unlike(value: object, protocol: type) -> str:
     """Return why an object does not satisfy a protocol; empty if it does.
 
     Methods must accept the arguments of the methods of the protocol.
     """
-    if missing := [name for name in members(of) if not hasattr(value, name)]:
+    if missing := [name for name in members(protocol) if not hasattr(value, name)]:
         return f"it lacks {', '.join(missing)}"
     known = _alike.setdefault(type(value), set())
-    for name, expected in members(of).items():
-        if expected is None or of in known:
+    for name, expected in members(protocol).items():
+        if expected is None or protocol in known:
             continue
         _, *parameters = inspect.signature(expected).parameters.values()
         by_name = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
@@ -160,5 +160,5 @@ def unlike(value: object, of: type) -> str:
         except TypeError:  # also if the member is not callable
             call = ", ".join(p.name for p in parameters)
             return f"its method {name} cannot be called as {name}({call})"
-    known.add(of)
+    known.add(protocol)
     return ""

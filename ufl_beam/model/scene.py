@@ -107,19 +107,19 @@ class Scene(Record, Rich):
         self._require_once()
         known = {GROUND, *self.beams, *self.bodies}
         for owner, place in self.attachments():
-            one = place.beam if isinstance(place, Place) else place.body
-            if one not in known:
-                part = "beams" if isinstance(one, Beam) else "bodies"
-                raise ModelError(f"{owner}: {one.name} is not in the scene; add it to {part}")
+            member = place.beam if isinstance(place, Place) else place.body
+            if member not in known:
+                field = "beams" if isinstance(member, Beam) else "bodies"
+                raise ModelError(f"{owner}: {member.name} is not in the scene; add it to {field}")
         for joint in self.joints:
-            for i, other in enumerate(joint.places[1:], start=1):
-                if other in joint.places[:i]:
+            for i, place in enumerate(joint.places[1:], start=1):
+                if place in joint.places[:i]:
                     raise ModelError(f"{joint}: the same place twice")
-                gap = math.dist(joint.places[0].point, other.point)
+                gap = math.dist(joint.places[0].point, place.point)
                 if joint.meets and gap > 1e-9 * self.size:
                     raise ModelError(
                         f"{type(joint).__name__}: joint ends lie {gap:.6g} m apart: "
-                        f"{joint.places[0]} and {other}; {joint.advice}"
+                        f"{joint.places[0]} and {place}; {joint.advice}"
                     )
         for connector in self.links:
             if node(connector.a) == node(connector.b):
@@ -135,14 +135,14 @@ class Scene(Record, Rich):
             ModelError: No beam or body has this name, or more than one has it.
         """
         everything: tuple[Beam | Body, ...] = (*self.beams, *self.bodies)
-        found = [one for one in everything if one.name == name]
-        if len(found) != 1:
-            there = ", ".join(dict.fromkeys(str(one.name) for one in everything))
+        matches = [x for x in everything if x.name == name]
+        if len(matches) != 1:
+            names = ", ".join(dict.fromkeys(str(x.name) for x in everything))
             raise ModelError(
-                f"Scene: {len(found) or 'no'} beams and bodies are called {name!r}; "
-                f"there is {there}; scene.beams[i] and scene.bodies[i] are those of a number"
+                f"Scene: {len(matches) or 'no'} beams and bodies are called {name!r}; "
+                f"there is {names}; scene.beams[i] and scene.bodies[i] are found by index"
             )
-        return found[0]
+        return matches[0]
 
     def __str__(self) -> str:
         return counted(
@@ -163,8 +163,8 @@ class Scene(Record, Rich):
         It does not depend on the axes.  If all points coincide, it is the largest radius of
         gyration, or 1.
         """
-        of_kind = {(b.cells, b.corners): b for b in self.beams}  # equal beams share an array
-        vertices = {kind: np.array(b.vertices(())) for kind, b in of_kind.items()}
+        beams = {(b.cells, b.corners): b for b in self.beams}  # equal beams share an array
+        vertices = {kind: np.array(b.vertices(())) for kind, b in beams.items()}
         curves = [beam.curve for beam in self.beams]
         on_beams = points_along(curves, [vertices[b.cells, b.corners] for b in self.beams])
         others = [body.center for body in self.bodies]
@@ -176,15 +176,15 @@ class Scene(Record, Rich):
     @cached_property
     def links(self) -> tuple[Connector, ...]:
         """Connectors of joints, of the scene and of off-centre loads, and plastic hinges."""
-        return (*self._links_but_hinges, *self.hinges)
+        return (*self._connectors_but_hinges, *self.hinges)
 
     @cached_property
-    def _links_but_hinges(self) -> tuple[Connector, ...]:
-        held = [holder for joint in self.joints for holder in joint.holders]
+    def _connectors_but_hinges(self) -> tuple[Connector, ...]:
+        constraints = [holder for joint in self.joints for holder in joint.holders]
         pushing = (load for load in self.loads if isinstance(load, PointLoad))
         loads = [push for load in pushing for push in _off_center(load)]
-        between = [link for one in self.connectors for link in one.components or (one,)]
-        return (*held, *between, *loads)
+        between = [link for x in self.connectors for link in x.components or (x,)]
+        return (*constraints, *between, *loads)
 
     @cached_property
     def hinges(self) -> tuple[Connector, ...]:
@@ -192,7 +192,7 @@ class Scene(Record, Rich):
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
         bearing = [support.place for support in self.supports if 2 in support.held]
         bearing += [mass.place for mass in self.masses if mass.inertia]
-        for link in self._links_but_hinges if laws else ():
+        for link in self._connectors_but_hinges if laws else ():
             by_a, by_b = link.rigidly()
             bearing += [link.a] * bool(by_a[2] or link.follows_a) + [link.b] * bool(by_b[2])
         loaded = [load.place for load in self.moments]
@@ -213,10 +213,8 @@ class Scene(Record, Rich):
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
         """Iterate over functions of time of loads, motions and drives, and their owners."""
-        yield from (
-            (one, one.amplitude) for one in self.loads if not isinstance(one, RotatingFrame)
-        )
-        yield from ((one, motion) for one in self.supports for motion in one.held.values())
+        yield from ((x, x.amplitude) for x in self.loads if not isinstance(x, RotatingFrame))
+        yield from ((x, motion) for x in self.supports for motion in x.held.values())
         for link in self.links:
             if isinstance(link.law, PrescribedMotion):
                 yield link, link.law.motion
@@ -237,8 +235,8 @@ class Scene(Record, Rich):
             elif beam := getattr(load, "beam", None):
                 yield load, beam.start
         for velocity in self.initial:
-            for one in velocity.beams:
-                yield "Velocity", one.middle if isinstance(one, Body) else one.start
+            for member in velocity.beams:
+                yield "Velocity", member.middle if isinstance(member, Body) else member.start
         for damping in self.damping:
             if isinstance(damping, KelvinVoigt):
                 for beam in damping.beams or ():
@@ -249,20 +247,20 @@ class Scene(Record, Rich):
     @cached_property
     def attached(self) -> dict[Member, list[float]]:
         """Parameters of the places on each beam that must be vertices."""
-        found: dict[Member, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
+        places: dict[Member, list[float]] = {beam: list(beam.hinges) for beam in self.beams}
         for _, place in self.attachments():
             if isinstance(place, Place):
-                found[place.beam].append(place.s)
-        return found
+                places[place.beam].append(place.s)
+        return places
 
     def _require_once(self) -> None:
         """Raise if a record repeats another, works share a name, or two frames rotate."""
-        for one, twice in (*_again("beams", self.beams), *_again("bodies", self.bodies)):
-            raise ModelError(f"Scene: {one.name} is in the scene {twice}")
-        for part in ("joints", "connectors", "loads", "masses", "initial", "damping", "works"):
-            for record, twice in _again(part, getattr(self, part)):
+        for member, twice in (*_again("beams", self.beams), *_again("bodies", self.bodies)):
+            raise ModelError(f"Scene: {member.name} is in the scene {twice}")
+        for field in ("joints", "connectors", "loads", "masses", "initial", "damping", "works"):
+            for record, twice in _again(field, getattr(self, field)):
                 raise ModelError(
-                    f"Scene: {clip(str(record))} is there {twice}; remove one, or make two of them"
+                    f"Scene: {clip(str(record))} occurs {twice}; remove one, or make two of them"
                 )
         for joint, twice in _again(
             "joints", self.joints,
@@ -271,18 +269,18 @@ class Scene(Record, Rich):
                 *((link.motion, link.axis, id(link.law)) for link in joint.holders),
             ),
         ):  # fmt: skip
-            raise ModelError(f"Scene: {joint} is there {twice}; remove one")
+            raise ModelError(f"Scene: {joint} occurs {twice}; remove one")
         for work, twice in _again("works", self.works, key=lambda work: work.name):
             raise ModelError(
                 f"Scene: a work is called {work.name!r} {twice}, the name of its entry in the "
                 "energy ledger; give one of them another name"
             )
-        of_time = {work.in_time: work for work in self.works if isinstance(work, Potential)}
+        in_time = {work.in_time: work for work in self.works if isinstance(work, Potential)}
         for work in self.works:
-            if work.name in of_time:
+            if work.name in in_time:
                 raise ModelError(
-                    f"Scene: {work} has the name of another entry of the energy ledger, of what "
-                    f"{of_time[work.name]} gains in time; give one of them another name"
+                    f"Scene: {work} has the name of another entry of the energy ledger, the energy "
+                    f"that {in_time[work.name]} gains in time; give one of them another name"
                 )
         frames = [load for load in self.loads if isinstance(load, RotatingFrame)]
         if len(frames) > 1:
@@ -336,16 +334,16 @@ class Scene(Record, Rich):
                 holders[dof] = str(support)
 
 
-def spots_of(scene: Scene) -> dict[Body, list[Spot]]:
+def attachment_points(scene: Scene) -> dict[Body, list[Spot]]:
     """Find the attachment points of bodies and of the ground, each once."""
     anchors = [place for joint in scene.joints for place in joint.places]
     anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
     anchors += [x.place for x in scene.loads if isinstance(x, PointLoad | FollowerLoad)]
-    found: dict[Body, dict[Spot, None]] = {body: {} for body in (*scene.bodies, GROUND)}
-    for anchor in anchors:
-        if isinstance(anchor, Spot):
-            found[anchor.body][anchor] = None
-    return {body: list(spots) for body, spots in found.items()}
+    points: dict[Body, dict[Spot, None]] = {body: {} for body in (*scene.bodies, GROUND)}
+    for attached in anchors:
+        if isinstance(attached, Spot):
+            points[attached.body][attached] = None
+    return {body: list(spots) for body, spots in points.items()}
 
 
 def _off_center(load: PointLoad) -> tuple[Connector, ...]:
@@ -366,10 +364,10 @@ def _off_center(load: PointLoad) -> tuple[Connector, ...]:
 
 
 def _again(
-    part: str, records: Sequence[Any], key: Callable[[Any], object] = id
+    field: str, records: Sequence[Any], key: Callable[[Any], object] = id
 ) -> Iterator[tuple[Any, str]]:
     """Iterate over records that a list repeats, with words for a message."""
     first: dict[object, int] = {}
     for i, record in enumerate(records):
         if (j := first.setdefault(key(record), i)) != i:
-            yield record, f"twice, as {part}[{j}] and {part}[{i}]"
+            yield record, f"twice, as {field}[{j}] and {field}[{i}]"

@@ -88,9 +88,9 @@ class Section(Record):
                 f"Section: a law {laws[0]} beside fibres; the fibres bear N and M, shear is elastic"
             )
         if self.interaction is not None and (laws or self.fibres is not None):
-            other = laws[0] if laws else "fibres"
+            law = laws[0] if laws else "fibres"
             raise ModelError(
-                f"Section: {other} beside interaction, the law of N and M; give one of both"
+                f"Section: {law} beside interaction, the law of N and M; give one of both"
             )
         self.layout(self.hinge)  # refuses laws that do not go together
 
@@ -117,17 +117,17 @@ class Section(Record):
             laws[2] = self.bending or ElastoPlastic(yield_limit=math.inf)
         else:
             hinge = None
-        here = np.array([law is not None for law in laws])
-        if not here.any():
+        inelastic = np.array([law is not None for law in laws])
+        if not inelastic.any():
             return None
         return Layout(
-            strains=np.eye(3)[here],
-            weights=np.ones(here.sum()),
-            stiffness=stiffness[here],
+            strains=np.eye(3)[inelastic],
+            weights=np.ones(inelastic.sum()),
+            stiffness=stiffness[inelastic],
             laws=tuple((law, 1) for law in laws if law is not None),
-            rest=np.where(here, 0.0, stiffness),
+            rest=np.where(inelastic, 0.0, stiffness),
             softening=hinge,
-            breaking=slice(here.sum() - 1, None),
+            breaking=slice(inelastic.sum() - 1, None),
             hinges=hinge is not None,
         )
 

@@ -143,7 +143,7 @@ This is far below round-off.  Numbers that underflow would make forces and stiff
 
 
 @dataclass(frozen=True)
-class _OfLimitAndEnergy(Record, SofteningLaw):
+class _LimitAndEnergy(Record, SofteningLaw):
     """Base of laws with a limit and an energy; their tractions never exceed the limit.
 
     They fall by at most limit²/energy per opening; a steeper law must define ``steepest``.
@@ -160,7 +160,7 @@ class _OfLimitAndEnergy(Record, SofteningLaw):
 
 
 @closed(OWN_LAW)
-class Softening(_OfLimitAndEnergy):
+class Softening(_LimitAndEnergy):
     """Exponential softening of a hinge or crack, down to a perfect joint, P(51)-P(53).
 
     Args:
@@ -184,11 +184,11 @@ class Softening(_OfLimitAndEnergy):
 
     def mean_traction(self, ξ: Values, a: Values) -> Values:
         """Return the mean resistance from ξ to ξ + a; its product with a is dissipated."""
-        return self.traction(ξ) * _mean_of_decay(self.limit / self.fracture_energy * a)
+        return self.traction(ξ) * _decay_mean(self.limit / self.fracture_energy * a)
 
 
 @closed(OWN_LAW)
-class LinearSoftening(_OfLimitAndEnergy):
+class LinearSoftening(_LimitAndEnergy):
     """Linear softening of a hinge or crack, to zero at the opening 2 fracture_energy / limit.
 
     It has the arguments and errors of :class:`Softening`.
@@ -211,7 +211,7 @@ class LinearSoftening(_OfLimitAndEnergy):
         return where(ends, now**2 / (2 * safe), now - slope * a / 2)
 
 
-def _mean_of_decay(x: Values) -> Values:
+def _decay_mean(x: Values) -> Values:
     """Return the mean of exp(-x) from 0 to x, (1 - exp(-x))/x; below 0.1 by its series."""
     small = below(x, 0.1)
     series = 1.0
@@ -224,7 +224,7 @@ def _mean_of_decay(x: Values) -> Values:
 def require_softening(law: object, what: str) -> None:
     """Raise :class:`ModelError` naming ``what`` unless a discontinuity can follow a law."""
     require_kind(law, (Softening, LinearSoftening, SofteningLaw), what)
-    if isinstance(law, _OfLimitAndEnergy):
+    if isinstance(law, _LimitAndEnergy):
         return
     kind = f"{what}: {type(law).__name__}"
     require_fields(law, SofteningLaw, kind, but=("limit", "fracture_energy"))
@@ -233,7 +233,7 @@ def require_softening(law: object, what: str) -> None:
         if hasattr(value, "draw"):
             raise ModelError(
                 f"{kind}: {field.name} = {shorten(value)} is a distribution; numbers of softening "
-                "are the same in all cells; draw those of the bulk, ElastoPlastic(limit)"
+                "are the same in all cells; draw the numbers of the bulk, ElastoPlastic(limit)"
             )
         require_field(value, f"{kind}: {field.name}")
     try:
@@ -287,7 +287,7 @@ def course(law: SofteningLaw) -> Course:
     if not abs(slope) * unit < 1e9 * limit:
         raise ModelError(
             f"{kind}: its traction has an infinite slope at zero opening, for which there is no "
-            "tangent; let it begin with a finite one"
+            "tangent; let it begin with a finite slope"
         )
     _require_integral(law, unit, energy)
     falls = -np.diff(tractions) / np.diff(some)
@@ -311,23 +311,23 @@ def _called(law: SofteningLaw, method: str, openings: Array) -> Array:
     what = f"{type(law).__name__}.{method}"
     try:
         with np.errstate(all="ignore"):
-            found = getattr(law, method)(openings) + 0 * openings
+            values = getattr(law, method)(openings) + 0 * openings
     except Exception as error:
         raise ModelError(
             f"{what} fails: {error}{raised_at(error)}. It is called with arrays of openings, real "
             "or complex, and written with + - * / ** and the functions of ub.law_functions"
         ) from error
-    if np.shape(found) != openings.shape:
+    if np.shape(values) != openings.shape:
         raise ModelError(
-            f"{what} answers {len(openings)} openings with an array of shape {np.shape(found)}; it "
+            f"{what} returns for {len(openings)} openings an array of shape {np.shape(values)}; it "
             "must return one number for each"
         )
-    if (bad := ~np.isfinite(found)).any():
+    if (bad := ~np.isfinite(values)).any():
         raise ModelError(
-            f"{what} is {found[bad][0]} at the opening {openings[bad][0]:.6g}; it must be a number "
-            "at all openings from zero on"
+            f"{what} is {values[bad][0]} at the opening {openings[bad][0]:.6g}; it must be a "
+            "number at all openings from zero on"
         )
-    return np.asarray(found)
+    return np.asarray(values)
 
 
 def _integral(law: SofteningLaw, edges: Array) -> float:
@@ -361,22 +361,22 @@ def _require_integral(law: SofteningLaw, unit: float, energy: float) -> None:
     kind = type(law).__name__
     if law.energy_to(np.zeros(1)) is not None:
         for opening in (0.0, *(unit * np.array([0.1, 0.5, 1.0, 2.0, 5.0]))):
-            (stated,) = _called(law, "energy_to", np.array([opening]))
-            found = _integral(law, np.linspace(0.0, opening, 17)) if opening else 0.0
-            if abs(stated - found) > 1e-6 * energy:
+            (defined,) = _called(law, "energy_to", np.array([opening]))
+            computed = _integral(law, np.linspace(0.0, opening, 17)) if opening else 0.0
+            if abs(defined - computed) > 1e-6 * energy:
                 raise ModelError(
-                    f"{kind}: energy_to is {stated:.6g} at the opening {opening:.6g}, but the "
-                    f"integral of the traction is {found:.6g}; make both agree, or leave it out"
+                    f"{kind}: energy_to is {defined:.6g} at the opening {opening:.6g}, but the "
+                    f"integral of the traction is {computed:.6g}; make both agree, or leave it out"
                 )
     (first,) = _called(law, "traction", np.zeros(1))
-    for name, found in (("limit", first), ("fracture_energy", energy)):
+    for name, computed in (("limit", first), ("fracture_energy", energy)):
         if name in vars(law) or hasattr(type(law), name):
-            stated = getattr(law, name)
-            if not abs(stated - found) <= 1e-6 * found:
-                means = "traction at zero opening" if name == "limit" else "integral of it"
+            defined = getattr(law, name)
+            if not abs(defined - computed) <= 1e-6 * computed:
+                means = "the traction at zero opening" if name == "limit" else "its integral"
                 raise ModelError(
-                    f"{kind}: {name} = {stated:.6g}, but the {means} is {found:.6g}; make both "
-                    "agree, or call the number otherwise"
+                    f"{kind}: {name} = {defined:.6g}, but {means} is {computed:.6g}; make both "
+                    "agree, or give the number another name"
                 )
 
 

@@ -158,11 +158,11 @@ class PrescribedDisplacement(Support):
     @cached_property
     def held(self) -> dict[int, TimeFunction]:
         """Component -> its value in time."""
-        held: dict[int, TimeFunction] = {}
+        components: dict[int, TimeFunction] = {}
         for component, value in enumerate((self.u, self.v, self.psi)):
             if callable(value):
-                held[component] = value
+                components[component] = value
             elif value is not None:
                 number = require_number(value, f"{self}: {COMPONENTS[component]}")
-                held[component] = Constant(number) if number else still
-        return held
+                components[component] = Constant(number) if number else still
+        return components

@@ -54,7 +54,7 @@ class Work(Record):
         for name, value in self.numbers.items():
             what = f"{self}: numbers[{shorten(name)}]"
             if name in self.arguments:
-                raise ModelError(f"{what}: the name has a meaning already; take another one")
+                raise ModelError(f"{what}: the name has a meaning already; take another name")
             if callable(value):
                 require_time_function(value, what)
             else:
@@ -75,7 +75,7 @@ class Work(Record):
         """Names of the parameters of the function, all of them known."""
         known = (*self.arguments, *self.numbers)
         asked = parameters_by_name(
-            self.density, known, f"{self}: the function", more=", and what `numbers` names"
+            self.density, known, f"{self}: the function", more=", and the names in `numbers`"
         )
         if asked is None:
             raise ModelError(

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, State
-from ufl_beam.display import one_line
+from ufl_beam.display import compact_repr
 from ufl_beam.errors import (
     ArgumentError,
     require_function,
@@ -84,7 +84,7 @@ def any_mean(range: Array, mean: Array) -> Array:
 
 Life = Annotated[float, partial(require_number, positive=True, infinite=True)]
 MeanStress = Annotated[
-    Callable[[Array, Array], Array], partial(require_function, of="(range, mean)")
+    Callable[[Array, Array], Array], partial(require_function, arguments="(range, mean)")
 ]
 
 
@@ -120,7 +120,7 @@ class SNCurve(Record):
     limit: Life = math.inf
     mean: MeanStress = any_mean
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -175,7 +175,7 @@ class Cycles:
     mean: Array
     count: Array
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     def damage(self, curve: SNCurve) -> float:
         """Compute Miner's sum: the fraction of the life that is used, 1 at failure."""
@@ -289,7 +289,7 @@ class HotSpot(Record):
     place: Instance[Place]
     stress: Callable[[Array, Array, Array], Array]
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -20,7 +20,7 @@ from ufl_beam.errors import ArgumentError, require_count
 from ufl_beam.model.bodies import Anchor, arm
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Link, RigidLink
-from ufl_beam.model.scene import Scene, spots_of
+from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
 from ufl_beam.output.postprocessing import turned
 from ufl_beam.output.recorders import Restartable, StateView
@@ -55,7 +55,7 @@ class Rod(NamedTuple):
 
 def scene_rods(scene: Scene) -> list[Rod]:
     """Return lines from the centre of each body to its points, and along links and springs."""
-    spots, rods = spots_of(scene), list[Rod]()
+    spots, rods = attachment_points(scene), list[Rod]()
     for body in scene.bodies:
         x, y = body.center
         # A body with attachments at its centre alone also gets a line, which shows its rotation.

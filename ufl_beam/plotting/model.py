@@ -12,10 +12,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.display import counted, html_of
+from ufl_beam.display import counted, html_page
 from ufl_beam.model.constraint_checks import require_independent
 from ufl_beam.model.loads import Gravity, Load, Rayleigh, RotatingFrame
-from ufl_beam.model.scene import Scene, spots_of
+from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.plotting import notebook, style
 from ufl_beam.plotting.model_drawing import (
     CAPTIONS,
@@ -100,7 +100,7 @@ def draw_model(scene: Scene, *, ax: Axes | None = None) -> Figure:
     return style.parent_figure(axes)
 
 
-@html_of.register
+@html_page.register
 def scene_page(scene: Scene) -> str:
     """Write a scene: its parts, and its picture."""
     return notebook.lines(str(scene)) + notebook.image("model", partial(draw_model, scene))
@@ -153,7 +153,8 @@ def _planned(
     """
     scene = subject.scene
     points = [*subject.axes.values(), *(np.array([body.center]) for body in scene.bodies)]
-    points += [np.array([point.point]) for spots in spots_of(scene).values() for point in spots]
+    attached = chain(*attachment_points(scene).values())
+    points += [np.array([place.point]) for place in attached]
     low, high = np.concatenate(points).min(axis=0), np.concatenate(points).max(axis=0)
     scale, frame = max(*(high - low) / (400.0, 250.0), scene.size / 500.0), UNBOUNDED
     # Symbols around the beams have sizes in points, so a second iteration is needed to fit them.

@@ -9,7 +9,7 @@ from html import escape
 from typing import TYPE_CHECKING
 
 from ufl_beam.analysis.parameter_study import Study
-from ufl_beam.display import html_of
+from ufl_beam.display import html_page
 from ufl_beam.plotting.style import png
 from ufl_beam.terms.energy_ledger import Energy
 
@@ -19,14 +19,14 @@ if TYPE_CHECKING:
 ROWS = 12  # most cases of a study in a table
 
 
-@html_of.register
+@html_page.register
 def energy_page(energy: Energy) -> str:
     """Write an energy ledger as a table of its final entries."""
     rows = [(kind, name, f"{value:.6g}") for kind, name, value in energy.entries()]
     return table(("energy", "", "at the end (J)"), rows) + lines(energy.balance()) if rows else ""
 
 
-@html_of.register
+@html_page.register
 def study_page(results: Study) -> str:
     """Write a study: its first cases with their scalar results."""
     title, *failed = str(results).splitlines()

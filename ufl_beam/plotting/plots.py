@@ -13,7 +13,7 @@ import numpy as np
 from ufl_beam.analysis.modes import Shapes
 from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
-from ufl_beam.display import html_of
+from ufl_beam.display import html_page
 from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import Anchor
 from ufl_beam.output.extremes import Extremes
@@ -97,7 +97,7 @@ def draw_shapes(
     return style.parent_figure(axes)
 
 
-@html_of.register
+@html_page.register
 def solution_page(solution: Solution) -> str:
     """Write a solution: its summary, the energy ledger, and successive shapes.
 
@@ -236,7 +236,7 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
     return figure
 
 
-@html_of.register
+@html_page.register
 def shapes_page(shapes: Shapes) -> str:
     """Write modes: their frequencies or load factors, and pictures of the first ones."""
     rows = [(str(k), title) for k, title in enumerate(shapes.titles)]
@@ -297,7 +297,7 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
     return style.parent_figure(axes)
 
 
-@html_of.register
+@html_page.register
 def tradeoff_page(result: Tradeoff) -> str:
     """Write a trade-off: the runs that no other run beats, remarks, and a picture."""
     head, *rows = result.table()

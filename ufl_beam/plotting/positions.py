@@ -18,7 +18,7 @@ from ufl_beam.model.bodies import GROUND, Anchor, Body
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import nearest, parameter_step, tangent
-from ufl_beam.model.scene import Scene, spots_of
+from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.states import States
 
 SYMBOL, SHORT_BEAM, SMALLEST = 12.0, 45.0, 0.3
@@ -107,7 +107,7 @@ class Canvas:
         self.scene = subject.scene if isinstance(subject, States) else subject
         number = 0 if self._solution is None else len(self._solution.times)
         self._shown = range(number) if shown is None else shown
-        self.spots = spots_of(self.scene)  # attachment points of bodies and of the ground
+        self.spots = attachment_points(self.scene)  # attachment points of bodies and of the ground
 
     @classmethod
     def at_scale(

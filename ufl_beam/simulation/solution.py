@@ -21,7 +21,7 @@ from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.functions import Curve, nearest, parameter_step
-from ufl_beam.model.joints import NEAR_START
+from ufl_beam.model.joints import START_INTERVAL
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import (
     Content,
@@ -418,4 +418,4 @@ def _used_curve(solution: Solution, curve: Curve) -> SavedCurve:
     first, last = float(np.nanmin(used)), float(np.nanmax(used))
     steps = (parameter_step(curve, s, scene.size) for s in (first, last))
     more = 0.1 * (last - first) + 8 * max(steps)
-    return SavedCurve.sampled(curve, first - more, last + more, (0.0, *NEAR_START))
+    return SavedCurve.sampled(curve, first - more, last + more, (0.0, *START_INTERVAL))

@@ -12,7 +12,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ufl_beam.compiled.c_library import ffi, petsc
-from ufl_beam.display import one_line
+from ufl_beam.display import compact_repr
 from ufl_beam.errors import (
     ArgumentError,
     require_count,
@@ -54,7 +54,7 @@ class Newton:
     petsc: dict[str, Any] = field(default_factory=dict)
     reference: bool = False
 
-    __repr__ = one_line
+    __repr__ = compact_repr
 
     def __post_init__(self) -> None:
         require_number(self.rtol, "Newton: rtol", positive=True)
