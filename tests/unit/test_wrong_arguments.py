@@ -552,7 +552,7 @@ WORDS = {
 """Words in the place of a parameter's name."""
 
 PLACES = {"places", "place", "follow"}
-"""Of recorders; what is wrong with them is said as of other places."""
+"""Of recorders and cameras; errors of places are a `ModelError`."""
 
 
 def of_models(name):
@@ -607,56 +607,45 @@ def test_wrong_values_are_refused_by_name(name, monkeypatch):
 # -- functions of users, in the middle of a run ---------------------------------------------------
 
 
-def late(value):
-    """A function of time that is good until 0.2 s."""
-    return lambda t: 1e-3 * t if t < 0.25 else value
-
-
-def shaken(**parts):
-    one = ub.Beam((0, 0), (1, 0), SECTION, cells=2, name="girder")
-    made = {name: [make(one)] for name, make in parts.items()}
-    held = () if "supports" in made else [ub.Clamped(one.start)]
-    return ub.Scene([one], **{"supports": held, **made})
+def turned(a, law):
+    return {"connectors": [ub.Turn(a, BEAM.end, law)]}
 
 
 OWNERS = {
-    "PointLoad at girder.end": lambda v: shaken(
-        loads=lambda b: ub.PointLoad(b.end, force=(1, 0), amplitude=late(v))
+    "PointLoad at girder.end": lambda f: {
+        "loads": [ub.PointLoad(BEAM.end, force=(1, 0), amplitude=f)]
+    },
+    "FollowerLoad at girder.end": lambda f: {
+        "loads": [ub.FollowerLoad(BEAM.end, force=(1, 0), amplitude=f)]
+    },
+    "LineLoad on girder": lambda f: {"loads": [ub.LineLoad(BEAM, force=(1, 0), amplitude=f)]},
+    "Gravity": lambda f: {"loads": [ub.Gravity(amplitude=f)]},
+    "PrescribedDisplacement at girder.start": lambda f: {
+        "supports": [ub.PrescribedDisplacement(BEAM.start, u=0, v=f, psi=0)]
+    },
+    "Turn(ground (1, 0), girder.end (1, 0))": lambda f: turned(
+        ub.ground(1, 0), ub.PrescribedMotion(f)
     ),
-    "FollowerLoad at girder.end": lambda v: shaken(
-        loads=lambda b: ub.FollowerLoad(b.end, force=(1, 0), amplitude=late(v))
+    "Slide(ground (1, 0), girder.end (1, 0))": lambda f: {
+        "connectors": [ub.Slide(ub.ground(1, 0), BEAM.end, ub.PrescribedForce(f), axis=(1, 0))]
+    },
+    "Turn(ground (0, 0), girder.end (1, 0))": lambda f: turned(
+        ub.ground(0, 0), ub.Controller(lambda simulation: f(simulation.t))
     ),
-    "LineLoad on girder": lambda v: shaken(
-        loads=lambda b: ub.LineLoad(b, force=(1, 0), amplitude=late(v))
-    ),
-    "Gravity": lambda v: shaken(loads=lambda b: ub.Gravity(amplitude=late(v))),
-    "PrescribedDisplacement at girder.start": lambda v: shaken(
-        supports=lambda b: ub.PrescribedDisplacement(b.start, u=0, v=late(v), psi=0)
-    ),
-    "Turn(ground (1, 0), girder.end (1, 0))": lambda v: shaken(
-        connectors=lambda b: ub.Turn(ub.ground(1, 0), b.end, ub.PrescribedMotion(late(v)))
-    ),
-    "Slide(ground (1, 0), girder.end (1, 0))": lambda v: shaken(
-        connectors=lambda b: ub.Slide(
-            ub.ground(1, 0), b.end, ub.PrescribedForce(late(v)), axis=(1, 0)
-        )
-    ),
-    "Turn(ground (0, 0), girder.end (1, 0))": lambda v: shaken(
-        connectors=lambda b: ub.Turn(
-            ub.ground(0, 0), b.end, ub.Controller(lambda simulation: late(v)(simulation.t))
-        )
-    ),
-    "Turn(ground (2, 0), girder.end (1, 0))": lambda v: shaken(
-        connectors=lambda b: ub.Turn(ub.ground(2, 0), b.end, ub.ForceLaw(lambda e, rate: v))
+    "Turn(ground (2, 0), girder.end (1, 0))": lambda f: turned(
+        ub.ground(2, 0), ub.ForceLaw(lambda e, rate: f(1.0))
     ),
 }
+"""Parts of a scene with a function of time, by the name of the part that a message has."""
 
 
 @pytest.mark.parametrize("owner", OWNERS)
 @pytest.mark.parametrize("value", [None, "1.0", 1j, np.zeros(2), np.zeros(1), HUGE])
-def test_functions_that_return_no_number_later(owner, value):
-    """The message names the owner; before, most of them were bare errors of NumPy, or silent."""
-    scene = OWNERS[owner](value)
+def test_a_function_that_returns_no_number_during_a_run_is_refused(owner, value):
+    """The function returns numbers until 0.2 s."""
+    parts = {"supports": [ub.Clamped(BEAM.start)]}
+    parts |= OWNERS[owner](lambda t: 1e-3 * t if t < 0.25 else value)
+    scene = ub.Scene([BEAM], **parts)
     with pytest.raises(ub.ArgumentError) as failure:
         ub.simulate(
             scene, ub.EnergyMomentum(), t=(0, 1), dt=0.1, progress=False, comm=MPI.COMM_SELF
@@ -688,7 +677,7 @@ def test_messages_show_the_beginning_of_long_values():
     assert len(str(failure.value)) < 150
 
 
-def test_entries_that_the_ledger_lacks():
+def test_an_entry_that_the_ledger_lacks_is_refused():
     solution = ub.simulate(SCENE, ub.Static(), t=(0, 1), dt=1, comm=MPI.COMM_SELF)
     for ask in (lambda e: e.lost["hinges"], lambda e: e["hinges"]):
         with pytest.raises(KeyError, match=r"no entry 'hinges'.*scene has nothing.*'stored'"):

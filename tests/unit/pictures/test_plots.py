@@ -16,6 +16,12 @@ from ufl_beam.plotting.style import BLUE, RED, WHITE, decimal_prefix, number, wi
 UNIT = {"N": "N", "V": "N", "M": "N m"}
 
 
+@pytest.fixture(scope="module")
+def diagrams(portal):
+    """Pictures of the portal by the section force."""
+    return {what: ub.plot(portal, what) for what in UNIT}
+
+
 def values_of(solution, what):
     """What diagrams show along each beam."""
     return [getattr(solution.diagram(beam), what) for beam in solution.scene.beams]
@@ -72,33 +78,32 @@ def test_pins_shrink_where_beams_are_short():
     np.testing.assert_allclose(short, 0.3 * long)
 
 
-@pytest.mark.parametrize("what", ["N", "V", "M"])
-def test_extreme_values_are_those_of_the_solution(portal, what):
+@pytest.mark.parametrize("what", UNIT)
+def test_extreme_values_are_those_of_the_solution(portal, diagrams, what):
     values = np.concatenate(values_of(portal, what))
     factor, prefix = decimal_prefix(np.abs(values).max())
-    expected = {number(x / factor) for x in (values.max(), values.min())}
-    if what == "N":  # all beams are in compression
-        expected = {number(values.min() / factor)}
-    figure = ub.plot(portal, what)
+    extremes = (values.min(),) if what == "N" else (values.max(), values.min())
+    assert (values.max() < 0.0) == (what == "N")  # all beams are in compression
+    figure = diagrams[what]
     bold = {text.get_text() for text in figure.axes[0].texts if text.get_weight() == "bold"}
-    assert bold == expected
+    assert bold == {number(x / factor) for x in extremes}
     assert set(texts(figure)) <= {number(x / factor) for x in values}
     title = figure.axes[0].get_title(loc="left")
     assert f" {what} ({prefix}{UNIT[what]}) at t = 1 s" in title.replace("\N{NO-BREAK SPACE}", " ")
 
 
-@pytest.mark.parametrize("what", ["N", "V", "M"])
-def test_an_area_for_each_run_of_one_sign(portal, what):
+@pytest.mark.parametrize("what", UNIT)
+def test_an_area_for_each_run_of_one_sign(portal, diagrams, what):
     runs = sum(1 + np.count_nonzero(np.diff(f > 0)) for f in values_of(portal, what))
-    assert len(areas_of(ub.plot(portal, what))) == runs
+    assert len(areas_of(diagrams[what])) == runs
 
 
-def test_ordinates_are_in_proportion_to_the_values(portal):
+def test_ordinates_are_in_proportion_to_the_values(portal, diagrams):
     # A patch of one beam: axis start, the values, axis back.  The roof is nearly horizontal, its
     # displacement at this load some millimetres: 1 % of the ordinates.
     roof = portal.scene.beams[1]
     s, values, *_ = portal.diagram(roof)
-    (outline,) = [x for x in areas_of(ub.plot(portal, "N")) if np.ptp(x[:, 0]) > 5.5]
+    (outline,) = [x for x in areas_of(diagrams["N"]) if np.ptp(x[:, 0]) > 5.5]
     tips, shape = outline[1 : 1 + len(values)], portal.shape(roof)
     heights = tips[:, 1] - np.interp(s, portal.grid.parameters(roof), shape[:, 1])
     np.testing.assert_allclose(heights / heights[0], values / values[0], rtol=0.01)
@@ -145,16 +150,12 @@ def test_moments_under_a_line_load_are_a_parabola(direction):
     np.testing.assert_allclose(depth, depth.max() * parabola, atol=1e-3)
 
 
-@pytest.mark.parametrize("what", ["N", "V", "M"])
-@pytest.mark.parametrize("name", ["portal", "beam", "upright"])
-def test_extreme_values_cover_nothing(portal, name, what):
-    """Neither areas of the diagram nor beams; labels do not overlap and are in the picture."""
-    solution = {
-        "portal": lambda: portal,
-        "beam": lambda: simple_beam(8),
-        "upright": lambda: simple_beam(8, direction=math.pi / 2),
-    }[name]()
-    figure = ub.plot(solution, what)
+@pytest.mark.parametrize("what", UNIT)
+@pytest.mark.parametrize("direction", [None, 0.0, math.pi / 2], ids=["portal", "beam", "upright"])
+def test_extreme_values_cover_neither_areas_nor_beams_nor_each_other(diagrams, direction, what):
+    figure = (
+        diagrams[what] if direction is None else ub.plot(simple_beam(8, direction=direction), what)
+    )
     axes, boxes = figure.axes[0], boxes_of(figure)
     require_apart(boxes, figure.bbox)
     for k, box in enumerate(boxes):
@@ -183,11 +184,11 @@ def test_forty_labels_do_not_overlap():
             assert not any(line.intersects_bbox(box) for box in boxes if box is not own)
 
 
-def test_the_legend_names_the_signs_in_the_picture(portal):
+def test_the_legend_names_the_signs_in_the_picture(portal, diagrams):
     """The roof of the portal is in compression, and so are its posts."""
-    (legend,) = ub.plot(portal, "N").legends
+    (legend,) = diagrams["N"].legends
     assert [text.get_text() for text in legend.get_texts()] == ["N < 0: compression"]
-    (legend,) = ub.plot(portal, "M").legends
+    (legend,) = diagrams["M"].legends
     assert [text.get_text()[:5] for text in legend.get_texts()] == ["M > 0", "M < 0"]
     assert not ub.plot(portal).legends
 
@@ -262,10 +263,10 @@ def test_displacements_are_magnified(portal):
     assert "× 10" in axes.get_title(loc="left")
 
 
-def test_a_saved_picture_has_the_size_of_its_figure(portal, tmp_path):
+def test_a_saved_picture_has_the_size_of_its_figure(diagrams, tmp_path):
     from matplotlib.image import imread
 
-    figure = ub.plot(portal, "M")
+    figure = diagrams["M"]
     figure.savefig(tmp_path / "portal.png")
     assert (tmp_path / "portal.png").exists() == FIRST
     if FIRST:
