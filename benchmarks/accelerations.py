@@ -81,8 +81,8 @@ ACCELERATIONS = {
         "velocity of the last step.",
         by.SHIPPED, by.VELOCITY,
         (
-            "compiled/c/march.c:enter_step", "compiled/c/march.c:compare_differences",
-            "compiled/c/march.c~p->both|compare_differences",
+            "compiled/c/time_loop.c:enter_step", "compiled/c/time_loop.c:compare_differences",
+            "compiled/c/time_loop.c~p->both|compare_differences",
         ),
         (ELASTIC, LARGE, SWING, HINGED, JOINTED),
     ),

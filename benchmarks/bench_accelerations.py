@@ -65,12 +65,15 @@ def swing(cells):
     stiff = ub.Section.rectangle(h=1e-2, E=73e9, rho=270, **numbers)  # of the same mass
     beam = ub.Beam((0, 0), (0.72, 0), thin, cells=cells // 2)
     ends = beam.start, beam.end
-    links = [ub.Beam((x, 0), (x, 0.36), stiff, cells=cells // 4) for x in (0, 0.72)]
+    connectors = [ub.Beam((x, 0), (x, 0.36), stiff, cells=cells // 4) for x in (0, 0.72)]
     push = ub.Table([0, 0.128, 0.256], [0, 1, 0])
     return ub.Scene(
-        [beam, *links],
-        joints=[ub.Revolute(link.start, end) for link, end in zip(links, ends, strict=True)],
-        supports=[ub.Pinned(link.end) for link in links],
+        [beam, *connectors],
+        joints=[
+            ub.Revolute(connector.start, end)
+            for connector, end in zip(connectors, ends, strict=True)
+        ],
+        supports=[ub.Pinned(connector.end) for connector in connectors],
         masses=[ub.PointMass(beam.at(0.5), 0.5)],
         loads=[ub.PointLoad(beam.at(0.5), force=(2, 0), amplitude=push)],
     )

@@ -87,7 +87,7 @@ def main():
         ]
         case = {
             "case": name,
-            "unknowns": simulation.grid.size,
+            "unknowns": simulation.numbering.size,
             "entries": len(simulation.equation.A.data),
             "works": [type(term).__name__ for term in simulation.terms],
             "iterations_per_step": iterations / options.steps,

@@ -75,7 +75,7 @@ def lattice(cells, bays):
 def measure(cells, bays, steps):
     """One time loop on the processes of this ``mpirun``; a record, on the first of them."""
     comm = MPI.COMM_WORLD
-    one_process_below.SMALLEST_SHARE = 1
+    one_process_below.SMALLEST_SUBDOMAIN = 1
     begin = time.perf_counter()
     scene = lattice(cells, bays)
     simulation = ub.Simulation(scene, ub.EnergyMomentum())
@@ -100,10 +100,11 @@ def measure(cells, bays, steps):
         kept += time.perf_counter() - begin
     memory = comm.gather(1.024e-3 * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
     return {
-        "case": "lattice", "cells": len(simulation.grid.cells), "beams": len(scene.beams),
+        "case": "lattice", "cells": len(simulation.numbering.cells), "beams": len(scene.beams),
         "bays": bays, "processes": comm.size, "steps": steps, "iterations": iterations,
         "build_s": built, "ms_per_iteration": 1e3 * seconds / iterations,
-        "ms_per_kept_state": 1e3 * kept / steps, "memory_mb": memory, **traffic, **work(simulation),
+        "ms_per_kept_state": 1e3 * kept / steps, "memory_mb": memory,
+        **traffic, **work(simulation),
     }  # fmt: skip
 
 

@@ -41,13 +41,13 @@ class Counted:
 def count_traffic(simulation):
     """Count the collective calls, ghost updates and bytes of a simulation from now on."""
     count, solver = Counter(), simulation.solver
-    if simulation.share.alone:
+    if simulation.subdomain.alone:
         return count
-    simulation.share.comm = Counted(simulation.share.comm, count)
+    simulation.subdomain.comm = Counted(simulation.subdomain.comm, count)
     simulation.together._comm = Counted(simulation.together._comm, count)
     summed = solver._factors._solved._inner
     summed._comm = Counted(summed._comm, count)
-    ghosts, update = 8 * len(simulation.share.ghosts), lib.petsc.VecGhostUpdateBegin
+    ghosts, update = 8 * len(simulation.subdomain.ghosts), lib.petsc.VecGhostUpdateBegin
 
     def counted(vector, *how):
         count.update(messages=1, bytes=ghosts)
@@ -69,11 +69,11 @@ def work(simulation):
     factors = simulation.solver._factors
     fronts, entries = factors._solved, factors._elimination.left
     found = {
-        "cells_here": len(simulation.share.cells),
+        "cells_here": len(simulation.subdomain.cells),
         "joints_here": entries.size,
-        "ghosts": len(simulation.share.ghosts),
+        "ghosts": len(simulation.subdomain.ghosts),
     }
-    if not simulation.share.alone:
+    if not simulation.subdomain.alone:
         summed, fronts = fronts._inner.left, fronts._inner._inner
         sizes = {"border": summed.size, "border_entries": len(summed.data)}
         found |= {"border_here": fronts.left.size, **sizes}
@@ -85,13 +85,13 @@ def work(simulation):
     return found
 
 
-def borders(grid, ranks):
+def borders(numbering, ranks):
     """Unknowns that several of so many processes have, in all and of one process at most."""
-    part = bisected(grid.points[grid.cells].mean(axis=1), ranks)
-    of_cell = grid.dofs[grid.cells].reshape(len(part), 6)
+    part = bisected(numbering.points[numbering.cells].mean(axis=1), ranks)
+    of_cell = numbering.dofs[numbering.cells].reshape(len(part), 6)
     pairs = np.unique(of_cell.astype(np.int64) * ranks + part[:, None])
     dofs, ranks_of = pairs // ranks, pairs % ranks
-    shared = np.bincount(dofs, minlength=grid.size)[dofs] > 1
+    shared = np.bincount(dofs, minlength=numbering.size)[dofs] > 1
     return len(np.unique(dofs[shared])), int(np.bincount(ranks_of[shared]).max(initial=0))
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 from records import machine
 from scaling_model import borders, extrapolated, fitted
 
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 
 PAGE = Path(__file__).parents[1] / "docs" / "ranks.md"
 BEGIN, END = "<!-- tables -->", "<!-- end of tables -->"
@@ -39,16 +39,16 @@ def modelled(cases, half, lattice):
     square = bays > 50
     growth = 1.5 if square else 1.0
     width = round((SAMPLE / 20) ** 0.5) if square else bays
-    grid = Grid(lattice(SAMPLE, width))
+    numbering = DofNumbering(lattice(SAMPLE, width))
     for ranks in RANKS:
-        border, part = borders(grid, ranks)
+        border, part = borders(numbering, ranks)
         longer = (CELLS / SAMPLE) ** 0.5 if square else 1
         border, part = border * longer, part * longer
-        seconds, memory = extrapolated(CELLS, ranks, model, border, part, growth)
+        seconds, archive = extrapolated(CELLS, ranks, model, border, part, growth)
         total = sum(seconds.values())
         yield row(
             "square" if square else f"{bays} bays", ranks, f"{border:.0f}",
-            *(f"{t:.3g}" for t in seconds.values()), f"{total:.3g}", f"{memory / 1e9:.1f}",
+            *(f"{t:.3g}" for t in seconds.values()), f"{total:.3g}", f"{archive / 1e9:.1f}",
         )  # fmt: skip
 
 

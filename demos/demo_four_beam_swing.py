@@ -94,9 +94,9 @@ def rods(cells):
     """Return the swing on two links, and the places of the reference: mid-span, A and B."""
     beam = ub.Beam((0, -0.36), (0.72, -0.36), flexible, cells=cells, name="beam")
     middle = beam.at(0.5)
-    links = [ub.Link(ub.ground(0, 0), beam.start), ub.Link(ub.ground(1.08, 0), beam.end)]
+    connectors = [ub.Link(ub.ground(0, 0), beam.start), ub.Link(ub.ground(1.08, 0), beam.end)]
     load = ub.PointLoad(middle, force=(1, 0), amplitude=push)
-    scene = ub.Scene([beam], joints=links, masses=[ub.PointMass(middle, 0.5)], loads=[load])
+    scene = ub.Scene([beam], joints=connectors, masses=[ub.PointMass(middle, 0.5)], loads=[load])
     return scene, (middle, beam.start, beam.end)
 
 

@@ -95,8 +95,8 @@ wall = ub.Scene(
 simulation = ub.Simulation(wall, ub.EnergyMomentum())  # conserves energy exactly
 built = time.perf_counter() - begin
 ub.print_once(
-    f"{len(wall.beams)} beams, {len(wall.joints)} joints, {len(simulation.grid.cells)} cells, "
-    f"{simulation.grid.size} unknowns; built in {built:.1f} s"
+    f"{len(wall.beams)} beams, {len(wall.joints)} joints, {len(simulation.numbering.cells)} cells, "
+    f"{simulation.numbering.size} unknowns; built in {built:.1f} s"
 )
 
 # %% [markdown]
@@ -125,11 +125,11 @@ for n in range(1, steps + 1):
 files.close()
 simulation.close()
 
-memory = MPI.COMM_WORLD.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+archive = MPI.COMM_WORLD.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 ub.print_once(f"{steps} steps of {1e3 * end / steps:.2f} ms, {simulation.iterations} iterations")
 ub.print_once(f"{np.median(seconds):.2f} s a step on {MPI.COMM_WORLD.size} process(es)")
 if MPI.COMM_WORLD.rank == 0:
-    ub.print_once("largest memory:", *(f"{megabytes:.0f} MB" for megabytes in memory))
+    ub.print_once("largest memory:", *(f"{megabytes:.0f} MB" for megabytes in archive))
 ub.print_once(solution.energy)
 
 # %% [markdown]
@@ -140,10 +140,11 @@ ub.print_once(solution.energy)
 
 # %%
 speeds = [
-    np.hypot(*v[solution.grid.dofs[solution.grid.cells, :2]].mean(axis=1).T) for v in solution.v[1:]
+    np.hypot(*v[solution.numbering.dofs[solution.numbering.cells, :2]].mean(axis=1).T)
+    for v in solution.v[1:]
 ]
-points = solution.grid.points
-at = points[solution.grid.cells]
+points = solution.numbering.points
+at = points[solution.numbering.cells]
 fastest = max(speed.max() for speed in speeds)
 
 

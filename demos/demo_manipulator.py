@@ -279,7 +279,7 @@ ub.print_once(
 eps, turned = np.finfo(float).eps, drive(t_end)  # 1, rad
 everyone = [revolute, *by_length.values(), *by_cells.values(), *by_stiffness.values(), body]
 for one in everyone:
-    rounding = eps * 1e8 * EA * turned * length / one.motion.energy.throughput
+    rounding = eps * 1e8 * EA * turned * length / one.motion.energy.energy_transferred
     assert one.motion.energy.worst < (rounding if one is by_stiffness[1e8] else 1e-9)
     assert one.motion.iterations <= 5 * one.motion.parts
     assert not one.motion.energy.lost or max(one.motion.energy.lost["hinges"]) < 1e-20 * G_f

@@ -112,9 +112,9 @@ def gallery():
         saved = [*folder.glob(f"{name}*.png")] or [*folder.glob(f"{name.split('_')[-1]}*.png")]
         saved.sort(key=lambda path: ("shapes" not in path.name, path.name))
         picture = [f":img-top: {path.relative_to(DOCS)}" for path in saved[:1]]
-        head = f":::{{grid-item-card}} {title}"
-        link = [f":link: demos/{script.removesuffix('.py')}", ":link-type: doc"]
-        return "\n".join([head, *link, *picture, "", topic, ":::", ""])
+        head = f":::{{numbering-item-card}} {title}"
+        connector = [f":link: demos/{script.removesuffix('.py')}", ":link-type: doc"]
+        return "\n".join([head, *connector, *picture, "", topic, ":::", ""])
 
     cards = map(card, re.finditer(r"\| `(demo_\w+\.py)` \| (.*) \|", text))
     return "\n".join(["::::{grid} 1 2 3 3", ":gutter: 3", "", *cards, "::::", ""])
@@ -185,8 +185,8 @@ def where_used(app, what, name, obj, options, lines):
     """Append links to the pages and demos that use a name."""
     pages = used.get(name.removeprefix("ufl_beam."), [])
     if pages:
-        links = (f":doc:`/{page.relative_to(DOCS).with_suffix('')}`" for page in pages)
-        lines += ["", ".. rubric:: Used in", "", ", ".join(links), ""]
+        connectors = (f":doc:`/{page.relative_to(DOCS).with_suffix('')}`" for page in pages)
+        lines += ["", ".. rubric:: Used in", "", ", ".join(connectors), ""]
 
 
 def hide_colons(app, what, name, obj, options, lines):

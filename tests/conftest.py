@@ -15,7 +15,7 @@ from ufl_beam.errors import ArgumentError
 sys.path.insert(0, str(Path(__file__).parent))
 
 # Under mpirun the tests' small scenes, too, are shared among all processes.
-parallel.SMALLEST_SHARE = 1
+parallel.SMALLEST_SUBDOMAIN = 1
 
 COMM = MPI.COMM_WORLD
 

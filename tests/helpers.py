@@ -36,7 +36,7 @@ def law_of(fields=None, **members):
 def require_no_gain(energy):
     """Dissipated energies never decrease, but for round-off."""
     for lost in energy.lost.values():
-        assert np.diff(lost).min() >= -1e-12 * energy.throughput
+        assert np.diff(lost).min() >= -1e-12 * energy.energy_transferred
 
 
 def assert_balanced(energy):
@@ -45,36 +45,38 @@ def assert_balanced(energy):
     require_no_gain(energy)
 
 
-def require_reference(run, scene, link, scheme, **more):
+def require_reference(run, scene, connector, scheme, **more):
     """The reference solver, with the laws by NumPy, finds the same, ledger included; the run."""
     found, reference = (
         run(scene, scheme, newton=ub.Newton(rtol=1e-12, reference=one), **more)
         for one in (False, True)
     )
     np.testing.assert_allclose(found.q, reference.q, rtol=0, atol=1e-9 * np.abs(found.q).max())
-    for mine, other in zip(found.connector(link), reference.connector(link), strict=True):
+    for mine, other in zip(found.connector(connector), reference.connector(connector), strict=True):
         np.testing.assert_allclose(mine, other, rtol=0, atol=1e-9 * max(np.abs(mine).max(), 1e-3))
     assert list(found.energy) == list(reference.energy)
     for entry in found.energy:
         a, b = found.energy[entry], reference.energy[entry]
-        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.throughput)
+        np.testing.assert_allclose(a, b, rtol=0, atol=1e-9 * found.energy.energy_transferred)
     return found
 
 
-def require_restart(run, scene, links, scheme, folder, until):
+def require_restart(run, scene, connectors, scheme, folder, until):
     """A run resumed at half time ends bit for bit as the whole one, one from `start=` nearly so."""
     half, whole = until / 2, run(scene, scheme, t=(0, until))
     file = ub.Checkpoint(folder / "run.checkpoint", every=7)
     run(scene, scheme, t=(0, half), checkpoint=file)
     resumed = run(scene, scheme, t=(0, until), checkpoint=file)
     assert np.array_equal(resumed.q, whole.q)
-    for link in links:
-        for mine, other in zip(resumed.connector(link), whole.connector(link), strict=True):
+    for connector in connectors:
+        for mine, other in zip(
+            resumed.connector(connector), whole.connector(connector), strict=True
+        ):
             assert np.array_equal(mine, other)
     for entry in whole.energy:
         # Several processes add up what was lost before and after in another order.
         digits = 0.0 if MPI.COMM_WORLD.size == 1 else 1e-14
-        scale = digits * whole.energy.throughput
+        scale = digits * whole.energy.energy_transferred
         np.testing.assert_allclose(resumed.energy[entry], whole.energy[entry], rtol=0, atol=scale)
     second = run(scene, scheme, t=(half, until), start=run(scene, scheme, t=(0, half)))
     np.testing.assert_allclose(second.q[-1], whole.q[-1], rtol=0, atol=1e-8 * np.abs(whole.q).max())

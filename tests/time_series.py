@@ -43,18 +43,18 @@ def read_xdmf(path):
 
     (collection,) = ET.parse(path).getroot().findall("Domain/Grid")
     assert collection.attrib["CollectionType"] == "Temporal"
-    for n, grid in enumerate(collection.findall("Grid")):
-        assert grid.attrib == {"Name": str(n), "GridType": "Uniform"}
-        series.times.append(float(grid.find("Time").attrib["Value"]))
+    for n, numbering in enumerate(collection.findall("Grid")):
+        assert numbering.attrib == {"Name": str(n), "GridType": "Uniform"}
+        series.times.append(float(numbering.find("Time").attrib["Value"]))
         cells, points = (
-            numbers(grid.find(f"{what}/DataItem")) for what in ("Topology", "Geometry")
+            numbers(numbering.find(f"{what}/DataItem")) for what in ("Topology", "Geometry")
         )
-        assert len(cells) == int(grid.find("Topology").attrib["NumberOfElements"])
+        assert len(cells) == int(numbering.find("Topology").attrib["NumberOfElements"])
         assert series.cells is None or (cells == series.cells).all()
         assert series.points is None or (points == series.points).all()
         series.cells, series.points = cells, points
         fields = {"Node": {}, "Cell": {}}
-        for one in grid.findall("Attribute"):
+        for one in numbering.findall("Attribute"):
             values = numbers(one.find("DataItem"))
             assert one.attrib["AttributeType"] == ("Vector" if values.ndim == 2 else "Scalar")
             fields[one.attrib["Center"]][one.attrib["Name"]] = values

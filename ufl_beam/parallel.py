@@ -114,10 +114,10 @@ class Agreement:
             value = function(*arguments)
         except BaseException as caught:
             error = caught
-        self.settle(error)
+        self.synchronize(error)
         return value
 
-    def settle(self, error: BaseException | None) -> None:
+    def synchronize(self, error: BaseException | None) -> None:
         """Raise on all processes if one of them has an exception; all call it together.
 
         Any other exception takes precedence over a failed step, after which the run may continue.
@@ -273,7 +273,7 @@ def progress_bar(shown: bool, comm: MPI.Intracomm, **options: Any) -> Any:
 TOLERANCE = 1e-8
 """Relative difference of motions above which they differ: far above round-off."""
 
-SMALLEST_SHARE = 6_000
+SMALLEST_SUBDOMAIN = 6_000
 """Scenes with fewer cells per process are computed by each process.
 
 Measured with lattices on two cores: two processes break even at some 3 000 cells each, and are 1.2
@@ -292,7 +292,7 @@ _left: list[tuple[MPI.Request, Array]] = []
 
 def sharing(comm: MPI.Intracomm, cells: int) -> MPI.Intracomm:
     """Return the processes that share a scene of ``cells`` cells: all, or this process alone."""
-    return comm if cells >= comm.size * SMALLEST_SHARE else MPI.COMM_SELF
+    return comm if cells >= comm.size * SMALLEST_SUBDOMAIN else MPI.COMM_SELF
 
 
 class Copies:
@@ -307,14 +307,16 @@ class Copies:
         several: False if the scene is computed once, with nothing to compare.
     """
 
-    def __init__(self, comm: MPI.Intracomm, share: Any) -> None:  # a `Share`, above this module
-        self.several = self._open = comm.size > share.comm.size
+    def __init__(
+        self, comm: MPI.Intracomm, subdomain: Any
+    ) -> None:  # a `Subdomain`, above this module
+        self.several = self._open = comm.size > subdomain.comm.size
         self._pending: tuple[MPI.Request, Array] | None = None
         if not self.several:
             return
         self._comm = duplicate(comm)
-        random = np.random.default_rng(0).uniform(0.5, 1.0, share.size)
-        self._weights: Array = share.grid.scales[share.dofs] * random
+        random = np.random.default_rng(0).uniform(0.5, 1.0, subdomain.size)
+        self._weights: Array = subdomain.numbering.scales[subdomain.dofs] * random
         self._sum = self._size = self._times = 0.0
         self._steps, self._compared = 0, 0
         _left[:] = [pair for pair in _left if not pair[0].Test()]
@@ -330,7 +332,7 @@ class Copies:
             self._complete()
             self._post()
 
-    def settle(self) -> None:
+    def synchronize(self) -> None:
         """Compare all states so far, on all processes together; all raise if states differ."""
         if self._open and self._compared < self._steps:
             self._complete()

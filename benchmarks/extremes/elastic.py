@@ -90,7 +90,7 @@ def rigid_in_flight(ratio):
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 3.5), dt=0.035)
     # An axial strain of last digits stores EA/h EPS² and changes what is stored by its force.
     stored = float(solution.energy["stored"].max())
-    floor = 2 * math.sqrt(stored * 1e4 * ratio) * EPS * 4 / solution.energy.throughput
+    floor = 2 * math.sqrt(stored * 1e4 * ratio) * EPS * 4 / solution.energy.energy_transferred
     # Newton's method ends where 8 last digits of strains, EA/h EPS of forces, are missed; either
     # way, so that 100 steps make ten times the work of one.
     missed = 8 * EPS * 1e4 * ratio * 4 * 10 * solution_way(solution)
@@ -100,7 +100,7 @@ def rigid_in_flight(ratio):
 def solution_way(solution):
     """How far a step goes, over the energy that went through."""
     way = np.abs(np.diff(solution.q, axis=0)).max()
-    return float(way / solution.energy.throughput)
+    return float(way / solution.energy.energy_transferred)
 
 
 def conserved(solution):
@@ -162,7 +162,7 @@ def drift(solution, spin=3.0):
     force = spin**2 / 4
     # Far away from where it began positions, and so strains, have fewer digits.
     force += 1e10 * EPS * 1e4 * 8 * 2.3 * t / 100
-    return LEDGER + 1e-10 * force * (2.3 + spin) * t / solution.energy.throughput
+    return LEDGER + 1e-10 * force * (2.3 + spin) * t / solution.energy.energy_transferred
 
 
 def flight(cells, *, steps, dt, spin=3.0, linear=(1.0, 2.0), every=1):
@@ -550,6 +550,8 @@ def units(unit):
         a, b = si.displacement(one.end), other.displacement(two.end) / [metre, metre, 1.0]
         parts.append(np.abs(a - b).max() / np.abs(a).max())
     for name, values in {**si.energy.state, **si.energy.lost}.items():
-        parts.append(np.abs(values - other.energy[name] / joule).max() / si.energy.throughput)
+        parts.append(
+            np.abs(values - other.energy[name] / joule).max() / si.energy.energy_transferred
+        )
     # Both are solved to 1e-10 of the forces, and errors grow with the motion.
     return outcome(other, float(max(parts)), 1e-7)

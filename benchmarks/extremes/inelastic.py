@@ -147,7 +147,7 @@ def ledger_of_hinges(solution, energy, hinges, note=""):
     """The ledger must close, and hinges dissipate no more than they can."""
     spent = float(solution.energy.lost["hinges"][-1]) if "hinges" in solution.energy.lost else 0.0
     beyond = max(spent / (hinges * energy) - 1, 0.0)
-    throughput = solution.energy.throughput
+    throughput = solution.energy.energy_transferred
     beyond *= hinges * energy / throughput  # as a part of what went through
     return outcome(solution, max(solution.energy.worst, beyond), LEDGER, note)
 

@@ -181,10 +181,11 @@ def swing(cells, dt, newton, solver, rho=0.9, end=None):
     p = PROBLEMS["P3"]
     model = Model(p.chains(cells))
     beam, left, right = model.nodes
-    for link, node in ((left, beam[0]), (right, beam[-1])):
-        model.tie(link[-1], None, (0, 1))
+    for connector, node in ((left, beam[0]), (right, beam[-1])):
+        model.tie(connector[-1], None, (0, 1))
         pair = [
-            model.system.AddMarker(item.MarkerNodePosition(nodeNumber=n)) for n in (link[0], node)
+            model.system.AddMarker(item.MarkerNodePosition(nodeNumber=n))
+            for n in (connector[0], node)
         ]
         model.system.AddObject(item.ObjectJointRevolute2D(markerNumbers=pair))
     middle = beam[len(beam) // 2]

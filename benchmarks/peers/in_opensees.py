@@ -155,11 +155,11 @@ def swing(cells, dt, newton="full", integrator="trbdf2", end=None):
     middle = beam[len(beam) // 2]
     m, J = model.masses[middle]
     model.masses[middle] = m + p.mass, J
-    for link in (left, right):
-        model.fix(link[-1], 1, 1, 0)
+    for connector in (left, right):
+        model.fix(connector[-1], 1, 1, 0)
     model.finish()
-    for link, tag in ((left, beam[0]), (right, beam[-1])):
-        ops.equalDOF(tag, link[0], 1, 2)
+    for connector, tag in ((left, beam[0]), (right, beam[-1])):
+        ops.equalDOF(tag, connector[0], 1, 2)
     times, values = (-1.0, 0.0, p.until / 2, p.until, 1e3), (0.0, 0.0, p.peak, 0.0, 0.0)
     model.load(middle, ("Path", 1, "-time", *times, "-values", *values), fx=1.0)
     analyse(newton, INTEGRATORS[integrator], joined=True)

@@ -115,14 +115,14 @@ class Swing:
     """
 
     section = steel_like(5e-3, 1e-3, E=73e9, nu=0.3, rho=2700.0)
-    stiffer, mass, length, link = 100.0, 0.5, 0.72, 0.36  # -, kg, m, m
+    stiffer, mass, length, connector = 100.0, 0.5, 0.72, 0.36  # -, kg, m, m
     peak, until, end = 2.0, 0.256, 2.5  # N, s, s
     sampled = 0.05  # s
     compared = 1.2  # s; at 1.53 s links and beam snap taut, and what follows hangs on every digit
 
     def chains(self, cells):
         rigid, n = self.section.times(self.stiffer), cells // 4
-        L, H = self.length, self.link
+        L, H = self.length, self.connector
         return [
             Chain((0, 0), (L, 0), self.section, 2 * n),
             Chain((0, 0), (0, H), rigid, n),

@@ -54,7 +54,7 @@ def row(record):
     error = f"{measures['error']:.2e}" if "error" in measures else ""
     scatter = max(record["wall"]) / min(record["wall"])
     return [
-        *said, f"{unit(record, 'steps'):.4g}{only}", per, f"{record['memory']:.0f}", error,
+        *said, f"{unit(record, 'steps'):.4g}{only}", per, f"{record['archive']:.0f}", error,
         f"{scatter:.2f}",
     ]  # fmt: skip
 
@@ -121,7 +121,7 @@ def draw(records):
             ax.loglog(*zip(*front(some), strict=True), style, color=colour, ms=6, label=name)
         ax.set_title(NAMES[problem], loc="left")
         ax.set(xlabel="time of the loop (s)", ylabel="error (m)")
-        ax.grid(which="major", color="0.9")
+        ax.numbering(which="major", color="0.9")
         ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), frameon=False)
     figure.savefig(PICTURE)
 

@@ -65,7 +65,7 @@ class Setting:
         }
 
 
-def grid(case: Case, quick: bool) -> Iterator[Setting]:
+def numbering(case: Case, quick: bool) -> Iterator[Setting]:
     """Schemes, steps and cells; cells of degree 2 where they may be."""
     schemes = SCHEMES if case.dynamic else STATIC
     halvings = ((0, 2) if quick else range(5)) if case.dynamic else range(2)

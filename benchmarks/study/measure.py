@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from cases import Case
-from dials import Setting, base, grid, one_by_one, reference
+from dials import Setting, base, numbering, one_by_one, reference
 
 import ufl_beam as ub
 
@@ -44,7 +44,7 @@ class Bench:
             if "values" in dials[-1] and "values" in here:
                 dials[-1]["changes"] = self._distance(dials[-1]["values"], here["values"])
         times = 1 if self.quick else 3
-        runs = [self.run(setting, times) for setting in grid(self.case, self.quick)]
+        runs = [self.run(setting, times) for setting in numbering(self.case, self.quick)]
         return {
             "name": self.case.name,
             "kind": self.case.kind,
@@ -82,7 +82,7 @@ class Bench:
             **asdict(setting),
             "seconds": statistics.median(seconds),
             "taken": solution.parts,
-            "cells": len(solution.grid.cells),
+            "cells": len(solution.numbering.cells),
             "iterations": solution.iterations / solution.parts,
             "imbalance": float(solution.energy.worst),
             "values": values.tolist(),

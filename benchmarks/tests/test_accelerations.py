@@ -46,7 +46,7 @@ def test_points_open_and_couplings_dissipate_in_the_scenes():
     jointed = bench.Run(bench.SHIPPED, bench.jointed_beams(16), 0.01)
     jointed.advance(150)
     assert min(jointed.simulation.ledger.lost.values()) > 0
-    assert {type(link.law) for link in jointed.simulation.scene.connectors} == {
+    assert {type(connector.law) for connector in jointed.simulation.scene.connectors} == {
         ub.Spring, ub.RigidPlastic,
     }  # fmt: skip
     assert len(jointed.simulation.scene.beams) == 4

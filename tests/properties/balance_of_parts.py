@@ -105,7 +105,7 @@ class Balance:
     def on_cell(self, beam, k, s0, s1):
         """Distributed loads and works on the k-th cell, from s0 to s1."""
         total = np.zeros(3)
-        length = math.dist(*self.solution.grid.points[self._nodes(beam, k)])
+        length = math.dist(*self.solution.numbering.points[self._nodes(beam, k)])
         for ξ, w in zip(*GAUSS, strict=True):
             place = beam.at((s0 + s1) / 2 + ξ * (s1 - s0) / 2)
             x = self.solution.position(place)[-1]
@@ -120,7 +120,7 @@ class Balance:
 
     def _nodes(self, beam, k):
         """Vertices of the k-th cell of a beam."""
-        return self.solution.grid.cells[self.solution.grid.cells_of(beam)][k]
+        return self.solution.numbering.cells[self.solution.numbering.cells_of(beam)][k]
 
     def _of_works(self, beam, place, ends, length):
         """Force and moment per length of the works of user_classes.py."""
@@ -148,7 +148,7 @@ class Balance:
         x, y = np.subtract(*beam.ends[::-1]) / math.dist(*beam.ends)
         for k in range(0, len(diagram.s), 2):
             ends = []
-            turns = self.solution.q[-1, self.solution.grid.dofs[self._nodes(beam, k // 2), 2]]
+            turns = self.solution.q[-1, self.solution.numbering.dofs[self._nodes(beam, k // 2), 2]]
             for i, sign, turn in ((k, -1.0, turns[0]), (k + 1, 1.0, turns[1])):
                 place = beam.at(diagram.s[i])
                 c, s = math.cos(turn), math.sin(turn)

@@ -127,10 +127,12 @@ def results(names, solution, rows=slice(None)):
     found["motions"] = np.array([solution.displacement(p)[rows] / lengths for p in moved]), 1.0
     forces = [solution.section_forces_at(p)[rows] for p in moved if isinstance(p, ub.Place)]
     forces += [solution.reaction(support)[rows] for support in scene.supports]
-    links = [solution.connector(one) for one in scene.connectors]
+    connectors = [solution.connector(one) for one in scene.connectors]
     found["forces"] = np.array(forces), None
-    of_each = [np.atleast_2d(link.force[rows].T) for link in links]  # rows by component
-    found["of connectors"] = np.concatenate(of_each) if links else np.array([]), None
+    of_each = [
+        np.atleast_2d(connector.force[rows].T) for connector in connectors
+    ]  # rows by component
+    found["of connectors"] = np.concatenate(of_each) if connectors else np.array([]), None
     return found
 
 
@@ -145,7 +147,7 @@ def differences(one, other, rows=slice(None), begin=None):
     for name, (values, size) in a.items():
         values, others = (x[:, 1:] if x.ndim > 1 else x for x in (values, b[name][0]))
         found[name] = difference(values, others, size or forces)
-    through = other.solution.energy.throughput or 1.0
+    through = other.solution.energy.energy_transferred or 1.0
     for kind in ("state", "supplied", "lost"):
         mine, others = getattr(one.solution.energy, kind), getattr(other.solution.energy, kind)
         assert set(mine) == set(others)

@@ -51,7 +51,7 @@ def ledger(case):
         if name in energy.lost and case.combination.has_exact_ledger:
             gives_back = name == "numerical" and case.combination.has("EnergyMomentumDecaying")
             least = energy.lost[name] if gives_back else np.diff(energy.lost[name])
-            assert least.min(initial=0.0) >= -1e-9 * energy.throughput, name
+            assert least.min(initial=0.0) >= -1e-9 * energy.energy_transferred, name
 
 
 @check
@@ -85,7 +85,7 @@ def imbalance(run):
     In statics the first trapeze, from rest to loads that are there from the start, does not count.
     """
     energy, first = run.solution.energy, 0 if len(run.solution.v) else 1
-    return np.ptp(energy.imbalance[first:]) / (energy.throughput or 1.0)
+    return np.ptp(energy.imbalance[first:]) / (energy.energy_transferred or 1.0)
 
 
 @check
@@ -176,8 +176,8 @@ def recorders(case):
         assert (rows[:, 1:4] == end).all()
     only(not has_cut(run), "parts of steps are in either the solution or the records")
     for beam in run.names["scene"].beams:
-        grid = run.solution.grid
-        kept = run.solution.q[:, grid.dofs[grid.nodes_along(beam)]]
+        numbering = run.solution.numbering
+        kept = run.solution.q[:, numbering.dofs[numbering.nodes_along(beam)]]
         drawn = [run.solution.diagram(beam, n, points=2)[1:] for n in range(len(kept))]
         forces = np.array(drawn).transpose(0, 2, 1)
         moved, borne = extremes.displacement(beam), extremes.section_forces(beam)
@@ -348,8 +348,8 @@ def newton_options(case):
 def processes(case):
     """Shared by all processes of MPI the run is the one of a single process."""
     only(MPI.COMM_WORLD.size > 1, "one process")
-    smallest, parallel.SMALLEST_SHARE = parallel.SMALLEST_SHARE, 1
+    smallest, parallel.SMALLEST_SUBDOMAIN = parallel.SMALLEST_SUBDOMAIN, 1
     try:
         assert_agree(case, comm=MPI.COMM_WORLD)
     finally:
-        parallel.SMALLEST_SHARE = smallest
+        parallel.SMALLEST_SUBDOMAIN = smallest

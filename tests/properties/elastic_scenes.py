@@ -279,7 +279,7 @@ def difference(one, other):
     parts.append(relative(one.section_forces(), other.section_forces()))
     first, second = one.energies(), other.energies()
     assert first.keys() == second.keys()
-    throughput = one.solution.energy.throughput / one.units.joule
+    throughput = one.solution.energy.energy_transferred / one.units.joule
     parts += [float(np.abs(first[n] - second[n]).max()) / throughput for n in first]
     return max(parts)
 

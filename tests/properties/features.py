@@ -232,7 +232,7 @@ def release(d):
 
 
 @feature("tip")
-def link(d):
+def connector(d):
     x, y = d.tip
     d.joints.append(f"ub.Link(ub.ground({x - 0.4:.3f}, {y - 0.9:.3f}), {d.last}.end)")
 

@@ -142,7 +142,9 @@ def momentum(case):
 
 
 def _length(solution, beam):
-    return np.hypot(*np.diff(solution.grid.points[solution.grid.vertices_of(beam)], axis=0).T).sum()
+    return np.hypot(
+        *np.diff(solution.numbering.points[solution.numbering.vertices_of(beam)], axis=0).T
+    ).sum()
 
 
 def _turned(angles):
@@ -253,7 +255,7 @@ def path(case):
         others, rows = others[common], rows[common]
         only(len(rows), "the first step was cut")
     rows = rows + 1
-    nodes = np.unique(np.vstack([expected.grid.dofs, expected.grid.dofs_of_bodies]))
+    nodes = np.unique(np.vstack([expected.numbering.dofs, expected.numbering.dofs_of_bodies]))
     assert difference(found.q[others][:, nodes], expected.q[rows][:, nodes], 1.0) < SAME
     for one, other in zip(names["scene"].supports, case.exact.names["scene"].supports, strict=True):
         forces = expected.reaction(other)[rows]

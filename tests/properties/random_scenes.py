@@ -15,7 +15,7 @@ from itertools import pairwise
 
 import numpy as np
 from random_laws import Laws
-from scene_statements import AS_GIVEN, Numbers
+from scene_statements import AS_GIVEN, MotionGeometry
 
 STEPS = 15
 """Steps of a run of equal ones."""
@@ -57,7 +57,7 @@ class _Writer(Laws):
         self._random = np.random.default_rng(seed)
         self._others = np.random.default_rng([seed, 1])
         self._scattered = self._chance(0.1)
-        self._say = Numbers(statement, places_stay=self._scattered)
+        self._say = MotionGeometry(statement, places_stay=self._scattered)
         self._lists = {name: [] for name in PARTS}
         self._lines = [
             f"# {'scattered, ' * self._scattered}seed {seed}, {statement.name}",

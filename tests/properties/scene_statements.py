@@ -87,7 +87,7 @@ def changed_statements(seed):
     ]
 
 
-class Numbers:
+class MotionGeometry:
     """Writes numbers as text in the units and axes of a statement.
 
     Args:

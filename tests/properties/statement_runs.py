@@ -81,7 +81,7 @@ class Run:
     def energies(self):
         """Entries of the ledger as parts of the energy that went through."""
         energy = self.solution.energy
-        return {name: energy[name] / (energy.throughput or 1.0) for name in energy}
+        return {name: energy[name] / (energy.energy_transferred or 1.0) for name in energy}
 
     def is_backwards(self, beam):
         return f"# {beam.name} runs backwards" in self.source

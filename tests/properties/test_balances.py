@@ -23,8 +23,8 @@ def test_work_is_the_increment_of_energy(seed, step):
     assert energy.lost == {}
     work = energy["loads"]
     change = energy.total - energy.total[0]
-    assert np.abs(work - change).max() < CLOSED * energy.throughput
-    assert energy.throughput > 1e-3
+    assert np.abs(work - change).max() < CLOSED * energy.energy_transferred
+    assert energy.energy_transferred > 1e-3
 
 
 @pytest.mark.parametrize("step", SIZES)

@@ -16,7 +16,7 @@ def test_results_have_their_digits_on_any_number_of_processes():
     for name, numbers in (
         ("q", run.q[-1]),
         ("energy", [entry[-1] for entry in run.energy.lost.values()]),
-        ("links", [run.connector(link).work[-1] for link in run.scene.connectors]),
+        ("links", [run.connector(connector).work[-1] for connector in run.scene.connectors]),
     ):
         size = np.linalg.norm(np.sort(np.abs(numbers)))
         assert f"{size:.9g}" == CHECKSUMS[name], name

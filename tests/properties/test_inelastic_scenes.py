@@ -119,7 +119,7 @@ def difference(one, other):
     pairs = [(one.motion(), other.motion()), *zip(one.material(), other.material(), strict=True)]
     first, second = one.energies(), other.energies()
     assert first.keys() == second.keys()
-    throughput = one.solution.energy.throughput
+    throughput = one.solution.energy.energy_transferred
     parts = [np.abs(first[n] - second[n]).max() / throughput for n in first]
     for a, b in pairs:
         assert a.shape == b.shape
@@ -137,7 +137,7 @@ each_scheme = pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 def test_a_good_part_of_the_energy_is_dissipated(kind, scheme):
     """The tests below would show little of scenes that hardly yield and break."""
     frame = Frame(kind).run(scheme)
-    energies, throughput = frame.energies(), frame.solution.energy.throughput
+    energies, throughput = frame.energies(), frame.solution.energy.energy_transferred
     assert energies["plastic"][-1] > 1e-2 * throughput
     assert ("hinges" in energies) == (kind in ("hinges", "cracks"))
     if "hinges" in energies:

@@ -68,7 +68,7 @@ def test_a_beam_cut_in_two_is_the_same_beam(seed):
     one = Built(numbers).run(SCHEME)
     other = Built(numbers, cut=range(len(numbers.beams))).run(SCHEME)
     assert len(other.scene.beams) == 2 * len(one.scene.beams)
-    assert other.solution.grid.size == one.solution.grid.size
+    assert other.solution.numbering.size == one.solution.numbering.size
     assert difference(one, other) < SAME
 
 

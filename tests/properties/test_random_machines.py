@@ -59,14 +59,14 @@ def run(seed):
         faulthandler.cancel_dump_traceback_later()
     assert any(words in said for words in CLEAR), said
     assert np.isfinite(solution.q).all()
-    digits = 1e-12 * solution.energy.throughput
+    digits = 1e-12 * solution.energy.energy_transferred
     assert all((np.diff(lost) >= -digits).all() for lost in _sinks(solution))
     open_by = solution.energy.imbalance
     if isinstance(names["scheme"], ub.Static):
         # The first trapeze, from rest, may err by all it has.
         open_by = open_by[min(1, len(open_by) - 1) :] - open_by[:2][-1]
     imbalance = max(float(np.abs(open_by).max()) - round_off(solution), 0.0)
-    return imbalance / (solution.energy.throughput or 1.0)
+    return imbalance / (solution.energy.energy_transferred or 1.0)
 
 
 def _sinks(solution):

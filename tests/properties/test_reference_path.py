@@ -86,7 +86,7 @@ def differences(found, reference):
     """Largest differences of all kinds of results, by name."""
     if len(found) != len(reference):
         return {"number of steps": np.inf}
-    scene, through = reference.scene, reference.energy.throughput or 1.0
+    scene, through = reference.scene, reference.energy.energy_transferred or 1.0
     every = {"times": (found.times, reference.times), "q": (found.q, reference.q)}
     every["velocities"] = found.v, reference.v
     mine, others = (_forces(solution) for solution in (found, reference))
@@ -98,12 +98,12 @@ def differences(found, reference):
         assert set(mine) == set(others)
         for name in mine:
             of[name] = np.abs(mine[name] - others[name]).max() / through
-    for link in scene.links:
-        size = 1.0 if link.turns else scene.size
-        pairs = [*zip(found.connector(link), reference.connector(link), strict=True)]
+    for connector in scene.all_connectors:
+        size = 1.0 if connector.turns else scene.size
+        pairs = [*zip(found.connector(connector), reference.connector(connector), strict=True)]
         sizes = size, np.inf, through, size / (found.times[-1] - found.times[0]), through
         for name, pair, of_size in zip(COLUMNS, pairs, sizes, strict=True):
-            of[f"{name} of {link}"] = np.abs(np.nan_to_num(pair[0] - pair[1])).max() / of_size
+            of[f"{name} of {connector}"] = np.abs(np.nan_to_num(pair[0] - pair[1])).max() / of_size
     return of
 
 
@@ -148,7 +148,7 @@ def test_residuals_and_tangents(seed):
     simulation = ub.Simulation(scene, scheme, mesh=mesh, newton=newton, comm=MPI.COMM_SELF)
     equation, supports = simulation.equation, simulation.supports
     solver = Solver(
-        simulation.grid, scheme, t0, simulation.q, initial_velocities(simulation), rtol=1e-12,
+        simulation.numbering, scheme, t0, simulation.q, initial_velocities(simulation), rtol=1e-12,
         max_iterations=30, petsc={},
     )  # fmt: skip
     solver.start(None, same=False)

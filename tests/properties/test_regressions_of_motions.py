@@ -248,7 +248,9 @@ def test_attempts_leave_no_trace():
     push = ub.PointLoad(body.middle, force=(5.0, 0), amplitude=ub.ramp(1.0))
     scene = ub.Scene(bodies=[body], joints=[rail], connectors=[rub], loads=[push])
     simulation = ub.Simulation(scene, ub.EnergyMomentum())
-    friction = simulation.couplings[[c.links == [rub] for c in simulation.couplings].index(True)]
+    friction = simulation.connector_terms[
+        [c.connectors == [rub] for c in simulation.connector_terms].index(True)
+    ]
     before = friction.response.state()
     assert simulation.attempt(1.0).q1.any()  # it slips
     np.testing.assert_array_equal(before, friction.response.state())

@@ -211,7 +211,7 @@ class LargestCurvature(ub.Recorder):
     def write(self, simulation):
         curvature = simulation.dolfinx.strains.x.array.reshape(-1, 3)[:, 2]
         here = np.abs(curvature).max(initial=0.0)
-        self.largest = simulation.share.largest(max(self.largest, here))
+        self.largest = simulation.subdomain.largest(max(self.largest, here))
 
     def state(self):
         return {"largest": np.array([self.largest])}

@@ -17,7 +17,7 @@ from ufl_beam import parallel
 
 WORLD = MPI.COMM_WORLD
 ALL = -1
-parallel.SMALLEST_SHARE = 1
+parallel.SMALLEST_SUBDOMAIN = 1
 
 SECTION = ub.Section(EA=1e6, GA=1e6, EI=1e2, rhoA=1.0, rhoI=1e-3)
 BEAM = ub.Beam((0, 0), (1, 0), SECTION, cells=8)
@@ -230,7 +230,7 @@ def asked(fail):
 
 def own(fail):
     """A small scene, which each process computes for itself."""
-    parallel.SMALLEST_SHARE = 10**6
+    parallel.SMALLEST_SUBDOMAIN = 10**6
     load(fail)
 
 

@@ -84,7 +84,7 @@ def require_same(one, other):
         assert same(one.momentum(), other.momentum())
     for a, b in zip(one.scene.supports, other.scene.supports, strict=True):
         assert same(one.reaction(a), other.reaction(b))
-    for a, b in zip(one.scene.links, other.scene.links, strict=True):
+    for a, b in zip(one.scene.all_connectors, other.scene.all_connectors, strict=True):
         assert str(a) == str(b)
         for x, y in zip(one.connector(a), other.connector(b), strict=True):
             assert same(x, y)
@@ -125,8 +125,8 @@ def test_a_machine_of_everything(shared_path):
     # What is one object in the scene is one in the other
     (friction,) = (c.law for c in loaded.scene.connectors if isinstance(c.law, ub.Coulomb))
     assert friction.joint in loaded.scene.joints
-    held = [link.law is HELD for link in solution.scene.links]
-    assert [link.law is HELD for link in loaded.scene.links] == held
+    held = [connector.law is HELD for connector in solution.scene.all_connectors]
+    assert [connector.law is HELD for connector in loaded.scene.all_connectors] == held
     for picture in (
         lambda s: ub.plot(s, "M"),
         lambda s: ub.plot(s, "shapes"),
@@ -192,7 +192,7 @@ def test_curves_and_meshes(shared_path):
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.1), dt=0.05, mesh=mesh)
     loaded = saved(solution, shared_path)
     require_same(loaded, solution)
-    assert loaded.grid.mesh == mesh
+    assert loaded.numbering.mesh == mesh
     for s in (0.1, 0.123, 0.9):
         for beam in beams[:2]:
             assert loaded.scene[beam.name].at(s).point == beam.at(s).point

@@ -504,7 +504,7 @@ class Pulse:
 
 
 def test_whole_numbers_of_cells_may_be_floats():
-    assert len(run(ub.Scene([beam(cells=2.0)])).grid.cells) == 2
+    assert len(run(ub.Scene([beam(cells=2.0)])).numbering.cells) == 2
 
 
 def test_time_functions_need_no_hash():

@@ -8,7 +8,7 @@ import pytest
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.model.functions import points_along
 
 SECTION = ub.Section(EA=1e4, GA=1e4, EI=100.0)
@@ -58,9 +58,9 @@ def test_an_arc_may_run_clockwise():
 
 def test_full_circle_may_close():
     beam = ub.Beam.arc((0, 0), 1.0, (0, 2 * math.pi), SECTION, cells=12)
-    grid = Grid(ub.Scene([beam], joints=[ub.Rigid(beam.start, beam.end)]))
-    assert len(grid.points) == 13
-    assert grid.size == 36  # 12 vertices: the ends share all three
+    numbering = DofNumbering(ub.Scene([beam], joints=[ub.Rigid(beam.start, beam.end)]))
+    assert len(numbering.points) == 13
+    assert numbering.size == 36  # 12 vertices: the ends share all three
 
 
 def test_polyline_goes_by_length():
@@ -112,7 +112,7 @@ def test_hinges_of_curved_beams_are_checked():
 def test_corners_are_vertices():
     beam = ub.Beam.polyline([(0, 0), (3, 0), (3, 1)], SECTION, cells=3)
     assert beam.vertices(()) == pytest.approx([0, 1 / 3, 2 / 3, 3 / 4, 1])
-    points = Grid(ub.Scene([beam])).points
+    points = DofNumbering(ub.Scene([beam])).points
     assert points == pytest.approx(
         np.array([(0, 0), (4 / 3, 0), (8 / 3, 0), (3, 0), (3, 1)], dtype=float)
     )
@@ -121,7 +121,9 @@ def test_corners_are_vertices():
 def test_a_beam_may_follow_any_curve():
     beam = ub.Beam.along(lambda s: (2 * s, s**2), SECTION, cells=4)
     assert beam.ends == ((0, 0), (2, 1))
-    assert Grid(ub.Scene([beam])).points[:, 1] == pytest.approx([0, 1 / 16, 1 / 4, 9 / 16, 1])
+    assert DofNumbering(ub.Scene([beam])).points[:, 1] == pytest.approx(
+        [0, 1 / 16, 1 / 4, 9 / 16, 1]
+    )
 
 
 def test_vertices_are_regular_and_those_attached():
@@ -151,10 +153,10 @@ def test_places_next_to_a_vertex_are_that_vertex():
 def test_attached_places_become_vertices(attach):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=2)
     parts = {"beams": [beam], **attach(beam.at(0.3))}
-    grid = Grid(ub.Scene(**parts))
-    vertices = grid.vertices_of(beam)
-    assert grid.points[vertices, 0] == pytest.approx([0, 0.3, 0.5, 1])
-    assert grid.vertex(beam.at(0.3)) == vertices[1]
+    numbering = DofNumbering(ub.Scene(**parts))
+    vertices = numbering.vertices_of(beam)
+    assert numbering.points[vertices, 0] == pytest.approx([0, 0.3, 0.5, 1])
+    assert numbering.vertex(beam.at(0.3)) == vertices[1]
 
 
 EXTRA = ub.Beam((0.3, 0), (0.3, 1), SECTION, cells=1)
@@ -166,20 +168,20 @@ def test_joints_share_degrees_of_freedom():
     beams = [ub.Beam((0, 0), end, SECTION, cells=3) for end in ((1, 0), (0, 1), (-1, 0))]
     a, b, c = (beam.start for beam in beams)
     scene = ub.Scene(beams, joints=[ub.Rigid(a, b), ub.Revolute(b, c)])
-    grid = Grid(scene)
-    assert grid.size == 36 - 5
-    at = [grid.dofs[grid.vertex(place)] for place in (a, b, c)]
+    numbering = DofNumbering(scene)
+    assert numbering.size == 36 - 5
+    at = [numbering.dofs[numbering.vertex(place)] for place in (a, b, c)]
     assert (at[0] == at[1]).all()
     assert (at[0][:2] == at[2][:2]).all()
     assert at[0][2] != at[2][2]
-    assert sorted(set(grid.dofs.ravel())) == list(range(grid.size))
+    assert sorted(set(numbering.dofs.ravel())) == list(range(numbering.size))
 
 
 def test_three_places_in_one_joint_are_as_two_joints():
     beams = [ub.Beam((0, 0), end, SECTION, cells=1) for end in ((1, 0), (0, 1), (-1, 0))]
     a, b, c = (beam.start for beam in beams)
-    together = Grid(ub.Scene(beams, joints=[ub.Revolute(a, b, c)]))
-    pairs = Grid(ub.Scene(beams, joints=[ub.Revolute(c, b), ub.Revolute(a, c)]))
+    together = DofNumbering(ub.Scene(beams, joints=[ub.Revolute(a, b, c)]))
+    pairs = DofNumbering(ub.Scene(beams, joints=[ub.Revolute(c, b), ub.Revolute(a, c)]))
     assert together.size == pairs.size == 18 - 4
 
 
@@ -187,13 +189,13 @@ def test_joints_whose_ends_are_apart_by_rounding_only():
     one = ub.Beam((0, 0), (0.1 + 0.2, 0), SECTION)
     other = ub.Beam((0.3, 0), (1, 0), SECTION)
     apart, joined = ((), [ub.Rigid(one.end, other.start)])
-    sizes = [Grid(ub.Scene([one, other], joints=joints)).size for joints in (apart, joined)]
+    sizes = [DofNumbering(ub.Scene([one, other], joints=joints)).size for joints in (apart, joined)]
     assert sizes[0] - sizes[1] == 3
 
 
 def test_interpolation_between_vertices():
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    vertices, weights = Grid(ub.Scene([beam])).weights(beam.at(0.3))
+    vertices, weights = DofNumbering(ub.Scene([beam])).weights(beam.at(0.3))
     assert list(vertices) == [1, 2]
     assert weights == pytest.approx([0.8, 0.2])
 
@@ -217,6 +219,6 @@ def test_beams_alike_share_their_parameters():
     section = ub.Section(EA=60.0, GA=40.0, EI=30.0)
     one, other, divided = (ub.Beam((0, i), (1, i), section, cells=4) for i in range(3))
     loads = [ub.PointLoad(divided.at(0.3), force=(0.0, -1.0)), ub.PointLoad(one.end, moment=1.0)]
-    grid = Grid(ub.Scene([one, other, divided], loads=loads))
-    assert grid.parameters(one) is grid.parameters(other)
-    assert grid.parameters(divided).tolist() == [0.0, 0.25, 0.3, 0.5, 0.75, 1.0]
+    numbering = DofNumbering(ub.Scene([one, other, divided], loads=loads))
+    assert numbering.parameters(one) is numbering.parameters(other)
+    assert numbering.parameters(divided).tolist() == [0.0, 0.25, 0.3, 0.5, 0.75, 1.0]

@@ -15,7 +15,7 @@ import pytest
 from scenes import clamped, rigid_chain
 
 import ufl_beam as ub
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.output import output_files
 from ufl_beam.output.serialization import Description, difference
 from ufl_beam.simulation.checkpoint import FORMAT
@@ -390,34 +390,38 @@ def test_arrays_and_dicts():
 
 def test_a_state_is_that_of_all_processes():
     simulation = ub.Simulation(scene(), ub.EnergyMomentum())
-    share, grid = simulation.share, simulation.grid
-    memory = Memory(share)
-    memory.at_dofs("dofs", share.dofs.astype(float))
-    memory.added("added", np.ones(share.size))
-    memory.total("total", 2.0)
-    memory.number("number", 3.0)
-    memory.rows("cells", share.cells, np.column_stack([share.cells, -share.cells]).astype(float))
-    state = memory.state()
-    assert (state["dofs"] == np.arange(grid.size)).all()
-    assert state["added"].sum() == share.total(share.size)
-    assert state["total"] == 2.0 * share.comm.size
+    subdomain, numbering = simulation.subdomain, simulation.numbering
+    archive = Archive(subdomain)
+    archive.at_dofs("dofs", subdomain.dofs.astype(float))
+    archive.added("added", np.ones(subdomain.size))
+    archive.total("total", 2.0)
+    archive.number("number", 3.0)
+    archive.rows(
+        "cells", subdomain.cells, np.column_stack([subdomain.cells, -subdomain.cells]).astype(float)
+    )
+    state = archive.state()
+    assert (state["dofs"] == np.arange(numbering.size)).all()
+    assert state["added"].sum() == subdomain.total(subdomain.size)
+    assert state["total"] == 2.0 * subdomain.comm.size
     assert state["number"] == 3.0
-    assert (state["cells, 2"][:, 1] == np.arange(len(grid.cells))).all()
-    back = Memory(share, state)
-    assert (back.at_dofs("dofs", share.dofs) == share.dofs).all()
-    assert share.total(back.added("added", share.dofs).sum()) == share.total(share.size)
-    assert share.total(back.total("total", 0.0)) == 2.0 * share.comm.size
-    rows = np.full((len(share.cells), 2), np.nan)
-    assert (back.rows("cells", share.cells, rows)[:, 1] == -share.cells).all()
-    assert np.isnan(back.rows("others", share.cells, rows)).all()
+    assert (state["cells, 2"][:, 1] == np.arange(len(numbering.cells))).all()
+    back = Archive(subdomain, state)
+    assert (back.at_dofs("dofs", subdomain.dofs) == subdomain.dofs).all()
+    assert subdomain.total(back.added("added", subdomain.dofs).sum()) == subdomain.total(
+        subdomain.size
+    )
+    assert subdomain.total(back.total("total", 0.0)) == 2.0 * subdomain.comm.size
+    rows = np.full((len(subdomain.cells), 2), np.nan)
+    assert (back.rows("cells", subdomain.cells, rows)[:, 1] == -subdomain.cells).all()
+    assert np.isnan(back.rows("others", subdomain.cells, rows)).all()
     simulation.close()
 
 
 def test_signs_of_zeros_are_kept():
     simulation = ub.Simulation(scene(), ub.EnergyMomentum())
-    memory = Memory(simulation.share)
-    memory.total("zero", -0.0)
-    assert math.copysign(1.0, memory.state()["zero"][0]) == -1.0
+    archive = Archive(simulation.subdomain)
+    archive.total("zero", -0.0)
+    assert math.copysign(1.0, archive.state()["zero"][0]) == -1.0
     simulation.close()
 
 
@@ -435,9 +439,9 @@ def test_the_last_step_of_cells_that_the_first_process_does_not_have():
     runs = [ub.Simulation(scene, ub.EnergyMomentumDecaying()) for _ in range(2)]
     for n in range(1, 6):
         runs[0].step_to(0.01 * n)
-    memory = Memory(runs[0].share)
-    runs[0].remember(memory)
-    runs[1].remember(Memory(runs[1].share, memory.state()))
+    archive = Archive(runs[0].subdomain)
+    runs[0].save_or_restore(archive)
+    runs[1].save_or_restore(Archive(runs[1].subdomain, archive.state()))
     for one in runs:
         one.step_to(0.06)
     assert np.array_equal(*(one.q for one in runs))

@@ -72,7 +72,7 @@ def test_processes_that_fail_alike_end_without_an_abort():
 def test_calls_return_what_the_function_does():
     agreement = Agreement(COMM)
     assert agreement(divmod, 7, 2) == (3, 1)
-    agreement.settle(None)
+    agreement.synchronize(None)
 
 
 @pytest.mark.parametrize("rank", range(COMM.size))
@@ -80,7 +80,7 @@ def test_one_process_raises_for_all(rank):
     agreement = Agreement(COMM)
     mine = ValueError("mine") if COMM.rank == rank else None
     with pytest.raises(ValueError, match="mine") as raised:
-        agreement.settle(mine)
+        agreement.synchronize(mine)
     assert mine is None or raised.value is mine
     assert COMM.size == 1 or agreement.raised is raised.value
 
@@ -90,7 +90,7 @@ def test_other_exceptions_go_before_failed_steps():
     agreement = Agreement(COMM)
     last = COMM.rank == COMM.size - 1
     with pytest.raises(ValueError, match="of a user"):
-        agreement.settle(ValueError("of a user") if last else StepFailed("no equilibrium"))
+        agreement.synchronize(ValueError("of a user") if last else StepFailed("no equilibrium"))
 
 
 class Unreadable(Exception):

@@ -13,9 +13,9 @@ from scenes import clamped
 
 import ufl_beam as ub
 from ufl_beam.discretization import compiled_forms
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import DolfinxFields, Fields
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import VERSION, cpp, fem, line_mesh
 from ufl_beam.mechanics.kinematics import Axis, strain
 
@@ -260,7 +260,7 @@ def fields_of_a_frame():
     a = ub.Beam((0, 0), (0, 2), SECTION, cells=3)
     b = ub.Beam((0, 2), (3, 1), SECTION, cells=4)
     scene = ub.Scene([a, b], joints=[ub.Revolute(a.end, b.start)])
-    return Fields(Share(Grid(scene), MPI.COMM_SELF))
+    return Fields(Subdomain(DofNumbering(scene), MPI.COMM_SELF))
 
 
 def forms_of(q, axis, dx):
@@ -288,8 +288,8 @@ def test_kernels_give_what_dolfinx_assembles():
     fields = fields_of_a_frame()
     element = fields.element
     energy, force, tangent = forms_of(element.q1, element.axis, element.dx(1))
-    q = np.random.default_rng(0).uniform(-1, 1, fields.share.size)
-    vector = np.zeros(fields.share.size)
+    q = np.random.default_rng(0).uniform(-1, 1, fields.subdomain.size)
+    vector = np.zeros(fields.subdomain.size)
     fields.kernel(force, element.q1).add(q, vector)
     matrix = fields.matrix()
     kernel = fields.kernel(tangent, element.q1)
@@ -297,8 +297,8 @@ def test_kernels_give_what_dolfinx_assembles():
     kernel.add(q, matrix.data)
     value = fields.kernel(energy, element.q1).value(q)
 
-    of_three, meshed = element.space.ufl_element(), DolfinxFields(fields.share)
-    space = space_with_dofs(meshed.mesh, of_three, meshed.cell_dofs, fields.share.size)
+    of_three, meshed = element.space.ufl_element(), DolfinxFields(fields.subdomain)
+    space = space_with_dofs(meshed.mesh, of_three, meshed.cell_dofs, fields.subdomain.size)
     function = fem.Function(space)
     function.x.array[:] = q
     dx = ufl.Measure("dx", domain=meshed.mesh, metadata={"quadrature_degree": 1})
@@ -319,7 +319,7 @@ def test_a_form_without_coefficients_is_added_in_all_cells():
     u, w = ufl.TrialFunction(element.space), ufl.TestFunction(element.space)
     kernel, matrix = fields.kernel(u[0] * w[0] * element.dx(2), element.q1), fields.matrix()
     kernel.place(matrix)
-    kernel.add(np.zeros(fields.share.size), matrix.data)
+    kernel.add(np.zeros(fields.subdomain.size), matrix.data)
     # The integral of 1 over both beams; entries of the cells of a partition of unity
     assert matrix.data.sum() == pytest.approx(2 + math.sqrt(10), rel=1e-14)
 

@@ -120,23 +120,23 @@ SCHEMES = [
 def cantilever(*laws, load=None, **more):
     """A flexible cantilever with a connector of each law across its end."""
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
-    links = [ub.Slide(ub.ground(1, 0), beam.end, law, axis=(0, 1)) for law in laws]
+    connectors = [ub.Slide(ub.ground(1, 0), beam.end, law, axis=(0, 1)) for law in laws]
     push = ub.PointLoad(beam.end, force=(0, 1.0), amplitude=load or (lambda t: math.sin(9 * t)))
     held = {"supports": [ub.Clamped(beam.start)], "loads": [push]}
-    return beam.end, links, ub.Scene([beam], connectors=links, **held, **more)
+    return beam.end, connectors, ub.Scene([beam], connectors=connectors, **held, **more)
 
 
 def carriage(law, v, mass=2.0, more=()):
     """A body on a rail that arrives with a velocity."""
     body = ub.Body((1, 0), mass=mass, inertia=1.0)
     rail = ub.ground(0, 0), body.middle
-    link = ub.Slide(*rail, law)
+    connector = ub.Slide(*rail, law)
     scene = ub.Scene(
         bodies=[body], joints=[ub.Prismatic(*rail)],
-        connectors=[link, *(ub.Slide(*rail, one) for one in more)],
+        connectors=[connector, *(ub.Slide(*rail, one) for one in more)],
         initial=[ub.Velocity((body,), linear=(v, 0))],
     )  # fmt: skip
-    return body.middle, link, scene
+    return body.middle, connector, scene
 
 
 run = partial(ub.simulate, t=(0, 0.6), dt=0.02)
@@ -152,7 +152,7 @@ def test_tangent_is_the_derivative(name, scheme):
     law = LAWS[name]
     forms = LawForms(law, scheme)
     names = inputs(law)
-    known = {f"number {n}": x for n, x in law.numbers().items()} | {
+    known = {f"number {n}": x for n, x in law.parameters().items()} | {
         "dt": 0.01,
         "theta": scheme.theta,
     }
@@ -174,7 +174,7 @@ def test_tangent_is_the_derivative(name, scheme):
 @pytest.mark.parametrize("dt", [2e-2, 1e-3])
 @pytest.mark.filterwarnings("ignore:the energy ledger is open")  # a claim of 10 rtol = 1e-13
 def test_energy_is_conserved(law, dt):
-    _, link, scene = carriage(law, v=0.1)
+    _, connector, scene = carriage(law, v=0.1)
     solution = run(
         scene, ub.EnergyMomentum(), t=(0, 1000 * dt), dt=dt, newton=ub.Newton(rtol=1e-13)
     )
@@ -182,15 +182,15 @@ def test_energy_is_conserved(law, dt):
     assert np.ptp(total) < 1e-11 * total[0]
     assert solution.energy["stored"].max() > 0.01 * total[0]
     assert not solution.energy.lost
-    assert not solution.connector(link).dissipated.any()
+    assert not solution.connector(connector).dissipated.any()
 
 
 def test_small_steps_keep_the_digits_of_the_force():
     """A quotient of energies would have none left: the steps are 1e-9 of the motion."""
-    _, (link,), scene = cantilever(Cubic(1e3, 1e6), load=lambda t: 1.0 + 1e-8 * t)
+    _, (connector,), scene = cantilever(Cubic(1e3, 1e6), load=lambda t: 1.0 + 1e-8 * t)
     start = run(scene, ub.Static(), dt=0.3)
     solution = run(scene, ub.EnergyMomentumStatic(0.5), t=(0.6, 1.6), dt=0.1, start=start)
-    history = solution.connector(link)
+    history = solution.connector(connector)
     force = 1e3 * history.motion + 1e6 * history.motion**3
     np.testing.assert_allclose(history.force[1:], force[1:], rtol=1e-8)
 
@@ -198,9 +198,9 @@ def test_small_steps_keep_the_digits_of_the_force():
 @pytest.mark.parametrize("scheme", SCHEMES, ids=str)
 @pytest.mark.parametrize("name", LAWS)
 def test_the_reference_finds_the_same(name, scheme):
-    _, (link,), scene = cantilever(LAWS[name])
-    found = require_reference(run, scene, link, scheme)
-    mine = found.connector(link)
+    _, (connector,), scene = cantilever(LAWS[name])
+    found = require_reference(run, scene, connector, scheme)
+    mine = found.connector(connector)
     lost = found.energy.lost.get(LAWS[name].entry, 0.0)
     np.testing.assert_allclose(lost, mine.dissipated, rtol=0, atol=1e-15)
     if isinstance(scheme, ub.EnergyMomentumBase):
@@ -229,10 +229,10 @@ class Named(Maxwell):
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.EnergyMomentum(0.1, 0.1)], ids=str)
 def test_names_of_variables_are_free(scheme):
-    _, (link,), scene = cantilever(Named(200.0, 20.0))
-    named = require_reference(run, scene, link, scheme).connector(link)
-    _, (link,), scene = cantilever(LAWS["maxwell"])
-    for one, other in zip(named, run(scene, scheme).connector(link), strict=True):
+    _, (connector,), scene = cantilever(Named(200.0, 20.0))
+    named = require_reference(run, scene, connector, scheme).connector(connector)
+    _, (connector,), scene = cantilever(LAWS["maxwell"])
+    for one, other in zip(named, run(scene, scheme).connector(connector), strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(other).max())
 
 
@@ -265,14 +265,14 @@ def test_a_maxwell_element_relaxes(scheme, order):
     beam = ub.Beam((0, 0), (1, 0), SECTION, cells=1)
     way = ub.Table([0.0, 0.5, 9.0], [0.0, 0.1, 0.1])
     held = ub.PrescribedDisplacement(beam.start, u=0.0, v=way, psi=0.0)
-    link = ub.Slide(ub.ground(0, 0), beam.start, Maxwell(k, eta), axis=(0, 1))
-    scene = ub.Scene([beam], supports=[held], connectors=[link])
+    connector = ub.Slide(ub.ground(0, 0), beam.start, Maxwell(k, eta), axis=(0, 1))
+    scene = ub.Scene([beam], supports=[held], connectors=[connector])
     force = eta * 0.2 * (1 - math.exp(-k * 0.5 / eta)) * math.exp(-k * 0.5 / eta)
     errors = []
     for dt in (0.05, 0.025, 0.0125):
         solution = run(scene, scheme, t=(0, 1), dt=dt)
         errors.append(math.sqrt(2 * k * solution.energy["stored"][-1]) - force)
-        assert solution.connector(link).dissipated[-1] > 0
+        assert solution.connector(connector).dissipated[-1] > 0
     np.testing.assert_allclose(np.log2(np.divide(errors[:-1], errors[1:])), order, atol=0.1)
 
 
@@ -285,20 +285,20 @@ def all_laws():
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.05), ub.Newmark(), ub.Static()], ids=str)
 def test_restart_and_start(scheme, shared_path):
-    _, links, scene = all_laws()
-    whole = require_restart(run, scene, links, scheme, shared_path, until=0.6)
+    _, connectors, scene = all_laws()
+    whole = require_restart(run, scene, connectors, scheme, shared_path, until=0.6)
     if scheme == ub.EnergyMomentum(0.05):
         assert whole.energy.worst < 1e-9
 
 
 def test_save_and_load(shared_path):
-    _, (link, *_), scene = all_laws()
+    _, (connector, *_), scene = all_laws()
     solution, path = run(scene, ub.EnergyMomentum()), shared_path / "run.h5"
     solution.save(path)
     with pytest.raises(ub.ArgumentError, match="the class Cubic of your own"):
         ub.Solution.load(path)
     loaded = ub.Solution.load(path, scene=scene)
-    assert np.array_equal(loaded.connector(link).force, solution.connector(link).force)
+    assert np.array_equal(loaded.connector(connector).force, solution.connector(connector).force)
     more = [run(scene, ub.EnergyMomentum(), t=(0.6, 0.8), start=one) for one in (solution, loaded)]
     assert np.array_equal(more[0].q, more[1].q)
     _, (stop,), scene = cantilever(LAWS["damped stop"])
@@ -347,7 +347,7 @@ SHARED = """
 import sys
 sys.path[:0] = [{here!r}, {tests!r}]
 from ufl_beam import parallel
-parallel.SMALLEST_SHARE = 1
+parallel.SMALLEST_SUBDOMAIN = 1
 import test_connector_laws as t
 at, links, scene = t.all_laws()
 solution = t.run(scene, t.ub.EnergyMomentum())
@@ -364,9 +364,9 @@ def test_two_processes_share_a_scene():
     found = on_two_processes("-c", code)
     assert found.returncode == 0, found.stderr
     forces, energies = map(eval, found.stdout.splitlines()[-2:])
-    _, links, scene = all_laws()
+    _, connectors, scene = all_laws()
     solution = run(scene, ub.EnergyMomentum())
-    alone = [solution.connector(x).force[-1] for x in links]
+    alone = [solution.connector(x).force[-1] for x in connectors]
     np.testing.assert_allclose(forces, alone, rtol=0, atol=1e-9 * np.abs(alone).max())
     ends = [x[-1] for x in solution.energy.values()]
     np.testing.assert_allclose(energies, ends, rtol=0, atol=1e-9 * np.abs(ends).max())
@@ -385,9 +385,11 @@ def test_modes_about_a_state():
         def resistance(self, motion, rate, state, dt):
             return self.c * rate * (1 + motion)
 
-    at, link, scene = carriage(Damped(100.0, 4e4, 3.0), v=0.0)
+    at, connector, scene = carriage(Damped(100.0, 4e4, 3.0), v=0.0)
     load = ub.PointLoad(at, force=(5.0, 0), amplitude=lambda t: 1.0)
-    scene = ub.Scene((), joints=scene.joints, loads=[load], bodies=scene.bodies, connectors=[link])
+    scene = ub.Scene(
+        (), joints=scene.joints, loads=[load], bodies=scene.bodies, connectors=[connector]
+    )
     state = run(scene, ub.Static(), t=(0, 2e9), dt=1e9)  # nothing creeps any more
     x = state.displacement(at)[-1, 0]
     assert 100 * x + 4e4 * x**3 == pytest.approx(5.0, rel=1e-9)
@@ -459,9 +461,9 @@ def test_a_damped_stop_takes_a_part_of_the_velocity(damping, v):
         assert expected == pytest.approx(1 - 2 / 3 * damping * v, abs=0.5 * (damping * v) ** 2)
     found = []
     for dt in (2e-4, 1e-4):
-        at, link, scene = carriage(ub.Stop(k, high=0.01, damping=damping), v=v)
+        at, connector, scene = carriage(ub.Stop(k, high=0.01, damping=damping), v=v)
         solution = run(scene, ub.EnergyMomentum(), t=(0, 0.2), dt=dt)
-        history = solution.connector(link)
+        history = solution.connector(connector)
         assert history.force.min() > -1e-9 * history.force.max()  # it never pulls
         assert solution.energy.worst < 1e-9
         lost = solution.energy.lost["contact"]
@@ -473,9 +475,9 @@ def test_a_damped_stop_takes_a_part_of_the_velocity(damping, v):
 
 
 def test_a_stop_without_damping_has_no_entry():
-    _, (link,), scene = cantilever(LAWS["stop"])
+    _, (connector,), scene = cantilever(LAWS["stop"])
     assert "contact" not in run(scene, ub.EnergyMomentum()).energy
-    assert repr(link.law) == "Stop(stiffness=300.0, low=-0.004, high=0.006, damping=0.0)"
+    assert repr(connector.law) == "Stop(stiffness=300.0, low=-0.004, high=0.006, damping=0.0)"
 
 
 # -- what is refused -----------------------------------------------------------------------------
@@ -495,7 +497,7 @@ ONE = {"variables": {"z": 0.0}, "energy": quadratic}
         (lambda: type("Plain", (ub.ConnectorLaw,), {"energy": quadratic})(), "must be a dataclass"),
         (lambda: law_of(energy=quadratic, fields={"k": math.nan}), "Mine: k = nan is not finite"),
         (lambda: law_of(energy=quadratic, fields={"k": "x"}), "Mine: k = 'x' is not a number"),
-        (lambda: law_of(energy=quadratic, fields={"numbers": 1.0}), "cannot have the name numbers"),
+        (lambda: law_of(energy=quadratic, fields={"parameters": 1.0}), "have the name parameters"),
         (lambda: law_of(energy=quadratic, entry="kinetic"), "is no name of a loss; there"),
         (lambda: law_of(energy=quadratic, entry=3), "Mine.entry = 3 must be text"),
         (lambda: law_of(**ONE), "has variables and no increments"),
@@ -567,7 +569,7 @@ def test_preloaded_laws_need_a_state():
 @pytest.mark.serial  # the first process warns
 @pytest.mark.parametrize(("law", "warned"), [(Bad(0.5), True), (Drive(0.5), False)])
 def test_a_law_that_gives_energy_is_told(law, warned):
-    _, link, scene = carriage(law, v=0.1)
+    _, connector, scene = carriage(law, v=0.1)
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         solution = run(scene, ub.EnergyMomentum())
@@ -575,5 +577,5 @@ def test_a_law_that_gives_energy_is_told(law, warned):
     assert bool(found) == warned
     assert solution.energy.lost[law.entry][-1] < 0
     if warned:
-        assert found[0].startswith(f"{link}: ")
+        assert found[0].startswith(f"{connector}: ")
         assert "active = True" in found[0]

@@ -10,8 +10,8 @@ import pytest
 from scipy import stats
 
 import ufl_beam as ub
-from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.partition import Subdomain
 
 MEAN, DEVIATION, SEED = 250e6, 50e6, 7
 NORMALS = [ub.Normal, ub.TruncatedNormal, ub.Lognormal]
@@ -113,10 +113,10 @@ LAW = ub.ElastoPlastic(ub.Lognormal(MEAN, DEVIATION, seed=SEED))
 def limits(beams, comm=MPI.COMM_SELF, joints=()):
     """Limits of all fibres that a process has, by number of the cell."""
     scene = ub.Scene(beams, joints=joints)
-    share = Share(Grid(scene), comm)
+    subdomain = Subdomain(DofNumbering(scene), comm)
     layout = beams[0].section.layout(None)
-    drawn = layout.numbers(share.grid.keys(share.cells))["yield_limit"]
-    return dict(zip(share.cells.tolist(), drawn, strict=True))
+    drawn = layout.parameters(subdomain.numbering.keys(subdomain.cells))["yield_limit"]
+    return dict(zip(subdomain.cells.tolist(), drawn, strict=True))
 
 
 def frame():
@@ -159,6 +159,6 @@ def test_resultants_may_be_random_too():
     section = ub.Section(
         EA=1.0, GA=1.0, EI=1.0, bending=ub.ElastoPlastic(ub.Weibull(10.0, 5.0, seed=2))
     )
-    limit = section.layout(None).numbers([(0, k) for k in range(50)])["yield_limit"]
+    limit = section.layout(None).parameters([(0, k) for k in range(50)])["yield_limit"]
     assert limit.shape == (50, 1)
     assert len(np.unique(limit)) == 50

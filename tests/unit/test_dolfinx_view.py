@@ -20,12 +20,12 @@ STEEL = {"EA": 1e6, "GA": 4e5, "EI": 800.0, "rhoA": 10.0, "rhoI": 0.01}
 @pytest.mark.parametrize("least", [1, 6000], ids=["shared", "copies"])
 def test_total_is_that_of_the_scene_on_any_processes(monkeypatch, least):
     """Length, ∫ x² and stored energy; [round-off] of 12 cells and of Newton's method."""
-    monkeypatch.setattr(parallel, "SMALLEST_SHARE", least)
+    monkeypatch.setattr(parallel, "SMALLEST_SUBDOMAIN", least)
     beam = ub.Beam((0, 0), (3, 0), ub.Section(**STEEL), cells=12)
     load = ub.PointLoad(beam.end, force=(10.0, 30.0))
     scene = clamped(beam, loads=[load])
     simulation = moved(scene, ub.EnergyMomentum(), comm=MPI.COMM_WORLD)
-    assert simulation.share.comm.size == (MPI.COMM_WORLD.size if least == 1 else 1)
+    assert simulation.subdomain.comm.size == (MPI.COMM_WORLD.size if least == 1 else 1)
     view = simulation.dolfinx
     x, C, e = ufl.SpatialCoordinate(view.mesh), view.stiffness, view.strains
     stored = sum(C[i] * e[i] ** 2 / 2 for i in range(3)) * view.dx
@@ -56,9 +56,9 @@ def test_what_total_refuses():
 def _shuffled(monkeypatch):
     """Cells of the mesh in an order that is not theirs in the scene, as DOLFINx may choose."""
 
-    def fields(share):
-        order = np.random.default_rng(3).permutation(len(share.cells))
-        return DolfinxFields(share, order)
+    def fields(subdomain):
+        order = np.random.default_rng(3).permutation(len(subdomain.cells))
+        return DolfinxFields(subdomain, order)
 
     monkeypatch.setattr(dolfinx_view, "DolfinxFields", fields)
 
@@ -198,7 +198,7 @@ def test_each_process_has_its_cells():
     v, M = view.velocity.x.array, fem.assemble_matrix(fem.form(view.forms.mass)).to_scipy()
     kinetic = MPI.COMM_WORLD.allreduce(v @ M @ v / 2)
     assert kinetic == pytest.approx(state["kinetic"], rel=1e-12)
-    jump = np.zeros(len(simulation.grid.cells))
+    jump = np.zeros(len(simulation.numbering.cells))
     jump[view.cells] = view.jump.x.array
     MPI.COMM_WORLD.Allreduce(MPI.IN_PLACE, jump)
     alone = moved(scene, ub.EnergyMomentum(0.1))
@@ -263,7 +263,7 @@ def test_a_monitor_sees_each_iteration_and_changes_none():
     assert len(seen) - sum(iteration == 0 for iteration, _ in seen) == watched.iterations
     assert plain.iterations == watched.iterations
     # Sums are in another order, and in C operations are contracted otherwise.
-    assert np.allclose(plain.q, watched.share.gather(watched.q), rtol=0, atol=1e-11)
+    assert np.allclose(plain.q, watched.subdomain.gather(watched.q), rtol=0, atol=1e-11)
     for simulation in (plain, watched):
         simulation.close()
 
@@ -285,7 +285,7 @@ def test_the_matrix_of_snes():
     assert "indices" not in vars(simulation.equation.A)
     snes = simulation.snes
     simulation.step_to(0.02)
-    if simulation.share.alone:
+    if simulation.subdomain.alone:
         matrix = snes.getJacobian()[0]
         indptr, indices, data = matrix.getValuesCSR()
         A = simulation.equation.A

@@ -52,14 +52,14 @@ def test_total_and_imbalance():
 
 def test_throughput_counts_work_both_ways():
     # At most 9 J in the scene; 2 J in and 1 J out again
-    assert energy().throughput == 9 + 2 + 1
+    assert energy().energy_transferred == 9 + 2 + 1
     off = energy(supplied={"loads": np.array([0.0, 2.0, 5.0])})
     assert off.worst == 4 / (9 + 5)
 
 
 def test_a_ledger_of_zeros_has_no_throughput():
     nothing = ub.Energy({"stored": np.zeros(3)}, {}, {})
-    assert nothing.throughput == 0
+    assert nothing.energy_transferred == 0
     assert nothing.worst == 0
 
 
@@ -159,7 +159,7 @@ def test_the_ledger_of_dynamics_closes(scheme, dt):
     energy = solution.energy
     assert energy.worst < CLOSED
     assert set(energy.supplied) == {"loads", "supports"}
-    assert energy.throughput > 1e-3  # something happens
+    assert energy.energy_transferred > 1e-3  # something happens
     if scheme == ub.EnergyMomentum():
         assert "numerical" not in energy.lost
     else:
@@ -247,7 +247,7 @@ def test_a_scene_that_turns_as_a_whole_has_no_energy_to_balance():
     turn = ub.PrescribedDisplacement(beam.end, psi=lambda t: math.sin(math.pi * t))
     scene = ub.Scene([beam], supports=[ub.Pinned(beam.start), turn])
     solution = ub.simulate(scene, ub.EnergyMomentumStatic(), t=(0, 1), dt=0.01)
-    assert solution.energy.throughput < 1e-9
+    assert solution.energy.energy_transferred < 1e-9
     assert solution.open_ledger == ""
 
 

@@ -204,7 +204,7 @@ def test_extremes_are_those_of_all_steps():
     solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 0.4), dt=0.01, record=extremes)
     kept = range(len(solution))
     forces = np.array([np.transpose(solution.diagram(beam, n, points=2)[1:]) for n in kept])
-    nodes = solution.grid.nodes_of(beam)[1]
+    nodes = solution.numbering.nodes_of(beam)[1]
     for found, values in (
         (extremes.section_forces(beam), forces),
         (extremes.displacement(beam), solution.q[:, nodes]),

@@ -214,7 +214,7 @@ def test_internal_variables_change_with_accepted_steps_only():
     law = ub.ForceLaw(counting, state=[0.0, 0.0])
     _, scene, _ = floating(law, lambda t: 2.0 * t)
     simulation = ub.Simulation(scene, ub.Static())
-    response = simulation.couplings[0].response
+    response = simulation.connector_terms[0].response
     simulation.attempt(0.5)
     assert response.state()[0, 0] == 0.0
     for n, t in enumerate((0.25, 0.5, 1.0)):

@@ -128,7 +128,7 @@ def pushed(section, turn=0.3):
 
 def on_cells(simulation):
     """The element on the cells of a scene, and its configuration."""
-    fields = DolfinxFields(simulation.share)
+    fields = DolfinxFields(simulation.subdomain)
     fields.element.q1.x.array[dofs_of_cells(fields.element.space)] = simulation.q[fields.cell_dofs]
     return fields
 
@@ -136,10 +136,10 @@ def on_cells(simulation):
 def test_forces_are_the_derivative_of_the_potential():
     """Internal forces of a static step, elastic, are P(34), its first equation."""
     simulation = pushed(ub.Section(EA=6e3, GA=4e3, EI=300.0))
-    fields, share = on_cells(simulation), simulation.share
+    fields, subdomain = on_cells(simulation), simulation.subdomain
     of = fields.element
     W = functional.elastic_energy(strain(of.q1, of.axis), ufl.as_vector((6e3, 4e3, 300.0)))
-    expected, found = np.zeros((2, share.size))
+    expected, found = np.zeros((2, subdomain.size))
     expected[simulation.dolfinx.dofs] = vector(derivative(W, of.q1, of.dx(1)))
     for one in simulation.beams:
         one.add_residual(simulation.q, found)

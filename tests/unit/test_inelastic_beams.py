@@ -9,7 +9,7 @@ from failing_steps import let_fail
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 
 ELASTIC = {"EA": 1e5, "GA": 1e5, "EI": 100.0, "rhoA": 1.0, "rhoI": 0.01}
 LAWS = {
@@ -159,8 +159,8 @@ def test_hinges_of_a_beam_come_before_those_of_its_section():
     assert at == [
         (0, 0.0, law), (0, 1.0, law), (1, 0.0, law), (1, 1.0, other), (2, 1.0, law), (2, 0.5, other)
     ]  # fmt: skip
-    grid = Grid(scene)
-    assert all(grid.hinges(beam) == [law] * 4 for beam in beams)
+    numbering = DofNumbering(scene)
+    assert all(numbering.hinges(beam) == [law] * 4 for beam in beams)
 
 
 def test_cracks_of_fibres_are_no_rotations():

@@ -112,7 +112,7 @@ def test_the_ledger_closes():
     for scheme in (ub.EnergyMomentum(), ub.EnergyMomentum(0.1)):
         run = ub.simulate(scene, scheme, t=(0, 1), dt=0.01)
         assert run.energy.worst < 1e-9
-        assert run.energy.lost["plastic"][-1] > 0.01 * run.energy.throughput
+        assert run.energy.lost["plastic"][-1] > 0.01 * run.energy.energy_transferred
 
 
 @pytest.mark.parametrize(

@@ -183,7 +183,7 @@ def test_velocities_must_agree_with_joints():
 
 
 def unknowns(**parts):
-    return ub.Simulation(ub.Scene(**parts), ub.EnergyMomentum()).grid.size
+    return ub.Simulation(ub.Scene(**parts), ub.EnergyMomentum()).numbering.size
 
 
 def test_only_what_is_there_has_unknowns():
@@ -206,8 +206,8 @@ def test_only_what_is_there_has_unknowns():
 
 def test_elastic_scenes_without_links_have_no_couplings():
     simulation = ub.Simulation(ub.Scene([beam()]), ub.EnergyMomentum())
-    assert simulation.couplings == []
-    assert simulation.grid.multipliers.size == 0
+    assert simulation.connector_terms == []
+    assert simulation.numbering.multipliers.size == 0
 
 
 # -- results -------------------------------------------------------------------------------------
@@ -328,8 +328,8 @@ def test_a_run_that_goes_on_remembers_its_connectors():
     rest = run(one, t=(0.5, 1), dt=0.01, start=half)
     assert whole.energy["plastic"][-1] > 0.1
     assert np.abs(rest.q[-1][:3] - whole.q[-1][:3]).max() < 1e-9
-    for link in one.connectors:
-        ends = [solution.connector(link).work[-1] for solution in (whole, rest)]
+    for connector in one.connectors:
+        ends = [solution.connector(connector).work[-1] for solution in (whole, rest)]
         assert ends[1] == pytest.approx(ends[0], abs=1e-9)
 
 
@@ -343,7 +343,7 @@ def test_works_of_connectors_are_in_the_ledger():
         joints=[ub.Revolute(a.middle, ub.ground(0, 0)), ub.Prismatic(a.middle, b.middle)],
     )  # fmt: skip
     solution = run(scene, t=(0, 1), dt=0.01)
-    works = [solution.connector(link).work for link in (spring, damper, motor)]
+    works = [solution.connector(connector).work for connector in (spring, damper, motor)]
     assert solution.energy["stored"] == pytest.approx(works[0], abs=1e-12)
     assert solution.energy["damping"] == pytest.approx(works[1], abs=1e-12)
     assert solution.energy["motors"] == pytest.approx(-works[2], abs=1e-12)

@@ -84,14 +84,14 @@ def oscillator(*laws, v=1.5):
     """A mass between a spring and what rubs on its rail, struck and pushed to and fro."""
     mass = ub.Body((1, 0), mass=2.0, inertia=1.0)
     rail = ub.ground(0, 0), mass.middle
-    links = [ub.Slide(*rail, law) for law in laws]
+    connectors = [ub.Slide(*rail, law) for law in laws]
     push = ub.PointLoad(mass.middle, force=(3.0, 0), amplitude=lambda t: math.sin(4 * t))
     scene = ub.Scene(
         bodies=[mass], joints=[ub.Prismatic(*rail)], loads=[push],
-        connectors=[ub.Slide(*rail, ub.Spring(50.0)), *links],
+        connectors=[ub.Slide(*rail, ub.Spring(50.0)), *connectors],
         initial=[ub.Velocity((mass,), linear=(v, 0.0))],
     )  # fmt: skip
-    return mass.middle, links, scene
+    return mass.middle, connectors, scene
 
 
 run = partial(ub.simulate, t=(0, 3.0), dt=0.01)
@@ -101,13 +101,13 @@ run = partial(ub.simulate, t=(0, 3.0), dt=0.01)
 def test_a_constant_limit_is_dry_friction(scheme):
     solutions = []
     for law in (Dry(2.0), ub.Coulomb(2.0)):
-        at, (link,), scene = oscillator(law)
+        at, (connector,), scene = oscillator(law)
         solution = run(scene, scheme, newton=ub.Newton(rtol=1e-13))
-        solutions.append((solution.displacement(at), *solution.connector(link)[:4]))
+        solutions.append((solution.displacement(at), *solution.connector(connector)[:4]))
         lost = solution.energy.lost["friction"]
         assert lost[-1] > 0
         if isinstance(law, Dry):
-            np.testing.assert_allclose(solution.connector(link).dissipated, lost, atol=1e-15)
+            np.testing.assert_allclose(solution.connector(connector).dissipated, lost, atol=1e-15)
     for one, other in zip(*solutions, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-11 * np.abs(other).max())
 
@@ -130,17 +130,17 @@ class Named(Wearing):
 def test_names_of_variables_are_free(scheme):
     found = []
     for law in (Named(2.0, 0.5, 0.1), LAWS["wearing"]):
-        _, (link,), scene = oscillator(law)
-        found.append(require_reference(run, scene, link, scheme).connector(link))
+        _, (connector,), scene = oscillator(law)
+        found.append(require_reference(run, scene, connector, scheme).connector(connector))
     for one, other in zip(*found, strict=True):
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-9 * np.abs(other).max())
 
 
 @CASES
 def test_held_exactly_and_never_gives_energy(name, scheme):
-    _, (link,), scene = oscillator(LAWS[name])
+    _, (connector,), scene = oscillator(LAWS[name])
     solution = run(scene, scheme)
-    history = solution.connector(link)
+    history = solution.connector(connector)
     lost = solution.energy.lost[LAWS[name].entry]
     assert np.diff(lost).min() > -1e-13 * lost[-1]
     if scheme != ub.Static():
@@ -168,15 +168,15 @@ def test_a_slow_pull_slips_by_twice_the_drop():
     k, mass, v = 50.0, 2.0, 4e-5
     body = ub.Body((1, 0), mass=mass, inertia=1.0)
     hand = ub.Body((2, 0), mass=1.0, inertia=1.0)
-    links = [ub.Slide(ub.ground(0, 0), one.middle, law) for one, law in (
+    connectors = [ub.Slide(ub.ground(0, 0), one.middle, law) for one, law in (
         (body, Drop(3.0, 2.0, 1.0, 0.0)),
         (hand, ub.PrescribedMotion(lambda t: 0.059 + v * t)))]  # fmt: skip
     spring = ub.Slide(body.middle, hand.middle, ub.Spring(k))
     rails = [ub.Prismatic(ub.ground(0, 0), one.middle) for one in (body, hand)]
-    scene = ub.Scene(bodies=[body, hand], joints=rails, connectors=[*links, spring])
+    scene = ub.Scene(bodies=[body, hand], joints=rails, connectors=[*connectors, spring])
     start = run(scene, ub.Static(), t=(-1, 0), dt=1.0)
     solution = run(scene, ub.EnergyMomentum(), t=(0, 30), dt=0.005, start=start)
-    pull, moved = solution.connector(spring).force, solution.connector(links[0]).motion
+    pull, moved = solution.connector(spring).force, solution.connector(connectors[0]).motion
     assert pull.max() == pytest.approx(3.0, rel=1e-4)
     assert moved[-1] == pytest.approx(2 * (3.0 - 2.0) / k, rel=5e-3)
     after = pull[np.argmax(pull) + 400]  # at rest again
@@ -219,10 +219,10 @@ def test_iterations_do_not_decide_what_breaks_loose(dt):
 
 def test_what_wears_is_lost():
     """The way of sliding is the variable, and the loss its integral of the limit [closed]."""
-    _, (link,), scene = oscillator(Wearing(2.0, 0.5, 0.1))
+    _, (connector,), scene = oscillator(Wearing(2.0, 0.5, 0.1))
     coarse, fine = (
         (solution := run(scene, ub.EnergyMomentum(), dt=dt)).energy.lost["connectors"][-1]
-        - lost_over(np.abs(np.diff(solution.connector(link).motion)).sum())
+        - lost_over(np.abs(np.diff(solution.connector(connector).motion)).sum())
         for dt in (0.02, 0.01)
     )
     assert abs(fine) < abs(coarse) < 0.02
@@ -236,14 +236,14 @@ def lost_over(way):
 
 @CASES
 def test_the_reference_finds_the_same(name, scheme):
-    _, (link,), scene = oscillator(LAWS[name])
-    require_reference(run, scene, link, scheme, t=(0, 1))
+    _, (connector,), scene = oscillator(LAWS[name])
+    require_reference(run, scene, connector, scheme, t=(0, 1))
 
 
 @pytest.mark.parametrize("scheme", [ub.EnergyMomentum(0.05), ub.Static()], ids=str)
 def test_restart_and_start(scheme, shared_path):
-    _, links, scene = oscillator(*LAWS.values())
-    require_restart(run, scene, links, scheme, shared_path, until=1.0)
+    _, connectors, scene = oscillator(*LAWS.values())
+    require_restart(run, scene, connectors, scheme, shared_path, until=1.0)
 
 
 @pytest.mark.parametrize(

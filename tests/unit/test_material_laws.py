@@ -20,7 +20,7 @@ STEP = 1e-30
 
 def bulk(C=C, limit=LIMIT, H=H, B=B, eta=ETA):
     numbers = {"yield_limit": limit, "isotropic": H, "kinematic": B, "viscosity": eta}
-    return ub.ElastoPlastic(1.0).of(*arrays(C, numbers))
+    return ub.ElastoPlastic(1.0).with_parameters(*arrays(C, numbers))
 
 
 def arrays(C, numbers):
@@ -273,7 +273,7 @@ def test_laws_of_resultants_stand_at_their_points():
         bending=ub.ElastoPlastic(4.0, kinematic=6.0, viscosity=ub.Perzyna(9.0)),
     )  # fmt: skip
     layout = section.layout(None)
-    numbers = layout.numbers([(0, 0), (0, 1)])
+    numbers = layout.parameters([(0, 0), (0, 1)])
     assert layout.strains.tolist() == [[1, 0, 0], [0, 0, 1]]
     assert layout.rest.tolist() == [0, 5, 0]
     assert layout.stiffness.tolist() == [7, 3]

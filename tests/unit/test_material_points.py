@@ -52,7 +52,7 @@ def test_laws_hold_after_each_step(law, scheme):
     some, dt, θ = bars(law, scheme), 0.1, scheme.theta
     bulk, softening = LAWS[law]
     H, B = bulk.isotropic, bulk.kinematic
-    eta = float(np.ravel(some.numbers["viscosity"])[0])
+    eta = float(np.ravel(some.parameters["viscosity"])[0])
     seen = set()
     for strain in histories(200):
         p, ξ, opening, jump = (some[n] for n in ("plastic", "accumulated", "opening", "jump"))

@@ -87,6 +87,6 @@ def test_a_kept_tangent_ends_below_the_tolerance():
             hinged_frame(), ub.EnergyMomentum(), t=(0, 0.05), dt=1e-3,
             newton=ub.Newton(rtol=rtol),
         )  # fmt: skip
-        ends.append(np.delete(run.q[-1], run.grid.multipliers))
+        ends.append(np.delete(run.q[-1], run.numbering.multipliers))
     # 1e-10 of some 1e5 N in each of 50 steps, on stiffnesses of the frame above 1e6 N/m.
     assert np.abs(ends[0] - ends[1]).max() < 50 * 1e-10 * 1e5 / 1e6

@@ -8,7 +8,7 @@ import pytest
 from helpers import run
 
 import ufl_beam as ub
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Archive
 
 DYNAMIC = [ub.EnergyMomentum(), ub.EnergyMomentum(alpha=0.1, beta=0.1), ub.EnergyMomentumDecaying()]
 STATIC = [ub.Static(), ub.EnergyMomentumStatic()]
@@ -104,8 +104,8 @@ def test_a_run_goes_on_with_what_is_idle():
 
     whole, other = after(begun(), range(10)), begun()
     half = after(begun(), range(5))
-    half.remember(memory := Memory(half.share))
-    other.remember(Memory(other.share, memory.state()))
+    half.save_or_restore(archive := Archive(half.subdomain))
+    other.save_or_restore(Archive(other.subdomain, archive.state()))
     after(other, range(5, 10))
     assert other.iterations == whole.iterations
     assert np.array_equal(other.q, whole.q)

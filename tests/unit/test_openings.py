@@ -11,7 +11,7 @@ import pytest
 from helpers import run
 
 import ufl_beam as ub
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Archive
 
 LENGTH, EI, STIFF = 2.0, 1000.0, 1e6  # m, N m², N
 LAWS = [ub.Softening, ub.LinearSoftening]
@@ -152,16 +152,16 @@ def test_what_flows_is_part_of_the_state():
     for n, t in enumerate(ends):
         one.step_to(t)
         if n == 40:
-            one.remember(memory := Memory(one.share))
-            state, flows = memory.state(), [x.points["flows"].copy() for x in one.inelastic]
+            one.save_or_restore(archive := Archive(one.subdomain))
+            state, flows = archive.state(), [x.points["flows"].copy() for x in one.inelastic]
     assert one.comm.allreduce(sum(int((x == 1).sum()) for x in flows)) > 0
     other = ub.Simulation(scene, ub.EnergyMomentum())
-    other.remember(Memory(other.share, state))
+    other.save_or_restore(Archive(other.subdomain, state))
     for here, there in zip(other.inelastic, flows, strict=True):
         np.testing.assert_array_equal(here.points["flows"], there)
     for t in ends[41:]:
         other.step_to(t)
-    np.testing.assert_array_equal(one.share.gather(one.q), other.share.gather(other.q))
+    np.testing.assert_array_equal(one.subdomain.gather(one.q), other.subdomain.gather(other.q))
     assert one.iterations == other.iterations
 
 
@@ -206,7 +206,7 @@ def test_no_search_where_nothing_opens():
     _, scene = pushed()
     _, closed = pushed(ub.Softening(FOREVER, FOREVER))
     elastic = ub.Simulation(scene, ub.EnergyMomentum())
-    assert not elastic.march.opens
+    assert not elastic.time_loop.opens
     assert (
         run(closed, ub.EnergyMomentum(), dt=0.01).iterations
         == run(scene, ub.EnergyMomentum(), dt=0.01).iterations

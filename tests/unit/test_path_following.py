@@ -69,7 +69,7 @@ def test_a_two_bar_truss_snaps_through(factor):
         assert point.factor == path.factor[point.n]
         assert v[point.n] == pytest.approx(height - HEIGHT, abs=1e-5)
         # What moves is the apex, down or up.
-        dofs = path.grid.node(apex)
+        dofs = path.numbering.node(apex)
         assert abs(point.mode[dofs[1]]) > 1e6 * abs(point.mode[dofs[0]])
     assert path.energy.worst < 0.01
 

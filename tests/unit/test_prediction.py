@@ -18,7 +18,7 @@ def prediction_of(scheme):
     scene = clamped(beam)
     simulation = ub.Simulation(scene, scheme)
     simulation.close()
-    return simulation.prediction, simulation.share.size
+    return simulation.prediction, simulation.subdomain.size
 
 
 SMALL = 1e-3

@@ -24,7 +24,7 @@ def no_mesh(monkeypatch):
         raise AssertionError("a mesh was made")
 
     monkeypatch.setattr(step_equation, "Fields", made)
-    monkeypatch.setattr("ufl_beam.simulation.simulation.Share", made)
+    monkeypatch.setattr("ufl_beam.simulation.simulation.Subdomain", made)
 
 
 def refused(said, scheme=None, **more):

@@ -52,11 +52,11 @@ def test_time_series_hold_the_solution(series):
     make, read = series
     frame = scene()
     solution = run(frame, make())
-    found, grid = read(), solution.grid
+    found, numbering = read(), solution.numbering
     assert found.times == list(solution.times)
     # Beams in their order, node after node: the same numbers
-    assert (found.points == np.pad(grid.points, [(0, 0), (0, 1)])).all()
-    assert (found.cells == grid.cells).all()
+    assert (found.points == np.pad(numbering.points, [(0, 0), (0, 1)])).all()
+    assert (found.cells == numbering.cells).all()
     names = ["displacement", "rotation", "velocity", "angular velocity", "part", "N", "V", "M"]
     assert sorted(found.names) == sorted(names)
     for n in range(7):
@@ -64,7 +64,7 @@ def test_time_series_hold_the_solution(series):
             (solution.q, "displacement", "rotation"),
             (solution.v, "velocity", "angular velocity"),
         ):
-            at_nodes = states[n][grid.dofs]
+            at_nodes = states[n][numbering.dofs]
             # Copies, so equal to the last bit
             assert (found.of(vector)[n] == at_nodes * (1, 1, 0)).all()
             assert (found.of(angle)[n] == at_nodes[:, 2]).all()
@@ -82,11 +82,11 @@ def test_xdmf_has_one_grid_with_all_fields_at_each_time(shared_path, on_first_ra
     (collection,) = root.findall("Domain/Grid")
     grids = collection.findall("Grid")
     assert len(grids) == 7
-    for grid in grids:
-        names = {one.attrib["Name"] for one in grid.findall("Attribute")}
+    for numbering in grids:
+        names = {one.attrib["Name"] for one in numbering.findall("Attribute")}
         assert {"displacement", "rotation", "N", "V", "M", "part"} <= names
         # Spelled as readers know it
-        assert grid.find("Topology").attrib["TopologyType"] == "Polyline"
+        assert numbering.find("Topology").attrib["TopologyType"] == "Polyline"
 
 
 def test_statics_have_no_velocity(series):
@@ -100,7 +100,7 @@ def test_paths_are_written_by_load_factor(series):
     path = ub.follow(scene(), ub.LoadControl(0.25), steps=3, record=make())
     found = read()
     assert found.times == list(path.factor)
-    assert (found.of("rotation")[-1] == path.q[-1][path.grid.dofs[:, 2]]).all()
+    assert (found.of("rotation")[-1] == path.q[-1][path.numbering.dofs[:, 2]]).all()
 
 
 # -- bodies and joints -------------------------------------------------------------------------
@@ -139,12 +139,12 @@ def test_time_series_show_bodies_and_links(series, beams):
     solution = run(scene, make(), steps=4)
     found = read()
     rocker, weight, wheel = scene.bodies
-    link, spring = scene.joints[1], scene.connectors[0]
+    connector, spring = scene.joints[1], scene.connectors[0]
     spots = [(0, 0), (1, 0), (0, 0.5), *([(1, 0.5)] if beams else [])]
     rods = [(rocker.middle, rocker.at(*spot)) for spot in spots]
     # What only turns is seen by a line of 2 % of the scene
     rods += [(one.middle, None) for one in (weight, wheel)]
-    rods += [link.places, (spring.a, spring.b)]
+    rods += [connector.places, (spring.a, spring.b)]
 
     points = found.points[:, :2]
     for values in found.of("part"):
@@ -164,7 +164,7 @@ def test_time_series_show_bodies_and_links(series, beams):
 
     for a, b in rods:
         ((cell, order),) = cells_between(a, b)
-        assert found.of("part")[0][cell] == (2 if a in (link.places[0], spring.a) else 1)
+        assert found.of("part")[0][cell] == (2 if a in (connector.places[0], spring.a) else 1)
         other = b if b is not None else a.body.at(*points[order[1]])
         for vertex, place in zip(order, (a, other), strict=True):
             u, v = solution.displacement(place), solution.velocity(place)
@@ -176,7 +176,7 @@ def test_time_series_show_bodies_and_links(series, beams):
         for name in "VM":
             assert (found.of(name)[:, cell] == 0.0).all()
         pulls = list(found.of("N")[:, cell])
-        holder = {link.places[0]: link.holders[0], spring.a: spring}.get(a)
+        holder = {connector.places[0]: connector.holders[0], spring.a: spring}.get(a)
         if holder is None:
             assert pulls == [0.0] * len(pulls)
         else:
@@ -192,7 +192,7 @@ def test_a_series_has_every_nth_state(series, every, kept):
     solution = run(scene(), make(every=every))
     found = read()
     assert found.times == list(solution.times[kept])
-    assert (found.of("rotation") == solution.q[kept][:, solution.grid.dofs[:, 2]]).all()
+    assert (found.of("rotation") == solution.q[kept][:, solution.numbering.dofs[:, 2]]).all()
 
 
 def test_every_of_the_solution_keeps_the_last():
@@ -255,9 +255,9 @@ def test_names_in_a_table_are_no_formulas(shared_path, on_first_rank):
 def test_history_of_points_of_bodies_and_of_connectors(shared_path, on_first_rank):
     scene = machine(beams=False)
     spring, damper, _ = scene.connectors
-    link, point = scene.joints[1], scene.bodies[0].at(1, 0)
+    connector, point = scene.joints[1], scene.bodies[0].at(1, 0)
     record = ub.History(
-        shared_path / "run.csv", [point, ub.ground(0, 0)], connectors=[spring, damper, link]
+        shared_path / "run.csv", [point, ub.ground(0, 0)], connectors=[spring, damper, connector]
     )
     solution = run(scene, record, steps=5)
     header, rows = on_first_rank(lambda: read_csv(shared_path / "run.csv"))
@@ -278,8 +278,8 @@ def test_history_of_points_of_bodies_and_of_connectors(shared_path, on_first_ran
     # Numbers are written to the last digit
     assert (rows[:, 1:4] == solution.displacement(point)).all()
     assert (rows[:, 4:7] == 0.0).all()
-    for k, connector in enumerate((spring, damper, link.holders[0])):
-        history = solution.connector(connector)
+    for k, followed in enumerate((spring, damper, connector.holders[0])):
+        history = solution.connector(followed)
         columns = rows[:, 7 + 3 * k : 10 + 3 * k].T
         for column, values in zip(
             columns, (history.motion, history.force, history.work), strict=True

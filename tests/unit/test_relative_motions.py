@@ -39,31 +39,31 @@ def pair(motion, law=HELD):
     """Two bodies and a connector between points of them that are not their centres."""
     a, b = bodies()
     axis = (math.cos(0.4), math.sin(0.4))
-    link = Component("test", motion, a.at(0.5, 0.3), b.at(1.1, 0.9), law, axis)
-    return ub.Scene(bodies=[a, b], connectors=[link]), link
+    connector = Component("test", motion, a.at(0.5, 0.3), b.at(1.1, 0.9), law, axis)
+    return ub.Scene(bodies=[a, b], connectors=[connector]), connector
 
 
-def by_hand(link, q):
+def by_hand(connector, q):
     """The relative motion, from the coordinates of both points."""
     points = []
-    for anchor, motion in zip((link.a, link.b), q, strict=True):
+    for anchor, motion in zip((connector.a, connector.b), q, strict=True):
         center = np.array(anchor.body.center)
         points.append(center + motion[:2] + rotation(motion[2]) @ (anchor.point - center))
-    d, d0 = points[1] - points[0], np.subtract(link.b.point, link.a.point)
-    axis = np.array(link.axis)
+    d, d0 = points[1] - points[0], np.subtract(connector.b.point, connector.a.point)
+    axis = np.array(connector.axis)
     return {
         "turning": q[1][2] - q[0][2],
         "stretching": np.linalg.norm(d) - np.linalg.norm(d0),
         "parting": axis @ (d - d0),
         "sliding": rotation(q[0][2]) @ axis @ d - axis @ d0,
-    }[link.motion]
+    }[connector.motion]
 
 
 class Between:
     """A coupling of two bodies in a step between random configurations."""
 
     def __init__(self, motion, scheme, seed, turn=1.4):
-        scene, self.link = pair(motion)
+        scene, self.connector = pair(motion)
         if not scheme.dynamic:
             # Springs, so that statics has an answer.
             ends, soft = [body.middle for body in scene.bodies], ub.Spring(1.0)
@@ -72,15 +72,17 @@ class Between:
             ]
             scene = ub.Scene(
                 bodies=scene.bodies, supports=[ub.Clamped(ends[0])],
-                connectors=[self.link, ub.Turn(*ends, soft), *springs],
+                connectors=[self.connector, ub.Turn(*ends, soft), *springs],
             )  # fmt: skip
         self.simulation = ub.Simulation(scene, scheme, comm=MPI.COMM_SELF)
         self.coupling = next(
-            c for c in self.simulation.couplings if self.link in c.links and len(c.links) == 1
+            c
+            for c in self.simulation.connector_terms
+            if self.connector in c.connectors and len(c.connectors) == 1
         )
-        self.dofs = self.simulation.grid.dofs_of_bodies
+        self.dofs = self.simulation.numbering.dofs_of_bodies
         random = np.random.default_rng(seed)
-        size = self.simulation.share.size
+        size = self.simulation.subdomain.size
         self.q0, self.q1 = np.zeros((2, size))
         self.q0[self.dofs] = random.uniform(-1, 1, (2, 3))
         self.q1[self.dofs] = self.q0[self.dofs] + random.uniform(-turn, turn, (2, 3))
@@ -99,10 +101,10 @@ class Between:
         r = np.zeros((2, len(self.q0)))
         for force, row in zip((0.0, 1.0), r, strict=True):
             q = self.q1.copy()
-            q[self.simulation.share.multipliers[self.coupling.numbers]] = force
+            q[self.simulation.subdomain.multipliers[self.coupling.indices]] = force
             self.coupling.add_residual(q, row)
         difference = r[1] - r[0]
-        difference[self.simulation.share.multipliers] = 0.0
+        difference[self.simulation.subdomain.multipliers] = 0.0
         return difference
 
 
@@ -110,7 +112,7 @@ class Between:
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_relative_motions_are_those_by_hand(motion, seed):
     some = Between(motion, ub.EnergyMomentum(), seed)
-    expected = by_hand(some.link, some.q1[some.dofs])
+    expected = by_hand(some.connector, some.q1[some.dofs])
     (value,) = some.coupling.motion(some.q1)
     assert value == pytest.approx(expected, abs=1e-14)  # round-off of lengths near one
     assert some.coupling.motion(np.zeros_like(some.q1)) == pytest.approx(0.0, abs=1e-15)
@@ -122,7 +124,9 @@ def test_relative_motions_are_those_by_hand(motion, seed):
 def test_variation_of_the_step_is_the_increment(motion, scheme, seed):
     """The force does work on nothing but the growth of the motion, at any size of the step."""
     some = Between(motion, scheme, seed)
-    increment = by_hand(some.link, some.q1[some.dofs]) - by_hand(some.link, some.q0[some.dofs])
+    increment = by_hand(some.connector, some.q1[some.dofs]) - by_hand(
+        some.connector, some.q0[some.dofs]
+    )
     assert some.gradient() @ some.step_of_nodes() == pytest.approx(increment, abs=1e-13)
 
 
@@ -130,7 +134,9 @@ def test_variation_of_the_step_is_the_increment(motion, scheme, seed):
 def test_variation_of_a_small_turn(motion):
     """Where angles hardly change no digit is lost: 0/0 of x/tan x."""
     some = Between(motion, ub.EnergyMomentum(), 3, turn=1e-9)
-    increment = by_hand(some.link, some.q1[some.dofs]) - by_hand(some.link, some.q0[some.dofs])
+    increment = by_hand(some.connector, some.q1[some.dofs]) - by_hand(
+        some.connector, some.q0[some.dofs]
+    )
     assert some.gradient() @ some.step_of_nodes() == pytest.approx(increment, abs=2e-15)
 
 
@@ -141,7 +147,7 @@ def test_static_variation_is_the_derivative(motion, seed):
     w = np.zeros_like(some.q1)
     w[some.dofs] = np.random.default_rng(99 + seed).uniform(-1, 1, (2, 3))
     ε = 1e-6
-    ends = [by_hand(some.link, (some.q1 + sign * ε * w)[some.dofs]) for sign in (1, -1)]
+    ends = [by_hand(some.connector, (some.q1 + sign * ε * w)[some.dofs]) for sign in (1, -1)]
     derivative = (ends[0] - ends[1]) / (2 * ε)
     # ε² of third derivatives, 1e-12, and 1e-16/ε of values
     assert some.gradient() @ w == pytest.approx(derivative, abs=1e-9)

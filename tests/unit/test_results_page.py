@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pages import DOCS
 
-from ufl_beam.model.connector_law import ENTRIES
+from ufl_beam.model.connector_law import CONTRIBUTIONS
 
 PACKAGE = Path(__file__).parents[2] / "ufl_beam"
 WRITTEN = re.compile(
@@ -24,7 +24,7 @@ def test_the_page_of_results_lists_all_entries_of_the_ledger():
     )
     written = {name for pair in WRITTEN.findall(text) for name in pair if name}
     assert len(rows) == len(set(rows))
-    assert set(rows) == set(ENTRIES)
+    assert set(rows) == set(CONTRIBUTIONS)
     assert set(rows) <= written
     other_uses = {"beams", "lost", "new", "supplied", "v"}  # of the words in the pattern
     assert written - set(rows) <= other_uses

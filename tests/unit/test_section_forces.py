@@ -215,7 +215,7 @@ def test_section_forces_along_a_path_are_in_equilibrium():
 @pytest.mark.parametrize("actions", ["virtual work", "frame", "Rayleigh"])
 @pytest.mark.parametrize("kind", ["elastic", "yielding"])
 def test_processes_that_share_a_scene(actions, kind, monkeypatch):
-    monkeypatch.setattr("ufl_beam.parallel.SMALLEST_SHARE", 1)
+    monkeypatch.setattr("ufl_beam.parallel.SMALLEST_SUBDOMAIN", 1)
     scene, joint = two_beams(actions, kind)
     options = {"t": (0, 0.1), "dt": 0.02}
     extremes, others = ub.Extremes(3), ub.Extremes(3)
@@ -452,7 +452,7 @@ def require_extremes(scene, scheme, points, **options):
             at = np.abs(run.times - when[..., None]).argmin(axis=-1)
             reached = np.take_along_axis(values, at[None], axis=0)[0]
             assert np.abs(reached - extreme).max() < ROUND_OFF * size
-        motion = run.q[:, run.grid.dofs[run.grid.nodes_along(beam)]]
+        motion = run.q[:, run.numbering.dofs[run.numbering.nodes_along(beam)]]
         assert np.array_equal(extremes.displacement(beam).low, motion.min(axis=0))
         assert np.array_equal(extremes.displacement(beam).high, motion.max(axis=0))
 

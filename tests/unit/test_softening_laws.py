@@ -123,9 +123,9 @@ def turned(law, motion, place="cell", rho=0.0):
     supports = [ub.PrescribedDisplacement(beam.end, psi=motion)]
     if place in ("cell", "hinge"):
         return clamped(beam, *supports)
-    of_link = ub.RigidPlastic(law) if place == "connector" else ub.Spring(1e3, softening=law)
-    link = ub.Turn(ub.ground(0, 0), beam.start, of_link)
-    return ub.Scene([beam], supports=[ub.Pinned(beam.start), *supports], connectors=[link])
+    of_connector = ub.RigidPlastic(law) if place == "connector" else ub.Spring(1e3, softening=law)
+    connector = ub.Turn(ub.ground(0, 0), beam.start, of_connector)
+    return ub.Scene([beam], supports=[ub.Pinned(beam.start), *supports], connectors=[connector])
 
 
 PLACES = ["cell", "hinge", "connector", "spring"]
@@ -139,8 +139,8 @@ def response(run, place):
     if place == "cell":
         at = run.material_at(beam.at(0.5))
         return at.forces[:, 2], at.jump, at.hinge
-    link = scene.hinges[0] if place == "hinge" else scene.connectors[0]
-    found = run.connector(link)
+    connector = scene.hinges[0] if place == "hinge" else scene.connectors[0]
+    found = run.connector(connector)
     M = found.force
     return M, found.motion - (M / 1e3 if place == "spring" else 0.0), found.dissipated
 
@@ -232,7 +232,7 @@ def test_both_solvers_agree(name, place, scheme):
         )
         for reference in (False, True)
     ]  # fmt: skip
-    through = runs[0].energy.throughput
+    through = runs[0].energy.energy_transferred
     for kind in ("state", "lost"):
         mine, other = (getattr(run.energy, kind) for run in runs)
         for entry in mine:
@@ -257,7 +257,7 @@ def test_an_exponential_law_of_ones_own_is_softening(place, scheme):
     one, other = runs
     assert np.abs(one.q - other.q).max() < 1e-12 * max(1.0, np.abs(one.q).max())
     lost, same = (run.energy.lost["hinges"] for run in runs)
-    assert np.abs(lost - same).max() < 1e-12 * one.energy.throughput
+    assert np.abs(lost - same).max() < 1e-12 * one.energy.energy_transferred
 
 
 @pytest.mark.parametrize("place", [*PLACES, "fibres"])

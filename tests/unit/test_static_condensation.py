@@ -38,10 +38,10 @@ def system(cell_dofs, seed=0, more=(), held=()):
         dense[dof, dof] = 5.0
     rows = np.repeat(np.arange(size), np.diff(pattern.indptr))
     A = Csr(dense[rows, pattern.indices], pattern.indices, pattern.indptr)
-    share = SimpleNamespace(
+    subdomain = SimpleNamespace(
         comm=MPI.COMM_SELF, cell_dofs=cell_dofs, size=size, dofs=np.arange(size), num_owned=size
     )
-    return share, A, dense
+    return subdomain, A, dense
 
 
 def solve(elimination, b, again=False):
@@ -79,10 +79,10 @@ CHAINS = {  # beams as their vertices; how many vertices are left
 @pytest.mark.parametrize("seed", [0, 1])
 def test_solutions_are_those_of_the_whole(name, seed):
     cell_dofs, left = CHAINS[name]
-    share, A, dense = system(cell_dofs, seed)
-    elimination = Elimination(share, A)
+    subdomain, A, dense = system(cell_dofs, seed)
+    elimination = Elimination(subdomain, A)
     assert elimination.left.size == 3 * left
-    for again, b in enumerate(np.random.default_rng(seed).uniform(-1, 1, (2, share.size))):
+    for again, b in enumerate(np.random.default_rng(seed).uniform(-1, 1, (2, subdomain.size))):
         # Random blocks need pivots between them, too, which elimination does not look for: some
         # digits of sixteen are lost, here four at most.
         found = solve(elimination, b, again)
@@ -90,8 +90,8 @@ def test_solutions_are_those_of_the_whole(name, seed):
 
 
 def test_another_matrix_of_the_same_structure():
-    share, A, dense = system(cells_of(range(10)))
-    elimination, b = Elimination(share, A), np.ones(share.size)
+    subdomain, A, dense = system(cells_of(range(10)))
+    elimination, b = Elimination(subdomain, A), np.ones(subdomain.size)
     solve(elimination, b)
     A.data *= 2.0
     assert np.allclose(solve(elimination, b), np.linalg.solve(2 * dense, b), rtol=1e-12, atol=0)
@@ -100,8 +100,8 @@ def test_another_matrix_of_the_same_structure():
 def test_held_degrees_of_freedom():
     """Of an end, of a joint, and some or all of a vertex within a chain."""
     held = [0, 1, 2, 9, 16, 21, 22, 23]
-    share, A, dense = system(cells_of([0, 1, 2, 3], [3, 4, 5, 6, 7, 8, 9]), held=held)
-    elimination, b = Elimination(share, A), np.arange(1.0, share.size + 1)
+    subdomain, A, dense = system(cells_of([0, 1, 2, 3], [3, 4, 5, 6, 7, 8, 9]), held=held)
+    elimination, b = Elimination(subdomain, A), np.arange(1.0, subdomain.size + 1)
     assert elimination.left.size == 3  # both ends have one neighbour
     assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-10, atol=1e-10)
 
@@ -114,10 +114,10 @@ def test_vertices_whose_degrees_of_freedom_do_not_follow_each_other(scattered):
         number[firsts] = np.roll(firsts, 1)
     else:
         number[firsts[0] + np.arange(3)] = firsts[0] + np.array([1, 2, 0])
-    share, A, dense = system(number[cells_of(range(12))])
-    elimination = Elimination(share, A)
+    subdomain, A, dense = system(number[cells_of(range(12))])
+    elimination = Elimination(subdomain, A)
     assert elimination.left.size == 3 * len(scattered)
-    for again, b in enumerate(np.random.default_rng(1).uniform(-1, 1, (2, share.size))):
+    for again, b in enumerate(np.random.default_rng(1).uniform(-1, 1, (2, subdomain.size))):
         x = solve(elimination, b, again)
         assert np.allclose(x, np.linalg.solve(dense, b), rtol=1e-9, atol=1e-10)
 
@@ -126,8 +126,8 @@ def test_vertices_whose_degrees_of_freedom_do_not_follow_each_other(scattered):
 def test_what_couples_to_more_is_left(pair):
     """A further unknown, another vertex far away, the next but one."""
     cell_dofs = cells_of(range(20))
-    share, A, dense = system(cell_dofs, more=[pair])
-    elimination, b = Elimination(share, A), np.ones(share.size)
+    subdomain, A, dense = system(cell_dofs, more=[pair])
+    elimination, b = Elimination(subdomain, A), np.ones(subdomain.size)
     left = {60: 4, 30: 6, 17: 3}[pair[1]]  # vertex and unknown, two vertices, one end as ever
     assert elimination.left.size == left
     assert np.allclose(solve(elimination, b), np.linalg.solve(dense, b), rtol=1e-10, atol=1e-10)
@@ -135,22 +135,22 @@ def test_what_couples_to_more_is_left(pair):
 
 def test_zero_pivots_within_a_block():
     """A block that is regular although its first pivots are zero."""
-    share, A, dense = system(cells_of(range(6)))
+    subdomain, A, dense = system(cells_of(range(6)))
     entries = A.positions(np.array([6, 7, 8, 7, 8]), np.array([6, 7, 8, 6, 6]))
     A.data[entries] = 0, 0, 0, 3, 0
     dense[[6, 7, 8, 7, 8], [6, 7, 8, 6, 6]] = 0, 0, 0, 3, 0
-    b = np.ones(share.size)
-    x = solve(Elimination(share, A), b)
+    b = np.ones(subdomain.size)
+    x = solve(Elimination(subdomain, A), b)
     assert np.allclose(x, np.linalg.solve(dense, b), rtol=1e-9, atol=1e-10)
 
 
 @pytest.mark.parametrize(("block", "held"), [((0, 1, 2), ()), ((3, 4, 5), (3, 4, 5))])
 def test_a_singular_block_is_said(block, held):
     """Even where nothing couples to it."""
-    share, A, _ = system(cells_of(range(6)), held=held)
+    subdomain, A, _ = system(cells_of(range(6)), held=held)
     rows = A.rows()
     A.data[np.isin(rows, block) & np.isin(A.indices, block)] = 0.0
-    assert not Elimination(share, A).factor(np.zeros(A.size))
+    assert not Elimination(subdomain, A).factor(np.zeros(A.size))
 
 
 def tower():

@@ -23,7 +23,7 @@ class Whole:
         matrix = csr_array(matrix)
         matrix.sort_indices()
         self.left = Csr(matrix.data.copy(), matrix.indices, matrix.indptr)
-        self.numbers, self.f = numbers, np.zeros(matrix.shape[0])
+        self.dofs, self.f = numbers, np.zeros(matrix.shape[0])
         self.good = True
 
     def factor(self, b):
@@ -109,7 +109,7 @@ def test_the_schur_complement():
     kk, ki, ik, ii = cut
     expected = kk - ki @ np.linalg.solve(ii, ik)
     assert np.allclose(dense(condensed.left), expected, rtol=0, atol=1e-12 * np.abs(kk).max())
-    assert condensed.numbers.tolist() == [2, 3, 50, 51]
+    assert condensed.dofs.tolist() == [2, 3, 50, 51]
 
 
 @pytest.mark.parametrize(("stays", "best"), [(0, "amd"), (20, "nd")])
@@ -168,7 +168,7 @@ def test_sums_over_processes():
     owned = b[here] * np.array([comm.rank == 0, 1, 1])  # the end before is another's
     for again in (False, True):
         assert np.allclose(solve(summed, owned, again), np.linalg.solve(K, b)[here], rtol=1e-13)
-    assert summed.numbers.tolist() == list(range(2, size - 1, 2))
+    assert summed.dofs.tolist() == list(range(2, size - 1, 2))
     whole.good = comm.rank < comm.size - 1
     assert not summed.factor(owned)
 

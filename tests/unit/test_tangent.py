@@ -85,7 +85,7 @@ class Probe:
         self.simulation = simulation = ub.Simulation(
             scene, scheme, mesh=mesh, newton=newton, comm=MPI.COMM_SELF
         )
-        size = simulation.share.size
+        size = simulation.subdomain.size
         simulation._q = random.uniform(-0.5, 0.5, size)
         if scheme.dynamic:
             self.in_motion(simulation, random)
@@ -294,7 +294,7 @@ def test_static_tangent_of_associated_flow_is_symmetric(kind):
     dead = ub.Scene(scene.beams, joints=scene.joints, supports=scene.supports)
     probe = Probe(dead, ub.Static(), turn=1.0)
     tangent = probe.tangent()
-    for row in np.flatnonzero(np.isin(probe.free, probe.simulation.grid.multipliers)):
+    for row in np.flatnonzero(np.isin(probe.free, probe.simulation.numbering.multipliers)):
         other = int(np.argmax(np.abs(tangent[:, row]) * (np.arange(len(tangent)) != row)))
         tangent[row] *= tangent[other, row] / tangent[row, other]
     assert np.abs(tangent - tangent.T).max() < 1e-14 * np.abs(tangent).max()

@@ -34,7 +34,7 @@ def law(monkeypatch):
             return SimpleNamespace(
                 seconds=whole, building=BUILDING,
                 parts=steps, iterations=2 * steps,
-                grid=SimpleNamespace(cells=range(cells)),
+                numbering=SimpleNamespace(cells=range(cells)),
                 value=1.0 + error(4 / cells, length, scheme, newton),
             )  # fmt: skip
 

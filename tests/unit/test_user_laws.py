@@ -109,8 +109,8 @@ def layered():
 
 def sprung(law):
     beam = ub.Beam((0, 0), (2, 0), section(), cells=2)
-    link = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e4, law=law))
-    return thrown(beam, connectors=[link])
+    connector = ub.Stretch(ub.ground(2, 1), beam.end, ub.Spring(1e4, law=law))
+    return thrown(beam, connectors=[connector])
 
 
 @pytest.mark.parametrize(
@@ -128,7 +128,7 @@ def test_the_ledger_closes_in_both_paths(name, scheme):
     ]  # fmt: skip
     for run in runs:
         assert run.energy.worst < 1e-9
-    through = runs[0].energy.throughput
+    through = runs[0].energy.energy_transferred
     for kind in ("state", "lost"):
         mine, other = (getattr(run.energy, kind) for run in runs)
         for entry in mine:
@@ -245,20 +245,20 @@ class OfNumPy(Half):
 @dataclass(frozen=True)
 class Shadowing(Dashpot):
     C: float = 0.0
-    numbers: float = 1.0
+    parameters: float = 1.0
 
 
 @dataclass(frozen=True)
 class Renamed(Dashpot):
-    def numbers(self, C):
+    def parameters(self, C):
         return {"C": 1.0, "eta": self.eta}
 
 
 @pytest.mark.parametrize(
     ("law", "says"),
     [
-        (Shadowing(1.0), "Shadowing: a field cannot have the name C or numbers"),
-        (Renamed(1.0), "Renamed.numbers has the name C"),
+        (Shadowing(1.0), "Shadowing: a field cannot have the name C or parameters"),
+        (Renamed(1.0), "Renamed.parameters has the name C"),
         (Half(), "Half has neither increments nor residuals"),
         (Misspelt(), "Misspelt.increments: the returned dict lacks p and has q"),
         (Unknown(), "Unknown.increments fails .* no internal variable 'plastic'; .*: p"),

@@ -445,7 +445,7 @@ def test_bad_functions_of_virtual_works(function, says, scheme, monkeypatch):
     def no_grid(*_):
         raise AssertionError("a mesh")
 
-    monkeypatch.setattr("ufl_beam.simulation.initial_state.Grid", no_grid)
+    monkeypatch.setattr("ufl_beam.simulation.initial_state.DofNumbering", no_grid)
     held = [ub.Clamped(BEAM.start)]
     scene = ub.Scene([BEAM], supports=held, works=[ub.VirtualWork("a", function)])
     with raises(says):

@@ -24,7 +24,7 @@ class Bars:
             hinges=True,
         )
         self.C, self.length, self.scheme, self.softening = C, length, scheme, softening
-        self.numbers = layout.numbers([(0, k) for k in range(cells)])
+        self.parameters = layout.parameters([(0, k) for k in range(cells)])
         keys = [(0, k) for k in range(cells)]
         self.points = Points(layout, keys, np.full(cells, length), scheme)
         self.strain = np.zeros(cells)

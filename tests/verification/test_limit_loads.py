@@ -188,4 +188,4 @@ def test_cantilever_that_breaks():
     assert np.abs(M[hinge.jump > 0.020778]).max() <= 1e-9 * a["M_u"]
     assert (hinge.plastic > 0).any()
     for lost in solution.energy.lost.values():
-        assert np.diff(lost).min() >= -1e-12 * solution.energy.throughput
+        assert np.diff(lost).min() >= -1e-12 * solution.energy.energy_transferred

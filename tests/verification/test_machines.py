@@ -641,7 +641,7 @@ def test_works_of_connectors_add_up_to_the_ledger():
     np.testing.assert_allclose(
         works[0] + works[2] + works[3],
         energy["stored"] + energy["hardening"] + energy["plastic"],
-        atol=1e-9 * energy.throughput,
+        atol=1e-9 * energy.energy_transferred,
     )
     moved = solution.displacement(flap.at(1.6, 0.3))[:, :2] @ (2, 1)
     fallen = -G * (
@@ -649,7 +649,7 @@ def test_works_of_connectors_add_up_to_the_ledger():
         + 0.5 * solution.displacement(flap.middle)[:, 1]
     )
     np.testing.assert_allclose(
-        energy["loads"], moved + fallen - works[5], atol=1e-9 * energy.throughput
+        energy["loads"], moved + fallen - works[5], atol=1e-9 * energy.energy_transferred
     )
     for name in ("friction", "damping", "plastic"):
         assert np.diff(energy[name]).min() >= -1e-13

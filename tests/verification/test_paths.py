@@ -136,7 +136,7 @@ def test_critical_load(cells, EA, GA):
     left = P * (1 - P / EA + P / GA)
     assert left == pytest.approx(4 * cells**2 * math.tan(math.pi / 4 / cells) ** 2, rel=1e-7)
     # The path goes on straight.
-    assert np.abs(path.q[-1][path.grid.dofs[:, 1:]]).max() < 1e-6
+    assert np.abs(path.q[-1][path.numbering.dofs[:, 1:]]).max() < 1e-6
 
 
 def test_branch_to_the_elastica():

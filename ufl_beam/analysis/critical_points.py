@@ -17,7 +17,7 @@ from scipy.sparse import block_array, coo_array, csr_array, diags_array
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import bracketed, compact_repr
 from ufl_beam.errors import ArgumentError, StepFailed
 from ufl_beam.simulation.solution import Solution
@@ -34,7 +34,7 @@ class Branch:
 
     Attributes:
         state: Solution whose last state is the start of the path.
-        mode: Direction at all degrees of freedom, in the order of the grid.
+        mode: Direction at all degrees of freedom, in the order of the numbering.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), amplitude=lambda t: t)
@@ -61,7 +61,7 @@ class CriticalPoint:
         factor: The load factor.
         n: Number of the state in the path.
         state: Solution with this state only.
-        mode: Critical mode at all degrees of freedom, in the order of the grid.  The root mean
+        mode: Critical mode at all degrees of freedom, in the order of the numbering.  The root mean
             square of its rotations, and displacements over the size of the scene, is 1.
 
     Example:
@@ -114,22 +114,24 @@ class Stiffness:
             the tangent is not symmetric, as with follower loads: 1 if its determinant is negative,
             else 0.
         flow: Change of the configuration for a unit of the load factor, zero at supported degrees
-            of freedom; (grid.size,).
+            of freedom; (numbering.size,).
     """
 
     def __init__(
-        self, share: Share, A: Csr, constrained: Index, rate: Array, weights: Array
+        self, subdomain: Subdomain, A: Csr, constrained: Index, rate: Array, weights: Array
     ) -> None:
-        grid = share.grid
-        triplets = share.dofs[A.rows()], share.dofs[A.indices], A.data
-        parts = share.comm.allgather((*triplets, share.dofs, rate, share.dofs[constrained]))
+        numbering = subdomain.numbering
+        triplets = subdomain.dofs[A.rows()], subdomain.dofs[A.indices], A.data
+        parts = subdomain.comm.allgather(
+            (*triplets, subdomain.dofs, rate, subdomain.dofs[constrained])
+        )
         rows, columns, data, dofs, rates, fixed = map(np.concatenate, zip(*parts, strict=True))
-        free = np.setdiff1d(np.arange(grid.size), fixed)
-        shape = (grid.size, grid.size)
+        free = np.setdiff1d(np.arange(numbering.size), fixed)
+        shape = (numbering.size, numbering.size)
         self._K = csr_array(coo_array((data, (rows, columns)), shape=shape))[free][:, free]
-        self._forces = np.bincount(dofs, weights=rates, minlength=grid.size)[free]
-        self._free, self._size, self._weights = free, grid.size, weights[free]
-        self._motions = n = len(free) - len(grid.multipliers)
+        self._forces = np.bincount(dofs, weights=rates, minlength=numbering.size)[free]
+        self._free, self._size, self._weights = free, numbering.size, weights[free]
+        self._motions = n = len(free) - len(numbering.multipliers)
 
         K, G, B = self._K[:n, :n], self._K[:n, n:], self._K[n:, :n]
         β = self._K.diagonal()[n:]

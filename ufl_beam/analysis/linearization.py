@@ -47,7 +47,7 @@ def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array
     simulation.controllers.ask(simulation)
     for cells in simulation.inelastic:
         cells.points.freeze()
-    for group in simulation.couplings:
+    for group in simulation.connector_terms:
         group.response.freeze()
     step = Step(0.0, dt, simulation.q, simulation.t, simulation.t, fraction=1.0)
     return simulation.equation.linearise(q, step)
@@ -107,15 +107,15 @@ class SmallMotions:
         if t is not None:
             simulation.t = t
         self.scene, self._simulation = scene, simulation
-        self.grid, self.q = simulation.grid, simulation.q
+        self.numbering, self.q = simulation.numbering, simulation.q
         simulation.close()
         T = self._derivative(self.q, AT_REST)
-        multipliers = self.grid.multipliers
+        multipliers = self.numbering.multipliers
         about_forces = T.diagonal()[multipliers] != 0.0
         self._laws, constraints = multipliers[about_forces], multipliers[~about_forces]
-        left = np.ones(self.grid.size, dtype=bool)
+        left = np.ones(self.numbering.size, dtype=bool)
         left[simulation.supports.dofs] = left[self._laws] = False
-        scale = np.ones(self.grid.size)
+        scale = np.ones(self.numbering.size)
         scale[constraints] = abs(T.data).max()  # as stiff as the constrained motions
         # Columns: the free motions, in the axes of supports, and the Lagrange multipliers.
         self._Z = (self._axes() @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
@@ -133,9 +133,9 @@ class SmallMotions:
 
     def _axes(self) -> csr_array:
         """Return the components of motion in the axes of supports, in columns."""
-        Q = eye_array(self.grid.size, format="lil")
+        Q = eye_array(self.numbering.size, format="lil")
         for support in (support for support in self.scene.supports if support.angle):
-            i, j = self.grid.node(support.place)[:2]
+            i, j = self.numbering.node(support.place)[:2]
             c, s = math.cos(support.angle), math.sin(support.angle)
             Q[i, i], Q[i, j], Q[j, i], Q[j, j] = c, -s, s, c
         return csr_array(Q)
@@ -158,9 +158,9 @@ class SmallMotions:
         sizes = abs(self._matrix(data)).max(axis=1).toarray().ravel()
         apart = np.abs(self._axes().T @ r) > BALANCED * self.scene.size * sizes
         apart[self._simulation.supports.dofs] = False
-        links = zip(self.scene.links, self.grid.multipliers, strict=True)
-        names = [str(link) for link, force in links if apart[force]]
-        apart[self.grid.multipliers] = False
+        connectors = zip(self.scene.all_connectors, self.numbering.multipliers, strict=True)
+        names = [str(connector) for connector, force in connectors if apart[force]]
+        apart[self.numbering.multipliers] = False
         names += [str(work) for work in self.scene.works if apart.any()]
         supports = ((s, motion) for s in self.scene.supports for motion in s.held.values())
         names += [str(s) for s, motion in supports if value_at(motion, t, s) != 0.0]
@@ -268,7 +268,7 @@ class SmallMotions:
         """
         T, laws, Z = self._derivative(self.q, AT_REST), self._laws, self._Z
         flexibility = diags_array(1 / T.diagonal()[laws])
-        columns = eye_array(self.grid.size, format="csr")[:, laws]
+        columns = eye_array(self.numbering.size, format="csr")[:, laws]
         right = Z - columns @ (flexibility @ (T[laws, :] @ Z))
         left = Z.T - ((Z.T @ T[:, laws]) @ flexibility) @ columns.T
         return csr_array(right), csr_array(left)
@@ -300,9 +300,9 @@ class SmallMotions:
         """Return the n eigenvalues nearest to zero, and motions with the largest displacement 1."""
         order = np.argsort(np.abs(values), kind="stable")[:n]
         shapes = self._Z @ x[:, order]
-        turns = self._simulation.share.rotations
+        turns = self._simulation.subdomain.rotations
         sizes = np.abs(shapes)
-        sizes[self.grid.multipliers] = 0.0
+        sizes[self.numbering.multipliers] = 0.0
         turning = sizes[turns].max(axis=0, initial=0.0)
         sizes[turns] = 0.0
         # If only rotations move, the largest rotation is 1.

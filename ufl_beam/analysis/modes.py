@@ -17,10 +17,10 @@ from ufl_beam.analysis.linearization import SmallMotions, reference_state
 from ufl_beam.arrays import Array, Complex
 from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields, section_forces
 from ufl_beam.discretization.model_warnings import warn_of_masses
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Rich
 from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number, warn
 from ufl_beam.mechanics.classical import Static
@@ -52,14 +52,14 @@ class Shapes(Rich, ABC):
 
     Attributes:
         scene: Model.
-        grid: Its vertices, cells and numbering.
-        q: The state; all degrees of freedom in the order of the grid.
+        numbering: Its vertices, cells and numbering.
+        q: The state; all degrees of freedom in the order of the numbering.
         shapes: Motions of all degrees of freedom, in columns, with the largest displacement 1 (or
             rotation, if only rotations move); (size, n); complex if phases differ.
     """
 
     scene: Scene
-    grid: Grid
+    numbering: DofNumbering
     q: Array
     shapes: Array | Complex
 
@@ -88,7 +88,7 @@ class Shapes(Rich, ABC):
         """
         self._require(k)
         shape: Any = self.shapes[:, k]
-        return np.asarray(velocity_at(self.grid, place, self.q[None], shape[None])[0])
+        return np.asarray(velocity_at(self.numbering, place, self.q[None], shape[None])[0])
 
     def motion(self, k: int, *, amplitude: float = AMPLITUDE, count: int = 24) -> Solution:
         """Return one period of the k-th mode as a solution, for :func:`animate` or :func:`plot`.
@@ -107,17 +107,17 @@ class Shapes(Rich, ABC):
         times = np.arange(count + 1) / count
         swing = np.outer(np.exp(2j * math.pi * times), self._scaled(k, amplitude)).real
         states = np.ascontiguousarray(self.q + swing)
-        share = Share(self.grid, MPI.COMM_SELF)
-        fields, r = Fields(share), np.zeros(share.size)
+        subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
+        fields, r = Fields(subdomain), np.zeros(subdomain.size)
         form = fields.kernel(elastic_forms(fields.element, Static()).work, fields.element.q1)
-        cell_forces = CellForces(share, [InCells(lambda: form, lib.STRESS, fields.order)])
+        cell_forces = CellForces(subdomain, [InCells(lambda: form, lib.STRESS, fields.order)])
         cells = []
         for q in states:
             form.add(q, r)
             cell_forces.accept()
             cells.append(cell_forces(q, q))
         history = {"t": times, "q": states, "every": np.array([1]), FORCES: np.array(cells)}
-        solution = Solution(self.scene, self.grid)
+        solution = Solution(self.scene, self.numbering)
         solution.resume(history)
         return solution
 
@@ -140,10 +140,10 @@ class Shapes(Rich, ABC):
 
     def _write(self, recorder: TimeSeries, amplitude: float) -> None:
         recorder.require_writable()
-        share = Share(self.grid, MPI.COMM_SELF)
-        forces = section_forces(Fields(share))
+        subdomain = Subdomain(self.numbering, MPI.COMM_SELF)
+        forces = section_forces(Fields(subdomain))
         frames: list[Any] = [
-            _Frame(self, share, forces, float(k), self._scaled(k, amplitude).real)
+            _Frame(self, subdomain, forces, float(k), self._scaled(k, amplitude).real)
             for k in range(len(self))
         ]
         try:
@@ -156,7 +156,7 @@ class Shapes(Rich, ABC):
     def _scaled(self, k: int, amplitude: float) -> Array | Complex:
         """Scale the k-th shape to ``amplitude`` times the scene's size, or 1 rad for rotations."""
         shape = self.shapes[:, k]
-        lengths = np.r_[self.grid.dofs, self.grid.dofs_of_bodies][:, :2]
+        lengths = np.r_[self.numbering.dofs, self.numbering.dofs_of_bodies][:, :2]
         size = self.scene.size if np.abs(shape[lengths]).max() > 0.5 else 1.0
         scaled: Array | Complex = amplitude * size * shape
         return scaled
@@ -172,9 +172,14 @@ class _Frame:
     may_break = False
 
     def __init__(
-        self, shapes: Shapes, share: Share, forces: Kernel, t: float, change: Array
+        self, shapes: Shapes, subdomain: Subdomain, forces: Kernel, t: float, change: Array
     ) -> None:
-        self.scene, self.grid, self.comm, self.share = shapes.scene, shapes.grid, share.comm, share
+        self.scene, self.numbering, self.comm, self.subdomain = (
+            shapes.scene,
+            shapes.numbering,
+            subdomain.comm,
+            subdomain,
+        )
         self.q, self.t = shapes.q + change, t
         self._forces, self._state, self._change = forces, shapes.q, change
 
@@ -182,11 +187,11 @@ class _Frame:
         return []
 
     def connections(self) -> Array:
-        return np.zeros((len(self.scene.links), len(Connection._fields)))
+        return np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
 
     def section_forces(self) -> Array:
         """Return section forces of the shape alone, by a central difference."""
-        ends, ε = np.zeros((2, len(self.grid.cells), 3)), 1e-5
+        ends, ε = np.zeros((2, len(self.numbering.cells), 3)), 1e-5
         for sign, end in zip((1.0, -1.0), ends, strict=True):
             self._forces.add(self._state + sign * ε * self._change, end)
         return np.asarray((ends[0] - ends[1]) / (2 * ε))
@@ -310,7 +315,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
         raise ArgumentError("modes: nothing that can move has mass; give sections rho or rhoA")
     warn_of_masses(scene)
     exponents, shapes = small.exponents(n)
-    return Modes(scene, small.grid, small.q, shapes, exponents)
+    return Modes(scene, small.numbering, small.q, shapes, exponents)
 
 
 def buckling(
@@ -362,12 +367,12 @@ def buckling(
         _require_same_scene(at, scene, mesh, "buckling")
     small = SmallMotions(scene, at, t, mesh)
     factors, shapes = small.buckling(n)
-    return Buckling(scene, small.grid, small.q, shapes, factors)
+    return Buckling(scene, small.numbering, small.q, shapes, factors)
 
 
 def _require_same_scene(at: Solution, scene: Scene, mesh: Mesh | None, what: str) -> None:
     require_kind(at, Solution, f"{what}: at")
-    if not Grid(scene, mesh_of(at, mesh)).agrees(at.grid):
+    if not DofNumbering(scene, mesh_of(at, mesh)).agrees(at.numbering):
         raise ArgumentError(
             f"{what}: at is a solution of other beams, joints or cells; use the same Beam "
             "objects, joined alike, and the same Mesh"

@@ -63,18 +63,18 @@ class PathCorrector:
 
     def __init__(self, simulation: Simulation, factor: float) -> None:
         self.simulation, self.factor = simulation, factor
-        self.share = share = simulation.share
-        grid = share.grid
-        squares = grid.scales[share.dofs] ** 2
-        squares[share.num_owned :] = 0.0
-        squares /= grid.size - len(grid.multipliers)
-        self._all_weights = share.gather(squares)
-        self.factor_gradient = np.append(0.0 * squares, share.comm.rank == 0)
+        self.subdomain = subdomain = simulation.subdomain
+        numbering = subdomain.numbering
+        squares = numbering.scales[subdomain.dofs] ** 2
+        squares[subdomain.num_owned :] = 0.0
+        squares /= numbering.size - len(numbering.multipliers)
+        self._all_weights = subdomain.gather(squares)
+        self.factor_gradient = np.append(0.0 * squares, subdomain.comm.rank == 0)
         self.weights = np.append(squares, 0.0) + self.factor_gradient / factor**2
         self.t = simulation.t
         self.dissipates = False
         self.crossing: Crossing | None = None
-        self._loading: list[Term] = [*simulation.loads, *simulation.couplings]
+        self._loading: list[Term] = [*simulation.loads, *simulation.connector_terms]
         self.direction = self.sought = 0.0 * self.weights
 
     @property
@@ -86,11 +86,11 @@ class PathCorrector:
 
     def along(self, normal: Array, direction: Array) -> float:
         """Return the derivative along a direction of a quantity with the gradient ``normal``."""
-        return self.share.total(float(normal @ direction))
+        return self.subdomain.total(float(normal @ direction))
 
     def length(self, direction: Array) -> float:
         """Return the length of a direction, however small; dimensionless."""
-        largest = self.share.largest(float(np.abs(direction[:-1]).max(initial=0.0)))
+        largest = self.subdomain.largest(float(np.abs(direction[:-1]).max(initial=0.0)))
         largest = max(largest, abs(direction[-1]) / self.factor)
         if largest == 0.0 or not math.isfinite(largest):
             return largest
@@ -105,15 +105,15 @@ class PathCorrector:
     def dissipation(self, q: Array) -> float:
         """Return the energy that beams and springs dissipate in the step to ``q``; J."""
         in_cells = sum(term.dissipation(q) for term in self.simulation.inelastic)
-        local = sum((term.dissipation(q) for term in self.simulation.couplings), in_cells)
-        return self.share.total(local)
+        local = sum((term.dissipation(q) for term in self.simulation.connector_terms), in_cells)
+        return self.subdomain.total(local)
 
     def dissipation_side(self, q: Array, direction: Array) -> float:
         """Return a number with the sign of the change of dissipation along ``direction``, or 0."""
         motion = direction[:-1]
         now, size = self.dissipation(q), self.size(motion)
-        active = any(group.response.way.any() for group in self.simulation.couplings)
-        flows = self.share.total(float(active))
+        active = any(group.response.way.any() for group in self.simulation.connector_terms)
+        flows = self.subdomain.total(float(active))
         for doubled in range(MOST_DOUBLINGS if (now > 0 or flows) and size > 0 else 0):
             δ = 1e-9 * 2**doubled / size
             more = self.dissipation(q + δ * motion) - self.dissipation(q - δ * motion)
@@ -170,7 +170,7 @@ class PathCorrector:
 
     def _moved(self, t: float) -> Array:
         """Return the prescribed motions at the degrees of freedom of supports; zero elsewhere."""
-        x = np.zeros(self.share.size)
+        x = np.zeros(self.subdomain.size)
         self.simulation.supports.move(x, x, self.step_at(t))
         return x
 
@@ -185,7 +185,7 @@ class PathCorrector:
         q, ε = simulation.supports.in_plane(x), 1e-6 * max(1.0, abs(t))
         for δ, weight in ((ε, 0.5 / ε), (-ε, -0.5 / ε), (0.0, 0.0)):  # last: the tangent's state
             simulation.equation.begin(self.step_at(t + δ), self._loading)
-            forces = np.zeros(self.share.size)
+            forces = np.zeros(self.subdomain.size)
             for term in self._loading:
                 term.add_residual(q, forces)
             r += weight * forces
@@ -267,10 +267,10 @@ class PathCorrector:
         """Return the tangent stiffness of a state, and the direction of a growing load factor."""
         self.t, supports = t, self.simulation.supports
         for _ in range(2):  # the first tangent of a step belongs to the forces before it
-            rate = np.zeros(self.share.size)
+            rate = np.zeros(self.subdomain.size)
             self.simulation.together(self.tangent, supports.in_axes(q), rate)
-        stiffness = Stiffness(self.share, self._A, supports.dofs, rate, self._all_weights)
-        motion = stiffness.flow[self.share.dofs] + self._rates
+        stiffness = Stiffness(self.subdomain, self._A, supports.dofs, rate, self._all_weights)
+        motion = stiffness.flow[self.subdomain.dofs] + self._rates
         supports.leave(motion)
         direction = np.append(motion, 1.0)
         size = self.length(direction)
@@ -482,11 +482,11 @@ class DisplacementControl(Control):
 
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
         """Return the gradient of the component, with the sign of ``step``."""
-        share, normal = corrector.share, np.zeros(corrector.share.grid.size)
-        nodes, weights = share.grid.weights(self.place)
-        normal[share.grid.dofs[nodes, COMPONENTS.index(self.component)]] += weights
-        local = normal[share.dofs] * math.copysign(1.0, self.step)
-        local[share.num_owned :] = 0.0
+        subdomain, normal = corrector.subdomain, np.zeros(corrector.subdomain.numbering.size)
+        nodes, weights = subdomain.numbering.weights(self.place)
+        normal[subdomain.numbering.dofs[nodes, COMPONENTS.index(self.component)]] += weights
+        local = normal[subdomain.dofs] * math.copysign(1.0, self.step)
+        local[subdomain.num_owned :] = 0.0
         return np.append(local, 0.0)
 
 

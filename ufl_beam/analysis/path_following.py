@@ -106,8 +106,8 @@ class Path(Solution):
         super()._set_content(content)
         critical = []
         for k, entry in enumerate(content["critical"]):
-            state, inside = Solution(self.scene, self.grid), below(f"critical/{k}/", content)
-            require_arrays(inside, {"mode": (self.grid.size,)})
+            state, inside = Solution(self.scene, self.numbering), below(f"critical/{k}/", content)
+            require_arrays(inside, {"mode": (self.numbering.size,)})
             state._set_content({**{n: content[n] for n in NAMED}, **below("state/", inside)})
             kind, factor = str(entry["kind"]), float(entry["factor"])
             n = range(len(self))[entry["n"]]
@@ -117,7 +117,7 @@ class Path(Solution):
     @property
     def progress(self) -> Array:
         """Arc length of the path in the displacements of nodes, root mean square; (n+1,); m."""
-        nodes = np.unique(np.vstack([self.grid.dofs, self.grid.dofs_of_bodies])[:, :2])
+        nodes = np.unique(np.vstack([self.numbering.dofs, self.numbering.dofs_of_bodies])[:, :2])
         steps = np.sqrt(2 * np.mean(np.diff(self.q[:, nodes], axis=0) ** 2, axis=1))
         return np.concatenate([[0.0], np.cumsum(steps)])
 
@@ -204,16 +204,16 @@ def follow(
 
 def _require_load_factor(scene: Scene, t0: float) -> None:
     """Raise unless a load or motion depends on the load factor, and no law on physical time."""
-    for link in scene.links:
-        if isinstance(link.law, Controller):
-            raise ArgumentError(f"{link}: a controller acts in time, and a path has none")
-        if rubs(link.law):
+    for connector in scene.all_connectors:
+        if isinstance(connector.law, Controller):
+            raise ArgumentError(f"{connector}: a controller acts in time, and a path has none")
+        if rubs(connector.law):
             raise ArgumentError(
-                f"{link}: dry friction sticks or slides in steps of time, and a path has none; use "
-                "simulate(scene, Static(), ...), or a Spring that yields"
+                f"{connector}: dry friction sticks or slides in time steps, and a path has none; "
+                "use simulate(scene, Static(), ...), or a Spring that yields"
             )
-        if isinstance(link.law, ConnectorLaw):
-            require_limit(link.law, str(link))
+        if isinstance(connector.law, ConnectorLaw):
+            require_limit(connector.law, str(connector))
     for work in scene.works:
         if "v" in work.asked:
             raise ArgumentError(
@@ -247,7 +247,7 @@ class PathStepper:
         """Find the initial direction of the path; if ``fresh``, also its first equilibrium."""
         corrector, simulation = self.corrector, self._simulation
         if branch is not None:
-            corrector.direction = np.append(branch.mode[corrector.share.dofs], 0.0)
+            corrector.direction = np.append(branch.mode[corrector.subdomain.dofs], 0.0)
             return
         if fresh:
             factor = corrector.factor_gradient  # the load factor is prescribed
@@ -257,7 +257,7 @@ class PathStepper:
         sense = self._control.sense(corrector, direction, None)
         corrector.direction = direction if sense > 0 else -direction
         step = corrector.step_at(simulation.t)
-        initial = Trial(step, simulation.q, np.zeros(corrector.share.size))
+        initial = Trial(step, simulation.q, np.zeros(corrector.subdomain.size))
         # The path may continue a run that ended at a critical point.
         self._before = self._candidate(initial, stiffness, corrector.direction)
         self._landed = not fresh
@@ -449,7 +449,7 @@ class PathStepper:
             if not 0.0 <= x <= 1.0:
                 break
             end, direction = path(x), path(x, 1)  # the load factor is linear
-            mode = np.array(stiffness.softest[1][corrector.share.dofs])
+            mode = np.array(stiffness.softest[1][corrector.subdomain.dofs])
             to_plane(seen := mode.copy())
             speed = corrector.along(corrector.weights[:-1] * seen, direction[:-1]) / direction[-1]
             corrector.crossing = Crossing(end - corrector.start, mode, speed)
@@ -468,7 +468,7 @@ class PathStepper:
                 break
             sign = 1.0 if direction[-1] * first.direction[-1] > 0 else -1.0
             direction = sign / corrector.length(direction) * direction
-            to_plane(mode := np.array(stiffness.softest[1][corrector.share.dofs]))
+            to_plane(mode := np.array(stiffness.softest[1][corrector.subdomain.dofs]))
             return self._candidate(candidate.trial, last.stiffness, direction, mode), reached
         raise StepFailed("no bifurcation point was found")
 
@@ -485,14 +485,14 @@ class PathStepper:
         elif candidate.mode is not None:
             mode = candidate.mode
         else:
-            mode = np.array(candidate.stiffness.softest[1][corrector.share.dofs])
+            mode = np.array(candidate.stiffness.softest[1][corrector.subdomain.dofs])
             simulation.supports.leave(mode)
             # A singular stiffness gives no accurate component of the path along the mode.
             along = corrector.along(corrector.weights[:-1] * mode, (direction - before)[:-1])
             corrector.direction = direction - along * np.append(mode, 0.0)
         kind = "limit" if limit else "bifurcation"
         state = simulation.snapshot()
-        mode = corrector.share.gather(mode)
+        mode = corrector.subdomain.gather(mode)
         self.critical.append(CriticalPoint(kind, simulation.t, n, state, mode))
 
 

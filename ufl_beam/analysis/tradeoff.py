@@ -364,7 +364,7 @@ class _Runs:
             "seconds": solution.seconds,
             "building": solution.building,
             "steps": solution.parts,
-            "cells": len(solution.grid.cells),
+            "cells": len(solution.numbering.cells),
             "iterations": solution.iterations / solution.parts,
         }
         for n, (name, quantity) in enumerate(self.quantities.items()):

@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 SOURCES = (
     "loops", "material_points", "rigid_plastic", "connectors", "guide_curves", "elimination",
-    "fronts", "newton", "cell_forces", "march",
+    "fronts", "newton", "cell_forces", "time_loop",
 )  # fmt: skip
 """C files beside this one; they form one translation unit."""
 

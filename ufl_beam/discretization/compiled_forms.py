@@ -218,7 +218,7 @@ class Kernel:
         rows = np.broadcast_to(values, (len(self._dofs), columns.stop - columns.start))
         self._packed[:, columns] = in_batches(rows, self.lanes)
 
-    def share(self, source: Kernel) -> bool:
+    def subdomain(self, source: Kernel) -> bool:
         """Use the packed values of ``source``, if it has this form's values contiguously."""
         mine, others = self._columns, source._columns
         shifts = {others[f].start - mine[f].start for f in mine.keys() & others.keys()}

@@ -31,7 +31,7 @@ from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.model.supports import COMPONENTS
 
 
-class Grid:
+class DofNumbering:
     """Vertices, cells and degrees of freedom of a scene.
 
     Cells of a higher degree also have nodes between their vertices.  A node has three degrees of
@@ -92,12 +92,13 @@ class Grid:
         scene = self.scene
         return counted(
             (len(scene.beams), "beam", "beams"), (len(self.cells), "cell", "cells"),
-            (len(scene.bodies), "body", "bodies"), (len(scene.links), "link", "links"),
+            (len(scene.bodies), "body", "bodies"),
+            (len(scene.all_connectors), "connector", "connectors"),
             (self.size, "degree of freedom", "degrees of freedom"),
         )  # fmt: skip
 
     def __repr__(self) -> str:
-        return f"<Grid: {self}>"
+        return f"<DofNumbering: {self}>"
 
     def _add_hinges(self, places: Sequence[Place]) -> None:
         """Give each plastic hinge a second vertex, an end of the cell beyond it."""
@@ -141,15 +142,15 @@ class Grid:
         dofs = number[slots].reshape(-1, 3)
         self.dofs, self.dofs_of_bodies = dofs[:nodes], dofs[nodes:]
         # Forces come last: eliminating their motions first leaves no zero on the diagonal.
-        self.multipliers: Index = len(order) + np.arange(len(self.scene.links))
+        self.multipliers: Index = len(order) + np.arange(len(self.scene.all_connectors))
         self.size = len(order) + len(self.multipliers)
 
-    def agrees(self, grid: Grid) -> bool:
-        """Return whether another grid has the same degrees of freedom."""
+    def agrees(self, numbering: DofNumbering) -> bool:
+        """Return whether another numbering has the same degrees of freedom."""
         return (
-            self.scene.beams == grid.scene.beams
-            and np.array_equal(self.points, grid.points)
-            and np.array_equal(self.dofs, grid.dofs)
+            self.scene.beams == numbering.scene.beams
+            and np.array_equal(self.points, numbering.points)
+            and np.array_equal(self.dofs, numbering.dofs)
         )
 
     def checksum(self) -> int:
@@ -357,17 +358,17 @@ class Grid:
         return scales
 
     @cached_property
-    def dofs_of_links(self) -> Index:
+    def dofs_of_connectors(self) -> Index:
         """Degrees of freedom of each connector: u, v, ψ of both nodes, force; (num_links, 7)."""
-        links = self.scene.links
-        nodes = np.array([(self.node(c.a), self.node(c.b)) for c in links]).reshape(-1, 2, 3)
+        connectors = self.scene.all_connectors
+        nodes = np.array([(self.node(c.a), self.node(c.b)) for c in connectors]).reshape(-1, 2, 3)
         both = nodes.transpose(0, 2, 1).reshape(-1, 6)
         return np.column_stack([both, self.multipliers]).astype(np.int64)
 
     def describe(self, dof: int) -> str:
         """Describe a degree of freedom by its component, beam and point."""
         if dof in self.multipliers:
-            return f"force of {self.scene.links[dof - self.multipliers[0]]}"
+            return f"force of {self.scene.all_connectors[dof - self.multipliers[0]]}"
         if dof not in self.dofs:
             body, component = np.argwhere(self.dofs_of_bodies == dof)[0]
             return f"{COMPONENTS[component]} of {self.scene.rigid_bodies[body].name}"

@@ -19,7 +19,7 @@ from ufl_beam.compiled.csr import Csr, coupling
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches
 from ufl_beam.discretization.compiled_forms import Kernel, stated
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import ModelError, shorten
@@ -131,22 +131,22 @@ class Fields:
     """Cells of one process, or some of them, on which forms of the element are evaluated.
 
     Loops in C evaluate the forms, which are compiled once for all scenes.  ``positions`` in
-    ``share.cells`` select the cells.
+    ``subdomain.cells`` select the cells.
 
     Attributes:
         cell_dofs: Local degrees of freedom of the cells; (num_cells, 3 (degree + 1)).
-        order: Position in ``share.cells`` of each cell.
+        order: Position in ``subdomain.cells`` of each cell.
         element: The element that forms are stated on.
     """
 
-    def __init__(self, share: Share, positions: Index | None = None) -> None:
-        self.share = share
-        everywhere = np.arange(len(share.cells), dtype=np.int32)
+    def __init__(self, subdomain: Subdomain, positions: Index | None = None) -> None:
+        self.subdomain = subdomain
+        everywhere = np.arange(len(subdomain.cells), dtype=np.int32)
         whole = positions is None or np.array_equal(positions, everywhere)
         self.order: Index = everywhere if positions is None else positions
-        self.cell_dofs = share.cell_dofs if whole else share.cell_dofs[self.order]
+        self.cell_dofs = subdomain.cell_dofs if whole else subdomain.cell_dofs[self.order]
         self._matrix: Csr | None = None
-        self.element = element_of(share.grid.mesh)
+        self.element = element_of(subdomain.numbering.mesh)
 
     def kernel(
         self, form: ufl.Form, unknown: fem.Function, cell_dofs: Index | None = None, *,
@@ -176,16 +176,16 @@ class Fields:
         if force.lanes != tangent.lanes:  # they could not share coefficients
             force = self.kernel(work, q1, several=False)
             tangent = Kernel(form, q1, self.cell_dofs, self._coordinates())
-        if not tangent.share(force):
+        if not tangent.subdomain(force):
             raise ValueError("force and tangent do not have the same coefficients")
         tangent.place(A)
         return force, tangent
 
     def _coordinates(self) -> Array:
         """Return the vertices of the cells; (num_cells, 2, 2); m."""
-        grid = self.share.grid
-        vertices = grid.cells.take(self.share.cells[self.order], axis=0)
-        return np.asarray(grid.points.take(vertices, axis=0))
+        numbering = self.subdomain.numbering
+        vertices = numbering.cells.take(self.subdomain.cells[self.order], axis=0)
+        return np.asarray(numbering.points.take(vertices, axis=0))
 
     @cached_property
     def _coordinates_in_lanes(self) -> Array:
@@ -194,14 +194,16 @@ class Fields:
     def matrix(self) -> Csr:
         """Create a matrix on the degrees of freedom of this process."""
         if self._matrix is None:
-            share = self.share
-            links = share.grid.scene.links
-            couples = [share.cell_dofs, share.link_dofs, share.body_dofs]
-            component = np.array([links[i].component for i in share.links], dtype=np.int32)
+            subdomain = self.subdomain
+            connectors = subdomain.numbering.scene.all_connectors
+            couples = [subdomain.cell_dofs, subdomain.connector_dofs, subdomain.body_dofs]
+            component = np.array(
+                [connectors[i].component for i in subdomain.connectors], dtype=np.int32
+            )
             for offset in range(1, component.max(initial=0) + 1):  # forces of one bushing
-                later, force = np.flatnonzero(component >= offset), share.link_dofs[:, 6]
+                later, force = np.flatnonzero(component >= offset), subdomain.connector_dofs[:, 6]
                 couples.append(np.column_stack([force[later], force[later - offset]]))
-            self._matrix = coupling(share.size, *couples)
+            self._matrix = coupling(subdomain.size, *couples)
             return self._matrix
         return self._matrix.zeros_like()
 
@@ -210,16 +212,16 @@ class Fields:
         matrix = self.matrix()
         kernel = self.kernel(form, self.element.q1, several=False)
         kernel.place(matrix)
-        kernel.add(np.zeros(self.share.size), matrix.data)
+        kernel.add(np.zeros(self.subdomain.size), matrix.data)
         return matrix
 
     def of_sections(self, function: fem.Function) -> Array:
         """Return properties of the cells' sections, for a coefficient of the element."""
-        grid = self.share.grid
+        numbering = self.subdomain.numbering
         names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
-        sections, beam_sections = grid.sections
+        sections, beam_sections = numbering.sections
         properties = [[getattr(section, name) for name in names] for section in sections]
-        beams = grid.beam_of_cell[self.share.cells[self.order]]
+        beams = numbering.beam_of_cell[self.subdomain.cells[self.order]]
         return np.asarray(np.array(properties).reshape(-1, len(names))[beam_sections[beams]])
 
 
@@ -247,11 +249,11 @@ def lumps(scene: Scene) -> list[tuple[Anchor, float, float]]:
 
 def mass_matrix(fields: Fields) -> Csr:
     """Assemble the mass matrix of the beams, the point masses and the bodies."""
-    share, M = fields.share, fields.assembled(mass_form(fields.element))
-    for place, mass, inertia in lumps(share.grid.scene):
-        dofs = share.grid.node(place)
-        mine = share.owns(dofs)
-        local_dofs = share.local(dofs[mine])
+    subdomain, M = fields.subdomain, fields.assembled(mass_form(fields.element))
+    for place, mass, inertia in lumps(subdomain.numbering.scene):
+        dofs = subdomain.numbering.node(place)
+        mine = subdomain.owns(dofs)
+        local_dofs = subdomain.local(dofs[mine])
         M.data[M.positions(local_dofs, local_dofs)] += np.array([mass, mass, inertia])[mine]
     return M
 
@@ -270,7 +272,7 @@ class Strains:
 
     def __init__(self, fields: Fields) -> None:
         self.kernel = fields.kernel(_weighted_strains(fields.element), fields.element.q1)
-        self.weights = np.repeat(fields.share.grid.mesh.point_weights, 3)
+        self.weights = np.repeat(fields.subdomain.numbering.mesh.point_weights, 3)
         self.shape = (len(fields.order), len(self.weights))
 
     def __call__(self, q: Array) -> Array:
@@ -344,17 +346,20 @@ class DolfinxFields(Fields):
         mesh: Mesh of the cells, which DOLFINx reorders.
     """
 
-    def __init__(self, share: Share, positions: Index | None = None) -> None:
-        grid, cells = share.grid, share.cells if positions is None else share.cells[positions]
-        vertices, local_vertices = np.unique(grid.cells[cells], return_inverse=True)
-        self.mesh = line_mesh(grid.points[vertices], local_vertices.reshape(-1, 2))
+    def __init__(self, subdomain: Subdomain, positions: Index | None = None) -> None:
+        numbering, cells = (
+            subdomain.numbering,
+            subdomain.cells if positions is None else subdomain.cells[positions],
+        )
+        vertices, local_vertices = np.unique(numbering.cells[cells], return_inverse=True)
+        self.mesh = line_mesh(numbering.points[vertices], local_vertices.reshape(-1, 2))
         order: Index = np.asarray(self.mesh.topology.original_cell_index)
         # The order of the vertices of a cell orients the beam.
-        expected = grid.points[grid.cells[cells[order]]]
+        expected = numbering.points[numbering.cells[cells[order]]]
         if not np.array_equal(cell_coordinates(self.mesh)[:, :, :2], expected):
             raise RuntimeError("this version of DOLFINx reverses cells; please report it")
-        super().__init__(share, order if positions is None else positions[order])
-        self.element = element = Element(grid.mesh, self.mesh)
+        super().__init__(subdomain, order if positions is None else positions[order])
+        self.element = element = Element(numbering.mesh, self.mesh)
         for function in (element.stiffness, element.inertia):
             dofs = dofs_of_cells(function.function_space)
             function.x.array[dofs] = self.of_sections(function)

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.errors import warn
 from ufl_beam.memory import of_structure
 from ufl_beam.model.bodies import GROUND, Place, Spot, carries
@@ -78,11 +78,11 @@ def warn_of_free_hinges(scene: Scene) -> None:
             )
 
 
-def warn_of_touching(grid: Grid) -> None:
+def warn_of_touching(numbering: DofNumbering) -> None:
     """Warn of ends of beams that touch another beam without a joint or connector between them."""
-    if not grid.scene.beams or not len(pairs := _touching(grid)):
+    if not numbering.scene.beams or not len(pairs := _touching(numbering)):
         return
-    end, touched = (grid.place(int(vertex)) for vertex in pairs[0])
+    end, touched = (numbering.place(int(vertex)) for vertex in pairs[0])
     gap = math.dist(end.point, touched.point)
     more = f"; so do {len(pairs) - 1} more pairs of places" if len(pairs) > 1 else ""
     warn(
@@ -92,11 +92,11 @@ def warn_of_touching(grid: Grid) -> None:
     )
 
 
-def _touching(grid: Grid) -> Index:
+def _touching(numbering: DofNumbering) -> Index:
     """Return vertices of ends, and vertices that they touch without a joint; (num_pairs, 2)."""
-    first = grid.first_vertices
+    first = numbering.first_vertices
     beams = np.repeat(np.arange(len(first) - 1), np.diff(first))
-    points = grid.points[: first[-1]]
+    points = numbering.points[: first[-1]]
     ends = np.column_stack([first[:-1], first[1:] - 1]).ravel()
     steps = np.linalg.norm(np.diff(points, axis=0), axis=1) * (np.diff(beams) == 0)
     lengths = np.bincount(beams[:-1], weights=steps, minlength=len(first) - 1)
@@ -113,7 +113,7 @@ def _touching(grid: Grid) -> Index:
     if not touching.any():
         return np.empty((0, 2), dtype=np.int64)
     end, touched, gap = end[touching], touched[touching], gap[touching]
-    group = _groups(grid)[: first[-1]]
+    group = _groups(numbering)[: first[-1]]
     joined = group[end] == group[touched]
     keys = end * len(first) + beams[touched]
     loose = ~joined & ~np.isin(keys, keys[joined])
@@ -126,16 +126,16 @@ def _touching(grid: Grid) -> Index:
     return np.asarray(pairs[np.sort(once)])
 
 
-def _groups(grid: Grid) -> Index:
+def _groups(numbering: DofNumbering) -> Index:
     """Number groups of nodes connected by joints, connectors and supports; return each node's."""
-    links = grid.dofs_of_links[:, :2]
-    fixed = [s.place for s in grid.scene.supports if {0, 1} <= s.held.keys()]
-    has_ground = GROUND in grid.scene.rigid_bodies
-    ground = int(grid.node(GROUND.middle)[0]) if has_ground else grid.size
-    to_ground = np.array([(grid.node(place)[0], ground) for place in fixed], dtype=np.int64)
-    pairs = np.concatenate([links, to_ground.reshape(-1, 2)])
-    (group,) = _connected(grid.size + 1, pairs)
-    return np.asarray(group[grid.dofs[:, 0]])
+    connectors = numbering.dofs_of_connectors[:, :2]
+    fixed = [s.place for s in numbering.scene.supports if {0, 1} <= s.held.keys()]
+    has_ground = GROUND in numbering.scene.rigid_bodies
+    ground = int(numbering.node(GROUND.middle)[0]) if has_ground else numbering.size
+    to_ground = np.array([(numbering.node(place)[0], ground) for place in fixed], dtype=np.int64)
+    pairs = np.concatenate([connectors, to_ground.reshape(-1, 2)])
+    (group,) = _connected(numbering.size + 1, pairs)
+    return np.asarray(group[numbering.dofs[:, 0]])
 
 
 @of_structure
@@ -213,7 +213,7 @@ def _outside(point: Array, points: Array) -> float:
     return float(np.linalg.norm(beyond))
 
 
-def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
+def warn_of_jumps(numbering: DofNumbering, t: float, q: Array, motions: Array) -> None:
     """Warn of prescribed motions in dynamics that jump from the state ``q`` at the time ``t``.
 
     ``motions`` are the relative motions of the connectors in this state; (num_links,).
@@ -221,19 +221,24 @@ def warn_of_jumps(grid: Grid, t: float, q: Array, motions: Array) -> None:
     starts = [
         (
             f"{support}: {COMPONENTS[c]}",
-            q[grid.node(support.place)[c]],
+            q[numbering.node(support.place)[c]],
             value_at(f, t, support),
             c == 2,
         )
-        for support in grid.scene.supports
+        for support in numbering.scene.supports
         for c, f in support.moving.items()
     ] + [
-        (f"{link}: its motion", value, value_at(link.law.motion, t, link), link.turns)
-        for link, value in zip(grid.scene.links, motions, strict=True)
-        if isinstance(link.law, PrescribedMotion) and link.law is not HELD
+        (
+            f"{connector}: its motion",
+            value,
+            value_at(connector.law.motion, t, connector),
+            connector.turns,
+        )
+        for connector, value in zip(numbering.scene.all_connectors, motions, strict=True)
+        if isinstance(connector.law, PrescribedMotion) and connector.law is not HELD
     ]
     for name, value, target, is_rotation in starts:
-        if abs(target - value) > JUMP * (1.0 if is_rotation else grid.scene.size):
+        if abs(target - value) > JUMP * (1.0 if is_rotation else numbering.scene.size):
             unit = "rad" if is_rotation else "m"
             warn(
                 f"{name} jumps from {value:.6g} to {target:.6g} {unit} at the start, "

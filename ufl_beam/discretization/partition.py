@@ -37,72 +37,76 @@ def bisected(points: Array, number: int) -> Index:
     return subdomains
 
 
-class Share:
-    """Subdomain of a grid that one process computes: its cells, and their degrees of freedom.
+class Subdomain:
+    """Subdomain of a scene that one process computes: its cells, and their degrees of freedom.
 
     Local numbers begin with the degrees of freedom that this process owns, followed by the ghosts,
-    each in the order of the grid.  Global numbers, used by PETSc, are contiguous on each process.
+    each in the order of the numbering.  Global numbers, used by PETSc, are contiguous on each
+    process.
 
     Attributes:
-        grid: The :class:`Grid`.
+        numbering: The :class:`DofNumbering`.
         alone: True if there is only one process; MPI calls take longer.
         cells: Numbers of the cells of this process, ascending.
-        dofs: Degrees of freedom, in numbers of the grid, by local number.
+        dofs: Degrees of freedom, in numbers of the scene, by local number.
         size: Number of local degrees of freedom, including ghosts.
         num_owned: Number of degrees of freedom that this process owns.
         ghosts: Global numbers of the ghosts.
         cell_dofs: Local degrees of freedom of the cells: all u, all v, all ψ of their nodes;
             shape (len(cells), 3 (degree + 1)).
-        links: Numbers of the connectors of this process.
+        connectors: Numbers of the connectors of this process.
         body_dofs: Local degrees of freedom of the bodies on this process; (num, 3).
-        link_dofs: Local degrees of freedom of the connectors: u, v, ψ of both nodes, as in a cell,
-            and the force; shape (len(links), 7).
+        connector_dofs: Local degrees of freedom of the connectors: u, v, ψ of both nodes, as in a
+            cell, and the force; shape (num, 7).
         rotations, multipliers: Local numbers of all rotations, and of the forces of connectors;
             int32.
     """
 
-    def __init__(self, grid: Any, comm: MPI.Intracomm) -> None:
-        self.grid = grid
+    def __init__(self, numbering: Any, comm: MPI.Intracomm) -> None:
+        self.numbering = numbering
         self.comm, self.alone = comm, comm.size == 1
-        cell_ranks = bisected(grid.points[grid.cells].mean(axis=1), comm.size)
-        owner = np.full(grid.size, comm.size, dtype=np.int32)
+        cell_ranks = bisected(numbering.points[numbering.cells].mean(axis=1), comm.size)
+        owner = np.full(numbering.size, comm.size, dtype=np.int32)
         for rank in reversed(range(comm.size)):  # the first process that has it
-            owner[grid.dofs[grid.nodes_of_cells[cell_ranks == rank]]] = rank
+            owner[numbering.dofs[numbering.nodes_of_cells[cell_ranks == rank]]] = rank
         self.cells = np.flatnonzero(cell_ranks == comm.rank).astype(np.int32)
-        cell_dofs = grid.dofs[grid.nodes_of_cells[self.cells]].transpose(0, 2, 1)
-        cell_dofs = cell_dofs.reshape(len(self.cells), 3 * (grid.mesh.degree + 1))
-        hinge_dofs, hinge_cells = grid.dofs[grid.vertices_at_hinges], grid.cells_at_hinges
+        cell_dofs = numbering.dofs[numbering.nodes_of_cells[self.cells]].transpose(0, 2, 1)
+        cell_dofs = cell_dofs.reshape(len(self.cells), 3 * (numbering.mesh.degree + 1))
+        hinge_dofs, hinge_cells = (
+            numbering.dofs[numbering.vertices_at_hinges],
+            numbering.cells_at_hinges,
+        )
         np.minimum.at(owner, hinge_dofs, cell_ranks[hinge_cells][:, None])
-        link_dofs = grid.dofs_of_links
-        connector_ranks = owner[link_dofs].min(axis=1, initial=comm.size) % comm.size
-        np.minimum.at(owner, link_dofs, connector_ranks[:, None])
+        connector_dofs = numbering.dofs_of_connectors
+        connector_ranks = owner[connector_dofs].min(axis=1, initial=comm.size) % comm.size
+        np.minimum.at(owner, connector_dofs, connector_ranks[:, None])
         owner[owner == comm.size] = 0  # bodies without attachments
-        self.links = np.flatnonzero(connector_ranks == comm.rank)
+        self.connectors = np.flatnonzero(connector_ranks == comm.rank)
         order = np.argsort(owner, kind="stable")
-        number = np.empty(grid.size, dtype=np.int32)  # of PETSc
-        number[order] = np.arange(grid.size, dtype=np.int32)
+        number = np.empty(numbering.size, dtype=np.int32)  # of PETSc
+        number[order] = np.arange(numbering.size, dtype=np.int32)
 
         own = owner == comm.rank
-        ghost = np.zeros(grid.size, dtype=bool)
+        ghost = np.zeros(numbering.size, dtype=bool)
         ghost[cell_dofs] = True
         ghost[hinge_dofs[cell_ranks[hinge_cells] == comm.rank]] = True
-        ghost[link_dofs[self.links]] = True
+        ghost[connector_dofs[self.connectors]] = True
         ghost &= ~own
         self.dofs = np.concatenate([np.flatnonzero(x).astype(np.int32) for x in (own, ghost)])
         self.size, self.num_owned = len(self.dofs), int(own.sum())
         self.ghosts: Index = number[self.dofs[self.num_owned :]]
-        self._local: Index = np.full(grid.size, -1, dtype=np.int32)
+        self._local: Index = np.full(numbering.size, -1, dtype=np.int32)
         self._local[self.dofs] = np.arange(len(self.dofs))
         self.cell_dofs = self._local[cell_dofs]
-        self.link_dofs = self._local[link_dofs[self.links]]
-        body_dofs = self._local[grid.dofs_of_bodies]
+        self.connector_dofs = self._local[connector_dofs[self.connectors]]
+        body_dofs = self._local[numbering.dofs_of_bodies]
         self.body_dofs = body_dofs[(body_dofs >= 0).all(axis=1)]
         self._all_owned: Index = order
         if self.alone:  # all numbers are the same
             self._local = self._all_owned = self.dofs
-        self.rotations = np.sort(self.local(grid.rotations)).astype(np.int32)
-        self.multipliers = self.local(grid.multipliers).astype(np.int32)
-        self._gathered: Array = np.empty(0 if self.alone else grid.size)  # new memory is slow
+        self.rotations = np.sort(self.local(numbering.rotations)).astype(np.int32)
+        self.multipliers = self.local(numbering.multipliers).astype(np.int32)
+        self._gathered: Array = np.empty(0 if self.alone else numbering.size)  # new memory is slow
         self._num_owned_by = np.bincount(owner, minlength=comm.size).tolist()
 
     @cached_property
@@ -116,14 +120,14 @@ class Share:
         It then has all degrees of freedom of the place, even if other processes own some of them.
         """
         if isinstance(anchor, Spot):
-            return bool(self.owns(self.grid.node(anchor)).all())
-        place = np.searchsorted(self.cells, cell := self.grid.cell(anchor))
+            return bool(self.owns(self.numbering.node(anchor)).all())
+        place = np.searchsorted(self.cells, cell := self.numbering.cell(anchor))
         return bool(np.any(self.cells[place : place + 1] == cell))
 
     def translations(self) -> tuple[Index, Index]:
         """Return local numbers of both components of all displacements."""
-        grid = self.grid
-        pairs = np.unique(np.r_[grid.dofs[:, :2], grid.dofs_of_bodies[:, :2]], axis=0)
+        numbering = self.numbering
+        pairs = np.unique(np.r_[numbering.dofs[:, :2], numbering.dofs_of_bodies[:, :2]], axis=0)
         indices = self._local[pairs]
         x, y = indices[(indices >= 0).all(axis=1)].T
         return x, y
@@ -133,9 +137,9 @@ class Share:
 
         Bodies have the size of the scene, forces of connectors 0.
         """
-        lengths = np.full(self.size, self.grid.scene.size)
-        displacements = self.cell_dofs[:, : 2 * (self.grid.mesh.degree + 1)]
-        lengths[displacements] = self.grid.lengths(self.cells)[:, None]
+        lengths = np.full(self.size, self.numbering.scene.size)
+        displacements = self.cell_dofs[:, : 2 * (self.numbering.mesh.degree + 1)]
+        lengths[displacements] = self.numbering.lengths(self.cells)[:, None]
         lengths[self.rotations] = 1.0
         lengths[self.multipliers] = 0.0
         return lengths
@@ -143,29 +147,29 @@ class Share:
     def weights(self) -> Array:
         """Return factors that make forces and moments comparable, see ``StepEquation``."""
         weights = np.ones(self.size)
-        weights[self.rotations] = 1 / self.grid.scene.size
+        weights[self.rotations] = 1 / self.numbering.scene.size
         weights[self.multipliers] = 0.0
         weights[self.num_owned :] = 0.0
         return weights
 
     def local(self, dofs: Index) -> Index:
-        """Return local numbers of the ``dofs`` (numbers of the grid) that this process has."""
+        """Return local numbers of the ``dofs`` (numbers of the scene) that this process has."""
         indices = self._local[dofs]
         return np.asarray(indices[indices >= 0])
 
     def owns(self, dofs: Index) -> npt.NDArray[np.bool_]:
-        """Return which of ``dofs`` (numbers of the grid) this process owns."""
+        """Return which of ``dofs`` (numbers of the scene) this process owns."""
         indices = self._local[dofs]
         return np.asarray((indices >= 0) & (indices < self.num_owned))
 
     def gather(self, values: Array, out: Array | None = None) -> Array:
-        """Gather values of all degrees of freedom, in the order of the grid, on every process.
+        """Gather values of all degrees of freedom, in the order of the numbering, on every process.
 
         A single process returns ``values`` itself: states are new arrays in each step.
         """
         if self.alone:
             return values
-        result = np.empty(self.grid.size) if out is None else out
+        result = np.empty(self.numbering.size) if out is None else out
         gathered = self._gathered
         owned = np.ascontiguousarray(values[: self.num_owned])
         self.comm.Allgatherv(owned, [gathered, self._num_owned_by])
@@ -176,7 +180,7 @@ class Share:
         """Sum values at the local degrees of freedom over the processes."""
         if self.alone:
             return values
-        sums = np.zeros(self.grid.size)
+        sums = np.zeros(self.numbering.size)
         sums[self.dofs] = values
         self.comm.Allreduce(MPI.IN_PLACE, sums)
         return np.asarray(sums[self.dofs])

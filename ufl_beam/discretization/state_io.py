@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""State of a simulation in numbers of the grid, the same on any number of processes.
+"""State of a simulation in numbers of the scene, the same on any number of processes.
 
 Each object with state between steps lists it in one method, ``remember``.  The same calls save and
 restore it.
@@ -13,7 +13,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.arrays import State as State
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ModelError
 
 NOWHERE: Array = np.empty(0)
@@ -21,19 +21,19 @@ NOWHERE: Array = np.empty(0)
 stored energies do not belong to the configuration of the scene."""
 
 
-class Memory:
+class Archive:
     """Storage of the state of a process, for restart and ``start=``.
 
     Without a ``state``, methods save their values and return them.  With a ``state``, they return
     the saved values instead.
     """
 
-    def __init__(self, share: Share, state: State | None = None) -> None:
-        self._share, self._restored = share, state
+    def __init__(self, subdomain: Subdomain, state: State | None = None) -> None:
+        self._subdomain, self._restored = subdomain, state
         self._sums: dict[str, tuple[int, Index, Array]] = {}
         self._rows: defaultdict[str, list[Array]] = defaultdict(list)
-        self._scalar = (1, np.zeros(1, dtype=int), int(share.comm.rank == 0))
-        self._dofs = (share.grid.size, share.dofs, share.num_owned)
+        self._scalar = (1, np.zeros(1, dtype=int), int(subdomain.comm.rank == 0))
+        self._dofs = (subdomain.numbering.size, subdomain.dofs, subdomain.num_owned)
 
     def number(self, name: str, value: float) -> float:
         """Save or restore a number that is equal on all processes."""
@@ -76,7 +76,7 @@ class Memory:
         columns = rows.shape[1]
         key = f"{name}, {columns}"
         if self._restored is None:
-            if not known or self._share.comm.rank == 0:
+            if not known or self._subdomain.comm.rank == 0:
                 self._rows[key].append(np.column_stack([indices, rows]))
             return rows
         if not self.has(key):
@@ -101,7 +101,7 @@ class Memory:
     def state(self) -> State:
         """Return the saved state of all processes on each process; all call it together."""
         own = self._sums, self._rows
-        everyone = [own] if self._share.comm.size == 1 else self._share.comm.allgather(own)
+        everyone = [own] if self._subdomain.comm.size == 1 else self._subdomain.comm.allgather(own)
         state: State = {}
         tables: defaultdict[str, list[Array]] = defaultdict(list)
         for sums, rows in everyone:

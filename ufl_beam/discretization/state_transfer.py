@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import State
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import GROUND
@@ -30,25 +30,25 @@ class Transfer:
     the joint's position.  If a joint was added, its places must coincide.
     """
 
-    def __init__(self, old: Grid, new: Grid) -> None:
+    def __init__(self, old: DofNumbering, new: DofNumbering) -> None:
         self._old, self._new = old, new
         self._require_alike()
         bodies = [body for body in new.scene.rigid_bodies if body in old.scene.rigid_bodies]
         news, olds = (
-            np.vstack([grid.dofs, *(grid.node(body.middle) for body in bodies)]).ravel()
-            for grid in (new, old)
+            np.vstack([numbering.dofs, *(numbering.node(body.middle) for body in bodies)]).ravel()
+            for numbering in (new, old)
         )
         # Numbers of connectors in both scenes: new -> old
         known: dict[object, list[int]] = {}
-        for i, link in enumerate(old.scene.links):
-            known.setdefault(_geometry(link), []).append(i)
-        links: dict[int, int] = {}
-        for i, link in enumerate(new.scene.links):
-            if candidates := known.get(_geometry(link)):
-                links[i] = candidates.pop(0)
-        self._link_map = {a: b for b, a in links.items()}
-        self._to = np.concatenate([news, new.multipliers[list(links)]])
-        self._from = np.concatenate([olds, old.multipliers[list(links.values())]])
+        for i, connector in enumerate(old.scene.all_connectors):
+            known.setdefault(_geometry(connector), []).append(i)
+        connectors: dict[int, int] = {}
+        for i, connector in enumerate(new.scene.all_connectors):
+            if candidates := known.get(_geometry(connector)):
+                connectors[i] = candidates.pop(0)
+        self._link_map = {a: b for b, a in connectors.items()}
+        self._to = np.concatenate([news, new.multipliers[list(connectors)]])
+        self._from = np.concatenate([olds, old.multipliers[list(connectors.values())]])
 
     def _require_alike(self) -> None:
         """Raise unless beams and vertices are equal and all bodies are in the old scene."""
@@ -121,16 +121,26 @@ class Transfer:
         return mapped
 
 
-def same_unknowns(old: Grid, new: Grid) -> bool:
+def same_unknowns(old: DofNumbering, new: DofNumbering) -> bool:
     """Return true if degrees of freedom and connectors have the same numbers in two scenes."""
-    links = ([_geometry(link) for link in grid.scene.links] for grid in (old, new))
+    connectors = (
+        [_geometry(connector) for connector in numbering.scene.all_connectors]
+        for numbering in (old, new)
+    )
     return (
         new.agrees(old)
         and old.size == new.size
         and old.scene.rigid_bodies == new.scene.rigid_bodies
-        and next(links) == next(links)
+        and next(connectors) == next(connectors)
     )
 
 
-def _geometry(link: Connector) -> object:
-    return link.motion, link.a, link.b, link.axis, link.corner, type(link.law)
+def _geometry(connector: Connector) -> object:
+    return (
+        connector.motion,
+        connector.a,
+        connector.b,
+        connector.axis,
+        connector.corner,
+        type(connector.law),
+    )

@@ -119,7 +119,7 @@ def _potential_forms(
     axis = element.anywhere
     (_, ψ0), (_, ψ1), (w_u, w_ψ) = map(split, (q0, q1, w))
     pairs = zip(axis.at_nodes(ψ1 - ψ0), axis.at_nodes(w_ψ), strict=True)
-    rotations = [scheme.virtual_turn(0.0, change, variation) for change, variation in pairs]
+    rotations = [scheme.virtual_rotation(0.0, change, variation) for change, variation in pairs]
     rotation, _ = axis.interpolate(rotations)
     s = ufl.as_vector([w_u[0], w_u[1], rotation])
     force = scheme.mean(lambda at: along(s, at), q0, q1)

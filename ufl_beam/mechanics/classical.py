@@ -25,7 +25,7 @@ class PlainStep:
 
     half_tangents = False
 
-    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+    def virtual_rotation(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """Return the virtual rotation itself."""
         return w
 
@@ -48,7 +48,7 @@ class _AtEnd(PlainStep):
 
     load_weight = 1.0
     weight_of_before = 0.5  # the trapezoidal rule, exact where forces grow in proportion
-    limits_turn = False  # rotations of nodes in a step have no limit
+    limits_rotation = False  # rotations of nodes in a step have no limit
     theta = 1.0
     alpha = 0.0
 
@@ -120,7 +120,7 @@ class _Accelerated(_AtEnd):
     dynamic = True
     slack = math.inf
     has_mean_velocity = False
-    looks_back = False
+    uses_last_step = False
     weights: Weights
     kept: tuple[str, ...]
 

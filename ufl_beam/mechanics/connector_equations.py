@@ -53,12 +53,12 @@ def law_step(
     for the motions before it, "dt" and "theta", "state ..." for the variables before the step, and
     "number ..." for the numbers of the law.
     """
-    law = law.of({name: at[f"number {name}"] for name in law.numbers()})
+    law = law.with_parameters({name: at[f"number {name}"] for name in law.parameters()})
     dt, θ, load_weight = at["dt"], at["theta"], scheme.load_weight
     e0, e1 = ([at[f"{n} {i}"] for i in range(law.components)] for n in ("before", "motion"))
     pairs = list(zip(e0, e1, strict=True))
-    e = law.given([(1 - θ) * x0 + θ * x1 for x0, x1 in pairs])
-    rate = law.given([(x1 - x0) / dt for x0, x1 in pairs])
+    e = law.as_argument([(1 - θ) * x0 + θ * x1 for x0, x1 in pairs])
+    rate = law.as_argument([(x1 - x0) / dt for x0, x1 in pairs])
     names = () if frozen else tuple(law.variables)
     old = State({name: at[f"state {name}"] for name in law.variables})
     changes = law.increments(e, rate, old, θ * dt) if names else {}
@@ -76,7 +76,7 @@ def law_step(
     elastic = _elastic_forces(law, e0, e1, after(load_weight), scheme)
     forces = tuple(f + ufl.as_ufl(r) for f, r in zip(elastic, resistances, strict=True))
     moved = [ufl.variable(x1) for x1 in e1]
-    stored = ufl.as_ufl(law.energy(law.given(moved), State(end)))
+    stored = ufl.as_ufl(law.energy(law.as_argument(moved), State(end)))
     numerical = zero
     if load_weight > 0.5 and scheme.average(0.0, 1.0) != 1.0:
         # Works are exact increments of energy.
@@ -84,7 +84,7 @@ def law_step(
         each = zip(moved, pairs, strict=True)
         growth = sum(ufl.diff(stored, m) * (x1 - x0) for m, (x0, x1) in each)
         growth += sum(ufl.diff(stored, z) * (z - getattr(old, n)) for n, z in end.items())
-        numerical = (2 * load_weight - 1) * (law.energy(law.given(e0), old) - stored + growth)
+        numerical = (2 * load_weight - 1) * (law.energy(law.as_argument(e0), old) - stored + growth)
     return LawStep(forces, stored, numerical, tuple(end.values()))
 
 
@@ -101,7 +101,7 @@ def _elastic_forces(
     """
 
     def energy(e: Sequence[Expr]) -> Expr:
-        return ufl.as_ufl(law.energy(law.given(e), state))
+        return ufl.as_ufl(law.energy(law.as_argument(e), state))
 
     def force(e: Expr, i: int) -> Expr:
         at = [ufl.variable(e[j]) for j in components]
@@ -154,7 +154,7 @@ class RigidPlasticStep(NamedTuple):
 
 def parameters(law: SofteningLaw | ElastoPlastic) -> dict[str, Any]:
     """Return the numbers of a law of slip by the names that :func:`slip` takes."""
-    values = law.numbers() if isinstance(law, SofteningLaw) else law.numbers(np.ones(()))
+    values = law.parameters() if isinstance(law, SofteningLaw) else law.parameters(np.ones(()))
     return {f"number {name}": value for name, value in values.items()}
 
 
@@ -170,7 +170,7 @@ def rigid_plastic_step(
     a, ξ, s, none = at["slip"], at["slipped"], at["direction"], 0 * at["slip"]
     values = {n.removeprefix("number "): x for n, x in at.items() if n.startswith("number ")}
     if isinstance(law, SofteningLaw):
-        law = law.of(values)
+        law = law.with_parameters(values)
         force = s * scheme.resistance(law, ξ, a)
         return RigidPlasticStep(
             force, a * law.mean_traction(ξ, a), none, none, law.traction(ξ + a), none
@@ -178,7 +178,7 @@ def rigid_plastic_step(
     e, θ, dt = (at[name] for name in ("start", "θ", "dt"))
     change = State({"plastic": a, "accumulated": a})
     limit, H, B = (values[name] for name in ("yield_limit", "isotropic", "kinematic"))
-    bulk = law.of(np.inf, values)
+    bulk = law.with_parameters(np.inf, values)
     resistance = limit + H * (ξ + θ * a) + values["viscosity"] * a / dt
     return RigidPlasticStep(
         s * resistance + B * (e + θ * s * a),

@@ -31,7 +31,7 @@ class _OverStep:
     """Base of schemes whose forces act over the step."""
 
     weight_of_before = 0.0  # the forces in the equation of the step do its work
-    limits_turn = True
+    limits_rotation = True
     alpha: float
 
     @property
@@ -79,7 +79,7 @@ class EnergyMomentumBase(_OverStep):
         """Return the variation that maps the nodal step to the increment of the strains."""
         return kinematics.virtual_strain_over_step(q0, q1, w, axis)
 
-    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+    def virtual_rotation(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """Return the increment of the rotation, if ``w`` is 2 tan(turn_b/2) - 2 tan(turn_a/2)."""
         tan_a, tan_b = (ufl.sin(x / 2) / ufl.cos(x / 2) for x in (turn_a, turn_b))
         return kinematics.over_tan((turn_b - turn_a) / 2) / (1 + tan_a * tan_b) * w
@@ -148,7 +148,7 @@ class MidpointLoads:
     slack = math.inf
     load_weight = 0.5
     has_mean_velocity = True
-    looks_back = False
+    uses_last_step = False
     rings = False
     kept: tuple[str, ...] = ()
     advice = (
@@ -257,7 +257,7 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
     rho_inf: float = 0.5
 
     alpha = 0.0
-    looks_back = True
+    uses_last_step = True
 
     def __post_init__(self) -> None:
         require_number(self.rho_inf, "EnergyMomentumDecaying: rho_inf", at_least=1 / 3, at_most=1.0)

@@ -40,7 +40,7 @@ def prefixed(prefix: str, names: Mapping[str, object] | tuple[str, ...]) -> tupl
 def inputs(layout: Layout) -> tuple[str, ...]:
     """Return the input names of the law of a point as stored; loops.h explains their order."""
     law, parameters = layout.kind
-    softening = layout.softening.numbers() if layout.softening is not None else {}
+    softening = layout.softening.parameters() if layout.softening is not None else {}
     return (
         *names("point_input"),
         *rows(law, "strain"), *rows(law, "before"), *rows(law, "stiffness"),
@@ -75,7 +75,9 @@ def curved(kind: Kind) -> bool:
 
     law = kind.law
     C, e = (tuple(map(symbol, rows(law, name))) for name in ("stiffness", "strain"))
-    point_law = law.of(law.as_argument(C), {name: symbol(name) for name in kind.numbers})
+    point_law = law.with_parameters(
+        law.as_argument(C), {name: symbol(name) for name in kind.parameters}
+    )
     state = State({name: symbol(name) for name in law.variables})
     try:
         stress = law.as_tuple(point_law.stress(law.as_argument(e), state))
@@ -97,12 +99,16 @@ class PointEquations:
         """Return the law with the numbers of points."""
         law, parameters = self._kind
         C = tuple(at[name] for name in rows(law, "stiffness"))
-        return law.of(law.as_argument(C), {name: at[f"number {name}"] for name in parameters})
+        return law.with_parameters(
+            law.as_argument(C), {name: at[f"number {name}"] for name in parameters}
+        )
 
     def softening(self, at: At) -> SofteningLaw | None:
         """Return the law of the discontinuity with the numbers of points."""
         law = self._softening
-        return law and law.of({name: at[f"softening {name}"] for name in law.numbers()})
+        return law and law.with_parameters(
+            {name: at[f"softening {name}"] for name in law.parameters()}
+        )
 
     def resistance(self, at: At, growth: Values) -> Values:
         """Return the resistance of a discontinuity that grows in the step."""

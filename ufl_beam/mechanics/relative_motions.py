@@ -80,7 +80,7 @@ def _length(d: Expr) -> Expr:
 def turning(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:
     """Return the rotation of b relative to a; rad."""
     rotation_a, rotation_b = (now[2] - before[2] for before, now in zip(q0, q1, strict=True))
-    return q1.b[2] - q1.a[2], scheme.virtual_turn(rotation_a, rotation_b, w.b[2] - w.a[2])
+    return q1.b[2] - q1.a[2], scheme.virtual_rotation(rotation_a, rotation_b, w.b[2] - w.a[2])
 
 
 def stretching(q0: Pair, q1: Pair, w: Pair, n: Geometry, scheme: Scheme) -> tuple[Expr, Expr]:

@@ -84,7 +84,7 @@ class Scheme(Protocol):
     load_weight: float  # fraction of the step at which loads act; in statics of their increment
     weight_of_before: float  # of the forces before a step in the mean that does its work
     half_tangents: bool  # True if forces work on 2 tan(Δψ/2) of a rotation, else on Δψ
-    limits_turn: bool  # True if a step that turns a node by more than 0.75 π is cut
+    limits_rotation: bool  # True if a step that turns a node by more than 0.75 π is cut
     theta: float  # fraction of the step at which laws of inelastic material hold
     slack: float  # fraction of stored and dissipated energy that the forces may miss; else a cut
     alpha: float  # numerical loss over twice the energy of a change of strain
@@ -104,7 +104,7 @@ class Scheme(Protocol):
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
         """Return the value in the step of a function of the configuration."""
 
-    def virtual_turn(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+    def virtual_rotation(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
         """Return the variation of a relative rotation whose virtual motion is ``w``."""
 
 
@@ -154,7 +154,7 @@ class DynamicScheme(Scheme, Protocol):
 
     kept: tuple[str, ...]  # names of rates besides velocities, such as accelerations
     has_mean_velocity: bool  # in the equation of a step; friction and rotating frames need it
-    looks_back: bool  # True if a step depends on length and velocities of the last step
+    uses_last_step: bool  # True if a step depends on length and velocities of the last step
     rings: bool  # True if accelerations of prescribed motions oscillate for ever
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:

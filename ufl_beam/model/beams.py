@@ -245,7 +245,7 @@ class Mesh:
         return np.asarray(np.polynomial.legendre.leggauss(self.degree)[1] / 2)
 
     @cached_property
-    def parts(self) -> Array:
+    def fractions(self) -> Array:
         """Fractions of the mass of a cell, or of a uniform load on it, at its nodes."""
         p = self.degree
         at = np.polynomial.legendre.Legendre.basis(p)(2 * self.nodes - 1)

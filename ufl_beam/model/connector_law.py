@@ -29,7 +29,7 @@ from ufl_beam.model.records import Record, parameters_by_name
 LOSSES = ("damping", "friction", "functions", "connectors", "contact")
 """Entries of the energy ledger for losses in connectors and dampers."""
 
-ENTRIES = (
+CONTRIBUTIONS = (
     *("kinetic", "stored", "hardening", "loads", "supports", "motors", "controllers"),
     *("numerical", "plastic", "hinges", *LOSSES),
 )
@@ -146,17 +146,17 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         """True if the law resists every motion, as a spring does."""
         return type(self).energy is not ConnectorLaw.energy
 
-    def numbers(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, Any]:
         """Return the parameters of the law by name, its fields."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
-    def of(self, numbers: Mapping[str, Values]) -> ConnectorLaw:
+    def with_parameters(self, parameters: Mapping[str, Values]) -> ConnectorLaw:
         """Return the law with arrays or symbols as parameters."""
         law = copy.copy(self)
-        vars(law).update(numbers)
+        vars(law).update(parameters)
         return law
 
-    def given(self, motions: Sequence[Values]) -> Any:
+    def as_argument(self, motions: Sequence[Values]) -> Any:
         """Return motions as arguments of the methods: a number, or a tuple of several."""
         return motions[0] if self.components == 1 else tuple(motions)
 
@@ -170,7 +170,7 @@ class ConnectorLaw(ABC):  # noqa: B024 - none of its methods must be there, but 
         for i, motion in enumerate(motions):
             moved = [*motions[:i], motion + IMAGINARY * 1j, *motions[i + 1 :]]
             with np.errstate(all="ignore"):
-                energy = self.energy(self.given(moved), state)
+                energy = self.energy(self.as_argument(moved), state)
             forces.append(np.imag(energy) / IMAGINARY + 0 * motion)
         return forces
 
@@ -185,7 +185,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     """
     what = f"{what}: {type(law).__name__}"
     require_fields(law, ConnectorLaw, what)
-    for name, value in law.numbers().items():
+    for name, value in law.parameters().items():
         require_number(value, f"{what}: {name}")
     defined = {n for n in CALLED if getattr(type(law), n) is not getattr(ConnectorLaw, n)}
     if not defined & {"energy", "resistance", "limit"}:
@@ -202,7 +202,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
     if law.variables and "increments" not in defined:
         raise ModelError(f"{what} has variables and no increments; define this method")
     require_text(law.entry, f"{what}.entry")
-    if not law.entry or (law.entry in ENTRIES and law.entry not in LOSSES):
+    if not law.entry or (law.entry in CONTRIBUTIONS and law.entry not in LOSSES):
         raise ModelError(
             f"{what}.entry = {law.entry!r} is no name of a loss; there are "
             f"{', '.join(LOSSES)}, or use a name of your own"
@@ -211,7 +211,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
         require_number(value, f"{what}.variables[{name!r}]")
     if law.components not in (1, 2, 3):
         raise ModelError(f"{what}.components = {law.components!r} must be 1, 2 or 3")
-    motion, state = law.given([np.zeros(1)] * law.components), initial_state(law)
+    motion, state = law.as_argument([np.zeros(1)] * law.components), initial_state(law)
     calls = {"energy": (motion, state), "limit": (state,)}
     calls |= dict.fromkeys(CALLED[2:], (motion, motion, state, 1.0))
     for name, arguments in calls.items():
@@ -253,7 +253,7 @@ CALLED = ("energy", "limit", "resistance", "sliding", "increments")
 
 def require_limit(law: ConnectorLaw, what: str) -> None:
     """Raise :class:`ModelError` unless increments of a law are finite for an infinite step."""
-    motion, rest = (law.given([np.full(1, x)] * law.components) for x in (0.5, 0.0))
+    motion, rest = (law.as_argument([np.full(1, x)] * law.components) for x in (0.5, 0.0))
     with np.errstate(all="ignore"):
         changes = law.increments(motion, rest, initial_state(law), np.inf) if law.variables else {}
     for name, change in changes.items():
@@ -285,7 +285,7 @@ def judges_loss(law: ConnectorLaw) -> bool:
         state = State({name: factor * draw(-1.0, 1.0, 1) for name in law.variables})
         with np.errstate(all="ignore"):
             motions = [factor * draw(-1.0, 1.0, 1) for _ in range(law.components)]
-            return [float(np.sum(law.energy(law.given(motions), state)))]
+            return [float(np.sum(law.energy(law.as_argument(motions), state)))]
 
     return not law.active and (not law.variables or quadratic(energy))
 
@@ -351,7 +351,7 @@ class ForceLaw(Record):
                 "ForceLaw: the function has no parameter for the state; give it a parameter state, "
                 "and return the force and the state after the step"
             )
-        _ = self.asked, self.asked_by_stored  # raises for unknown names
+        _ = self.asked, self.stored_arguments  # raises for unknown names
 
     @property
     def asked(self) -> tuple[str, ...]:
@@ -359,7 +359,7 @@ class ForceLaw(Record):
         return self._names(self.force, "force", "t", "dt", after=2)
 
     @property
-    def asked_by_stored(self) -> tuple[str, ...]:
+    def stored_arguments(self) -> tuple[str, ...]:
         """Names of the parameters of the energy after the motion."""
         return self._names(self.stored, "stored", after=1) if self.stored else ()
 

@@ -116,10 +116,12 @@ class Controller(Record):
     force: Annotated[Callable[[Any], float], partial(require_function, arguments="the simulation")]
     sample: Annotated[float | None, partial(require_number, positive=True)] = None
 
-    def ask(self, simulation: Running, link: object) -> float:
-        """Evaluate the force of ``link`` for the next steps; all processes call it together."""
+    def ask(self, simulation: Running, connector: object) -> float:
+        """Evaluate the force of a connector for the next steps; all processes call it together."""
         at = f"t = {simulation.t:.9g} s"
-        return require_returned(self.force(simulation), f"{link}: the controller", at, finite=True)
+        return require_returned(
+            self.force(simulation), f"{connector}: the controller", at, finite=True
+        )
 
 
 @closed(OWN_LAW)
@@ -296,10 +298,10 @@ class Clearance(Record, ConnectorLaw):
         """Elastic deflection of the sticking contact along the edge; m."""
         return {"deflection": 0.0} if self.rubs else {}
 
-    def numbers(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, Any]:
         """Return the parameters of the law by name."""
         unused = () if self.rubs else ("friction", "radius")
-        return {name: x for name, x in super().numbers().items() if name not in unused}
+        return {name: x for name, x in super().parameters().items() if name not in unused}
 
     @property
     def elastic(self) -> bool:
@@ -378,7 +380,7 @@ class Coulomb(Record):
         if (self.coefficient > 0) != (self.joint is not None):
             raise ModelError("Coulomb: give coefficient and joint together")
 
-    def ask(self, simulation: Running, link: object) -> float:
+    def ask(self, simulation: Running, connector: object) -> float:
         """Return the limit of the next step; all processes call it together."""
         if self.joint is None:
             return self.force

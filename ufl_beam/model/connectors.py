@@ -334,11 +334,11 @@ def plastic_hinges(
     return tuple(hinges)
 
 
-def law_of(link: Connector) -> HingeLaw:
+def law_of(connector: Connector) -> HingeLaw:
     """Return the law of a plastic hinge, or of another rigid-plastic connector."""
-    if not isinstance(link.law, RigidPlastic):
-        raise ModelError(f"{link}: its law is not rigid-plastic")
-    return link.law.law
+    if not isinstance(connector.law, RigidPlastic):
+        raise ModelError(f"{connector}: its law is not rigid-plastic")
+    return connector.law.law
 
 
 def place_of(hinge: Connector) -> Place:

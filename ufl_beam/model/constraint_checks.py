@@ -79,10 +79,10 @@ def require_inertia(scene: Scene) -> None:
         if inertia
     ]
 
-    def determines(link: Connector) -> bool:
-        if isinstance(link.law, Stop):
-            return link.law.low == 0.0 or link.law.high == 0.0
-        return isinstance(link.law, (*RESISTING, ConnectorLaw, Damper, Coulomb))
+    def determines(connector: Connector) -> bool:
+        if isinstance(connector.law, Stop):
+            return connector.law.low == 0.0 or connector.law.high == 0.0
+        return isinstance(connector.law, (*RESISTING, ConnectorLaw, Damper, Coulomb))
 
     rows = _constraints(scene, determines, masses)
     free = _null_space(csr_array(rows[:, loose]))
@@ -154,7 +154,7 @@ def _already(scene: Scene, rows: Iterable[Row]) -> Iterator[object]:
 
 def friction_repeats(scene: Scene) -> bool:
     """Return whether constraints of sticking friction are redundant."""
-    friction = any(rubs(link.law) for link in scene.links)
+    friction = any(rubs(connector.law) for connector in scene.all_connectors)
     return friction and _dependences(scene, friction=True)[1].shape[1] > 0
 
 
@@ -166,10 +166,12 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
     independent; such constraints are removed from the candidates, one after the other.
     """
 
-    def holds(link: Connector) -> bool:
-        return isinstance(link.law, (*HOLDING, RigidPlastic)) or (friction and rubs(link.law))
+    def holds(connector: Connector) -> bool:
+        return isinstance(connector.law, (*HOLDING, RigidPlastic)) or (
+            friction and rubs(connector.law)
+        )
 
-    if not any(map(holds, scene.links)):
+    if not any(map(holds, scene.all_connectors)):
         return [], np.zeros((0, 0))
     same, fixed = scene.representatives, _fixed(scene)
     turned = (support for support in scene.supports if support.angle)
@@ -243,10 +245,10 @@ def _rows(
     scene: Scene, acts: Callable[[Connector], bool], supports: Iterable[Support]
 ) -> Iterator[tuple[object, Row]]:
     """Iterate over the constraints of supports and of connectors that ``acts`` selects."""
-    for link in filter(acts, scene.links):
-        unit = np.array([1.0, 1.0, 1.0 if link.turns else 1 / scene.size])
-        ends = zip((link.a, link.b), link.rigidly(), strict=True)
-        yield link, [(node(end), np.multiply(factors, unit)) for end, factors in ends]
+    for connector in filter(acts, scene.all_connectors):
+        unit = np.array([1.0, 1.0, 1.0 if connector.turns else 1 / scene.size])
+        ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
+        yield connector, [(node(end), np.multiply(factors, unit)) for end, factors in ends]
     for support in supports:
         cos, sin = math.cos(support.angle), math.sin(support.angle)
         turned = np.array([[cos, sin, 0], [-sin, cos, 0], [0, 0, 1]])
@@ -255,7 +257,7 @@ def _rows(
 
 def _constraints(
     scene: Scene,
-    acts: Callable[[Connector], bool] = lambda link: resists(link.law),
+    acts: Callable[[Connector], bool] = lambda connector: resists(connector.law),
     also: Iterable[tuple[Anchor, int]] = (),
 ) -> csr_array:
     """Assemble constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
@@ -331,9 +333,14 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
     """
     size = scene.size
     laws: list[tuple[object, MaterialLaw, Array, Array]] = [
-        (link, spring.law, np.array([spring.stiffness]), np.array([1.0 if link.turns else size]))
-        for link in scene.connectors
-        if isinstance(spring := link.law, Spring) and spring.law is not None
+        (
+            connector,
+            spring.law,
+            np.array([spring.stiffness]),
+            np.array([1.0 if connector.turns else size]),
+        )
+        for connector in scene.connectors
+        if isinstance(spring := connector.law, Spring) and spring.law is not None
     ]
     for beam in scene.beams:
         if (layout := beam.section.layout(None)) is not None:
@@ -346,17 +353,17 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
                 (beam.name, law, stiffness[k], points[k])
                 for (law, _), k in zip(layout.laws, first[:-1], strict=True)
             ]
-    for link in scene.links:
-        if isinstance(link.law, ConnectorLaw):
-            rest, i = [np.zeros(1)] * link.law.components, link.component
-            moved = LAST_DIGITS * (1.0 if link.turns else size)
+    for connector in scene.all_connectors:
+        if isinstance(connector.law, ConnectorLaw):
+            rest, i = [np.zeros(1)] * connector.law.components, connector.component
+            moved = LAST_DIGITS * (1.0 if connector.turns else size)
             ends = (rest, [*rest[:i], rest[i] + moved, *rest[i + 1 :]])
-            state = initial_state(link.law)
-            at_rest, strained = (link.law.elastic_forces(e, state)[i][0] for e in ends)
+            state = initial_state(connector.law)
+            at_rest, strained = (connector.law.elastic_forces(e, state)[i][0] for e in ends)
             if abs(at_rest) > abs(strained - at_rest):
                 raise ModelError(
-                    f"{what}: {type(link.law).__name__} of {link} bears a force at no motion, "
-                    f"so that the undeformed scene is not in equilibrium; {instead}"
+                    f"{what}: {type(connector.law).__name__} of {connector} bears a force at no "
+                    f"motion, so that the undeformed scene is not in equilibrium; {instead}"
                 )
     for owner, law, C, strains in laws:
         if law.stressed(tuple(C), tuple(LAST_DIGITS * strains)):
@@ -376,13 +383,16 @@ class Rated(Protocol):
 def require_rates(scene: Scene, scheme: Rated) -> None:
     """Raise :class:`ModelError` if a time scheme lacks the rates that a scene needs."""
     name = type(scheme).__name__
-    for owner, what in [*((c, c.law) for c in scene.links), *((x, x) for x in scene.loads)]:
+    for owner, what in [
+        *((c, c.law) for c in scene.all_connectors),
+        *((x, x) for x in scene.loads),
+    ]:
         if (isinstance(what, RotatingFrame) or rubs(what)) and not scheme.has_mean_velocity:
             raise ModelError(
                 f"{name}: {owner} needs the mean velocity of a step, and forces act at its end "
                 "here; use EnergyMomentum() or EnergyMomentumDecaying()"
             )
-    prescribed = [str(c) for c in scene.links if isinstance(c.law, HOLDING)]
+    prescribed = [str(c) for c in scene.all_connectors if isinstance(c.law, HOLDING)]
     prescribed += [f"the support of {s.place}" for s in scene.supports if s.moving]
     if prescribed and scheme.rings:
         raise ModelError(

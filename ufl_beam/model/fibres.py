@@ -31,7 +31,7 @@ class Kind(NamedTuple):
     """A law with all parameters equal to 1, and the names of the parameters."""
 
     law: MaterialLaw
-    numbers: tuple[str, ...]
+    parameters: tuple[str, ...]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,8 +70,8 @@ class Layout:
         kinds: dict[Kind, MaterialLaw] = {}
         for law in laws:
             C = uniform(law, np.ones(()))
-            names = tuple(law.numbers(C))
-            kinds[Kind(law.of(1.0, dict.fromkeys(names, 1.0)), names)] = law
+            names = tuple(law.parameters(C))
+            kinds[Kind(law.with_parameters(1.0, dict.fromkeys(names, 1.0)), names)] = law
         if len(kinds) > 1:
             different = " and ".join(map(repr, kinds.values()))
             raise ModelError(f"Section: its laws must be of one class, not {different}")
@@ -84,18 +84,18 @@ class Layout:
                 )
         return kind
 
-    def numbers(self, keys: list[tuple[int, int]]) -> dict[str, Values]:
+    def parameters(self, keys: list[tuple[int, int]]) -> dict[str, Values]:
         """Return the parameters of the laws at the points of many cells, each (cells, n).
 
         Random values depend on the keys of the cells and a seed.
         """
         shape, first = (len(keys), len(self.weights)), 0
-        columns = {name: np.zeros(shape) for name in self.kind.numbers}
+        columns = {name: np.zeros(shape) for name in self.kind.parameters}
         stiffness = np.reshape(self.stiffness, (len(self.weights), -1))
         for law, n in self.laws:
             at = slice(first, first + n)
             C = law.as_argument(tuple(stiffness[at].T))
-            for name, value in law.numbers(C).items():
+            for name, value in law.parameters(C).items():
                 drawn = hasattr(value, "draw")
                 columns[name][:, at] = [value.draw(n, k) for k in keys] if drawn else value
             first += n

@@ -121,14 +121,14 @@ class MaterialLaw(ABC):
         """True if the variables never change."""
         return False
 
-    def numbers(self, C: Values) -> dict[str, Any]:
+    def parameters(self, C: Values) -> dict[str, Any]:
         """Return the parameters by name at points of stiffness ``C``, by default the fields."""
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
 
-    def of(self, C: Values, numbers: Mapping[str, Values]) -> MaterialLaw:
+    def with_parameters(self, C: Values, parameters: Mapping[str, Values]) -> MaterialLaw:
         """Return the law with a stiffness, and with arrays or symbols as parameters."""
         law = copy.copy(self)
-        vars(law).update(numbers, C=C)
+        vars(law).update(parameters, C=C)
         return law
 
     @property
@@ -142,7 +142,7 @@ class MaterialLaw(ABC):
         law = copy.copy(self)  # with irrational parameters, whose terms do not cancel
         vars(law).update({name: math.sqrt(k + 2) for k, name in enumerate(vars(self))})
         unit = uniform(self, 1.0)
-        return any(np.any(σ != 0) for σ in _at_no_strain(law.of(unit, {})))
+        return any(np.any(σ != 0) for σ in _at_no_strain(law.with_parameters(unit, {})))
 
     def stressed(self, C: tuple[Values, ...], least: tuple[Values, ...]) -> bool:
         """Return whether the stress at zero strain exceeds ``C`` times ``least``."""
@@ -171,8 +171,10 @@ def uniform(law: MaterialLaw, value: Values) -> Values:
 def _sample(law: MaterialLaw, C: tuple[Values, ...] = ()) -> MaterialLaw:
     """Return a law at points of stiffness ``C``, 1 by default, with 1 instead of random values."""
     at = law.as_argument(C) if C else uniform(law, np.ones(1))
-    numbers = law.numbers(at).items()
-    return law.of(at, {n: np.ones(1) if hasattr(x, "draw") else x for n, x in numbers})
+    parameters = law.parameters(at).items()
+    return law.with_parameters(
+        at, {n: np.ones(1) if hasattr(x, "draw") else x for n, x in parameters}
+    )
 
 
 def _at_no_strain(law: MaterialLaw) -> tuple[Values, ...]:
@@ -220,10 +222,10 @@ def require_law(law: object, what: str) -> None:
     if len(ways) != (1 if law.variables else len(ways)):
         has = "both increments and residuals" if ways else "neither increments nor residuals"
         raise ModelError(f"{kind} has {has}; define one of both methods")
-    numbers = law.numbers(uniform(law, np.ones(1)))
-    if "C" in numbers:
-        raise ModelError(f"{kind}.numbers has the name C, the name of the elastic stiffness")
-    for name, value in numbers.items():
+    parameters = law.parameters(uniform(law, np.ones(1)))
+    if "C" in parameters:
+        raise ModelError(f"{kind}.parameters has the name C, the name of the elastic stiffness")
+    for name, value in parameters.items():
         if not hasattr(value, "draw"):
             require_field(value, f"{kind}: {name}", Real | np.ndarray)
     tried, state = _sample(law), initial_state(law)

@@ -140,10 +140,10 @@ class ElastoPlastic(_Plastic):
     fracture_energy: ClassVar[float] = math.inf  # it never breaks
     steepest: ClassVar[tuple[float, float]] = (0.0, 0.0)  # fall per opening, and its opening
 
-    def numbers(self, C: Values) -> dict[str, Any]:
+    def parameters(self, C: Values) -> dict[str, Any]:
         """Return limit, moduli and viscosity, as overstress per plastic strain rate."""
         eta = self.viscosity.coefficient(C + self.isotropic + self.kinematic)
-        return super().numbers(C) | {"viscosity": eta}
+        return super().parameters(C) | {"viscosity": eta}
 
     def increments(self, strain: Values, state: State, dt: Values) -> dict[str, Values]:
         """Return the plastic strain increment and its size, in closed form, P(38)-P(44)."""

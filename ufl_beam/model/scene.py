@@ -121,7 +121,7 @@ class Scene(Record, Rich):
                         f"{type(joint).__name__}: joint ends lie {gap:.6g} m apart: "
                         f"{joint.places[0]} and {place}; {joint.advice}"
                     )
-        for connector in self.links:
+        for connector in self.all_connectors:
             if node(connector.a) == node(connector.b):
                 raise ModelError(f"{connector}: both ends are at the same body or cross-section")
             if isinstance(connector.law, Coulomb) and connector.law.joint is not None:
@@ -174,7 +174,7 @@ class Scene(Record, Rich):
         return enclosing_diameter(points) or max(gyration, default=0.0) or 1.0
 
     @cached_property
-    def links(self) -> tuple[Connector, ...]:
+    def all_connectors(self) -> tuple[Connector, ...]:
         """Connectors of joints, of the scene and of off-centre loads, and plastic hinges."""
         return (*self._connectors_but_hinges, *self.hinges)
 
@@ -183,7 +183,7 @@ class Scene(Record, Rich):
         constraints = [holder for joint in self.joints for holder in joint.holders]
         pushing = (load for load in self.loads if isinstance(load, PointLoad))
         loads = [push for load in pushing for push in _off_center(load)]
-        between = [link for x in self.connectors for link in x.components or (x,)]
+        between = [connector for x in self.connectors for connector in x.components or (x,)]
         return (*constraints, *between, *loads)
 
     @cached_property
@@ -192,9 +192,11 @@ class Scene(Record, Rich):
         laws = {place: law for beam in self.beams for place, law in beam.hinge_laws.items()}
         bearing = [support.place for support in self.supports if 2 in support.held]
         bearing += [mass.place for mass in self.masses if mass.inertia]
-        for link in self._connectors_but_hinges if laws else ():
-            by_a, by_b = link.rigidly()
-            bearing += [link.a] * bool(by_a[2] or link.follows_a) + [link.b] * bool(by_b[2])
+        for connector in self._connectors_but_hinges if laws else ():
+            by_a, by_b = connector.rigidly()
+            bearing += [connector.a] * bool(by_a[2] or connector.follows_a) + [connector.b] * bool(
+                by_b[2]
+            )
         loaded = [load.place for load in self.moments]
         rigid = [joint.equal(2) for joint in self.joints if 2 in joint.shared]
         return plastic_hinges(laws, rigid, bearing, loaded)
@@ -208,25 +210,29 @@ class Scene(Record, Rich):
     def rigid_bodies(self) -> tuple[Body, ...]:
         """The bodies, and the ground if something is attached to it."""
         attached = [place for _, place in self.attachments()]
-        attached += [link.a for link in self.links]
+        attached += [connector.a for connector in self.all_connectors]
         return (*self.bodies, *((GROUND,) if any(node(p) is GROUND for p in attached) else ()))
 
     def time_functions(self) -> Iterator[tuple[object, TimeFunction]]:
         """Iterate over functions of time of loads, motions and drives, and their owners."""
         yield from ((x, x.amplitude) for x in self.loads if not isinstance(x, RotatingFrame))
         yield from ((x, motion) for x in self.supports for motion in x.held.values())
-        for link in self.links:
-            if isinstance(link.law, PrescribedMotion):
-                yield link, link.law.motion
-            if isinstance(link.law, PrescribedForce):
-                yield link, link.law.force
+        for connector in self.all_connectors:
+            if isinstance(connector.law, PrescribedMotion):
+                yield connector, connector.law.motion
+            if isinstance(connector.law, PrescribedForce):
+                yield connector, connector.law.force
         for work in self.works:
             yield from ((work, number) for number in work.numbers.values() if callable(number))
 
     def attachments(self) -> Iterator[tuple[object, Anchor]]:
         """Iterate over pairs of a record (or a word for it) and a place that it refers to."""
         yield from ((joint, place) for joint in self.joints for place in joint.places)
-        yield from ((link, place) for link in self.connectors for place in (link.a, link.b))
+        yield from (
+            (connector, place)
+            for connector in self.connectors
+            for place in (connector.a, connector.b)
+        )
         yield from ((support, support.place) for support in self.supports)
         yield from (("PointMass", mass.place) for mass in self.masses)
         for load in self.loads:
@@ -266,7 +272,7 @@ class Scene(Record, Rich):
             "joints", self.joints,
             key=lambda joint: (
                 type(joint), frozenset(joint.places),
-                *((link.motion, link.axis, id(link.law)) for link in joint.holders),
+                *((holder.motion, holder.axis, id(holder.law)) for holder in joint.holders),
             ),
         ):  # fmt: skip
             raise ModelError(f"Scene: {joint} occurs {twice}; remove one")
@@ -315,7 +321,11 @@ class Scene(Record, Rich):
     @cached_property
     def representatives(self) -> Representatives:
         """Representative of each degree of freedom that joints and hinges share."""
-        hinges = ([(node(link.a), c), (node(link.b), c)] for link in self.hinges for c in (0, 1))
+        hinges = (
+            [(node(connector.a), c), (node(connector.b), c)]
+            for connector in self.hinges
+            for c in (0, 1)
+        )
         return merged([*self.shared_by_joints, *hinges])
 
     def _require_single_supports(self) -> None:

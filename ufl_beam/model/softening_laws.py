@@ -117,20 +117,20 @@ class SofteningLaw(ABC):
         """Largest fall of the traction per opening, and an opening with this fall."""
         return course(self).steepest
 
-    def numbers(self) -> dict[str, Any]:
+    def parameters(self) -> dict[str, Any]:
         """Return the parameters of the law by name: its fields, limit and energy."""
         own = {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
         return {"limit": self.limit, "fracture_energy": self.fracture_energy} | own
 
-    def of(self, numbers: Mapping[str, Values]) -> SofteningLaw:
+    def with_parameters(self, parameters: Mapping[str, Values]) -> SofteningLaw:
         """Return the law with other parameters: numbers, arrays or symbols."""
         law = copy.copy(self)
-        vars(law).update(numbers)
+        vars(law).update(parameters)
         return law
 
     def kind(self) -> SofteningLaw:
         """Return the law with all parameters equal to 1."""
-        return self.of(dict.fromkeys(self.numbers(), 1.0))
+        return self.with_parameters(dict.fromkeys(self.parameters(), 1.0))
 
 
 # -- laws of the package -------------------------------------------------------------------------

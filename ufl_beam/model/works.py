@@ -11,14 +11,14 @@ from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError, closed, shorten
 from ufl_beam.model.bodies import Beams, Member
 from ufl_beam.model.checks import require_count, require_function, require_number, require_text
-from ufl_beam.model.connector_law import ENTRIES
+from ufl_beam.model.connector_law import CONTRIBUTIONS
 from ufl_beam.model.functions import TimeFunction, require_time_function
 from ufl_beam.model.records import Record, parameters_by_name
 
 
 def _require_name(name: Any, what: str) -> None:
     require_text(name, what)
-    if not name or name in ENTRIES:
+    if not name or name in CONTRIBUTIONS:
         raise ModelError(
             f"{what} = {name!r} is an entry of the energy ledger already; give the work a name of "
             "its own"

@@ -77,7 +77,7 @@ class DolfinxView:
 
     def __init__(self, view: Any) -> None:  # a `StateView`, which is above this module
         self._view = view
-        self._fields = DolfinxFields(view.share)
+        self._fields = DolfinxFields(view.subdomain)
         self._functions: dict[str, fem.Function] = {}
 
     def __repr__(self) -> str:
@@ -98,7 +98,7 @@ class DolfinxView:
             >>> simulation.section_forces()[view.cells].shape
             (4, 3)
         """
-        return np.asarray(self._view.share.cells[self._fields.order])
+        return np.asarray(self._view.subdomain.cells[self._fields.order])
 
     @cached_property
     def cell_tags(self) -> meshes.MeshTags:
@@ -110,7 +110,7 @@ class DolfinxView:
             >>> print(round(view.total(fem.Constant(view.mesh, 1.0) * dx(0)), 9))
             2.0
         """
-        beams = self._view.share.grid.beam_of_cell[self.cells]
+        beams = self._view.subdomain.numbering.beam_of_cell[self.cells]
         numbers = np.arange(len(beams), dtype=np.int32)
         return meshes.meshtags(self.mesh, 1, numbers, beams.astype(np.int32))
 
@@ -160,7 +160,7 @@ class DolfinxView:
             >>> print(round(length, 9), bool(view.total(u_y) < 0))
             2.0 True
         """
-        return float(self._view.share.total(integrated(integral, self.mesh)))
+        return float(self._view.subdomain.total(integrated(integral, self.mesh)))
 
     # -- functions -------------------------------------------------------------------------------
 
@@ -272,7 +272,7 @@ class DolfinxView:
         forms = self._forms
         for function in (forms.q0, forms.q1):
             put_in_cells(function, self._view.q[self._fields.cell_dofs])
-        tables = [np.zeros((len(self._view.share.grid.cells), k)) for k in (3, 9)]
+        tables = [np.zeros((len(self._view.subdomain.numbering.cells), k)) for k in (3, 9)]
         for cells, *values in (beams.about_state() for beams in self._view.inelastic):
             for table, rows in zip(tables, values, strict=True):
                 table[cells] = rows

@@ -13,7 +13,7 @@ from ufl_beam.arrays import Array, Index, State
 from ufl_beam.compiled.c_library import doubles, lib, struct
 from ufl_beam.compiled.simd_kernels import in_batches
 from ufl_beam.discretization.compiled_forms import stated
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.display import in_one_line
 from ufl_beam.dolfinx_compat import fem
@@ -98,7 +98,7 @@ class ExtremesInC:
         self, fields: Fields, cell_forces: CellForces, along: ForcesAlongCells, between: float,
         parts: Array,
     ) -> None:  # fmt: skip
-        size, works = fields.share.size, bool(fields.share.grid.scene.works)
+        size, works = fields.subdomain.size, bool(fields.subdomain.numbering.scene.works)
         form = along_cells(fields.element, tuple(map(float, parts)), works)
         self._kernel = fields.kernel(form.form, form.motions, fields.cell_dofs[:, -form.moves :])
         _, self._batch, spare = self._kernel.keep_entries()
@@ -209,11 +209,11 @@ class Extremes(Restartable):
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Begin with the initial state, or continue from a :meth:`state`."""
-        self._grid: Grid = simulation.grid
+        self._numbering: DofNumbering = simulation.numbering
         self._solution = simulation.solution
         self._in_c = simulation.watch(self._fractions)
         self.by_itself = self._in_c is not None
-        shapes = (len(self._grid.cells), len(self._fractions), 3), (self._grid.size,)
+        shapes = (len(self._numbering.cells), len(self._fractions), 3), (self._numbering.size,)
         self._taken = []
         for what, shape in zip(("forces", "q"), shapes, strict=True):
             extent = Extent(*(np.full(shape, x) for x in (np.inf, -np.inf, 0.0, 0.0)))
@@ -233,7 +233,7 @@ class Extremes(Restartable):
             self._in_c.add(simulation.parts, simulation.t, simulation.q, simulation.q_before)
             return
         forces = simulation.now.cell_forces(0, self._fractions)
-        q = simulation.share.gather(simulation.q)  # the same on every process
+        q = simulation.subdomain.gather(simulation.q)  # the same on every process
         for extent, values in zip(self._taken, (forces, q), strict=True):
             for reached, when, beyond in (
                 (extent.low, extent.time_low, values < extent.low),
@@ -260,15 +260,15 @@ class Extremes(Restartable):
         return {f"{k} {name}": x for k, extent in extents for name, x in extent._asdict().items()}
 
     @property
-    def grid(self) -> Grid:
+    def numbering(self) -> DofNumbering:
         """Vertices and cells of the scene.
 
         Raises:
             ArgumentError: Nothing was run.
         """
-        if not hasattr(self, "_grid"):
+        if not hasattr(self, "_numbering"):
             raise ArgumentError("Extremes: nothing was run; give it to simulate(..., record=)")
-        return self._grid
+        return self._numbering
 
     @property
     def solution(self) -> Any:
@@ -277,7 +277,7 @@ class Extremes(Restartable):
         Raises:
             ArgumentError: Nothing was run.
         """
-        _ = self.grid  # or its error
+        _ = self.numbering  # or its error
         return self._solution
 
     def section_forces(self, beam: Member) -> Extent:
@@ -288,7 +288,7 @@ class Extremes(Restartable):
         Raises:
             ArgumentError: The beam is not in the scene, or nothing was run.
         """
-        cells = self.grid.cells_of(beam)
+        cells = self.numbering.cells_of(beam)
         return Extent(*(x.reshape(-1, 3) for x in self._extents[0].of(cells)))
 
     def displacement(self, one: Member | Body) -> Extent:
@@ -301,5 +301,5 @@ class Extremes(Restartable):
             ArgumentError: The object is not in the scene, or nothing was run.
         """
         if isinstance(one, Body):
-            return self._extents[1].of(self.grid.node(one.middle).reshape(1, 3))
-        return self._extents[1].of(self.grid.dofs[self.grid.nodes_along(one)])
+            return self._extents[1].of(self.numbering.node(one.middle).reshape(1, 3))
+        return self._extents[1].of(self.numbering.dofs[self.numbering.nodes_along(one)])

@@ -92,14 +92,14 @@ class History(Restartable):
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Write the header and the initial state, or cut off rows written after a state."""
         self._comm = simulation.comm
-        self._links = {
-            link: name
+        self._followed = {
+            connector: name
             for followed in self._connectors
-            for link, name in _named_components(simulation.scene, followed)
+            for connector, name in _named_components(simulation.scene, followed)
         }
         names = [f"{c} {place} [{unit}]" for place in self._places for c, unit in MOTION]
-        for link, name in self._links.items():
-            turns = simulation.scene.links[link].turns
+        for connector, name in self._followed.items():
+            turns = simulation.scene.all_connectors[connector].turns
             units = ("rad", "N m", "J") if turns else ("m", "N", "J")
             names += [f"{c} {name} [{unit}]" for c, unit in zip(CONNECTOR, units, strict=True)]
         energies = [f"{name} [J]" for group in simulation.entries() for name in group]
@@ -148,8 +148,8 @@ class History(Restartable):
 
     def _row(self, simulation: StateView) -> bytes:
         motion = [simulation.displacement(place) for place in self._places]
-        links = list(self._links)
-        connections = simulation.connections()[links, :3] if links else ()
+        connectors = list(self._followed)
+        connections = simulation.connections()[connectors, :3] if connectors else ()
         energies = [energy for group in simulation.entries() for energy in group.values()]
         numbers = (simulation.t, *np.ravel(motion), *np.ravel(connections), *energies)
         return _line([repr(float(x)) for x in numbers])
@@ -206,16 +206,19 @@ def _line(cells: Sequence[str]) -> bytes:
 
 
 def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[int, str]]:
-    """Return numbers and names of links; names of links between the same places differ."""
-    links = connector_indices(scene, followed)
+    """Return indices and names of connectors; equal places have different names."""
+    connectors = connector_indices(scene, followed)
     if isinstance(followed, Connector):
         names = COMPONENTS if followed.components else (type(followed.law).__name__,)
-        return [(link, f"{followed}, {name}") for link, name in zip(links, names, strict=False)]
-    holders = [scene.links[link] for link in links]
+        return [
+            (connector, f"{followed}, {name}")
+            for connector, name in zip(connectors, names, strict=False)
+        ]
+    holders = [scene.all_connectors[connector] for connector in connectors]
     axes = ["psi" if c.turns else "xy"[abs(c.axis[1]) > abs(c.axis[0])] for c in holders]
     return [
-        (link, f"{holder}, {axis}" if len(links) > 1 else str(holder))
-        for link, holder, axis in zip(links, holders, axes, strict=True)
+        (connector, f"{holder}, {axis}" if len(connectors) > 1 else str(holder))
+        for connector, holder, axis in zip(connectors, holders, axes, strict=True)
     ]
 
 
@@ -295,21 +298,23 @@ class Events(Restartable):
             rows = [(float(t), int(n), KINDS[int(kind)]) for t, n, kind in state["events"]]
             self._add(simulation, rows)
         # Events that the scene may have, and events before the run
-        grid = simulation.grid
-        in_cells = [law for beam in simulation.scene.beams for law in grid.hinges(beam)]
+        numbering = simulation.numbering
+        in_cells = [law for beam in simulation.scene.beams for law in numbering.hinges(beam)]
         laws = [*in_cells, *(law_of(hinge) for hinge in simulation.scene.hinges)]
         breaking = [law is not None and law.limit > 0 for law in laws]
         energies = np.array([law.fracture_energy if law is not None else np.inf for law in laws])
         self._enough = np.where(breaking, BROKEN_FRACTION * energies, np.inf)
         self._breaks = np.isfinite(energies)
-        links = simulation.scene.links
-        self._links = [i for i, link in enumerate(links) if type(link.law) in CONNECTOR_EVENTS]
+        connectors = simulation.scene.all_connectors
+        self._followed = [
+            i for i, connector in enumerate(connectors) if type(connector.law) in CONNECTOR_EVENTS
+        ]
         self._in_cells, self._on = self._look(simulation)
 
     def _look(self, simulation: StateView) -> tuple[Flags, Flags]:
         """Return the events of each cell and hinge, (n, 3), and which connectors touch or slide."""
         in_cells = np.zeros((len(self._enough), len(IN_CELLS)), dtype=bool)
-        num_cells, hinges = len(simulation.grid.cells), simulation.scene.hinges
+        num_cells, hinges = len(simulation.numbering.cells), simulation.scene.hinges
         plastic, broken = simulation.now.cells_of(0)[:, [PLASTIC, HINGE]].T
         happened = (plastic > 0, broken > 0, broken >= self._enough[:num_cells])
         in_cells[:num_cells] = np.column_stack(happened)
@@ -318,12 +323,12 @@ class Events(Restartable):
             breaks, enough = self._breaks[num_cells:], self._enough[num_cells:]
             happened = ((lost > 0) & ~breaks, (lost > 0) & breaks, lost >= enough)
             in_cells[num_cells:] = np.column_stack(happened)
-        if not self._links:
+        if not self._followed:
             return in_cells, np.zeros(0, dtype=bool)
-        forces = np.abs(simulation.connections()[self._links, FORCE])
+        forces = np.abs(simulation.connections()[self._followed, FORCE])
         # Forces above which they touch or slide; the limit of friction holds to some digits
-        links = (simulation.scene.links[link] for link in self._links)
-        limits = [(1 - 1e-9) * simulation.asked.get(link, 0.0) for link in links]
+        connectors = (simulation.scene.all_connectors[connector] for connector in self._followed)
+        limits = [(1 - 1e-9) * simulation.asked.get(connector, 0.0) for connector in connectors]
         return in_cells, np.asarray(forces > limits)
 
     def write(self, simulation: StateView) -> None:
@@ -332,18 +337,25 @@ class Events(Restartable):
         changes = np.argwhere(in_cells & ~self._in_cells)
         new = [(t, int(cell), IN_CELLS[n]) for cell, n in changes]
         for k in np.flatnonzero(on != self._on):
-            begins, ends = CONNECTOR_EVENTS[type(simulation.scene.links[self._links[k]].law)]
-            new.append((t, self._links[k], begins if on[k] else ends))
+            begins, ends = CONNECTOR_EVENTS[
+                type(simulation.scene.all_connectors[self._followed[k]].law)
+            ]
+            new.append((t, self._followed[k], begins if on[k] else ends))
         self._in_cells, self._on = in_cells, on
         events = self._add(simulation, new)
         if events:
             on_first(simulation.comm, lambda: [self._tell(event) for event in events])
 
     def _add(self, simulation: StateView, rows: list[Row]) -> list[Event]:
-        links, grid = simulation.scene.links, simulation.grid
+        connectors, numbering = simulation.scene.all_connectors, simulation.numbering
         named = simulation.parameter
         events = [
-            Event(t, grid.place_of(number) if what in IN_CELLS else links[number], what, named)
+            Event(
+                t,
+                numbering.place_of(number) if what in IN_CELLS else connectors[number],
+                what,
+                named,
+            )
             for t, number, what in rows
         ]
         self._rows += rows

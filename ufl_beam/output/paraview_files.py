@@ -83,32 +83,32 @@ class LineData:
     """
 
     def __init__(self, simulation: StateView) -> None:
-        grid, rods = simulation.grid, scene_rods(simulation.scene)
+        numbering, rods = simulation.numbering, scene_rods(simulation.scene)
         ends = [end for rod in rods for end in (rod.a, rod.b)]
         corners = np.reshape([end.point for end in ends], (-1, 2))
-        own = len(grid.points) + np.arange(len(ends)).reshape(-1, 2)
+        own = len(numbering.points) + np.arange(len(ends)).reshape(-1, 2)
         self.lines = Lines(
-            np.insert(np.concatenate([grid.points, corners]), 2, 0.0, axis=1),
-            np.concatenate([grid.pieces, own]),
-            np.append(np.zeros(len(grid.pieces)), [rod.group for rod in rods]),
+            np.insert(np.concatenate([numbering.points, corners]), 2, 0.0, axis=1),
+            np.concatenate([numbering.pieces, own]),
+            np.append(np.zeros(len(numbering.pieces)), [rod.group for rod in rods]),
         )
-        self._nodes = np.concatenate([grid.dofs, *(grid.node(a)[None] for a in ends)])
-        self._ends = slice(len(grid.points), None)
+        self._nodes = np.concatenate([numbering.dofs, *(numbering.node(a)[None] for a in ends)])
+        self._ends = slice(len(numbering.points), None)
         self._arms = np.reshape([arm(end) for end in ends], (-1, 2))
-        links = simulation.scene.links
+        connectors = simulation.scene.all_connectors
         # Lines, and links whose forces act along them
-        self._pulls = {k: links.index(rod.along) for k, rod in enumerate(rods) if rod.along}
-        self._pieces_per_cell, self._num_rods = grid.mesh.degree, len(rods)
+        self._pulls = {k: connectors.index(rod.along) for k, rod in enumerate(rods) if rod.along}
+        self._pieces_per_cell, self._num_rods = numbering.mesh.degree, len(rods)
 
     def fields(self, simulation: StateView) -> LineFields:
         """Compute the fields of the present state, see :class:`XDMF`; all processes call it."""
-        q = simulation.share.gather(simulation.q)[self._nodes]
+        q = simulation.subdomain.gather(simulation.q)[self._nodes]
         arms = turned(self._arms, q[self._ends, 2])
         displacement = np.insert(q[:, :2], 2, 0.0, axis=1)
         displacement[self._ends, :2] += arms - self._arms
         at_points = {"displacement": displacement, "rotation": q[:, 2]}
         for velocities in simulation.velocities():
-            v = simulation.share.gather(velocities)[self._nodes]
+            v = simulation.subdomain.gather(velocities)[self._nodes]
             velocity = np.insert(v[:, :2], 2, 0.0, axis=1)
             velocity[self._ends, :2] += v[self._ends, 2:] * arms[:, ::-1] * (-1.0, 1.0)
             at_points |= {"velocity": velocity, "angular velocity": v[:, 2]}
@@ -213,8 +213,8 @@ class XdmfWriter:
                 data += values.tobytes()
         self._data.put(length, data)
         # The text goes into the instruction, with a new tail that lies within one page.
-        grid, start = (text + "</Grid>\n").encode(), tail + len(TAIL)
-        new_tail = start + len(grid)
+        numbering, start = (text + "</Grid>\n").encode(), tail + len(TAIL)
+        new_tail = start + len(numbering)
         if new_tail % PAGE + len(TAIL) > PAGE:
             new_tail += -new_tail % PAGE
         if (least := new_tail + len(TAIL)) > capacity:
@@ -225,7 +225,7 @@ class XdmfWriter:
             self._xml.put(new_capacity, CLOSING)
             self._xml.put(capacity, b" " * len(CLOSING))
             capacity = new_capacity
-        self._xml.put(start, grid.ljust(new_tail - start) + TAIL)  # still in the instruction
+        self._xml.put(start, numbering.ljust(new_tail - start) + TAIL)  # still in the instruction
         self._xml.put(tail, b" " * len(TAIL))  # now in the document
         self.complete = Complete(steps + 1, new_tail, capacity, length + len(data))
 

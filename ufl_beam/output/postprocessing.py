@@ -17,7 +17,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.display import in_one_line
 from ufl_beam.errors import ArgumentError
 from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
@@ -54,10 +54,10 @@ class JointHistory(NamedTuple):
 def connector_indices(scene: Scene, connector: Connector | Joint) -> list[int]:
     """Return the indices of the components of a connector, or of a joint."""
     if isinstance(connector, Connector):
-        links = connector.components or (connector,)
-        if links[0] not in scene.links:
+        connectors = connector.components or (connector,)
+        if connectors[0] not in scene.all_connectors:
             raise ArgumentError(f"{connector} is not in the scene")
-        return [scene.links.index(link) for link in links]
+        return [scene.all_connectors.index(connector) for connector in connectors]
     if connector not in scene.joints:
         raise ArgumentError(f"{connector} is not in the scene")
     if not connector.holders:
@@ -65,7 +65,7 @@ def connector_indices(scene: Scene, connector: Connector | Joint) -> list[int]:
             f"{connector} shares unknowns, so that its force is not known; make it with "
             "multipliers=True"
         )
-    return [scene.links.index(holder) for holder in connector.holders]
+    return [scene.all_connectors.index(holder) for holder in connector.holders]
 
 
 def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
@@ -75,23 +75,25 @@ def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
     return np.column_stack([cos * a - sin * b, sin * a + cos * b])
 
 
-def values_at(grid: Grid, place: Anchor, states: Vectors) -> Array:
+def values_at(numbering: DofNumbering, place: Anchor, states: Vectors) -> Array:
     """Return values at the node that moves a place, or interpolated in its cell; (n, 3)."""
     if isinstance(place, Spot):
         if node(place) is GROUND:
             return np.zeros((len(states), 3))
-        dofs = grid.node(place)
+        dofs = numbering.node(place)
         return np.ascontiguousarray(states[:, dofs])
-    nodes, weights = grid.weights(place)
-    dofs = grid.dofs[nodes]
+    nodes, weights = numbering.weights(place)
+    dofs = numbering.dofs[nodes]
     return np.asarray(weights @ np.ascontiguousarray(states[:, dofs]))
 
 
-def velocity_at(grid: Grid, place: Anchor, states: Vectors, velocities: Vectors) -> Array:
+def velocity_at(
+    numbering: DofNumbering, place: Anchor, states: Vectors, velocities: Vectors
+) -> Array:
     """Return the velocity of a place; (n, 3); m/s, m/s, rad/s."""
-    motion = values_at(grid, place, velocities)
+    motion = values_at(numbering, place, velocities)
     if isinstance(place, Spot):
-        x, y = turned(arm(place), values_at(grid, place, states)[:, 2]).T
+        x, y = turned(arm(place), values_at(numbering, place, states)[:, 2]).T
         motion[:, :2] += motion[:, 2:] * np.column_stack([-y, x])
     return motion
 
@@ -192,26 +194,26 @@ def in_section(plane: tuple[Any, Any, Any], c: Any, s: Any) -> tuple[Any, Any, A
 
 
 class ForcesAlongCells:
-    """(N, V, M) in points of the cells of a grid.
+    """(N, V, M) in points of the cells of a scene.
 
     Args:
-        grid: Cells and numbering.
+        numbering: Cells and numbering.
 
     Attributes:
         angles: Angles of the undeformed axis at both ends of the cells; (num_cells, 2); rad.
         dofs: Degrees of freedom (u, v, ψ) of the nodes of cells; (num_cells, 3, degree + 1).
     """
 
-    def __init__(self, grid: Any) -> None:
-        nodes = grid.nodes_of_cells
+    def __init__(self, numbering: Any) -> None:
+        nodes = numbering.nodes_of_cells
         start, end, *inner = range(nodes.shape[1])
-        self._mesh, self._along = grid.mesh, [start, *inner, end]
-        self.dofs: Index = grid.dofs[nodes].transpose(0, 2, 1)
-        self._works = bool(grid.scene.works)
-        self._places: Array = grid.points[nodes[:, self._along]].transpose(2, 0, 1)
+        self._mesh, self._along = numbering.mesh, [start, *inner, end]
+        self.dofs: Index = numbering.dofs[nodes].transpose(0, 2, 1)
+        self._works = bool(numbering.scene.works)
+        self._places: Array = numbering.points[nodes[:, self._along]].transpose(2, 0, 1)
         x, y = self._places[:, :, -1] - self._places[:, :, 0]
         angles = np.asarray(np.arctan2(y, x))
-        self.angles = angles[:, None] + _axis_angles(grid, angles)
+        self.angles = angles[:, None] + _axis_angles(numbering, angles)
 
     def __call__(self, cells: Index | slice, parts: Array, numbers: Array, q: Array) -> Array:
         """Compute section forces at fractions of cells; N, N, N m.
@@ -239,18 +241,18 @@ class ForcesAlongCells:
         return np.stack(in_section(at(parts), np.cos(angle), np.sin(angle)), axis=2)
 
 
-def _axis_angles(grid: Any, angles: Array) -> Array:
+def _axis_angles(numbering: Any, angles: Array) -> Array:
     """Return angles from both ends of cells to the smooth axis of beams; (num_cells, 2); rad.
 
     The axis halves the angle between two cells at a vertex, except at corners of the beam.  Its
     angle is linear in a cell.
     """
     half = np.angle(np.exp(1j * np.diff(angles))) / 2
-    half[np.diff(grid.beam_of_cell) != 0] = np.nan
-    for beam in grid.scene.beams:
+    half[np.diff(numbering.beam_of_cell) != 0] = np.nan
+    for beam in numbering.scene.beams:
         if beam.corners:
-            at_corners = np.isin(grid.parameters(beam)[1:-1], beam.corners)
-            half[grid.cells_of(beam)[:-1][at_corners]] = np.nan
+            at_corners = np.isin(numbering.parameters(beam)[1:-1], beam.corners)
+            half[numbering.cells_of(beam)[:-1][at_corners]] = np.nan
     start, end = np.append(np.nan, -half), np.append(half, np.nan)
     # The axis is a circle in cells without a neighbour
     both = np.where(np.isnan(start), -end, start), np.where(np.isnan(end), -start, end)

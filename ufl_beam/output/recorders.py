@@ -13,9 +13,9 @@ from mpi4py import MPI
 import numpy as np
 
 from ufl_beam.arrays import Array, State
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Parameter
 from ufl_beam.errors import ArgumentError, require_sequence, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
@@ -40,7 +40,7 @@ class PresentState(ABC):
     """Present state for objects of the scene; all processes call its methods together."""
 
     scene: Scene
-    grid: Grid
+    numbering: DofNumbering
     scheme: Scheme
     t: float  # s
 
@@ -56,7 +56,7 @@ class PresentState(ABC):
         return tuple({name: numbers[at] for name, at in group.items()} for group in columns.ledger)
 
     def connections(self) -> Array:
-        """Return columns of :class:`Connection` for all links of the scene; (links, columns)."""
+        """Return columns of :class:`Connection` for all connectors of the scene; (num, columns)."""
         return np.asarray(self.now.column("connectors")[0,])
 
     def connector(self, connector: Connector) -> Connection:
@@ -93,8 +93,8 @@ class PresentState(ABC):
         if isinstance(joint, Support):
             number = self.scene.supports.index(joint)
             return float(np.linalg.norm(self.now.column("reactions")[0, number, :2]))
-        links = self.scene.links
-        numbers = [n for n in connector_indices(self.scene, joint) if not links[n].turns]
+        connectors = self.scene.all_connectors
+        numbers = [n for n in connector_indices(self.scene, joint) if not connectors[n].turns]
         return float(np.linalg.norm(self.connections()[numbers, FORCE]))
 
     def section_forces(self) -> Array:
@@ -109,7 +109,7 @@ class StateView(PresentState):
     """State of a run for recorders and controllers."""
 
     comm: MPI.Intracomm  # all processes of the run
-    share: Share  # degrees of freedom of this process
+    subdomain: Subdomain  # degrees of freedom of this process
     fields: Fields
     parameter: Parameter  # names and formats of `t`: time, or the load factor of a path
     parts: int  # steps so far; each substep is counted
@@ -133,7 +133,7 @@ class StateView(PresentState):
     @property
     def asked(self) -> dict[Connector, float]:
         """Forces of controllers, and limits of friction; N or N m."""
-        numbers: Any = self.controllers.numbers
+        numbers: Any = self.controllers.values
         return dict(zip(self.controllers.at, numbers.tolist(), strict=True))
 
     @property

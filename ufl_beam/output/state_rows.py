@@ -19,8 +19,8 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
-from ufl_beam.discretization.dof_numbering import Grid
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.dof_numbering import DofNumbering
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import in_one_line
 from ufl_beam.mechanics.time_schemes import V
 from ufl_beam.terms.boundary_conditions import Supports
@@ -100,25 +100,27 @@ class Columns:
         self._others: dict[tuple[str, str], Columns] = {}
 
     @classmethod
-    def of(cls, grid: Grid, *, moving: bool, ledger: Iterable[str], record: int | None) -> Columns:
+    def of(
+        cls, numbering: DofNumbering, *, moving: bool, ledger: Iterable[str], record: int | None
+    ) -> Columns:
         """Make the table of a scene; columns of connectors are the fields of :class:`Connection`.
 
         Args:
-            grid: Numbering of the scene.
+            numbering: Numbering of the scene.
             moving: Whether there are velocities.
             ledger: Entries, such as "lost: plastic".
             record: Length of the data for the forces of cells; None if the row has the forces.
         """
-        size, scene = grid.size, grid.scene
+        size, scene = numbering.size, numbering.scene
         return cls({
             "t": (),  # time, s; or the load factor of a path
             "reactions": (len(scene.supports), 3),  # forces of supports, in their axes
-            "connectors": (len(scene.links), len(Connection._fields)),
-            "material": (len(grid.inelastic_cells), int(lib.POINT_KEPT)),  # `Points.kept`
+            "connectors": (len(scene.all_connectors), len(Connection._fields)),
+            "material": (len(numbering.inelastic_cells), int(lib.POINT_KEPT)),  # `Points.kept`
             **dict.fromkeys(ledger, ()),  # J
-            "q": (size,),  # configuration, all degrees of freedom in the order of the grid
+            "q": (size,),  # configuration, all degrees of freedom in the order of the numbering
             **({"v": (size,)} if moving else {}),  # velocities
-            **({FORCES: (lib.CELL_NUMBERS, len(grid.cells))} if record is None
+            **({FORCES: (lib.CELL_NUMBERS, len(numbering.cells))} if record is None
                else {RECORD: (record,)}),
         })  # fmt: skip
 
@@ -190,64 +192,65 @@ class StateWriter:
     """
 
     def __init__(
-        self, march: Any, share: Share, ledger: Ledger, supports: Supports,
-        inelastic: Sequence[Any], couplings: Sequence[Any], cell_forces: CellForces,
+        self, time_loop: Any, subdomain: Subdomain, ledger: Ledger, supports: Supports,
+        inelastic: Sequence[Any], connector_terms: Sequence[Any], cell_forces: CellForces,
     ) -> None:  # fmt: skip
-        self._march, self._share = march, share
+        self._time_loop, self._subdomain = time_loop, subdomain
         self._alive, self._kinds = list[Any](), list[Any]()
-        grid, moving = share.grid, march.rates != ffi.NULL
+        numbering, moving = subdomain.numbering, time_loop.rates != ffi.NULL
         accounts = ledger.state, ledger.supplied, ledger.lost
-        self.records = share.alone or not share.largest(float(len(cell_forces.entries)))
+        self.records = subdomain.alone or not subdomain.largest(float(len(cell_forces.entries)))
         vectors, others = list[Any](), list[tuple[Any, int]]()
         if self.records:
             vectors, others = cell_forces.vectors, [*cell_forces.entries, *cell_forces.factors]
         self.columns = columns = Columns.of(
-            grid, moving=moving, record=grid.size * len(vectors) + sum(n for _, n in others),
+            numbering, moving=moving,
+            record=numbering.size * len(vectors) + sum(n for _, n in others),
             ledger=[f"{p}: {name}" for p, of in zip(LEDGER, accounts, strict=True) for name in of],
         )  # fmt: skip
         at = columns.at
-        if share.comm.rank == 0:
-            self._copy(self._place(ffi.addressof(march, "t")), at["t"].start, 1)
-        now = ffi.addressof(march, "q")
-        velocity = [ffi.addressof(march.rates, "rate", V)] if moving else []
+        if subdomain.comm.rank == 0:
+            self._copy(self._place(ffi.addressof(time_loop, "t")), at["t"].start, 1)
+        now = ffi.addressof(time_loop, "q")
+        velocity = [ffi.addressof(time_loop.rates, "rate", V)] if moving else []
         self._gathered = list[tuple[Any, slice]]()
         first = at["q"].start
         for place in (now, *velocity, *vectors):
-            if share.alone:
-                self._copy(place, first, grid.size)
+            if subdomain.alone:
+                self._copy(place, first, numbering.size)
             else:
-                self._gathered.append((place, slice(first, first + grid.size)))
-            first += grid.size
+                self._gathered.append((place, slice(first, first + numbering.size)))
+            first += numbering.size
         for place, number in others:
             self._copy(place, first, number)
             first += number
         for part, account in zip(LEDGER, accounts, strict=True):
             if account:
                 first = at[f"{part}: {next(iter(account))}"].start
-                self._copy(self._place(account.numbers), first, len(account))
+                self._copy(self._place(account.amounts), first, len(account))
         held = [  # degrees of freedom of supports that this process owns, and indices in the row
             (dof, at["reactions"].start + 3 * k + c)
-            for k, support in enumerate(grid.scene.supports)
-            for c, dof in ((c, share.grid.node(support.place)[c]) for c in support.held)
-            if share.owns(np.array([dof]))[0]
+            for k, support in enumerate(numbering.scene.supports)
+            for c, dof in ((c, subdomain.numbering.node(support.place)[c]) for c in support.held)
+            if subdomain.owns(np.array([dof]))[0]
         ]  # fmt: skip
         dofs, to = np.array(held, dtype=np.int64).reshape(-1, 2).T
-        mine = np.searchsorted(supports.dofs, share.local(dofs))
+        mine = np.searchsorted(supports.dofs, subdomain.local(dofs))
         self._add(self._place(supports.reactions), mine, to)
         for one in inelastic:
             mine, k = one.kept()[0], np.flatnonzero(one.kept_factors)
             width = columns.shapes["material"][1]
-            rows = at["material"].start + width * np.searchsorted(grid.inelastic_cells, mine)
+            rows = at["material"].start + width * np.searchsorted(numbering.inelastic_cells, mine)
             first = width * np.arange(len(mine))
             self._add(self._place(one.points.kept), first[:, None] + k, rows[:, None] + k)
-        for link in couplings:
-            rows = at["connectors"].start + columns.shapes["connectors"][1] * link.numbers
-            self._add(now, link.forces_at, rows + FORCE)
-            for field, numbers in link.kept:
+        for connector in connector_terms:
+            rows = at["connectors"].start + columns.shapes["connectors"][1] * connector.indices
+            self._add(now, connector.forces_at, rows + FORCE)
+            for field, numbers in connector.kept:
                 apart = numbers.strides[0] // numbers.itemsize * np.arange(len(rows))
                 self._add(self._place(numbers), apart, rows + Connection._fields.index(field))
         kept = ffi.new("kept_numbers[]", self._kinds)
-        fill(march, kinds=len(kept), kept=kept, width=columns.width, sums=at["q"].start)
+        fill(time_loop, kinds=len(kept), kept=kept, width=columns.width, sums=at["q"].start)
 
     def _place(self, numbers: Any) -> Any:
         """Return a pointer to the address of a number of C, of an array, or of a view."""
@@ -269,9 +272,9 @@ class StateWriter:
 
     def write(self, row: Array) -> None:
         """Write the state in C; all processes call it together."""
-        share = self._share
-        lib.keep_state(self._march, doubles(row))
-        if not share.alone:
-            share.comm.Allreduce(MPI.IN_PLACE, row[: self._march.sums])
+        subdomain = self._subdomain
+        lib.keep_state(self._time_loop, doubles(row))
+        if not subdomain.alone:
+            subdomain.comm.Allreduce(MPI.IN_PLACE, row[: self._time_loop.sums])
         for place, at in self._gathered:
-            share.gather(np.frombuffer(ffi.buffer(place[0], 8 * share.size)), row[at])
+            subdomain.gather(np.frombuffer(ffi.buffer(place[0], 8 * subdomain.size)), row[at])

@@ -12,9 +12,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.compiled.csr import Product
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.bodies import Anchor, Member, Place, Spot, arm
 from ufl_beam.model.connector_laws import Guide
@@ -63,13 +63,13 @@ class Cells:
     Processes do not communicate.
     """
 
-    def __init__(self, grid: Grid) -> None:
-        self.grid = grid
+    def __init__(self, numbering: DofNumbering) -> None:
+        self.numbering = numbering
 
     @cached_property
     def fields(self) -> Fields:
         """Fields on all cells."""
-        return Fields(Share(self.grid, MPI.COMM_SELF))
+        return Fields(Subdomain(self.numbering, MPI.COMM_SELF))
 
     @cached_property
     def strains(self) -> Strains:
@@ -79,7 +79,7 @@ class Cells:
     @cached_property
     def along(self) -> ForcesAlongCells:
         """Section forces of all cells."""
-        return ForcesAlongCells(self.grid)
+        return ForcesAlongCells(self.numbering)
 
 
 class States:
@@ -87,7 +87,7 @@ class States:
 
     Attributes:
         scene: Model.
-        grid: Its vertices, cells and numbering.
+        numbering: Its vertices, cells and numbering.
         between: Fraction of a step at whose configuration its forces are in equilibrium.
         begun: Whether forces depend on the configuration at the beginning of the step.
         cells: Section forces, strains and masses of its cells.
@@ -95,13 +95,13 @@ class States:
             beginning of the step; ``cell_number`` of loops.h; (9, num_cells).
     """
 
-    def __init__(self, grid: Grid, like: States | None = None, *blocks: Block) -> None:
-        self.scene: Scene = grid.scene
-        self.grid = grid
+    def __init__(self, numbering: DofNumbering, like: States | None = None, *blocks: Block) -> None:
+        self.scene: Scene = numbering.scene
+        self.numbering = numbering
         self.between, self.begun = 1.0, False
         self.of_record: Callable[[Array, Array, Array], Array] | None = None
         self._blocks = [*blocks]
-        self.cells = Cells(grid)
+        self.cells = Cells(numbering)
         self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest forces
         if like is not None:
             self.between, self.begun, self.of_record = like.between, like.begun, like.of_record
@@ -142,15 +142,15 @@ class States:
             begin, end = end, end + block.number
             rows = block.rows[max(first - begin, 0) : max(last - begin, 0)]
             blocks.append(Block(block.columns, rows, len(rows)))
-        return States(self.grid, self, *blocks)
+        return States(self.numbering, self, *blocks)
 
-    def thin(self) -> None:
+    def downsample(self) -> None:
         """Delete every other state; the first state stays."""
         states, self._blocks, self._computed = self.part(0, len(self)), [], None
         for n in range(0, len(states), 2):
             columns, *parts = states.row(n)
             if states.begun and BEFORE not in columns.at:
-                columns = columns.plus(BEFORE, (self.grid.size,))
+                columns = columns.plus(BEFORE, (self.numbering.size,))
                 parts.append(states.before(n))
             self.append(columns, *parts)
 
@@ -184,7 +184,7 @@ class States:
             return columns.of_rows(BEFORE, row)
         return self._row("q", n - 1 if n and self.begun else n)
 
-    def numbers(self, n: int) -> Array:
+    def cell_resultants(self, n: int) -> Array:
         """Return ``cell_number`` of loops.h in the n-th state; (9, num_cells); N, N m."""
         columns, row = self.row(n)
         if FORCES in columns.at:
@@ -200,7 +200,7 @@ class States:
         names = dict.fromkeys(name for block in self._blocks for name in block.columns.at)
         arrays = {name: self.column(name)[:,] for name in names if ": " not in name}
         arrays.pop(RECORD, None)
-        arrays[FORCES] = np.array([self.numbers(n) for n in number])
+        arrays[FORCES] = np.array([self.cell_resultants(n) for n in number])
         if arrays.pop(BEFORE, None) is not None:
             before = np.array([self.before(n) for n in number])
             if not np.array_equal(before, arrays["q"][[0, *number[:-1]]]):
@@ -219,9 +219,9 @@ class States:
         n, begins = len(history["t"]), BEFORE in history
         self._blocks, self._computed = [], None
         ledger = [name for name in history if name.startswith(tuple(f"{x}: " for x in LEDGER))]
-        columns = Columns.of(self.grid, moving="v" in history, ledger=ledger, record=None)
+        columns = Columns.of(self.numbering, moving="v" in history, ledger=ledger, record=None)
         if begins:
-            columns = columns.plus(BEFORE, (self.grid.size,))
+            columns = columns.plus(BEFORE, (self.numbering.size,))
         rows: Array = np.zeros((n, columns.width))
         for name, shape in columns.shapes.items():
             if name in history or name in ("q", FORCES):
@@ -238,7 +238,7 @@ class States:
 
     @property
     def q(self) -> Array:
-        """Configurations, all degrees of freedom in the order of the grid; (n+1, size)."""
+        """Configurations, all degrees of freedom in the order of the numbering; (n+1, size)."""
         return self.column("q")[:,]
 
     @property
@@ -254,7 +254,7 @@ class States:
         Raises:
             ArgumentError: The beam of the place is not in the scene.
         """
-        motion = values_at(self.grid, place, self.column("q"))
+        motion = values_at(self.numbering, place, self.column("q"))
         if isinstance(place, Spot):
             motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
         return motion
@@ -267,19 +267,21 @@ class States:
         """
         if not len(v := self.column("v")):
             raise ArgumentError("velocity: the run was static; there is none")
-        return velocity_at(self.grid, place, self.column("q"), v)
+        return velocity_at(self.numbering, place, self.column("q"), v)
 
     def position(self, place: Anchor) -> Array:
         """Return the coordinates of a place; (n+1, 2); m."""
         if isinstance(place, Spot):
             return np.asarray(place.point + self.displacement(place)[:, :2])
-        nodes, weights = self.grid.weights(place)
-        return np.asarray(weights @ self.grid.points[nodes] + self.displacement(place)[:, :2])
+        nodes, weights = self.numbering.weights(place)
+        return np.asarray(weights @ self.numbering.points[nodes] + self.displacement(place)[:, :2])
 
     def shape(self, beam: Member, n: int = -1) -> Array:
         """Return coordinates of the vertices of a beam at the n-th time; (num_vertices, 2); m."""
-        vertices, grid = self.grid.vertices_of(beam), self.grid
-        return np.asarray(grid.points[vertices] + self._row("q", n)[grid.dofs[vertices, :2]])
+        vertices, numbering = self.numbering.vertices_of(beam), self.numbering
+        return np.asarray(
+            numbering.points[vertices] + self._row("q", n)[numbering.dofs[vertices, :2]]
+        )
 
     # -- joints --------------------------------------------------------------------------------
 
@@ -373,14 +375,14 @@ class States:
             if self.between < 1:
                 q = (1 - self.between) * self.before(n) + self.between * q
             along = self.cells.along
-            forces = along(slice(None), parts, self.numbers(n), q[along.dofs])
+            forces = along(slice(None), parts, self.cell_resultants(n), q[along.dofs])
             forces.flags.writeable = False
             self._computed = key, forces
         return self._computed[1]
 
     def section_forces(self, beam: Member, n: int = -1) -> Array:
         """Return (N, V, M) of :meth:`diagram` in the middle of cells; (num_cells, 3); N, N, N m."""
-        return np.asarray(self.cell_forces(n)[self.grid.cells_of(beam), 0])
+        return np.asarray(self.cell_forces(n)[self.numbering.cells_of(beam), 0])
 
     def section_forces_at(self, place: Place) -> Array:
         """Return (N, V, M) of :meth:`diagram` at a place; (n+1, 3); N, N, N m.
@@ -390,13 +392,13 @@ class States:
         Raises:
             ArgumentError: The beam of the place is not in the scene.
         """
-        cell, part = self.grid.cell_and_part(place)
+        cell, part = self.numbering.cell_and_part(place)
         n, dofs = range(len(self)), self.cells.along.dofs[cell]
         q = self.column("q")[:, dofs]
         if self.between < 1:
             before = np.array([self.before(k)[dofs] for k in n])
             q = (1 - self.between) * before + self.between * q
-        numbers = np.array([self.numbers(k)[:, cell] for k in n]).T
+        numbers = np.array([self.cell_resultants(k)[:, cell] for k in n]).T
         forces = self.cells.along(np.full(len(n), cell), np.array([part]), numbers, q)
         return np.asarray(forces[:, 0])
 
@@ -415,7 +417,11 @@ class States:
             ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
         """
         require_number(points, "diagram: points", at_least=2)
-        s, cells, parts = self.grid.parameters(beam), self.grid.cells_of(beam), int(points)
+        s, cells, parts = (
+            self.numbering.parameters(beam),
+            self.numbering.cells_of(beam),
+            int(points),
+        )
         at = s[:-1, None] + np.linspace(0.0, 1.0, parts) * np.diff(s)[:, None]
         forces = self.cell_forces(n, np.arange(parts) / (parts - 1))[cells]
         return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
@@ -425,16 +431,16 @@ class States:
 
         The curvature includes the jump of a hinge over the length of its cell.
         """
-        return self.mean_strains(n)[self.grid.cells_of(beam)]
+        return self.mean_strains(n)[self.numbering.cells_of(beam)]
 
     def strains_at(self, place: Place) -> Array:
         """Return (Σ, Γ, K) in the cell of :meth:`section_forces_at`; (n+1, 3); 1, 1, 1/m."""
-        cell = self.grid.cell(place)
+        cell = self.numbering.cell(place)
         return np.array([self.mean_strains(n)[cell] for n in range(len(self))])
 
     def mean_strains(self, n: int) -> Array:
         """Return (Σ, Γ, K) in all cells in the n-th state; (num_cells, 3); 1, 1, 1/m."""
-        strains = np.empty((len(self.grid.cells), 3))
+        strains = np.empty((len(self.numbering.cells), 3))
         strains[self.cells.fields.order] = self.cells.strains.mean(self._row("q", n))
         return strains
 
@@ -444,19 +450,19 @@ class States:
         Raises:
             ArgumentError: The scene is elastic.
         """
-        return self._material(n, self.grid.cells_of(beam))
+        return self._material(n, self.numbering.cells_of(beam))
 
     def _material(self, n: int, cells: Index | int) -> Material:
-        if not len(self.grid.inelastic_cells) and not self.scene.hinges:
+        if not len(self.numbering.inelastic_cells) and not self.scene.hinges:
             raise ArgumentError("material: nothing in the scene yields or breaks; it is elastic")
         chosen = self.cells_of(n, self.cell_forces(n)[:, 0])[cells].T
         return Material(chosen[:3].T, *chosen[3:])
 
     def cells_of(self, n: int, forces: Array | float = 0.0) -> Array:
         """Return column "material" of all cells; elastic cells get ``forces``; (num_cells, 6)."""
-        everything = np.zeros((len(self.grid.cells), self.row(n)[0].shapes["material"][1]))
+        everything = np.zeros((len(self.numbering.cells), self.row(n)[0].shapes["material"][1]))
         everything[:, :3] = forces
-        everything[self.grid.inelastic_cells] = self._row("material", n)
+        everything[self.numbering.inelastic_cells] = self._row("material", n)
         return everything
 
     def material_at(self, place: Place) -> Material:
@@ -469,7 +475,7 @@ class States:
         Raises:
             ArgumentError: The scene is elastic, or the beam of the place is not in it.
         """
-        cell, hinge = self.grid.cell(place), self.grid.hinge_at(place)
+        cell, hinge = self.numbering.cell(place), self.numbering.hinge_at(place)
         states = zip(*(self._material(n, cell) for n in range(len(self))), strict=True)
         forces, jump, plastic, energy = map(np.array, states)
         if hinge is not None:
@@ -487,8 +493,8 @@ class States:
         jump, dissipated = states[:, 3].copy(), states[:, PLASTIC] + states[:, HINGE]
         if self.scene.hinges:
             hinges = Connection(*self._row("connectors", n)[-len(self.scene.hinges) :].T)
-            np.add.at(dissipated, self.grid.cells_at_hinges, hinges.dissipated)
-            for cell, motion in zip(self.grid.cells_at_hinges, hinges.motion, strict=True):
+            np.add.at(dissipated, self.numbering.cells_at_hinges, hinges.dissipated)
+            for cell, motion in zip(self.numbering.cells_at_hinges, hinges.motion, strict=True):
                 jump[cell] = max(jump[cell], motion, key=abs)
         return jump, dissipated
 
@@ -521,12 +527,12 @@ class States:
         """
         if not len(self.column("v")):
             raise ArgumentError("momentum: the run was static; there is none")
-        times, grid = Product(mass_matrix(self.cells.fields)), self.grid
-        dofs = np.vstack([grid.dofs, grid.dofs_of_bodies])
-        centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
+        times, numbering = Product(mass_matrix(self.cells.fields)), self.numbering
+        dofs = np.vstack([numbering.dofs, numbering.dofs_of_bodies])
+        centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
         _, first = np.unique(dofs[:, 0], return_index=True)
         u, v, ψ = dofs[first, 0], dofs[first, 1], np.unique(dofs[:, 2])
-        X, Y = np.vstack([grid.points, centers])[first].T
+        X, Y = np.vstack([numbering.points, centers])[first].T
 
         states = []
         for n in range(len(self)):

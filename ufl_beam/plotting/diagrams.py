@@ -92,8 +92,8 @@ def plane_canvas(
 
 def draw_beams(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
     """Draw the axes of all beams through these points."""
-    grid = solution.grid
-    lines = [points[grid.nodes_along(beam)] for beam in solution.scene.beams]
+    numbering = solution.numbering
+    lines = [points[numbering.nodes_along(beam)] for beam in solution.scene.beams]
     axes.plot(*joined(lines).T, **line)
 
 
@@ -127,7 +127,9 @@ def draw_shape(
     results = [
         (beam, getattr(solution.diagram(beam, n), quantity)) for beam in solution.scene.beams
     ]
-    diagrams = [(b, values.reshape(len(solution.grid.cells_of(b)), -1)) for b, values in results]
+    diagrams = [
+        (b, values.reshape(len(solution.numbering.cells_of(b)), -1)) for b, values in results
+    ]
     name = f"{RESULTANTS[quantity][0]} {quantity}"
     return draw_frame(ax, solution, n, shape, (name, when), quantity, diagrams)
 
@@ -190,7 +192,7 @@ def _draw_diagrams(
     from matplotlib.collections import PolyCollection
 
     side = -1.0 if what == "M" else 1.0
-    cells = np.concatenate([solution.grid.cells_of(beam) for beam, _ in diagrams])
+    cells = np.concatenate([solution.numbering.cells_of(beam) for beam, _ in diagrams])
     all_values = np.concatenate([values for _, values in diagrams])
     largest = float(np.abs(all_values).max())
     scale = 0.13 * side * math.hypot(*np.ptp(nodes, axis=0)) / largest
@@ -259,8 +261,8 @@ def _along(
 
     ``diagram`` is the number of the diagram of each cell.
     """
-    mesh, fractions = solution.grid.mesh, np.linspace(0.0, 1.0, points)
-    start, end, *between = solution.grid.nodes_of_cells[cells].T
+    mesh, fractions = solution.numbering.mesh, np.linspace(0.0, 1.0, points)
+    start, end, *between = solution.numbering.nodes_of_cells[cells].T
     lines = nodes[np.column_stack([start, *between, end])]
     ahead = unit_vectors(mesh.slopes(fractions) @ lines)
     # Ordinates at corners between cells of a beam bisect the angle; ordinates near them lean
@@ -332,7 +334,7 @@ def draw_damage_state(
     """
     from matplotlib.collections import LineCollection
 
-    grid = solution.grid
+    numbering = solution.numbering
     for beam in solution.scene.beams[:1]:
         solution.material(beam)  # raises if the scene is elastic
     canvas, (width, height) = plane_canvas(solution, [n], magnify, ax)
@@ -352,7 +354,7 @@ def draw_damage_state(
             unit, prefix = style.decimal_prefix(float(density.max()))
             colors = style.scale("YlOrRd", 0.2, 1.0, 0.0, float(density.max()) / unit)
             zones = LineCollection(
-                list(shape.nodes[grid.cells[yielded]]),
+                list(shape.nodes[numbering.cells[yielded]]),
                 colors=colors.to_rgba(density[yielded] / unit),
                 linewidths=11.0, capstyle="butt", zorder=3, gid="yielded",
             )  # fmt: skip

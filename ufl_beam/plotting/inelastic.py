@@ -38,18 +38,18 @@ class OpenHinge(NamedTuple):
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
     """Find open hinges, in cells and of zero length; ``points`` are the drawn nodes."""
-    grid = solution.grid
+    numbering = solution.numbering
     hinges: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
     for beam in solution.scene.beams:
-        laws = grid.hinges(beam)
+        laws = numbering.hinges(beam)
         if all(law is None or math.isinf(law.limit) for law in laws):
             continue
         state = solution.material(beam, n)
-        rows = zip(grid.cells_of(beam), laws, state.jump, state.hinge, strict=True)
+        rows = zip(numbering.cells_of(beam), laws, state.jump, state.hinge, strict=True)
         for cell, law, jump, lost in rows:
             if law is not None and (jump != 0.0 or lost > 0.0):
-                hinges.append((beam, points[grid.cells[cell]].mean(axis=0), law, float(lost)))
-    for hinge, vertex in zip(solution.scene.hinges, grid.vertices_at_hinges, strict=True):
+                hinges.append((beam, points[numbering.cells[cell]].mean(axis=0), law, float(lost)))
+    for hinge, vertex in zip(solution.scene.hinges, numbering.vertices_at_hinges, strict=True):
         kept = solution.connector(hinge)
         if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
             dissipated = float(kept.dissipated[n])
@@ -63,15 +63,15 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
 
 def dissipated_per_length(solution: Solution, n: int) -> Array:
     """Compute the energy that plastic strains and cracks dissipated; (num_cells,); J/m."""
-    grid = solution.grid
-    energy = np.zeros(len(grid.cells))
+    numbering = solution.numbering
+    energy = np.zeros(len(numbering.cells))
     for beam in solution.scene.beams:
         layout = beam.section.layout(None)
         if layout is not None and not layout.elastic:
             state = solution.material(beam, n)
             cracks = state.hinge if beam.section.fibres is not None else 0.0
-            energy[grid.cells_of(beam)] = state.plastic + cracks
-    return energy / grid.lengths(np.arange(len(grid.cells)))
+            energy[numbering.cells_of(beam)] = state.plastic + cracks
+    return energy / numbering.lengths(np.arange(len(numbering.cells)))
 
 
 def circle(fraction: float) -> dict[str, Any]:
@@ -87,7 +87,7 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
     """Mark yielded cells and open hinges on the axes of beams; return their names for a legend."""
     named: dict[str, Artist] = {}
     yielded = np.flatnonzero(dissipated_per_length(solution, n))
-    for ends in nodes[solution.grid.cells[yielded]]:
+    for ends in nodes[solution.numbering.cells[yielded]]:
         (zone,) = axes.plot(*ends.T, color=ORANGE, linewidth=9.0, solid_capstyle="butt", zorder=3.8)
         named["yielded or cracked"] = zone
     for hinge in open_hinges(solution, n, nodes):
@@ -145,9 +145,11 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     Example:
         >>> ub.plot(broken, "hinge", weak.start).savefig("hinge.png")
     """
-    kept, grid = solution.material_at(place), solution.grid
-    hinge = grid.hinge_at(place)
-    in_cell = grid.hinges(place.beam)[grid.cell(place) - int(grid.cells_of(place.beam)[0])]
+    kept, numbering = solution.material_at(place), solution.numbering
+    hinge = numbering.hinge_at(place)
+    in_cell = numbering.hinges(place.beam)[
+        numbering.cell(place) - int(numbering.cells_of(place.beam)[0])
+    ]
     law = in_cell if hinge is None else law_of(hinge)
     if law is None or np.isinf(law.limit):
         raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
@@ -197,7 +199,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     inside = energy.total
     work, lost = (sum(x.values(), np.zeros_like(t)) for x in (energy.supplied, energy.lost))
     supplied = inside[0] + lost[0] + work - work[0]
-    start = inside[0] > 1e-12 * energy.throughput
+    start = inside[0] > 1e-12 * energy.energy_transferred
     with style.panel(ax, (8.0, 5.0)) as axes:
         style.time_axes(axes)
         # Blue is reserved for the energy in the scene; the colours repeat.
@@ -210,7 +212,10 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         _prefix(axes.yaxis, np.concatenate([supplied, inside]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
         digits, power = f"{energy.worst:.1e}".split("e")
-        worst, through = rf"${digits}\times10^{{{int(power)}}}$", with_unit(energy.throughput, "J")
+        worst, through = (
+            rf"${digits}\times10^{{{int(power)}}}$",
+            with_unit(energy.energy_transferred, "J"),
+        )
         axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left")
         style.draw_legend(axes, ax, loc="outside upper left", ncols=3)
     return style.parent_figure(axes)

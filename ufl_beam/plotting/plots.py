@@ -108,7 +108,7 @@ def solution_page(solution: Solution) -> str:
         + notebook.energy_page(solution.energy)
         + notebook.lines(solution.open_ledger)
     )
-    moved = solution.q[:, solution.grid.dofs[:, :2]]
+    moved = solution.q[:, solution.numbering.dofs[:, :2]]
     fraction = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
     magnify = max(x for x in FACTORS if x == 1 or (fraction > 0.0 and x * fraction <= VISIBLE))
     shapes = partial(draw_shapes, solution, count=SHAPES, magnify=magnify)
@@ -175,7 +175,7 @@ def draw_energy(solution: Solution) -> Figure:
         ledger.set_ylabel("energy (J)")
         ledger.plot(along, energy.total, color=shade(INK), linewidth=1.2, label="in the scene")
         figure.legend(loc="outside upper left", ncols=5)
-        fraction = np.abs(energy.imbalance) / (energy.throughput or 1.0)
+        fraction = np.abs(energy.imbalance) / (energy.energy_transferred or 1.0)
         # A balance that is exactly zero has no logarithm: its points are at the lower edge.
         check.semilogy(
             along, np.maximum(fraction, 1e-2 * precision), color=style.RED, linewidth=1.2
@@ -222,10 +222,10 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
     columns = min(len(chosen), 3 if height < 0.8 * width else 4)
     rows = -(-len(chosen) // columns)
     with picture((4.0 * columns, rows * (4.0 * height / width + 0.5))) as figure:
-        grid = np.ravel(figure.subplots(rows, columns, squeeze=False))
-        for axes in grid:
+        numbering = np.ravel(figure.subplots(rows, columns, squeeze=False))
+        for axes in numbering:
             axes.set_axis_off()
-        for k, swing, canvas, axes in zip(chosen, swings, stages, grid, strict=False):
+        for k, swing, canvas, axes in zip(chosen, swings, stages, numbering, strict=False):
             forward, backward = canvas.shape(0), canvas.shape(1)
             draw_undeformed(axes, swing, canvas)
             draw_beams(axes, swing, backward.nodes, color=SKY, linewidth=1.6, zorder=2)
@@ -325,7 +325,7 @@ def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = 
     index, solution = list(style.RESULTANTS).index(quantity), extremes.solution
     reached = [(beam, extremes.section_forces(beam)) for beam in solution.scene.beams]
     diagrams = [
-        (beam, values[:, index].reshape(len(solution.grid.cells_of(beam)), -1))
+        (beam, values[:, index].reshape(len(solution.numbering.cells_of(beam)), -1))
         for beam, extent in reached
         for values in (extent.high, extent.low)
     ]
@@ -358,13 +358,13 @@ def draw_study(study: Study) -> Figure:
         raise ArgumentError("plot: the study has no results over numbers of its cases")
     rows, columns = len(study.results), len(varied)
     with picture((max(6.0, 4.0 * columns), max(4.0, 2.6 * rows))) as figure:
-        grid = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
-        for panels, (result, values) in zip(grid, study.results.items(), strict=True):
+        numbering = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
+        for panels, (result, values) in zip(numbering, study.results.items(), strict=True):
             sizes = np.abs(values.reshape(len(study), -1)).max(axis=1)
             panels[0].set_ylabel(result)
             for axes, x in zip(panels, varied.values(), strict=True):
                 axes.plot(x, sizes if values.ndim > 1 else values, "o", color=BLUE, ms=5.0)
-        for axes, name in zip(grid[-1], varied, strict=True):
+        for axes, name in zip(numbering[-1], varied, strict=True):
             axes.set_xlabel(name)
     return figure
 

@@ -128,19 +128,19 @@ class Canvas:
     @property
     def undeformed(self) -> DeformedShape:
         """DeformedShape of the undeformed scene."""
-        nodes = np.empty((0, 2)) if self._solution is None else self._solution.grid.points
+        nodes = np.empty((0, 2)) if self._solution is None else self._solution.numbering.points
         return DeformedShape(self, lambda place: np.zeros(3), nodes)
 
     def shape(self, n: int) -> DeformedShape:
         """Return the shape at the n-th kept time of the solution, or raise ArgumentError."""
         assert self._solution is not None
-        grid, number = self._solution.grid, len(self._solution.times)
+        numbering, number = self._solution.numbering, len(self._solution.times)
         if not -number <= n < number:
             raise ArgumentError(
                 f"n = {n}: the solution kept {number} times; give {-number} to {number - 1}"
             )
         state = self._solution.part(n % number, n % number + 1)
-        nodes = grid.points + self.magnify * state.q[0, grid.dofs[:, :2]]
+        nodes = numbering.points + self.magnify * state.q[0, numbering.dofs[:, :2]]
         return DeformedShape(self, lambda place: state.displacement(place)[0], nodes)
 
     def shapes(self) -> Iterator[DeformedShape]:

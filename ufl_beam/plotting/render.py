@@ -237,7 +237,7 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
             "pictures of solid bodies need PyVista; install it by: pip install ufl_beam[view]"
         ) from error
     solution, canvas, size = solids.solution, solids.canvas, solids.size
-    grid, beams = solution.grid, solution.scene.beams
+    numbering, beams = solution.numbering, solution.scene.beams
     largest = max(float(np.abs(solids.values(n)).max(initial=0.0)) for n in set(solids.shown))
     factor, prefix = style.decimal_prefix(largest)
     limit, (words, unit) = largest / factor or 1.0, QUANTITIES[solids.quantity]
@@ -255,7 +255,9 @@ def _frames(solids: Solids, camera: Camera) -> Generator[Any, None, None]:
             plotter.set_background("white")
             plotter.enable_anti_aliasing("msaa")
             if beams:
-                undeformed = _lines([grid.points[grid.vertices_of(beam)] for beam in beams])
+                undeformed = _lines(
+                    [numbering.points[numbering.vertices_of(beam)] for beam in beams]
+                )
                 plotter.add_mesh(undeformed, color="#A0A0A0", reset_camera=False)
                 plotter.add_text(f"{words} ({prefix}{unit})", position=(0.02, 0.025), **text)
             for n in solids.shown:
@@ -336,9 +338,9 @@ class Solids:
 
     def values(self, n: int) -> Array:
         """Return values of the colours at both ends of all cells; (num_cells, 2)."""
-        solution, grid = self.solution, self.solution.grid
+        solution, numbering = self.solution, self.solution.numbering
         if self.quantity == "rotation":
-            return np.asarray(solution.q[n][grid.dofs[grid.cells, 2]])
+            return np.asarray(solution.q[n][numbering.dofs[numbering.cells, 2]])
         index = list(RESULTANTS).index(self.quantity)
         beams = solution.scene.beams
         forces = [solution.diagram(beam, n, points=2)[1 + index] for beam in beams]
@@ -351,15 +353,15 @@ class Solids:
         """
         from pyvista import CellType, UnstructuredGrid
 
-        grid = self.solution.grid
-        vertices = np.arange(grid.cells.max(initial=-1) + 1)
-        along = unit_vectors(np.diff(grid.points[grid.cells], axis=1)[:, 0])
+        numbering = self.solution.numbering
+        vertices = np.arange(numbering.cells.max(initial=-1) + 1)
+        along = unit_vectors(np.diff(numbering.points[numbering.cells], axis=1)[:, 0])
         sizes = np.reshape([self.thickest([beam]) for beam in self.solution.scene.beams], (-1, 2))
         mean, halves = np.zeros((len(vertices), 2)), np.zeros((len(vertices), 2))
-        for end in grid.cells.T:
+        for end in numbering.cells.T:
             mean[end] += along  # no vertex is the same end of two cells
-            halves[end] = sizes[grid.beam_of_cell] / 2
-        angle = np.arctan2(mean[:, 1], mean[:, 0]) + self.solution.q[n][grid.dofs[vertices, 2]]
+            halves[end] = sizes[numbering.beam_of_cell] / 2
+        angle = np.arctan2(mean[:, 1], mean[:, 0]) + self.solution.q[n][numbering.dofs[vertices, 2]]
         depth, width = halves.T
         left = depth[:, None] * normal(directions(angle))
         corners = np.stack(  # of cross-sections; (num_vertices, 4, 3)
@@ -369,7 +371,7 @@ class Solids:
             ],
             axis=1,
         )
-        points = corners[grid.cells].reshape(-1, 3)  # for each cell, as colours may jump
+        points = corners[numbering.cells].reshape(-1, 3)  # for each cell, as colours may jump
         hexahedra = {CellType.HEXAHEDRON: np.arange(len(points)).reshape(-1, 8)}
         mesh = UnstructuredGrid(hexahedra, points)
         mesh.point_data["values"] = np.repeat(self.values(n) / factor, 4)

@@ -13,7 +13,7 @@ import ufl
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import mass_form
 from ufl_beam.errors import ModelError
 from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
@@ -29,10 +29,10 @@ from ufl_beam.mechanics.time_schemes import (
 from ufl_beam.model.fibres import Layout
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
 from ufl_beam.reference.cell_forms import (
+    Archive,
     CellForce,
     Cells,
     Force,
-    Memory,
     Response,
     Setting,
     lumps,
@@ -47,7 +47,7 @@ class ElasticBeams(CellForce):
     inner = True
 
     def __init__(self, indices: Index, setting: Setting) -> None:
-        cells, scheme = Cells(setting.grid, indices), setting.scheme
+        cells, scheme = Cells(setting.numbering, indices), setting.scheme
         element = cells.element
         C, e0, e1 = (
             element.stiffness,
@@ -71,7 +71,7 @@ class ElasticBeams(CellForce):
         super().__init__(
             cells, virtual_work(r, w_e) * element.dx(1), setting, stored=energy, lost=lost
         )
-        points = len(setting.grid.mesh.point_weights)
+        points = len(setting.numbering.mesh.point_weights)
         self._last_change: Array = np.zeros((len(indices), points, 3))
         self._last_dt = math.inf
 
@@ -91,12 +91,14 @@ class ElasticBeams(CellForce):
             self._last_change = self.cells.strains(q1) - self.cells.strains(step.q0)
             self._last_dt = step.dt
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the changes of the strains in the last step, and its length."""
         if self._decays:
             n = len(self._last_change)
             rows = self._last_change.reshape(n, -1), np.full(n, self._last_dt)
-            restored = memory.rows("changes of strains", self.cells.numbers, np.column_stack(rows))
+            restored = archive.rows(
+                "changes of strains", self.cells.cell_indices, np.column_stack(rows)
+            )
             self._last_change = restored[:, :-1].reshape(self._last_change.shape)
             self._last_dt = float(restored[0, -1])
 
@@ -111,7 +113,7 @@ class YieldingBeams(CellForce):
     inner = True
 
     def __init__(self, indices: Index, layout: Layout, setting: Setting) -> None:
-        cells, grid = Cells(setting.grid, indices), setting.grid
+        cells, numbering = Cells(setting.numbering, indices), setting.numbering
         element, self._hinges = cells.element, layout.hinges
         self._r, self._b, self._D = (
             element.at_points(3),
@@ -122,8 +124,10 @@ class YieldingBeams(CellForce):
         linear = self._b + ufl.dot(self._D, strain(element.q1, element.axis))
         work, around = (virtual_work(r, w_e) * element.dx(1) for r in (self._r, linear))
         super().__init__(cells, work, setting, around=around)
-        self._names = [grid.describe_cell(number) for number in cells.numbers]
-        self.points = MaterialPoints(layout, grid.keys(cells.numbers), cells.lengths, setting)
+        self._names = [numbering.describe_cell(number) for number in cells.cell_indices]
+        self.points = MaterialPoints(
+            layout, numbering.keys(cells.cell_indices), cells.lengths, setting
+        )
 
     def respond(self, step: Step, q1: Array) -> Response:
         """Return the work of the resultants of the return map, with its consistent tangent."""
@@ -152,32 +156,32 @@ class YieldingBeams(CellForce):
         """Stored energies of the points."""
         return self.points.stored
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the internal variables of all points."""
-        self.points.state(memory.rows("cells", self.cells.numbers, self.points.state()))
+        self.points.state(archive.rows("cells", self.cells.cell_indices, self.points.state()))
 
     def material(self) -> Array:
         """Return the numbers of the cells, and their data for solutions; (num_cells, 7)."""
         data = self.points.kept.copy()
         data[:, 3] *= self._hinges  # a crack of one fibre is no rotation
-        return np.column_stack([self.cells.numbers, data])
+        return np.column_stack([self.cells.cell_indices, data])
 
 
-def inelastic_cells(grid: Grid) -> dict[Layout, Index]:
+def inelastic_cells(numbering: DofNumbering) -> dict[Layout, Index]:
     """Return layouts of material points that can yield or break, and their cells."""
-    sections, section_indices = grid.sections
+    sections, section_indices = numbering.sections
     groups: dict[Layout, list[int]] = {}
     for number, section in enumerate(sections):
         layout = section.layout(section.hinge)
         if layout is not None and not layout.elastic:
-            if grid.mesh.degree > 1:
-                beam = grid.scene.beams[int(np.argmax(section_indices == number))]
+            if numbering.mesh.degree > 1:
+                beam = numbering.scene.beams[int(np.argmax(section_indices == number))]
                 raise ModelError(
-                    f"Mesh: degree = {grid.mesh.degree} is for elastic beams, and {beam.name} "
+                    f"Mesh: degree = {numbering.mesh.degree} is for elastic beams, and {beam.name} "
                     "may yield or break; use degree=1 with more cells, or an elastic section"
                 )
             groups.setdefault(layout, []).append(number)
-    cell_sections = section_indices[grid.beam_of_cell]
+    cell_sections = section_indices[numbering.beam_of_cell]
     return {
         layout: np.flatnonzero(np.isin(cell_sections, group)) for layout, group in groups.items()
     }
@@ -194,10 +198,10 @@ class Mass:
         cells: Cells of the beams.
     """
 
-    def __init__(self, grid: Grid) -> None:
-        self.cells = cells = Cells(grid, np.arange(len(grid.cells)))
-        form, diagonal = mass_form(cells.element), np.zeros(grid.size)
-        for dofs, mass, inertia in lumps(grid):
+    def __init__(self, numbering: DofNumbering) -> None:
+        self.cells = cells = Cells(numbering, np.arange(len(numbering.cells)))
+        form, diagonal = mass_form(cells.element), np.zeros(numbering.size)
+        for dofs, mass, inertia in lumps(numbering):
             np.add.at(diagonal, dofs, [mass, mass, inertia])
         self.matrix = cells.form(form).assembled() + csr_array(scipy.sparse.diags_array(diagonal))
         self._beam_form = cells.form(ufl.action(form, cells.element.q1))
@@ -220,8 +224,8 @@ class MatrixForce(Force):
     inertia: Inertia
 
     def __init__(self, setting: Setting, scheme: DynamicScheme, matrix: csr_array) -> None:
-        self.size, self.scheme, self.matrix = setting.grid.size, scheme, matrix
-        self.ledger, self._rotations = setting.ledger, setting.grid.rotations.astype(np.int32)
+        self.size, self.scheme, self.matrix = setting.numbering.size, scheme, matrix
+        self.ledger, self._rotations = setting.ledger, setting.numbering.rotations.astype(np.int32)
 
     def respond(self, step: Step, q1: Array) -> Response:
         """Return forces; the scheme decides whether the step of a rotation is 2 tan(Δψ/2) or Δψ."""
@@ -251,7 +255,7 @@ class Inertia(MatrixForce):
     row = "inertia"
 
     def __init__(self, setting: Setting, scheme: DynamicScheme, v: Array) -> None:
-        self.mass, self.inertia = Mass(setting.grid), self
+        self.mass, self.inertia = Mass(setting.numbering), self
         super().__init__(setting, scheme, self.mass.matrix)
         self.v, self.v_before, self.more, self.last_dt = v, v, tuple[Array, ...](), math.inf
         if scheme.coefficients(1.0, 1.0, len(scheme.kept)).slip is not None:
@@ -276,14 +280,14 @@ class Inertia(MatrixForce):
         """Compute the kinetic energy of the velocities."""
         self.stored = {"kinetic": float(self.v @ (self.matrix @ self.v)) / 2}
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the further rates of the scheme."""
         pairs = zip_longest(self.scheme.kept, self.more)
-        more = [memory.vector(name, known) for name, known in pairs]
+        more = [archive.vector(name, known) for name, known in pairs]
         self.more = tuple(known for known in more if known is not None)
         if isinstance(self.scheme, EnergyMomentumDecaying):
-            self.v_before = memory.vector("velocity before", self.v_before)
-            last = memory.vector("last step", np.full(self.size, self.last_dt))
+            self.v_before = archive.vector("velocity before", self.v_before)
+            last = archive.vector("last step", np.full(self.size, self.last_dt))
             self.last_dt = float(last[0])
 
 
@@ -315,7 +319,7 @@ class KelvinVoigtForce(CellForce):
     """Kelvin-Voigt damping: resultants C Δe times the retardation time over the step length."""
 
     def __init__(self, damping: KelvinVoigt, indices: Index, setting: Setting) -> None:
-        cells = Cells(setting.grid, indices)
+        cells = Cells(setting.numbering, indices)
         element, self._time, self._rate = (
             cells.element,
             damping.retardation_time,
@@ -336,12 +340,14 @@ class KelvinVoigtForce(CellForce):
 def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:
     """Return the forces of all damping in a scene."""
     forces: list[Force] = []
-    for damping in setting.grid.scene.damping:
+    for damping in setting.numbering.scene.damping:
         setting.loses("damping")
         if isinstance(damping, KelvinVoigt):
-            beams = setting.grid.scene.beams if damping.beams is None else damping.beams
+            beams = setting.numbering.scene.beams if damping.beams is None else damping.beams
             # Cells with a hinge are left out, so that an open hinge turns freely.
-            cells = [setting.grid.cells_of(beam) for beam in beams if beam.section.hinge is None]
+            cells = [
+                setting.numbering.cells_of(beam) for beam in beams if beam.section.hinge is None
+            ]
             if cells:
                 indices = np.unique(np.concatenate(cells))
                 forces.append(KelvinVoigtForce(damping, indices, setting))

@@ -20,7 +20,7 @@ from scipy.sparse import csr_array
 from ufl.algorithms import expand_derivatives
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Element
 from ufl_beam.dolfinx_compat import compile_form, fem, jit_directory, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
@@ -63,7 +63,7 @@ class Search:
 class Setting:
     """Arguments of all forces and laws of a scene."""
 
-    grid: Grid
+    numbering: DofNumbering
     scheme: Scheme
     asked: Mapping[Connector, float]  # forces of controllers, limits of friction
     rates: Mapping[Connector, float]  # of motions with friction at the beginning of a step
@@ -78,7 +78,7 @@ class Setting:
 
 
 @dataclass
-class Memory:
+class Archive:
     """Internal variables, by the names of :attr:`Solution.internal`.
 
     Each force has a method ``remember`` that both saves and restores its variables.
@@ -98,7 +98,7 @@ class Memory:
         return self.restored.get(name, values)
 
     def rows(self, name: str, indices: Index, rows: Array) -> Array:
-        """Save rows with numbers of cells or links; return them, replaced by restored rows."""
+        """Save rows with numbers of cells or connectors; return them, replaced by restored rows."""
         name, result = f"{name}, {rows.shape[1]}", rows.copy()
         self.saved[name].append(np.column_stack([indices, rows]))
         if name in self.restored:
@@ -145,7 +145,7 @@ class Force:
     def start(self, q: Array) -> None:
         """Begin at a configuration without a step."""
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore internal variables."""
 
 
@@ -214,16 +214,23 @@ class Cells:
         at: Number in the scene of each degree of freedom of the mesh.
     """
 
-    def __init__(self, grid: Grid, indices: Index) -> None:
-        mesh, order = separate_cells(grid.points[grid.cells[indices]])
-        self.numbers, self.size, self._grid = indices[order], grid.size, grid
-        self.lengths, self.element = grid.lengths(self.numbers), Element(grid.mesh, mesh)
-        element, self._weights = self.element, np.asarray(grid.mesh.point_weights)
+    def __init__(self, numbering: DofNumbering, indices: Index) -> None:
+        mesh, order = separate_cells(numbering.points[numbering.cells[indices]])
+        self.cell_indices, self.size, self._numbering = indices[order], numbering.size, numbering
+        self.lengths, self.element = (
+            numbering.lengths(self.cell_indices),
+            Element(numbering.mesh, mesh),
+        )
+        element, self._weights = self.element, np.asarray(numbering.mesh.point_weights)
         self._dofs = cell_dofs(element.space)
-        scene_dofs = grid.dofs[grid.nodes_of_cells[self.numbers]]  # (num_cells, nodes, 3)
+        scene_dofs = numbering.dofs[
+            numbering.nodes_of_cells[self.cell_indices]
+        ]  # (num_cells, nodes, 3)
         self.at: Index = np.empty(self._dofs.size, dtype=np.int64)
         self.at[self._dofs] = scene_dofs.transpose(0, 2, 1).reshape(self._dofs.shape)
-        sections = [grid.scene.beams[i].section for i in grid.beam_of_cell[self.numbers]]
+        sections = [
+            numbering.scene.beams[i].section for i in numbering.beam_of_cell[self.cell_indices]
+        ]
         put(element.stiffness, np.array([(s.EA, s.GA, s.EI) for s in sections]))
         put(element.inertia, np.array([(s.rhoA, s.rhoI) for s in sections]))
 
@@ -244,29 +251,29 @@ class Cells:
         self.set(self.element.q1, q)
         space = self.element.at_points(3).function_space
         weighted = self._strains.assembled()[cell_dofs(space)]
-        strains = weighted.reshape(len(self.numbers), -1, 3) / self._weights.reshape(-1, 1)
+        strains = weighted.reshape(len(self.cell_indices), -1, 3) / self._weights.reshape(-1, 1)
         return np.asarray(strains)
 
     def on_nodes(self, kind: str, values: Array) -> Array:
         """Return a vector on the nodes of the cells, see :func:`end_forces`."""
-        forces = values[self._dofs].reshape(len(self.numbers), 3, self._dofs.shape[1] // 3)
-        return end_forces(self._grid, kind, self.numbers, forces)
+        forces = values[self._dofs].reshape(len(self.cell_indices), 3, self._dofs.shape[1] // 3)
+        return end_forces(self._numbering, kind, self.cell_indices, forces)
 
 
-def end_forces(grid: Grid, kind: str, cells: Index, forces: Array) -> Array:
+def end_forces(numbering: DofNumbering, kind: str, cells: Index, forces: Array) -> Array:
     """Return forces at both ends of all cells, and moments of their distribution; (9, num_cells).
 
     The rows are (X, Y, M) at the start and at the end, the couple of the load along a cell, and
     first moments of its forces about the middle, over the length.
 
     Args:
-        grid: Numbering of the scene.
+        numbering: Numbering of the scene.
         kind: "stress"; "work" of a user; "density" along the whole cell.
         cells: Numbers of cells.
         forces: Forces on the nodes; (len(cells), 3, nodes of a cell); N, N, N m.
     """
-    table = np.zeros((9, len(grid.cells)))
-    first, *between, last = grid.mesh.nodes - 0.5
+    table = np.zeros((9, len(numbering.cells)))
+    first, *between, last = numbering.mesh.nodes - 0.5
     table[:3, cells], table[3:6, cells] = forces[:, :, 0].T, forces[:, :, 1].T
     if kind != "stress":
         table[6, cells] = forces[:, 2].sum(axis=1)
@@ -336,10 +343,14 @@ class CellForce(Force):
 # -- scenes --------------------------------------------------------------------------------------
 
 
-def lumps(grid: Grid) -> list[tuple[Index, float, float]]:
+def lumps(numbering: DofNumbering) -> list[tuple[Index, float, float]]:
     """Return dofs, mass and inertia of point masses and rigid bodies; (3,), kg, kg m²."""
-    masses = [(grid.node(mass.place), mass.mass, mass.inertia) for mass in grid.scene.masses]
-    bodies = [(grid.node(body.middle), body.mass, body.inertia) for body in grid.scene.bodies]
+    masses = [
+        (numbering.node(mass.place), mass.mass, mass.inertia) for mass in numbering.scene.masses
+    ]
+    bodies = [
+        (numbering.node(body.middle), body.mass, body.inertia) for body in numbering.scene.bodies
+    ]
     return masses + bodies
 
 

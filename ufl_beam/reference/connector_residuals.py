@@ -19,9 +19,9 @@ from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import REACH, nearest, parameter_step, tangent
 from ufl_beam.reference.cell_forms import (
+    Archive,
     Force,
     Form,
-    Memory,
     Response,
     Setting,
     cell_dofs,
@@ -42,7 +42,7 @@ class Linked(Force):
     """Base of connectors, whose forces are unknowns of the scene.
 
     Attributes:
-        numbers: Indices of the connectors in the links of the scene.
+        indices: Indices of the connectors in :attr:`Scene.all_connectors`.
         forces_at: Degrees of freedom of their forces.
         before: Forces at the end of the last step.
         at_rest: Forces of the laws in the undeformed scene.
@@ -51,10 +51,10 @@ class Linked(Force):
     inner = True
 
     def __init__(self, indices: Index, setting: Setting) -> None:
-        grid, self.setting = setting.grid, setting
-        self.size, self.numbers = grid.size, indices
-        self.links: list[Connector] = [grid.scene.links[i] for i in indices]
-        self.dofs = grid.dofs_of_links[indices]
+        numbering, self.setting = setting.numbering, setting
+        self.size, self.indices = numbering.size, indices
+        self.connectors: list[Connector] = [numbering.scene.all_connectors[i] for i in indices]
+        self.dofs = numbering.dofs_of_connectors[indices]
         self.forces_at = self.dofs[:, 6]
         self.work, self.rate, self.before, self.at_rest = np.zeros((4, len(indices)))
 
@@ -66,10 +66,13 @@ class Connectors(Linked):
     """
 
     def __init__(self, motions: Sequence[str], indices: Index, setting: Setting) -> None:
-        n, k, size = len(indices), len(motions), setting.grid.size
+        n, k, size = len(indices), len(motions), setting.numbering.size
         mesh, order = separate_cells(np.tile([[0.0, 0.0], [1.0, 0.0]], (n // k, 1, 1)))
         super().__init__(indices.reshape(-1, k)[order].ravel(), setting)
-        self._k, self.laws = k, [law_in_step(link, setting) for link in self.links[::k]]
+        self._k, self.laws = (
+            k,
+            [law_in_step(connector, setting) for connector in self.connectors[::k]],
+        )
         self._forms = connector_forms(motions, setting.scheme, mesh)
         forms = self._forms
         self._at: Index = np.empty(n // k * (6 + k), dtype=np.int64)
@@ -80,11 +83,13 @@ class Connectors(Linked):
             Form(form, self._at, size)
             for form in (forms.work, forms.tangent, forms.motion, forms.rate)
         )
-        geometry = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.links]
+        geometry = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in self.connectors]
         put(forms.geometry, np.reshape(geometry, (-1, 8 * k)))
         by_cell = forms.motion.arguments()[0].ufl_function_space()
         self._cell_dofs = cell_dofs(by_cell).ravel()
-        self._length = np.where([link.turns for link in self.links], 1.0, setting.grid.scene.size)
+        self._length = np.where(
+            [connector.turns for connector in self.connectors], 1.0, setting.numbering.scene.size
+        )
         self._rows: Array = np.zeros((n, k + 2))
         self._e0: Array = np.zeros(n)
 
@@ -121,7 +126,7 @@ class Connectors(Linked):
 
         The round-off of a row by motions does not count.
         """
-        size = self.setting.grid.scene.size
+        size = self.setting.numbering.scene.size
         k, length = self._k, self._length.reshape(-1, self._k)
         amplitude, weight = moved / size, np.abs(self._rows[:, k])
         slopes = np.repeat([law.slope for law in self.laws], k)
@@ -175,16 +180,16 @@ class Connectors(Linked):
         """Return the columns of ``Connection``; (num_links, columns)."""
         each = zip(self.laws, self._by_connector(self._e0), strict=True)
         e = np.ravel([law.z.get("start", e) for law, e in each])
-        dissipated = np.zeros(len(self.links))
+        dissipated = np.zeros(len(self.connectors))
         dissipated[:: self._k] = [law.z.get("dissipated", 0.0) for law in self.laws]
         return np.column_stack([e, q[self.forces_at], self.work, self.rate, dissipated])
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore works, rates, forces, motions and internal variables, by kind of law."""
-        for i in range(len(self.links)):
+        for i in range(len(self.connectors)):
             law = self.laws[i // self._k]
             row = np.array([self.work[i], self.rate[i], self.before[i], self._e0[i], *law.state()])
-            row = memory.rows(law.saved_as, self.numbers[i : i + 1], row[None])[0]
+            row = archive.rows(law.saved_as, self.indices[i : i + 1], row[None])[0]
             self.work[i], self.rate[i], self.before[i], self._e0[i] = row[:4]
             law.state(row[4:])
 
@@ -199,10 +204,14 @@ class GuideForce(Linked):
 
     def __init__(self, number: int, setting: Setting) -> None:
         super().__init__(np.array([number]), setting)
-        link = self.links[0]
-        assert isinstance(link.law, Guide)
-        self._place, self._curve, self._size = link.b, link.law.curve, setting.grid.scene.size
-        self._point = self._on0 = np.array(link.b.point)
+        connector = self.connectors[0]
+        assert isinstance(connector.law, Guide)
+        self._place, self._curve, self._size = (
+            connector.b,
+            connector.law.curve,
+            setting.numbering.scene.size,
+        )
+        self._point = self._on0 = np.array(connector.b.point)
         self._x, self._λ = self.dofs[0, [1, 3]], self.dofs[0, 6]
         self._over_step = setting.scheme.average(0.0, 1.0) != 1.0
         last_digit = np.spacing(self._size + np.abs(self._point).max())
@@ -268,10 +277,10 @@ class GuideForce(Linked):
             self._distance = math.nan
         return np.array([[self._distance, q[self._λ], 0.0, 0.0, 0.0]])
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the point on the curve, its parameter, and its step for tangents."""
         row = np.array([[self._distance, self._s, self._s0, self._step, *self._on0]])
-        (row,) = memory.rows("guides", self.numbers, row)
+        (row,) = archive.rows("guides", self.indices, row)
         self._distance, self._s, self._s0, self._step = map(float, row[:4])
         self._on0 = row[4:]
 
@@ -281,13 +290,15 @@ def all_connectors(setting: Setting) -> list[Connectors | GuideForce]:
     connectors: list[Connectors | GuideForce] = []
     kinds: dict[tuple[str, ...], list[int]] = {(motion,): [] for motion in MOTIONS}
     kinds |= {("sliding", "sliding", "turning")[:k]: [] for k in (2, 3)}
-    for i, link in enumerate(setting.grid.scene.links):
-        if isinstance(link.law, Guide):
+    for i, connector in enumerate(setting.numbering.scene.all_connectors):
+        if isinstance(connector.law, Guide):
             continue
-        k = link.law.components if isinstance(link.law, ConnectorLaw) else 1
-        kinds[(link.motion,) if k == 1 else ("sliding", "sliding", "turning")[:k]].append(i)
+        k = connector.law.components if isinstance(connector.law, ConnectorLaw) else 1
+        kinds[(connector.motion,) if k == 1 else ("sliding", "sliding", "turning")[:k]].append(i)
     for motions, indices in kinds.items():
         if indices:
             connectors.append(Connectors(motions, np.array(indices), setting))
-    guides = (i for i, x in enumerate(setting.grid.scene.links) if isinstance(x.law, Guide))
+    guides = (
+        i for i, x in enumerate(setting.numbering.scene.all_connectors) if isinstance(x.law, Guide)
+    )
     return [*connectors, *(GuideForce(i, setting) for i in guides)]

@@ -81,10 +81,10 @@ class LawInStep:
     slope = 1.0
     _row: Row
 
-    def __init__(self, link: Connector, setting: Setting) -> None:
-        self.link, self.setting, self.e0, self.dt = link, setting, 0.0, 1.0
-        self.law: Any = link.law
-        self.length = 1.0 if link.turns else setting.grid.scene.size  # scale of motions
+    def __init__(self, connector: Connector, setting: Setting) -> None:
+        self.connector, self.setting, self.e0, self.dt = connector, setting, 0.0, 1.0
+        self.law: Any = connector.law
+        self.length = 1.0 if connector.turns else setting.numbering.scene.size  # scale of motions
         self.z: dict[str, float] = {}
         self.stored: dict[str, float] = {}
         self.opens: Any = None
@@ -136,7 +136,7 @@ class LawInStep:
         """
         θ, e0, e1 = self.setting.scheme.theta, np.atleast_1d(self.e0), np.atleast_1d(e1)
         both = (1 - θ) * e0 + θ * e1, (e1 - e0) / self.dt
-        e, rate = (self.law.given([*values[:, None]]) for values in both)
+        e, rate = (self.law.as_argument([*values[:, None]]) for values in both)
         z = {name: np.array([self.z[f"state {name}"]]) for name in self.law.variables}
         if fraction and z:
             changes = self.law.increments(e, rate, State(z), θ * self.dt)
@@ -172,26 +172,28 @@ class _Known(LawInStep):
         Damper: ("lost", "damping", 1.0, "_Damped"),
     }
 
-    def __init__(self, link: Connector, setting: Setting) -> None:
+    def __init__(self, connector: Connector, setting: Setting) -> None:
         joint = "lost", "", 1.0, "_Held"  # a joint: no motion, no work
-        kind = joint if link.law is HELD else self.KINDS[type(link.law)]
+        kind = joint if connector.law is HELD else self.KINDS[type(connector.law)]
         self.account, self.entry, self.sign, self.saved_as = kind
-        super().__init__(link, setting)
+        super().__init__(connector, setting)
         self.z = {"reached": 0.0} if isinstance(self.law, PrescribedForce | Controller) else {}
 
     def begin(self, e0: float, step: Step) -> None:
-        law, link = self.law, self.link
+        law, connector = self.law, self.connector
         if law is HELD:
             self._row = 1.0, 0.0, 0.0
         elif isinstance(law, PrescribedMotion):
-            wanted = value_at(law.motion, step.motion_time, link)
+            wanted = value_at(law.motion, step.motion_time, connector)
             self._row = 1.0, 0.0, e0 + step.fraction * (wanted - e0)
         elif isinstance(law, Damper):
             factor = law.viscosity / step.dt
             self._row = -factor, 1.0, -factor * e0
         else:  # a controller is called at the beginning of the step
-            controlled, reached = self.setting.asked.get(link), self.z["reached"]
-            wanted = value_at(law.force, step.load_time, link) if controlled is None else controlled
+            controlled, reached = self.setting.asked.get(connector), self.z["reached"]
+            wanted = (
+                value_at(law.force, step.load_time, connector) if controlled is None else controlled
+            )
             growth = step.fraction * (-wanted - reached)
             self._row, self._end = (0.0, 1.0, reached + step.at * growth), reached + growth
 
@@ -207,8 +209,8 @@ class _Known(LawInStep):
 class _EnergyLaw(LawInStep):
     """Law with an energy and a resistance, such as a stop."""
 
-    def __init__(self, link: Connector, setting: Setting) -> None:
-        super().__init__(link, setting)
+    def __init__(self, connector: Connector, setting: Setting) -> None:
+        super().__init__(connector, setting)
         scheme = setting.scheme
         self._load_weight, self._θ = scheme.load_weight, scheme.theta
         self._delayed = scheme.weight_of_before == 0 and self._load_weight > 0.5
@@ -216,7 +218,7 @@ class _EnergyLaw(LawInStep):
             setting.loses("numerical")
 
     def _energy(self, e: Motions, z: State) -> Any:
-        return np.sum(self.law.energy(self.law.given([*np.atleast_1d(e)[:, None]]), z))
+        return np.sum(self.law.energy(self.law.as_argument([*np.atleast_1d(e)[:, None]]), z))
 
     def _elastic(self, e: Array, z: State) -> Array:
         """Return derivatives of the energy by the motions; (k,)."""
@@ -283,8 +285,8 @@ class _SpringLaw(LawInStep):
 
     saved_as = "_Sprung"
 
-    def __init__(self, link: Connector, setting: Setting) -> None:
-        super().__init__(link, setting)
+    def __init__(self, connector: Connector, setting: Setting) -> None:
+        super().__init__(connector, setting)
         law, softening = self.law.law or ElastoPlastic(yield_limit=np.inf), self.law.softening
         layout = Layout(
             strains=np.eye(1, 3), weights=np.ones(1), stiffness=np.array([self.law.stiffness]),
@@ -301,7 +303,7 @@ class _SpringLaw(LawInStep):
         return -D, 1.0, f - D * e1
 
     def change(self, e1: float, work: float) -> float:
-        self._points.require_dissipation([str(self.link)])
+        self._points.require_dissipation([str(self.connector)])
         return self._points.change()
 
     def accept(self, e1: float, work: float) -> None:
@@ -336,8 +338,8 @@ class _Friction(LawInStep):
 
     entry, saved_as = "friction", "_Rubbing"
 
-    def __init__(self, link: Connector, setting: Setting) -> None:
-        super().__init__(link, setting)
+    def __init__(self, connector: Connector, setting: Setting) -> None:
+        super().__init__(connector, setting)
         self.z = {"slip": 0.0, **self.z}
         self.excess, self.released = 0.0, False
         if isinstance(self.law, ConnectorLaw):
@@ -348,12 +350,12 @@ class _Friction(LawInStep):
         if self.opens:
             self._limit = max(float(np.sum(self.law.limit(self.after(e0, 0.0)[2]))), 0.0)
         else:
-            self._limit = self.setting.asked[self.link]
+            self._limit = self.setting.asked[self.connector]
         softness = CREEP * self.length * self.setting.friction_repeats
         self._creep = softness / self._limit if self._limit > 0 else 0.0
         # With this motion the velocity at the end is zero; without motion it would return reversed.
         self._rest_motion = (
-            increment_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.link]
+            increment_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.connector]
         )
         self._direction, self._against, self._guessed = self.z["slip"], False, True
 
@@ -415,9 +417,13 @@ class _Slipping(LawInStep):
 
     saved_as = "CompiledSlips"
 
-    def __init__(self, link: Connector, setting: Setting) -> None:
-        super().__init__(link, setting)
-        law, self.opens, self.slope = law_of(link), self, _slope(link, setting.grid.scene.size)
+    def __init__(self, connector: Connector, setting: Setting) -> None:
+        super().__init__(connector, setting)
+        law, self.opens, self.slope = (
+            law_of(connector),
+            self,
+            _slope(connector, setting.numbering.scene.size),
+        )
         self._law, self._parameters = law, {name: float(x) for name, x in parameters(law).items()}
         self.z = {"slipped": 0.0, "start": 0.0, "limit": float(law.limit), "back force": 0.0}
         self.z |= {"dissipated": 0.0, "way": 0.0, "stored": 0.0}
@@ -488,18 +494,20 @@ class _Slipping(LawInStep):
         return 0.0
 
 
-def _slope(link: Connector, size: float) -> float:
+def _slope(connector: Connector, size: float) -> float:
     """Return the factor r of motions in the equation of a rigid-plastic connector.
 
     It exceeds the steepest softening, so that an open branch stays open.  It is so large that
     motions, not the round-off of forces, decide in which direction a weak hinge slips.
     """
-    law = law_of(link)
+    law = law_of(connector)
     if not 0.0 < law.limit < np.inf:
         return 1.0
     steepest, _ = law.steepest
-    early = law.limit / (REFERENCE_MOTION * (1.0 if link.turns else size))
-    least = LEAST_SLOPE * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
+    early = law.limit / (REFERENCE_MOTION * (1.0 if connector.turns else size))
+    least = (
+        LEAST_SLOPE * connector.a.beam.section.EI / size if isinstance(connector.a, Place) else 0.0
+    )
     return float(max(early, least) + (2 * steepest if steepest < np.inf else 0.0))
 
 
@@ -511,8 +519,8 @@ class _UserLaw(LawInStep):
 
     entry, saved_as = "functions", "AskedLaws"
 
-    def __init__(self, link: Connector, setting: Setting) -> None:
-        super().__init__(link, setting)
+    def __init__(self, connector: Connector, setting: Setting) -> None:
+        super().__init__(connector, setting)
         self.z = {str(i): float(x) for i, x in enumerate(self.law.state)}
         self.stored = {"stored": 0.0}
 
@@ -538,13 +546,13 @@ class _UserLaw(LawInStep):
                 after = np.array(after, dtype=np.float64).reshape(len(self.z))
             except (TypeError, ValueError):
                 raise ModelError(
-                    f"{self.link}: the function must return the force and the state, a list of "
-                    f"{len(self.z)} numbers"
+                    f"{self.connector}: the function must return the force and the state, a list "
+                    f"of {len(self.z)} numbers"
                 ) from None
-        force = require_returned(value, f"{self.link}: the function", at)
+        force = require_returned(value, f"{self.connector}: the function", at)
         for number in (force, *map(float, after)):
             if not math.isfinite(number):  # a shorter step may avoid this motion
-                raise NoNumber(f"{self.link}: the function returned {number} at {at}")
+                raise NoNumber(f"{self.connector}: the function returned {number} at {at}")
         return force, after
 
     def row(self, e1: float, λ: float) -> Row:
@@ -581,8 +589,8 @@ class _UserLaw(LawInStep):
     def start(self, e: float) -> float:
         """Compute the recoverable energy; J."""
         if self.law.stored is not None:
-            value = self.law.stored(e, **dict.fromkeys(self.law.asked_by_stored, self.state()))
-            subject, at = f"{self.link}: the energy", f"motion = {e:.6g}"
+            value = self.law.stored(e, **dict.fromkeys(self.law.stored_arguments, self.state()))
+            subject, at = f"{self.connector}: the energy", f"motion = {e:.6g}"
             self.stored = {"stored": require_returned(value, subject, at, finite=True)}
         return 0.0
 
@@ -594,8 +602,10 @@ LAWS: dict[type, type[LawInStep]] = {
 """Classes of laws in a step, by the class of a record or its base."""
 
 
-def law_in_step(link: Connector, setting: Setting) -> LawInStep:
+def law_in_step(connector: Connector, setting: Setting) -> LawInStep:
     """Return the law of a connector in a step."""
-    if isinstance(link.law, ConnectorLaw) and link.law.holds:
-        return _Friction(link, setting)
-    return next(LAWS[kind] for kind in type(link.law).__mro__ if kind in LAWS)(link, setting)
+    if isinstance(connector.law, ConnectorLaw) and connector.law.holds:
+        return _Friction(connector, setting)
+    return next(LAWS[kind] for kind in type(connector.law).__mro__ if kind in LAWS)(
+        connector, setting
+    )

@@ -21,10 +21,10 @@ from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoa
 from ufl_beam.model.works import Potential, Work
 from ufl_beam.reference.beam_residuals import Mass
 from ufl_beam.reference.cell_forms import (
+    Archive,
     CellForce,
     Cells,
     Force,
-    Memory,
     Response,
     Setting,
     coupled,
@@ -47,7 +47,7 @@ class LoadForce(Force, ABC):
     along: Array | float = 0.0
 
     def __init__(self, load: Load | RotatingFrame, setting: Setting) -> None:
-        self.size, self.load, self.scheme = setting.grid.size, load, setting.scheme
+        self.size, self.load, self.scheme = setting.numbering.size, load, setting.scheme
         self.time = (lambda t: 1.0) if isinstance(load, RotatingFrame) else load.amplitude
         self.force: Array = np.zeros(self.size)
         self._before: Array = self.force
@@ -88,24 +88,26 @@ class DeadLoad(LoadForce):
 
     def __init__(self, load: Load, setting: Setting) -> None:
         super().__init__(load, setting)
-        grid = setting.grid
-        scene, self._vector = grid.scene, np.zeros(grid.size)
+        numbering = setting.numbering
+        scene, self._vector = numbering.scene, np.zeros(numbering.size)
         per_beam = np.zeros((len(scene.beams), 3))
-        if isinstance(load, PointLoad) and carries(load.place):  # else Scene.links has connectors
-            np.add.at(self._vector, grid.node(load.place), [*load.force, load.moment])
+        if isinstance(load, PointLoad) and carries(
+            load.place
+        ):  # else Scene.all_connectors has connectors
+            np.add.at(self._vector, numbering.node(load.place), [*load.force, load.moment])
         elif isinstance(load, LineLoad):
             per_beam[scene.beams.index(load.beam)] = *load.force, load.moment
         elif isinstance(load, Gravity):
             per_beam[:, :2] = np.outer([b.section.rhoA for b in scene.beams], load.acceleration)
-            for dofs, mass, _ in lumps(grid):
+            for dofs, mass, _ in lumps(numbering):
                 np.add.at(self._vector, dofs[:2], mass * np.array(load.acceleration))
         elif not isinstance(load, PointLoad):
             raise TypeError(f"{type(load).__name__} is not a dead load")
-        cells, (first, *between, last) = np.arange(len(grid.cells)), grid.mesh.parts
-        total = per_beam[grid.beam_of_cell] * grid.lengths(cells)[:, None]
+        cells, (first, *between, last) = np.arange(len(numbering.cells)), numbering.mesh.fractions
+        total = per_beam[numbering.beam_of_cell] * numbering.lengths(cells)[:, None]
         along = total[:, :, None] * np.array([first, last, *between])  # (num_cells, 3, nodes)
-        np.add.at(self._vector, grid.dofs[grid.nodes_of_cells].transpose(0, 2, 1), along)
-        self.along = end_forces(grid, "density", cells, -along)
+        np.add.at(self._vector, numbering.dofs[numbering.nodes_of_cells].transpose(0, 2, 1), along)
+        self.along = end_forces(numbering, "density", cells, -along)
 
     def forces(self, q: Array) -> Response:
         """Return the consistent nodal forces."""
@@ -117,7 +119,10 @@ class Follower(LoadForce):
 
     def __init__(self, load: FollowerLoad, setting: Setting) -> None:
         super().__init__(load, setting)
-        self._dofs, self._unit_force = setting.grid.node(load.place), (*load.force, load.moment)
+        self._dofs, self._unit_force = (
+            setting.numbering.node(load.place),
+            (*load.force, load.moment),
+        )
 
     def forces(self, q: Array) -> Response:
         """Return (F_x, F_y, M) turned by the rotation."""
@@ -137,23 +142,30 @@ class FrameForce(LoadForce):
 
     def __init__(self, frame: RotatingFrame, setting: Setting, mass: Mass) -> None:
         super().__init__(frame, setting)
-        grid, self._Ω, self._mass, element = setting.grid, frame.rate, mass, mass.cells.element
+        numbering, self._Ω, self._mass, element = (
+            setting.numbering,
+            frame.rate,
+            mass,
+            mass.cells.element,
+        )
         self._double = 2 * self._Ω * has_inertia(setting.scheme)
-        self._translational: Array = np.ones(grid.size)
-        self._translational[grid.rotations] = 0.0
+        self._translational: Array = np.ones(numbering.size)
+        self._translational[numbering.rotations] = 0.0
         self._pull = csr_array(mass.matrix.multiply(self._Ω**2 * self._translational[:, None]))
-        nodes = np.concatenate([grid.dofs_of_bodies, grid.dofs])
+        nodes = np.concatenate([numbering.dofs_of_bodies, numbering.dofs])
         self._pairs = np.unique(nodes[:, :2], axis=0)  # degrees of freedom u, v of the nodes
         # Mass times a quarter turn; Coriolis' force is 2 Ω times it times the velocities.
         (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
         density = element.inertia[0] * ufl.dot(perpendicular(u), w_u)
         G = mass.cells.form(density * element.dx_of_mass()).assembled()
-        for (i, j, _), m, _ in lumps(grid):
-            G = G + coupled(grid.size, np.array([i, j]), np.array([j, i]), m * np.array([-1, 1]))
+        for (i, j, _), m, _ in lumps(numbering):
+            G = G + coupled(
+                numbering.size, np.array([i, j]), np.array([j, i]), m * np.array([-1, 1])
+            )
         self._gyro = csr_array(self._double * G)
-        centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
-        self._places: Array = np.zeros(grid.size)  # from the centre of rotation
-        self._places[nodes[:, :2]] = np.concatenate([centers, grid.points]) - frame.about
+        centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
+        self._places: Array = np.zeros(numbering.size)  # from the centre of rotation
+        self._places[nodes[:, :2]] = np.concatenate([centers, numbering.points]) - frame.about
 
     def forces(self, q: Array) -> Response:
         """Return the centrifugal forces at the positions of the nodes."""
@@ -183,9 +195,11 @@ class WorkForce(CellForce):
     """
 
     def __init__(self, work: Work, setting: Setting, t0: float) -> None:
-        grid, scheme, supplied = setting.grid, setting.scheme, setting.ledger.supplied
-        indices = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
-        cells = Cells(grid, indices)
+        numbering, scheme, supplied = setting.numbering, setting.scheme, setting.ledger.supplied
+        indices = np.concatenate(
+            [numbering.cells_of(beam) for beam in work.on(numbering.scene.beams)]
+        )
+        cells = Cells(numbering, indices)
         self._forms = forms = statement(work, cells.element, scheme)
         energy = None if forms.energy is None else (forms.energy, work.name)
         lost = None if forms.lost is None else (forms.lost, "numerical")
@@ -193,7 +207,7 @@ class WorkForce(CellForce):
         self._work, self._scheme = work, scheme
         self._varies, self._is_potential = forms.varies(work), isinstance(work, Potential)
         self._t, self._grown = t0, 0.0
-        self.force: Array = np.zeros(grid.size)
+        self.force: Array = np.zeros(numbering.size)
         self._before: Array = self.force
         if not self._is_potential:
             supplied[work.name] += 0.0
@@ -249,23 +263,23 @@ class WorkForce(CellForce):
         self.force = self._before = -self.work.joined(self.work.assembled())
         return self.force
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the forces of the last step if they depend on its motion."""
         if self._work.takes_rates and self._scheme.weight_of_before and not self._is_potential:
-            self._before = memory.vector(f"work of {self._work.name}", self._before)
+            self._before = archive.vector(f"work of {self._work.name}", self._before)
 
 
 def all_loads(setting: Setting, mass: Mass | None, t0: float) -> list[LoadForce | WorkForce]:
     """Return all loads and works of a scene."""
     loads: list[LoadForce | WorkForce] = []
-    for load in setting.grid.scene.loads:
+    for load in setting.numbering.scene.loads:
         if isinstance(load, RotatingFrame):
-            loads.append(FrameForce(load, setting, mass or Mass(setting.grid)))
+            loads.append(FrameForce(load, setting, mass or Mass(setting.numbering)))
         elif isinstance(load, FollowerLoad):
             loads.append(Follower(load, setting))
         else:
             loads.append(DeadLoad(load, setting))
-    return [*loads, *(WorkForce(work, setting, t0) for work in setting.grid.scene.works)]
+    return [*loads, *(WorkForce(work, setting, t0) for work in setting.numbering.scene.works)]
 
 
 # -- supports ------------------------------------------------------------------------------------
@@ -283,15 +297,15 @@ class Supports:
     """
 
     def __init__(self, setting: Setting) -> None:
-        self._grid, self._scheme = setting.grid, setting.scheme
-        grid, self._supplied = setting.grid, setting.ledger.supplied
-        axes = scipy.sparse.eye_array(grid.size).tolil()
+        self._numbering, self._scheme = setting.numbering, setting.scheme
+        numbering, self._supplied = setting.numbering, setting.ledger.supplied
+        axes = scipy.sparse.eye_array(numbering.size).tolil()
         constrained: dict[int, None] = {}
-        if GROUND in grid.scene.rigid_bodies:
-            constrained = {int(dof): None for dof in grid.node(GROUND.middle)}
+        if GROUND in numbering.scene.rigid_bodies:
+            constrained = {int(dof): None for dof in numbering.node(GROUND.middle)}
         self._motions = []
-        for support in grid.scene.supports:
-            dofs = grid.node(support.place)
+        for support in numbering.scene.supports:
+            dofs = numbering.node(support.place)
             if support.angle:
                 c, s, (i, j) = math.cos(support.angle), math.sin(support.angle), dofs[:2]
                 axes[i, i], axes[i, j], axes[j, i], axes[j, j] = c, s, -s, c
@@ -300,8 +314,8 @@ class Supports:
                 self._motions.append((int(dofs[component]), motion, support))
         self.axes = csr_array(axes.tocsr())
         self.constrained = np.array(sorted(constrained), dtype=np.int64)
-        self.free = np.setdiff1d(np.arange(grid.size), self.constrained)
-        self.before: Array = np.zeros(grid.size)
+        self.free = np.setdiff1d(np.arange(numbering.size), self.constrained)
+        self.before: Array = np.zeros(numbering.size)
         self.store_reactions(self.before)
         if self._motions:
             self._supplied["supports"] += 0.0
@@ -334,10 +348,10 @@ class Supports:
 
     def forces(self) -> Array:
         """Return the forces of each support on the scene, in its held components; (num, 3)."""
-        forces = np.zeros((len(self._grid.scene.supports), 3))
-        for force, support in zip(forces, self._grid.scene.supports, strict=True):
+        forces = np.zeros((len(self._numbering.scene.supports), 3))
+        for force, support in zip(forces, self._numbering.scene.supports, strict=True):
             components = [*support.held]
-            force[components] = self.before[self._grid.node(support.place)[components]]
+            force[components] = self.before[self._numbering.node(support.place)[components]]
             c, s = math.cos(support.angle), math.sin(support.angle)
             force[:2] = c * force[0] - s * force[1], s * force[0] + c * force[1]
         return forces

@@ -101,13 +101,13 @@ class MaterialPoints:
         self._variables = *self._z, "jump", "opening", *self._e0, "traction", "flows"
         for name, C in zip(self._C, np.reshape(layout.stiffness, (n, -1)).T, strict=True):
             at[name][:] = C
-        for name, value in layout.numbers(keys).items():
+        for name, value in layout.parameters(keys).items():
             at[f"number {name}"][:] = value
         for name, initial in zip(self._z, self._law.variables.values(), strict=True):
             at[name][:] = initial
         at["length"][:], at["theta"][:], at["dt"][:] = length[:, None], scheme.theta, 1.0
         at["traction"][:] = np.inf
-        for name, value in (layout.softening.numbers() if layout.softening else {}).items():
+        for name, value in (layout.softening.parameters() if layout.softening else {}).items():
             at[f"softening {name}"][:] = value
         self._equations = PointEquations(layout.kind, layout.softening, scheme)
         # Strains of the points by component are B times the strains of the cell.

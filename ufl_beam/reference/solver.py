@@ -20,7 +20,7 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, Step, acting, has_inertia, nodal_step
 from ufl_beam.model.connector_laws import Controller, Coulomb, rubs
@@ -38,7 +38,7 @@ from ufl_beam.reference.beam_residuals import (
     damping_forces,
     inelastic_cells,
 )
-from ufl_beam.reference.cell_forms import Force, Memory, Response, Setting
+from ufl_beam.reference.cell_forms import Archive, Force, Response, Setting
 from ufl_beam.reference.connector_residuals import Connectors, all_connectors
 from ufl_beam.reference.load_vectors import Supports, all_loads
 
@@ -88,7 +88,7 @@ class Solver(PresentState):
     """State of a scene, and the next step; controllers see it as the running simulation.
 
     Args:
-        grid: Numbering of the degrees of freedom.
+        numbering: Numbering of the degrees of freedom.
         scheme: Time scheme.
         t: Time of the initial state; s.
         q: Initial configuration; (size,).
@@ -102,26 +102,37 @@ class Solver(PresentState):
     """
 
     def __init__(
-        self, grid: Grid, scheme: Scheme, t: float, q: Array, v: Array, *, rtol: float,
+        self, numbering: DofNumbering, scheme: Scheme, t: float, q: Array, v: Array, *, rtol: float,
         max_iterations: int, petsc: dict[str, Any],
     ) -> None:  # fmt: skip
-        self.scene, self.grid, self.scheme, scene = grid.scene, grid, scheme, grid.scene
+        self.scene, self.numbering, self.scheme, scene = (
+            numbering.scene,
+            numbering,
+            scheme,
+            numbering.scene,
+        )
         self.t, self.q, self.q_before, self.last_dt = t, q, q, math.inf
         self.parts = self.iterations = 0
-        asked = [link for link in scene.links if isinstance(link.law, Controller | Coulomb)]
-        frictional = [link for link in scene.links if rubs(link.law)]
+        asked = [
+            connector
+            for connector in scene.all_connectors
+            if isinstance(connector.law, Controller | Coulomb)
+        ]
+        frictional = [connector for connector in scene.all_connectors if rubs(connector.law)]
         self.asked: dict[Connector, float] = dict.fromkeys(asked, 0.0)
         self.rates: dict[Connector, float] = dict.fromkeys([*asked, *frictional], 0.0)
         self.samples: dict[Connector, tuple[float, int]] = {}  # first time, last number
-        laws = {link: link.law for link in asked if isinstance(link.law, Controller)}
-        self._sampled = {link: law.sample for link, law in laws.items() if law.sample}
+        laws = {
+            connector: connector.law for connector in asked if isinstance(connector.law, Controller)
+        }
+        self._sampled = {connector: law.sample for connector, law in laws.items() if law.sample}
 
         repeats = friction_repeats(scene)
-        setting = Setting(grid, scheme, self.asked, self.rates, repeats)
+        setting = Setting(numbering, scheme, self.asked, self.rates, repeats)
         self.ledger, self.search, self.supports = setting.ledger, setting.search, Supports(setting)
-        rest = np.arange(len(grid.cells))
+        rest = np.arange(len(numbering.cells))
         self.yielding: list[YieldingBeams] = []
-        for layout, cells in inelastic_cells(grid).items():
+        for layout, cells in inelastic_cells(numbering).items():
             self.yielding.append(YieldingBeams(cells, layout, setting))
             rest = np.setdiff1d(rest, cells)
         elastic = [ElasticBeams(rest, setting)] if len(rest) else []
@@ -141,12 +152,12 @@ class Solver(PresentState):
         self._open: list[Any] = [candidate for candidate in candidates if candidate is not None]
         self._open += [beams.points for beams in self.yielding if beams.points.softens]
 
-        self._weights: Array = np.ones(grid.size)  # make forces and moments comparable
-        self._weights[grid.rotations] = 1 / self.scene.size
-        self._weights[grid.multipliers] = 0.0
+        self._weights: Array = np.ones(numbering.size)  # make forces and moments comparable
+        self._weights[numbering.rotations] = 1 / self.scene.size
+        self._weights[numbering.multipliers] = 0.0
         self._rtol, self._max_iterations, self._petsc = rtol, max_iterations, petsc
-        self._x, self._K = q, csr_array((grid.size, grid.size))
-        self._inner: Array = np.zeros(grid.size)  # inner forces in the latest residual
+        self._x, self._K = q, csr_array((numbering.size, numbering.size))
+        self._inner: Array = np.zeros(numbering.size)  # inner forces in the latest residual
         self._inner_before: Array = self._inner
         self._error: Exception | None = None
         self._make_snes()
@@ -159,7 +170,7 @@ class Solver(PresentState):
         scheme, variables = self.scheme, dict(internal or {})
         self._continues = internal is not None
         v = None if self.inertia is None else self.inertia.v
-        loads: Array = np.zeros(self.grid.size)
+        loads: Array = np.zeros(self.numbering.size)
         if self._continues or (has_inertia(scheme) and scheme.kept):
             loads = sum((load.equilibrium(self.t, self.q, v) for load in self.loads), loads)
         known = same and "reactions" in variables
@@ -191,18 +202,18 @@ class Solver(PresentState):
 
     def internal(self, variables: Mapping[str, Array] | None = None) -> dict[str, Array]:
         """Return data for later steps, by name, after ``variables`` has replaced its entries."""
-        memory, supports = Memory(variables or {}), self.supports
-        supports.before = supports.reactions = memory.vector("reactions", supports.before)
+        archive, supports = Archive(variables or {}), self.supports
+        supports.before = supports.reactions = archive.vector("reactions", supports.before)
         for force in self.forces:
-            force.remember(memory)
-        for link, value in self.asked.items():
-            sample = self.samples.get(link, (math.nan, math.nan))
-            at = np.array([self.scene.links.index(link)])
-            (row,) = memory.rows("asked", at, np.array([[value, *sample, self.t]]))
-            self.asked[link] = float(row[0])
+            force.save_or_restore(archive)
+        for connector, value in self.asked.items():
+            sample = self.samples.get(connector, (math.nan, math.nan))
+            at = np.array([self.scene.all_connectors.index(connector)])
+            (row,) = archive.rows("asked", at, np.array([[value, *sample, self.t]]))
+            self.asked[connector] = float(row[0])
             if math.isfinite(row[1]) and row[3] == self.t:
-                self.samples[link] = float(row[1]), int(row[2])
-        together = {name: np.concatenate(arrays) for name, arrays in memory.saved.items()}
+                self.samples[connector] = float(row[1]), int(row[2])
+        together = {name: np.concatenate(arrays) for name, arrays in archive.saved.items()}
         return {n: x if x.ndim == 1 else x[np.argsort(x[:, 0])] for n, x in together.items()}
 
     # -- a step, and its substeps ----------------------------------------------------------------
@@ -275,10 +286,10 @@ class Solver(PresentState):
         guess = axes @ (q0 + step.dt / self.last_dt * (q0 - self.q_before))
         self.supports.move(guess, axes @ q0, step)
         q1 = np.asarray(axes.T @ self._equilibrium(guess, step))
-        s = nodal_step(self.scheme, q0, q1, self.grid.rotations)
-        s[self.grid.multipliers] = 0.0
+        s = nodal_step(self.scheme, q0, q1, self.numbering.rotations)
+        s[self.numbering.multipliers] = 0.0
         if (
-            self.scheme.limits_turn
+            self.scheme.limits_rotation
             and not (rotation := self._largest_rotation(q1)) <= LARGEST_ROTATION
         ):
             raise StepFailed(
@@ -293,7 +304,7 @@ class Solver(PresentState):
 
     def _largest_rotation(self, q1: Array) -> float:
         """Return the largest rotation of a node in the step to ``q1``; rad."""
-        return float(np.abs(q1 - self.q)[self.grid.rotations].max(initial=0.0))
+        return float(np.abs(q1 - self.q)[self.numbering.rotations].max(initial=0.0))
 
     def _require_path(self, q1: Array, s: Array, in_beams: float, in_connectors: float) -> None:
         """Raise :class:`StepFailed` if a static step has jumped to another branch of equilibria.
@@ -302,7 +313,7 @@ class Solver(PresentState):
         step.
         """
         moves = np.abs(s) / self.scene.size
-        moves[self.grid.rotations] *= self.scene.size
+        moves[self.numbering.rotations] *= self.scene.size
         if not moves.max(initial=0.0) <= LARGEST_MOTION:
             raise StepFailed("points that yield or have opened leave a mechanism")
         if math.isinf(self.scheme.slack):
@@ -462,7 +473,7 @@ class Solver(PresentState):
         except Exception as error:  # of a function of the user
             self._error = error
         if self._error is not None:
-            self._r = np.full(self.grid.size, np.nan)
+            self._r = np.full(self.numbering.size, np.nan)
         f.array_w[:] = self._r[self.supports.free]
 
     def _jacobian(self, snes: PETSc.SNES, vector: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:
@@ -520,7 +531,7 @@ class Solver(PresentState):
             f"Newton's method did not converge ({names.get(reason, reason)}); residual "
             f"{np.linalg.norm(r):.3e} N"
         )
-        failure.residuals = self.grid.worst(np.nan_to_num(r))
+        failure.residuals = self.numbering.worst(np.nan_to_num(r))
         failure.reason = str(names.get(reason, reason))
         return failure
 
@@ -528,29 +539,29 @@ class Solver(PresentState):
 
     def ask(self) -> None:
         """Evaluate controllers and limits of friction; store the rates of friction."""
-        for link in self.asked:
-            due = self._due(link) if link in self._sampled else None
-            if due is None or due != self.samples.get(link):
-                self.asked[link] = link.law.ask(self, link)  # type: ignore[union-attr]
+        for connector in self.asked:
+            due = self._due(connector) if connector in self._sampled else None
+            if due is None or due != self.samples.get(connector):
+                self.asked[connector] = connector.law.ask(self, connector)  # type: ignore[union-attr]
             if due is not None:
-                self.samples[link] = due
+                self.samples[connector] = due
         if self.inertia is not None:
-            groups = (group for group in self._groups if self.rates.keys() & {*group.links})
+            groups = (group for group in self._groups if self.rates.keys() & {*group.connectors})
             for group in groups:
                 rates = group.rates(self.q, self.inertia.v)
-                self.rates.update(zip(group.links, map(float, rates), strict=True))
+                self.rates.update(zip(group.connectors, map(float, rates), strict=True))
 
-    def _due(self, link: Connector) -> tuple[float, int]:
+    def _due(self, connector: Connector) -> tuple[float, int]:
         """Return the first sample time of a controller, s, and the number of the due sample."""
-        sample, (first, _) = self._sampled[link], self.samples.get(link, (self.t, -1))
+        sample, (first, _) = self._sampled[connector], self.samples.get(connector, (self.t, -1))
         digits = SAMPLE_TOLERANCE * sample + 4 * math.ulp(max(self.t, first, key=abs))
         return first, math.floor((self.t - first + digits) / sample)
 
     def _next_sample(self, end: float) -> float:
         """Return the next sample time of a controller, or ``end`` if that comes first; s."""
         stop = end
-        for link, sample in self._sampled.items():
-            first, number = self._due(link)
+        for connector, sample in self._sampled.items():
+            first, number = self._due(connector)
             at = first + (number + 1) * sample
             if (
                 self.t
@@ -563,10 +574,10 @@ class Solver(PresentState):
     # -- the state, by objects of the scene ------------------------------------------------------
 
     def connections(self) -> Array:
-        """Return the columns of ``Connection`` for all links; (num_links, columns)."""
-        table = np.zeros((len(self.scene.links), len(Connection._fields)))
+        """Return the columns of ``Connection`` for all connectors; (num, columns)."""
+        table = np.zeros((len(self.scene.all_connectors), len(Connection._fields)))
         for group in self.connectors:
-            table[group.numbers] = group.columns(self.q)
+            table[group.indices] = group.columns(self.q)
         return table
 
     @property
@@ -583,13 +594,13 @@ class Solver(PresentState):
             state |= {f"{account}: {name}": np.array(value) for name, value in energies.items()}
         state |= {
             "connectors": self.connections(), "material": rows[np.argsort(rows[:, 0]), 1:],
-            FORCES: np.zeros((9, len(self.grid.cells))) + self.on_nodes,
+            FORCES: np.zeros((9, len(self.numbering.cells))) + self.on_nodes,
         }  # fmt: skip
         between = float(self.scheme.average(0.0, 1.0))
         if between < 1:
             state[BEFORE] = self.q_before
         columns = Columns({name: np.shape(values) for name, values in state.items()})
         row = np.concatenate([np.ravel(values) for values in state.values()])
-        now = States(self.grid, None, Block(columns, row[None], 1))
+        now = States(self.numbering, None, Block(columns, row[None], 1))
         now.between, now.begun = between, between < 1
         return now

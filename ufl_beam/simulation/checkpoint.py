@@ -16,7 +16,7 @@ from mpi4py import MPI
 
 import numpy as np
 
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError, require_count, require_number, require_sequence, shorten
 from ufl_beam.file_system import Lock
 from ufl_beam.output.output_files import (
@@ -180,7 +180,7 @@ class Keeper:
         """Restore the run, its step control ``pace`` and recorders; then drop the content."""
         content, solution = self.content, simulation.solution
         with decoding(self.path, FORMAT):
-            simulation.remember(Memory(simulation.share, below("state/", content)))
+            simulation.save_or_restore(Archive(simulation.subdomain, below("state/", content)))
             solution.resume(below("history/", content))
             pace.restore(content["pace"])
             solution.seconds = float(content["seconds"])
@@ -233,12 +233,12 @@ class Keeper:
                     by_name[name] = item.state()
             return by_name
 
-        solution, memory = simulation.solution, Memory(simulation.share)
-        simulation.remember(memory)
+        solution, archive = simulation.solution, Archive(simulation.subdomain)
+        simulation.save_or_restore(archive)
         content = {
             "seconds": solution.seconds + seconds, "pace": pace.state(),
             "stateful": simulation.together(states), "warnings": solution.warnings,
-            **above("state/", memory.state()),
+            **above("state/", archive.state()),
         }  # fmt: skip
         for i, recorder in enumerate(self._recorders):
             content |= above(f"recorder {i}/", recorder.state())

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.compiled.c_library import doubles, ffi, integers, struct
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.model.connector_laws import (
     Controller,
     Coulomb,
@@ -35,35 +35,39 @@ class Controllers:
         asks: True if a force or limit is evaluated at the start of steps.
     """
 
-    def __init__(self, share: Share) -> None:
-        links = share.grid.scene.links
-        active = [link for link in links if isinstance(link.law, Controller | Coulomb)]
-        self.at: dict[Connector, int] = {link: i for i, link in enumerate(active)}
-        self.numbers, self.fresh = np.zeros(len(active)), np.zeros(len(active), dtype=np.int32)
+    def __init__(self, subdomain: Subdomain) -> None:
+        connectors = subdomain.numbering.scene.all_connectors
+        active = [
+            connector for connector in connectors if isinstance(connector.law, Controller | Coulomb)
+        ]
+        self.at: dict[Connector, int] = {connector: i for i, connector in enumerate(active)}
+        self.values, self.fresh = np.zeros(len(active)), np.zeros(len(active), dtype=np.int32)
         self.sampled: dict[int, float] = {}
         self._changing: list[tuple[int, Connector]] = []
-        for i, link in enumerate(active):
-            if isinstance(link.law, Coulomb) and not link.law.joint:
-                self.numbers[i] = link.law.force
+        for i, connector in enumerate(active):
+            if isinstance(connector.law, Coulomb) and not connector.law.joint:
+                self.values[i] = connector.law.force
                 continue
-            self._changing.append((i, link))
-            if isinstance(link.law, Controller) and link.law.sample:
-                self.sampled[i] = link.law.sample
+            self._changing.append((i, connector))
+            if isinstance(connector.law, Controller) and connector.law.sample:
+                self.sampled[i] = connector.law.sample
         self.asks = bool(self._changing)
-        self._numbers = np.array([i for i, link in enumerate(links) if link in self.at], dtype=int)
+        self._indices = np.array(
+            [i for i, connector in enumerate(connectors) if connector in self.at], dtype=int
+        )
         # Time of the first sample (s) and number of the last sample; NaN without a sample time.
         self._samples = np.full((len(active), 2), math.nan)
 
-    def place(self, link: Connector) -> Any:
+    def place(self, connector: Connector) -> Any:
         """Return the address of the force or limit of a connector."""
-        return doubles(self.numbers) + self.at[link]
+        return doubles(self.values) + self.at[connector]
 
     def ask(self, now: Running) -> None:
         """Evaluate forces and limits that are due at ``now.t``; all processes call it together."""
-        for i, link in self._changing:
+        for i, connector in self._changing:
             sample = self._due(i, now.t)
             if sample[1] != self._samples[i, 1]:  # always for NaN, without a sample time
-                self.numbers[i] = link.law.ask(now, link)  # type: ignore[union-attr]
+                self.values[i] = connector.law.ask(now, connector)  # type: ignore[union-attr]
                 self.fresh[i] = 1
                 self._samples[i] = sample
 
@@ -85,16 +89,16 @@ class Controllers:
                 stop = at
         return stop
 
-    def remember(self, memory: Memory, t: float) -> None:
+    def save_or_restore(self, archive: Archive, t: float) -> None:
         """Save or restore forces, limits and samples at the time ``t``.
 
         Sampling begins anew if the run begins at another time.
         """
-        if not len(self.numbers):
+        if not len(self.values):
             return
-        values = np.column_stack([self.numbers, self._samples, np.full(len(self.numbers), t)])
-        rows = memory.rows("asked", self._numbers, values, known=True)
-        self.numbers[:] = rows[:, 0]
+        values = np.column_stack([self.values, self._samples, np.full(len(self.values), t)])
+        rows = archive.rows("asked", self._indices, values, known=True)
+        self.values[:] = rows[:, 0]
         if np.all(rows[:, 3] == t):
             self._samples[:] = rows[:, 1:3]
 
@@ -130,7 +134,7 @@ TOO_FAST = (
 
 
 class ForceWatch:
-    """Check for forces of controllers and force laws in :class:`Links` that reverse in each step.
+    """Check for forces of controllers and force laws that reverse in each step.
 
     Attributes:
         c: ``force_watch`` of loops.h; None if there are no such laws.
@@ -138,18 +142,24 @@ class ForceWatch:
 
     c: Any = None
 
-    def __init__(self, couplings: Sequence[Any], controllers: Controllers, size: float) -> None:
+    def __init__(
+        self, connector_terms: Sequence[Any], controllers: Controllers, size: float
+    ) -> None:
         kinds = Controller, ForceLaw
         watched = [
-            (link, group, k) for group in couplings for k, link in enumerate(group.links)
-            if isinstance(link.law, kinds)
+            (connector, term, k)
+            for term in connector_terms for k, connector in enumerate(term.connectors)
+            if isinstance(connector.law, kinds)
         ]  # fmt: skip
-        self._links, n = [link for link, *_ in watched], len(watched)
+        self._connectors, n = [connector for connector, *_ in watched], len(watched)
         if not n:
             return
         values, fresh = (
-            [start + controllers.at[x] if x in controllers.at else ffi.NULL for x in self._links]
-            for start in (doubles(controllers.numbers), integers(controllers.fresh))
+            [
+                start + controllers.at[x] if x in controllers.at else ffi.NULL
+                for x in self._connectors
+            ]
+            for start in (doubles(controllers.values), integers(controllers.fresh))
         )
         self._told, none = np.full(n, math.nan), np.zeros((3, n))
         self.c = struct(
@@ -157,24 +167,24 @@ class ForceWatch:
             dof=np.array([group.forces_at[k] for _, group, k in watched], dtype=np.int32),
             value=ffi.new("double *[]", values), fresh=ffi.new("int32_t *[]", fresh),
             rate=ffi.new("double *[]", [doubles(group.rate) + k for _, group, k in watched]),
-            length=np.array([1.0 if link.turns else size for link in self._links]),
+            length=np.array([1.0 if connector.turns else size for connector in self._connectors]),
             force=none[0], change=none[1], largest=none[2], told=self._told,
             count=np.zeros(n, dtype=np.int32),
         )  # fmt: skip
-        self._alive = couplings, controllers
+        self._alive = connector_terms, controllers
 
     def told(self) -> Iterator[str]:
         """Yield new warnings, one for each connector."""
         if self.c is None or not self.c.tells:
             return
         self.c.tells = 0
-        for link, t in zip(self._links, map(float, self._told), strict=True):
+        for connector, t in zip(self._connectors, map(float, self._told), strict=True):
             if math.isnan(t):
                 continue
             times, why = "steps", TOO_FAST
-            if isinstance(link.law, Controller):
-                times, why = "samples" if link.law.sample else "steps", CONTROLLED
+            if isinstance(connector.law, Controller):
+                times, why = "samples" if connector.law.sample else "steps", CONTROLLED
             yield (
-                f"{link}: the force changed its direction at each of the {ALTERNATIONS} {times} "
-                f"before t = {t:.6g} s: {why}"
+                f"{connector}: the force changed its direction at each of the {ALTERNATIONS} "
+                f"{times} before t = {t:.6g} s: {why}"
             )

@@ -12,10 +12,10 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.errors import ArgumentError, ConvergenceError, ModelError, NoNumber, StepFailed
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.connector_law import ENTRIES, ConnectorLaw, judges_loss
+from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, judges_loss
 from ufl_beam.model.connector_laws import (
     Coulomb,
     Damper,
@@ -88,7 +88,7 @@ def no_equilibrium(
         return ModelError(f"{loose}{FREE_MOTION}{failure}")
     (t, end), named = times, solution.parameter
     q1 = equation.supports.in_plane(newton.unknowns.copy())
-    vectors = {kind: np.zeros(equation.share.size) for kind in KINDS}
+    vectors = {kind: np.zeros(equation.subdomain.size) for kind in KINDS}
     for term in equation.terms:
         try:
             term.add_residual(q1, vectors[term.kind])
@@ -125,10 +125,10 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
     if not len(equation.force) or not len(solution):
         return ""
     signs, least = [], []
-    for q in (solution.q[0][equation.share.dofs], q0, probe):
+    for q in (solution.q[0][equation.subdomain.dofs], q0, probe):
         if not np.isfinite(q).all() or not equation.evaluate(q):
             return ""
-        K, free = free_matrix(equation.share, equation.A, equation.supports.dofs)
+        K, free = free_matrix(equation.subdomain, equation.A, equation.supports.dofs)
         if not len(free):
             return ""
         try:
@@ -146,60 +146,67 @@ def _limit_point(equation: StepEquation, solution: Solution, q0: Array, probe: A
 
 def _probe_state(equation: StepEquation, q0: Array, q1: Array) -> Array:
     """Return a state between ``q0`` and ``q1``, at most :data:`PROBE_DISTANCE` away from ``q0``."""
-    share = equation.share
-    increment = np.abs(q1 - q0) * share.grid.scales[share.dofs]
-    far = share.largest(float(increment.max(initial=0.0)))
+    subdomain = equation.subdomain
+    increment = np.abs(q1 - q0) * subdomain.numbering.scales[subdomain.dofs]
+    far = subdomain.largest(float(increment.max(initial=0.0)))
     return np.asarray(q0 + min(1.0, PROBE_DISTANCE / far) * (q1 - q0)) if 0 < far < np.inf else q0
 
 
 def _singularity(equation: StepEquation, q: Array) -> str:
     """Describe why the latest tangent, evaluated at ``q``, is singular; empty if it is regular."""
-    grid, scene = equation.share.grid, equation.share.grid.scene
-    K, free = free_matrix(equation.share, equation.A, equation.supports.dofs)
+    numbering, scene = equation.subdomain.numbering, equation.subdomain.numbering.scene
+    K, free = free_matrix(equation.subdomain, equation.A, equation.supports.dofs)
     if not len(free) or not np.isfinite(K.data).all():
         return ""
     try:
         sizes, vectors = null_vectors(K)
     except (np.linalg.LinAlgError, RuntimeError):
         return ""
-    x: Array = np.zeros(grid.size)
+    x: Array = np.zeros(numbering.size)
     x[free], size = vectors[:, -1], sizes[-1]
-    motions = np.abs(x) * grid.scales
+    motions = np.abs(x) * numbering.scales
     largest = float(motions.max())
     if not np.isfinite(largest):
         return ""
     if largest == 0.0:
-        forces = np.abs(x[grid.multipliers])
-        names = [str(scene.links[i]) for i in _named(forces / forces.max())]
+        forces = np.abs(x[numbering.multipliers])
+        names = [str(scene.all_connectors[i]) for i in _named(forces / forces.max())]
         said = f"the tangent stiffness is singular: {_list(names)} hold the same motion twice"
         return said if size <= SINGULAR else ""
     x /= largest
     motions /= largest
-    links, cells = _deformations(equation, q, x)
-    said = _describe(grid, motions, links, cells)
+    connectors, cells = _deformations(equation, q, x)
+    said = _describe(numbering, motions, connectors, cells)
     if size <= SINGULAR:
         return f"the tangent stiffness is singular: {said}"
-    yields = len(links.soft) or len(cells.soft)
-    mechanism = yields and not (links.stiff or cells.stiff)
+    yields = len(connectors.soft) or len(cells.soft)
+    mechanism = yields and not (connectors.stiff or cells.stiff)
     return f"a mechanism has formed: {said}" if mechanism else ""
 
 
 def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     """Return the deformations of all connectors and of all cells in a motion ``x`` from ``q``."""
-    share, grid, scene = equation.share, equation.share.grid, equation.share.grid.scene
-    x_local, ε = x[share.dofs], 1e-6
-    links, left = np.zeros(len(scene.links)), np.ones(len(scene.links))
-    for group in equation.couplings:
+    subdomain, numbering, scene = (
+        equation.subdomain,
+        equation.subdomain.numbering,
+        equation.subdomain.numbering.scene,
+    )
+    x_local, ε = x[subdomain.dofs], 1e-6
+    connectors, left = np.zeros(len(scene.all_connectors)), np.ones(len(scene.all_connectors))
+    for group in equation.connector_terms:
         try:
             change = (group.motion(q + ε * x_local) - group.motion(q - ε * x_local)) / (2 * ε)
         except StepFailed:
             continue  # no motion beyond the end of a guide; the failure of the step reports it
-        links[group.numbers] = np.abs(change)
-        left[group.numbers] = group.response.remaining()
-    links /= np.where([link.turns for link in scene.links], 1.0, scene.size)
+        connectors[group.indices] = np.abs(change)
+        left[group.indices] = group.response.remaining()
+    connectors /= np.where([connector.turns for connector in scene.all_connectors], 1.0, scene.size)
     # Strains of a small motion, times lengths of cells; (num_cells, 3); m, m, rad
-    first, last = grid.cells[:, 0], grid.cells[:, 1]
-    position, motion = grid.points + share.gather(q)[grid.dofs[:, :2]], x[grid.dofs]
+    first, last = numbering.cells[:, 0], numbering.cells[:, 1]
+    position, motion = (
+        numbering.points + subdomain.gather(q)[numbering.dofs[:, :2]],
+        x[numbering.dofs],
+    )
     d = position[last] - position[first]
     across = np.column_stack([-d[:, 1], d[:, 0]])
     change = motion[last] - motion[first]
@@ -208,29 +215,31 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     length = np.linalg.norm(d, axis=1)
     along, shear = (np.sum(apart * axis, axis=1) / length for axis in (d, across))
     strains = np.column_stack([along, shear, change[:, 2]])
-    left_in_cells = np.ones(len(grid.cells))
+    left_in_cells = np.ones(len(numbering.cells))
     for beams in equation.inelastic:
         cells, _ = beams.kept()
         left_in_cells[cells] = beams.points.remaining(strains[cells])
-    if share.comm.size > 1:
-        share.comm.Allreduce(MPI.IN_PLACE, links)
-        share.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
-        share.comm.Allreduce(MPI.IN_PLACE, left_in_cells, op=MPI.MIN)
+    if subdomain.comm.size > 1:
+        subdomain.comm.Allreduce(MPI.IN_PLACE, connectors)
+        subdomain.comm.Allreduce(MPI.IN_PLACE, left, op=MPI.MIN)
+        subdomain.comm.Allreduce(MPI.IN_PLACE, left_in_cells, op=MPI.MIN)
     strains[:, :2] /= scene.size
     sizes = np.abs(strains).max(axis=1, initial=0.0)
     deformations = []
-    for deformed, remaining in ((links, left), (sizes, left_in_cells)):
+    for deformed, remaining in ((connectors, left), (sizes, left_in_cells)):
         soft = remaining <= SOFT
         stiff = bool((deformed[~soft] >= LEAST_NAMED).any())
         deformations.append(Deformed(_named(np.where(soft, deformed, 0.0)), stiff))
     return deformations
 
 
-def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> str:
+def _describe(
+    numbering: DofNumbering, motions: Array, connectors: Deformed, cells: Deformed
+) -> str:
     """Describe a motion without resistance; ``motions`` are the magnitudes of its components."""
     alike = np.round(motions, 6)  # round-off must not determine the order of equal motions
     parts = []
-    for words in grid.worst(np.where(alike >= 1 / 2, alike, 0.0)):
+    for words in numbering.worst(np.where(alike >= 1 / 2, alike, 0.0)):
         component, _, place = words.partition(" of ")
         what = "rotation" if component == "psi" else f"displacement {component}"
         parts.append(f"the {what} of {place}")
@@ -240,12 +249,14 @@ def _describe(grid: Grid, motions: Array, links: Deformed, cells: Deformed) -> s
             "limit load or a bifurcation"
         )
     said = f"{_list(parts)} {'is' if len(parts) == 1 else 'are'} held by nothing"
-    ways = [str(grid.scene.links[i]) for i in links.soft]
-    ways += [grid.describe_cell(i) for i in cells.soft]
+    ways = [str(numbering.scene.all_connectors[i]) for i in connectors.soft]
+    ways += [numbering.describe_cell(i) for i in cells.soft]
     if ways:
         verb = "gives way" if len(ways) == 1 else "give way together"
         said += f"; {_list(ways)} {verb} at no further force"
-    layouts = (grid.scene.beams[grid.beam_of_cell[i]].section.layout(None) for i in cells.soft)
+    layouts = (
+        numbering.scene.beams[numbering.beam_of_cell[i]].section.layout(None) for i in cells.soft
+    )
     laws = (law for layout in layouts if layout is not None for law, _ in layout.laws)
     perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
     if len(cells.soft) > 1 and perfect:
@@ -289,7 +300,7 @@ class LedgerWatch:
     """Check of the energy ledger in the kept states of a run, each once.
 
     Args:
-        grid: Grid of the scene.
+        numbering: Grid of the scene.
         scheme: The time scheme.
         claimed: Error of entries that the scheme allows; fraction of the energy transferred.
 
@@ -297,25 +308,31 @@ class LedgerWatch:
         judged: Number of the last checked state, or of the last state after some were deleted.
     """
 
-    def __init__(self, grid: Grid, scheme: Scheme, claimed: float) -> None:
-        self._grid, self._claimed = grid, claimed
-        links, laws = grid.scene.links, list[MaterialLaw]()  # of material points
-        for beam in grid.scene.beams:
+    def __init__(self, numbering: DofNumbering, scheme: Scheme, claimed: float) -> None:
+        self._numbering, self._claimed = numbering, claimed
+        connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()  # of material points
+        for beam in numbering.scene.beams:
             layout = beam.section.layout(beam.section.hinge)
             if layout is not None and not layout.elastic:
                 laws += [law for law, _ in layout.laws]
-        springs = [link.law.law for link in links if isinstance(link.law, Spring)]
+        springs = [
+            connector.law.law for connector in connectors if isinstance(connector.law, Spring)
+        ]
         laws += [law for law in springs if law is not None]
         grows = {"hinges": True, "plastic": all(map(judges_dissipation, laws))}
         # Other schemes integrate works with the mean of the forces at both ends.
         exact = grows["friction"] = grows["damping"] = scheme.weight_of_before == 0.0
         at_once = scheme.theta == scheme.load_weight  # elastic forces and variables
-        user_laws = [link.law for link in links if isinstance(link.law, ConnectorLaw)]
+        user_laws = [
+            connector.law for connector in connectors if isinstance(connector.law, ConnectorLaw)
+        ]
         for law in user_laws:
             certain = exact and (at_once or not law.variables) and judges_loss(law)
             grows[law.entry] = grows.get(law.entry, exact) and certain
         self._grows = [name for name, certain in grows.items() if certain]
-        prescribed = any(isinstance(link.law, ForceLaw) and link.law.stored for link in links)
+        prescribed = any(
+            isinstance(connector.law, ForceLaw) and connector.law.stored for connector in connectors
+        )
         prescribed = prescribed or not all(isinstance(law, Stop) for law in user_laws)
         self._bounded = not prescribed and all(map(has_quadratic_energies, laws))
         self._in_motion = has_inertia(scheme)
@@ -337,7 +354,7 @@ class LedgerWatch:
         self.judged += number
         times, (state, supplied, lost) = states.times, states.ledger()
         works = sum(float(np.abs(np.diff(work)).sum()) for work in supplied.values())
-        sizes = [e if name in ENTRIES else np.abs(e - e[0]) for name, e in state.items()]
+        sizes = [e if name in CONTRIBUTIONS else np.abs(e - e[0]) for name, e in state.items()]
         energy = np.asarray(sum(sizes, 0.0 * times))
         self._transferred += works + max(float(np.max(energy)) - self._most, 0.0)
         self._most = max(self._most, float(np.max(energy)))
@@ -389,17 +406,17 @@ class LedgerWatch:
         """Name the cell or connector whose dissipated energy falls most in a step."""
         kind = {"friction": Coulomb, "damping": Damper}.get(name)
         falls: dict[str, float] = {}
-        for i, link in enumerate(self._grid.scene.links):
-            entry = link.law.entry if isinstance(link.law, ConnectorLaw) else ""
-            if entry == name if entry else kind is None or isinstance(link.law, kind):
+        for i, connector in enumerate(self._numbering.scene.all_connectors):
+            entry = connector.law.entry if isinstance(connector.law, ConnectorLaw) else ""
+            if entry == name if entry else kind is None or isinstance(connector.law, kind):
                 column = WORK if kind and not entry else DISSIPATED
                 taken = states.column("connectors")[:, i, column]
-                falls[f"{link}: "] = taken[n] - taken[n + 1]
+                falls[f"{connector}: "] = taken[n] - taken[n + 1]
         if name in ("hinges", "plastic"):
             column = PLASTIC if name == "plastic" else HINGE
             before, after = (states.cells_of(k)[:, column] for k in (n, n + 1))
             cell = int(np.argmax(before - after))
-            place = self._grid.middle(cell)
+            place = self._numbering.middle(cell)
             fall = before[cell] - after[cell]
             falls[f"{place.beam.name}, cell at s = {place.s:.3g}: "] = float(fall)
         worst = max(falls, key=lambda name: falls[name], default="")

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import element_of
 from ufl_beam.discretization.model_warnings import (
     warn_of_far_points,
@@ -41,8 +41,10 @@ from ufl_beam.simulation.solution import Solution
 
 
 @no_garbage_collection()
-def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool) -> tuple[Grid, str]:
-    """Check that the scheme can compute a scene, and make its grid.
+def checked_grid(
+    scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool
+) -> tuple[DofNumbering, str]:
+    """Check that the scheme can compute a scene, and number its degrees of freedom.
 
     ``fresh`` says that the run begins with the undeformed scene.  The second result describes a
     motion that only loads may hold in statics; it is empty if there is none.
@@ -68,10 +70,10 @@ def checked_grid(scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool) -> tu
     require_independent(scene)
     warn_of_far_points(scene)
     warn_of_free_hinges(scene)
-    grid = Grid(scene, mesh)
+    numbering = DofNumbering(scene, mesh)
     if has_inertia(scheme):
-        warn_of_touching(grid)
-    return grid, loose
+        warn_of_touching(numbering)
+    return numbering, loose
 
 
 def require_scheme(scheme: Any, what: str) -> None:
@@ -98,31 +100,31 @@ def mesh_of(start: Solution | None, mesh: Mesh | None) -> Mesh:
     if mesh is not None:
         require_kind(mesh, Mesh, "mesh")
         return mesh
-    return Mesh() if start is None else start.grid.mesh
+    return Mesh() if start is None else start.numbering.mesh
 
 
-def initial_state(grid: Grid, start: Solution | None) -> tuple[Array, Array, State]:
+def initial_state(numbering: DofNumbering, start: Solution | None) -> tuple[Array, Array, State]:
     """Return configuration, velocities and internal variables at the beginning of a run."""
-    v = _initial_velocity(grid)
+    v = _initial_velocity(numbering)
     if start is None:
-        return np.zeros(grid.size), v, {}
+        return np.zeros(numbering.size), v, {}
     q0, v0 = start.q[-1], start.v[-1] if len(start.v) else None
-    if same_unknowns(start.grid, grid):
+    if same_unknowns(start.numbering, numbering):
         return q0, v if v0 is None else v0, start.internal
-    transfer = Transfer(start.grid, grid)
+    transfer = Transfer(start.numbering, numbering)
     q = transfer.state(q0)
     return q, v if v0 is None else transfer.velocity(v0), transfer.internal(start.internal)
 
 
-def _initial_velocity(grid: Grid) -> Array:
+def _initial_velocity(numbering: DofNumbering) -> Array:
     """Return the initial velocities by :class:`Velocity`; zero elsewhere."""
-    v: Array = np.full(grid.size, np.nan)
-    for velocity in grid.scene.initial:
+    v: Array = np.full(numbering.size, np.nan)
+    for velocity in numbering.scene.initial:
         for beam in velocity.beams:
-            points, dofs = grid.nodes_of(beam)
+            points, dofs = numbering.nodes_of(beam)
             new = np.array([velocity.at(x, y) for x, y in points])
             turning = abs(velocity.angular)
-            size = np.hypot(*new.T[:2]).max() + turning * grid.scene.size
+            size = np.hypot(*new.T[:2]).max() + turning * numbering.scene.size
             apart = np.abs(v[dofs] - new) > 1e-9 * np.array([size, size, turning])
             if apart.any():
                 x, y = points[np.flatnonzero(apart.any(axis=1))[0]]
@@ -132,36 +134,40 @@ def _initial_velocity(grid: Grid) -> Array:
                 )
             v[dofs] = new
     v = np.nan_to_num(v)
-    if grid.scene.initial:
-        _require_agreement(grid, v)
+    if numbering.scene.initial:
+        _require_agreement(numbering, v)
     return v
 
 
-def _require_agreement(grid: Grid, v: Array) -> None:
+def _require_agreement(numbering: DofNumbering, v: Array) -> None:
     """Raise if initial velocities violate joints, which would vibrate for ever, or supports.
 
     It is an error if supports cancel all velocities of a beam, and a warning if they cancel some.
     """
-    size, nodes = grid.scene.size, np.vstack([grid.dofs, grid.dofs_of_bodies])
+    size, nodes = numbering.scene.size, np.vstack([numbering.dofs, numbering.dofs_of_bodies])
     fastest = np.abs(v[nodes] * [1.0, 1.0, size]).max()
-    for link, dofs in zip(grid.scene.links, grid.dofs_of_links, strict=True):
+    for connector, dofs in zip(
+        numbering.scene.all_connectors, numbering.dofs_of_connectors, strict=True
+    ):
         a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
-        by_a, by_b = link.rigidly()
+        by_a, by_b = connector.rigidly()
         rate = float(np.dot(by_a, a) + np.dot(by_b, b))
-        if link.law is HELD and abs(rate) > 1e-9 * fastest / (size if link.turns else 1.0):
+        if connector.law is HELD and abs(rate) > 1e-9 * fastest / (
+            size if connector.turns else 1.0
+        ):
             raise ArgumentError(
-                f"Velocity: the parts that {link} joins would move apart at {rate:.3g} m/s "
+                f"Velocity: the parts that {connector} joins would move apart at {rate:.3g} m/s "
                 "or rad/s; give all joined parts velocities that agree"
             )
     supports = {
-        int(grid.node(support.place)[c]): support
-        for support in grid.scene.supports if not support.moving and not support.angle
+        int(numbering.node(support.place)[c]): support
+        for support in numbering.scene.supports if not support.moving and not support.angle
         for c in support.held
     }  # fmt: skip
-    moving = np.abs(v) > 1e-9 * np.abs(v).max() * max(grid.scene.size, 1.0)
-    columns = np.vstack([grid.dofs, grid.dofs_of_bodies]).T
-    for beam in (beam for velocity in grid.scene.initial for beam in velocity.beams):
-        dofs = np.unique(grid.nodes_of(beam)[1])
+    moving = np.abs(v) > 1e-9 * np.abs(v).max() * max(numbering.scene.size, 1.0)
+    columns = np.vstack([numbering.dofs, numbering.dofs_of_bodies]).T
+    for beam in (beam for velocity in numbering.scene.initial for beam in velocity.beams):
+        dofs = np.unique(numbering.nodes_of(beam)[1])
         dofs = dofs[moving[dofs]]
         lost = dofs[np.isin(dofs, [*supports])]
         if not len(lost):

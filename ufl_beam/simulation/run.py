@@ -39,7 +39,7 @@ from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
 from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, step_count
-from ufl_beam.simulation.stepper import MOST_PARTS
+from ufl_beam.simulation.stepper import MOST_SUBSTEPS
 from ufl_beam.solvers.newton_options import Newton, checked_newton, require_plain
 
 BAR = "{percentage:3.0f}%|{bar}| [{elapsed}<{remaining}{postfix}]"
@@ -100,7 +100,7 @@ def simulate(
     t0, t1 = require_times(t)
     if not isinstance(dt, Adaptive):
         require_number(dt, "simulate: dt", positive=True)
-        least = MOST_PARTS * math.ulp(max(abs(t0), abs(t1)))
+        least = MOST_SUBSTEPS * math.ulp(max(abs(t0), abs(t1)))
         if dt < least:
             raise ArgumentError(
                 f"simulate: dt = {dt:g} s is too small: steps from t = {t0:g} to {t1:g} s can "
@@ -185,18 +185,18 @@ def take_steps(
     """
     solution, ended = simulation.solution, False
     claimed = LEDGER_TOLERANCE * simulation.solver.c.rtol
-    watch = LedgerWatch(simulation.grid, simulation.scheme, claimed)
+    watch = LedgerWatch(simulation.numbering, simulation.scheme, claimed)
 
     def after_step() -> bool:
         solution.time_error = pace.error
         if recorders or keeper is not None:
-            simulation.copies.settle()  # before anything is written
+            simulation.copies.synchronize()  # before anything is written
         if pace.steps % solution.every == 0 or pace.finished:
             simulation.keep()
             thins = len(solution) > max_states + 1 and not pace.finished
             simulation.warn(watch.faults(solution, solution.every, last=thins or pace.finished))
             if thins:
-                solution.thin()
+                solution.downsample()
                 solution.every *= 2
                 watch.judged = len(solution) - 1
         for recorder in recorders:
@@ -224,7 +224,7 @@ def take_steps(
                 pace.advance(left if quiet else 1)
                 ended = simulation.together(after_step)
                 if until is not None:  # on which processes may disagree
-                    ended = simulation.share.largest(ended) > 0
+                    ended = simulation.subdomain.largest(ended) > 0
             if not bar.disable:
                 bar.set_postfix_str(simulation.parameter.at(simulation.t), refresh=False)
                 bar.update(pace.progress - bar.n)
@@ -240,15 +240,15 @@ def check_ledger(simulation: Simulation) -> None:
     Warns:
         ModelWarning: The ledger is open, perhaps by round-off.
     """
-    solution, share = simulation.solution, simulation.share
-    if not share.alone:  # forces are watched by the process that has the connector
-        everyone = share.comm.allgather(solution.warnings.splitlines(keepends=True))
+    solution, subdomain = simulation.solution, simulation.subdomain
+    if not subdomain.alone:  # forces are watched by the process that has the connector
+        everyone = subdomain.comm.allgather(solution.warnings.splitlines(keepends=True))
         solution.warnings = "".join(dict.fromkeys(chain.from_iterable(everyone)))
     if getattr(simulation.scheme, "exact_ledger", False) and len(solution) > 1:
         energy, claimed = solution.energy, LEDGER_TOLERANCE * simulation.solver.c.rtol
         if energy.opened(claimed, 0.0):
             # Errors of steps are independent: their squares add up.
-            q = solution.q[:, share.dofs]
+            q = solution.q[:, subdomain.dofs]
             steps = np.sqrt(np.sum(np.diff(q, axis=0) ** 2, axis=0))
             round_off = simulation.solver.random_work(np.abs(q).max(axis=0), steps)
             solution.open_ledger = energy.opened(claimed, round_off)
@@ -276,7 +276,7 @@ def running(
             check_ledger(simulation)
         except BaseException as error:
             simulation.copies.leave()
-            if simulation.share.comm.size == 1 or error is simulation.together.raised:
+            if simulation.subdomain.comm.size == 1 or error is simulation.together.raised:
                 simulation.end()  # else some processes may not get here
             stopped: Any = error
             stopped.solution = simulation.solution
@@ -313,18 +313,18 @@ def simulate_by_reference(
         require_plain(newton, f"mpirun, here with {comm.size} processes")
     newton = checked_newton(newton, comm)
     begin, (t0, t1) = time.perf_counter(), times
-    grid, _ = checked_grid(scene, scheme, mesh_of(start, mesh), fresh=start is None)
-    q, v, internal = initial_state(grid, start)
+    numbering, _ = checked_grid(scene, scheme, mesh_of(start, mesh), fresh=start is None)
+    q, v, internal = initial_state(numbering, start)
     options: dict[str, Any] = {"max_iterations": newton.max_iterations, "petsc": newton.petsc}
-    solver = Solver(grid, scheme, t0, q, v, rtol=newton.rtol, **options)
+    solver = Solver(numbering, scheme, t0, q, v, rtol=newton.rtol, **options)
     same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
     between = float(scheme.average(0.0, 1.0))
     solver.start(None if start is None else internal, same=same)
-    if start is not None and start.between == between and same_unknowns(start.grid, grid):
+    if start is not None and start.between == between and same_unknowns(start.numbering, numbering):
         goes_on = same and "reactions" in internal and not len(start.v)
         if goes_on or has_inertia(scheme):
-            solver.on_nodes, solver.q_before = start.numbers(-1), start.before(-1)
-    solution = Solution(scene, grid)
+            solver.on_nodes, solver.q_before = start.cell_resultants(-1), start.before(-1)
+    solution = Solution(scene, numbering)
     solution.between, solution.begun, solution.scheme = between, between < 1, scheme
     solution.every, solution.building = every, time.perf_counter() - begin
 
@@ -344,7 +344,7 @@ def simulate_by_reference(
                 if k % solution.every == 0 or k == number:
                     keep()
                     if len(solution) > max_states + 1 and k < number:
-                        solution.thin()
+                        solution.downsample()
                         solution.every *= 2
                 bar.update(k / number - bar.n)
     except StepFailed as failure:

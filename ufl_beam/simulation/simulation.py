@@ -14,8 +14,8 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, give_back_memory, lib
 from ufl_beam.discretization.model_warnings import warn_of_jumps
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
@@ -80,7 +80,7 @@ class Simulation(Stepper):
     solution: Solution
 
     def __repr__(self) -> str:
-        return f"<Simulation at {self.parameter.at(self.t)}: {self.grid}, {self.scheme!r}>"
+        return f"<Simulation at {self.parameter.at(self.t)}: {self.numbering}, {self.scheme!r}>"
 
     def __init__(
         self,
@@ -105,16 +105,16 @@ class Simulation(Stepper):
         if start is not None:
             require_kind(start, Solution, "start")
         fresh = start is None
-        grid, loose = checked_grid(scene, scheme, mesh_of(start, mesh), fresh=fresh)
-        share = Share(grid, sharing(comm, len(grid.cells)))
-        together, q, v, internal = Agreement(share.comm), *initial_state(grid, start)
-        equation = StepEquation(share, scheme, t0, v[share.dofs], together)
-        inertia, q_local, loaded = equation.inertia, q[share.dofs], list[Array]()
+        numbering, loose = checked_grid(scene, scheme, mesh_of(start, mesh), fresh=fresh)
+        subdomain = Subdomain(numbering, sharing(comm, len(numbering.cells)))
+        together, q, v, internal = Agreement(subdomain.comm), *initial_state(numbering, start)
+        equation = StepEquation(subdomain, scheme, t0, v[subdomain.dofs], together)
+        inertia, q_local, loaded = equation.inertia, q[subdomain.dofs], list[Array]()
         same = start is not None and start.scene is scene and bool(start.times[-1] == t0)
         goes_on = same and "reactions" in internal and start is not None and not len(start.v)
         if not fresh or (inertia is not None and inertia.scheme.kept):
             rates = None if inertia is None else inertia.v
-            past = Memory(share, internal) if same else None
+            past = Archive(subdomain, internal) if same else None
             loads = equation.loads
             loaded = together(lambda: [x.carry_on(t0, q_local, rates, past) for x in loads])
         if start is not None:
@@ -122,7 +122,7 @@ class Simulation(Stepper):
         for term in equation.terms:
             term.start(q_local)
         equation.add_state(q_local)
-        for group in equation.couplings if fresh else ():
+        for group in equation.connector_terms if fresh else ():
             group.put_forces(q_local)
         path = None
         if inertia is None:
@@ -130,27 +130,27 @@ class Simulation(Stepper):
         else:
             together(equation.inner_forces, q_local)
         goes_on = goes_on or inertia is not None
-        solution, forces, before = kind(scene, grid), None, None
+        solution, forces, before = kind(scene, numbering), None, None
         solution.between, solution.scheme = float(scheme.average(0.0, 1.0)), scheme
         alike = start is not None and start.between == solution.between
-        if goes_on and alike and start is not None and same_unknowns(start.grid, grid):
-            forces = np.ascontiguousarray(start.numbers(-1)[:, share.cells])
-            before = start.before(-1)[share.dofs] if start.begun else None
+        if goes_on and alike and start is not None and same_unknowns(start.numbering, numbering):
+            forces = np.ascontiguousarray(start.cell_resultants(-1)[:, subdomain.cells])
+            before = start.before(-1)[subdomain.dofs] if start.begun else None
         if forces is not None or inertia is not None:
             equation.cell_forces.begin(forces)
         super().__init__(comm, equation, newton, t0, q_local, path, solution, together, loose)
         self._begun_at = before
         solution.begun = solution.between < 1 or self.cell_forces.asks_for_before
-        of_scene = forces_of_scene(grid, scheme, t0)
-        solution.of_record = self.cell_forces.of_record if share.alone else of_scene
+        of_scene = forces_of_scene(numbering, scheme, t0)
+        solution.of_record = self.cell_forces.of_record if subdomain.alone else of_scene
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())
         # If forces act before the end of a step, loads that act from the start are applied first.
         self._applies = fresh and inertia is None and solution.between != 1.0 and acts
         give_back_memory(len(q_local))
-        if inertia is not None and (scene.links or scene.supports):
-            motions = self.connections()[:, 0] if scene.links else np.zeros(0)
-            together(warn_of_jumps, grid, t0, q, motions)
+        if inertia is not None and (scene.all_connectors or scene.supports):
+            motions = self.connections()[:, 0] if scene.all_connectors else np.zeros(0)
+            together(warn_of_jumps, numbering, t0, q, motions)
 
     # -- stepping ------------------------------------------------------------------------------
 
@@ -185,9 +185,9 @@ class Simulation(Stepper):
             [ -0.1 -18.9 -14.3]
             >>> simulation.close()
         """
-        c, solution, row_limit, rows = self.march, self.solution, 0, ffi.NULL
+        c, solution, row_limit, rows = self.time_loop, self.solution, 0, ffi.NULL
         ends = np.ascontiguousarray(ends, dtype=np.float64)
-        number = len(ends) if self.share.alone else 1  # clocks of processes differ
+        number = len(ends) if self.subdomain.alone else 1  # clocks of processes differ
         try:
             if self._applies and self.parts == 0:
                 self._applies = False
@@ -200,7 +200,7 @@ class Simulation(Stepper):
                     self._fail()
                 c.prediction.dt = math.inf  # the next step is not extrapolated from this step
             if keep:
-                if self.share.alone and (
+                if self.subdomain.alone and (
                     not solution.begun or solution.parts_of_last == self.parts
                 ):
                     columns = self._writer.columns
@@ -225,12 +225,12 @@ class Simulation(Stepper):
 
     def watch(self, parts: Array) -> ExtremesInC | None:
         """Let C update extremes after each step, or return None if processes share the scene."""
-        if not self.share.alone:
+        if not self.subdomain.alone:
             return None
-        along = ForcesAlongCells(self.grid), self.solution.between
+        along = ForcesAlongCells(self.numbering), self.solution.between
         self._watches.append(extremes := ExtremesInC(self.fields, self.cell_forces, *along, parts))
         pointers = ffi.new("watch *[]", [watch.c for watch in self._watches])
-        fill(self.march, watches=len(self._watches), watch=pointers)
+        fill(self.time_loop, watches=len(self._watches), watch=pointers)
         return extremes
 
     def give_up(self, failure: StepFailed, end: float, advice: str = "") -> NoReturn:
@@ -265,21 +265,21 @@ class Simulation(Stepper):
         if self._now is None:
             columns = self._writer.columns
             size = columns.width
-            (row,) = new_rows(1, size + self.solution.begun * self.grid.size)
+            (row,) = new_rows(1, size + self.solution.begun * self.numbering.size)
             self._writer.write(row[:size])
             if self.solution.begun:
-                row[size:] = self.share.gather(self.q_before)
-                columns = columns.plus(BEFORE, (self.grid.size,))
-            self._now = States(self.grid, self.solution, Block(columns, row[None], 1))
-            if not self.share.alone or self._lacks_record:
+                row[size:] = self.subdomain.gather(self.q_before)
+                columns = columns.plus(BEFORE, (self.numbering.size,))
+            self._now = States(self.numbering, self.solution, Block(columns, row[None], 1))
+            if not self.subdomain.alone or self._lacks_record:
                 self._now.of_record = partial(self._gathered_forces, self.parts)
         return self._now
 
     @cached_property
     def _writer(self) -> StateWriter:
         return StateWriter(
-            self.march, self.share, self.ledger, self.supports, self.inelastic, self.couplings,
-            self.cell_forces,
+            self.time_loop, self.subdomain, self.ledger, self.supports, self.inelastic,
+            self.connector_terms, self.cell_forces,
         )  # fmt: skip
 
     @property
@@ -291,10 +291,10 @@ class Simulation(Stepper):
         """Return ``cell_number`` of loops.h of all cells; ``parts`` must be the present number."""
         if parts != self.parts:
             raise ArgumentError("section forces of an earlier state: ask for simulation.now again")
-        forces: Array = np.zeros((lib.CELL_NUMBERS, len(self.grid.cells)))
-        forces[:, self.share.cells] = self.cell_forces(self.q, self.q_before)
-        if not self.share.alone:
-            self.share.comm.Allreduce(MPI.IN_PLACE, forces)
+        forces: Array = np.zeros((lib.CELL_NUMBERS, len(self.numbering.cells)))
+        forces[:, self.subdomain.cells] = self.cell_forces(self.q, self.q_before)
+        if not self.subdomain.alone:
+            self.subdomain.comm.Allreduce(MPI.IN_PLACE, forces)
         return forces
 
     def keep(self, solution: Solution | None = None) -> None:
@@ -310,7 +310,7 @@ class Simulation(Stepper):
             _, row = self.now.row(0)
             parts, before = [row[: columns.width]], row[columns.width :]
             if self._lacks_record:
-                forces = self.now.numbers(0)
+                forces = self.now.cell_resultants(0)
                 parts = [row[: columns.at[RECORD].start], forces.ravel()]
                 columns = columns.plus(FORCES, forces.shape, without=RECORD)
             at_rest = not len(solution) and np.array_equal(before, self.now.q[0])
@@ -332,7 +332,7 @@ class Simulation(Stepper):
 
     def end(self) -> None:
         """Give the solution the last state and the internal variables for a continued run."""
-        self.copies.settle()
+        self.copies.synchronize()
         if self.t not in self.solution.times[-1:]:
             self.keep()
         self.solution.parts, self.solution.iterations = self.parts, self.iterations  # with failures
@@ -340,34 +340,34 @@ class Simulation(Stepper):
 
     def snapshot(self) -> Solution:
         """Return the present state as a solution for ``start=``; all processes call it."""
-        self.copies.settle()
-        now = Solution(self.scene, self.grid, self.solution)
+        self.copies.synchronize()
+        now = Solution(self.scene, self.numbering, self.solution)
         self.keep(now)
         now.internal = self.equation.internal_variables(self.q, self.t)
         return now
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the data of later steps; the number of processes may have changed.
 
         All processes call it together.
         """
-        t, restores = memory.number("t", self.t), memory.has("t")
-        self.parts = int(memory.number("parts", self.parts))
-        self.solver.remember(memory)
-        q = memory.at_dofs("q", self.q)
-        self.controllers.remember(memory, t)
-        self.prediction.remember(memory)
+        t, restores = archive.number("t", self.t), archive.has("t")
+        self.parts = int(archive.number("parts", self.parts))
+        self.solver.save_or_restore(archive)
+        q = archive.at_dofs("q", self.q)
+        self.controllers.save_or_restore(archive, t)
+        self.prediction.save_or_restore(archive)
         if restores:
-            ffi.memmove(self.march.q, doubles(q), q.nbytes)
-            self.march.t, self._begun_at = t, None
+            ffi.memmove(self.time_loop.q, doubles(q), q.nbytes)
+            self.time_loop.t, self._begun_at = t, None
             self._moved(t)
-        self.cell_forces.remember(memory, self.q, self.q_before)
-        self.ledger.remember(memory)
+        self.cell_forces.save_or_restore(archive, self.q, self.q_before)
+        self.ledger.save_or_restore(archive)
         for term in self.terms:
-            term.remember(memory, self.q)
-        self.supports.remember(memory, self.q)
+            term.save_or_restore(archive, self.q)
+        self.supports.save_or_restore(archive, self.q)
         if self._path is not None:
-            self._path.remember(memory)
+            self._path.save_or_restore(archive)
         if restores:
             self.ledger.begin()
             self.equation.add_state(self.q)

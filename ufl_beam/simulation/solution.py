@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import State
 from ufl_beam.display import TIME, Rich
 from ufl_beam.errors import ArgumentError, require_kind, warn
@@ -58,7 +58,7 @@ class Solution(States, Rich):
 
     Attributes:
         scene: Model.
-        grid: Its vertices, cells and numbering.
+        numbering: Its vertices, cells and numbering.
         parts: Number of steps taken; each substep is counted.
         iterations: Number of Newton iterations.
         time_error: Sum of the estimated errors of :class:`Adaptive` steps, relative to the size of
@@ -85,8 +85,8 @@ class Solution(States, Rich):
 
     parameter = TIME
 
-    def __init__(self, scene: Scene, grid: Grid, like: States | None = None) -> None:
-        super().__init__(grid, like)
+    def __init__(self, scene: Scene, numbering: DofNumbering, like: States | None = None) -> None:
+        super().__init__(numbering, like)
         self.scene = scene
         self.parts = self.iterations = 0
         self.time_error, self.seconds, self.building = math.nan, 0.0, 0.0
@@ -99,10 +99,10 @@ class Solution(States, Rich):
         """Store the numbers of steps and iterations up to the last state."""
         self.parts, self.iterations, self.parts_of_last = parts, iterations, parts
 
-    def thin(self) -> None:
+    def downsample(self) -> None:
         """Delete every other state; the first state stays."""
         self.parts_of_last = self.parts_of_last if len(self) % 2 else UNKNOWN
-        super().thin()
+        super().downsample()
 
     def history(self) -> State:
         """Return all states, as arrays by name."""
@@ -159,12 +159,12 @@ class Solution(States, Rich):
             return restored(read(file, FORMAT), scene)
 
     def _content(self) -> Content:
-        grid = self.grid
+        numbering = self.numbering
 
         def record(owner: Any, field: str, function: Any) -> Any:
             """Return the record for a function that is a field of ``owner``."""
             if field == "curve" and isinstance(owner, Member):
-                return SavedCurve.sampled(function, 0.0, 1.0, grid.parameters(owner))
+                return SavedCurve.sampled(function, 0.0, 1.0, numbering.parameters(owner))
             if field == "curve":
                 return _used_curve(self, function)
             if field in TIME_FUNCTIONS and not isinstance(owner, Controller | ForceLaw):
@@ -173,8 +173,8 @@ class Solution(States, Rich):
 
         return {
             "kind": type(self).__name__, "version": version(),
-            "scene": to_data(grid.scene, record), "mesh": to_data(grid.mesh),
-            "numbering": grid.checksum(), **{name: getattr(self, name) for name in NAMED},
+            "scene": to_data(numbering.scene, record), "mesh": to_data(numbering.mesh),
+            "numbering": numbering.checksum(), **{name: getattr(self, name) for name in NAMED},
             **self._arrays(),
         }  # fmt: skip
 
@@ -213,7 +213,7 @@ class Solution(States, Rich):
         """Return lines on the model, the run, and embedded hinges that opened."""
         ends = " to ".join(f"{t:g}" for t in (*self.times[:1], *self.times[-1:]))
         lines = [
-            str(self.grid),
+            str(self.numbering),
             f"{self.parameter.value.format(ends)} in {self.parts} steps, "
             f"{self.iterations / max(self.parts, 1):.2f} Newton iterations each, "
             f"{self.seconds:.2f} s of wall time",
@@ -238,8 +238,8 @@ class Solution(States, Rich):
 def restored(content: Content, scene: Scene | None = None) -> Solution:
     """Make a solution from the content of a file, with the saved scene or the given scene."""
     described = from_data(content["scene"]) if scene is None else scene
-    grid = Grid(described, from_data(content["mesh"]))
-    if grid.checksum() != content["numbering"]:
+    numbering = DofNumbering(described, from_data(content["mesh"]))
+    if numbering.checksum() != content["numbering"]:
         if scene is not None:
             raise ArgumentError(
                 "it is a solution of another scene: its beams, cells, bodies or joints differ"
@@ -249,7 +249,7 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
             f"freedom differently from this version, {version()}; load it with the former version"
         )
     kinds = {kind.__name__: kind for kind in (Solution, *Solution.__subclasses__())}
-    solution = kinds[content["kind"]](grid.scene, grid)
+    solution = kinds[content["kind"]](numbering.scene, numbering)
     solution._set_content(content)
     if scene is not None:
         scenes = solution._content()["scene"], content["scene"]
@@ -296,16 +296,16 @@ class Opened:
     """
 
     def __init__(self, states: States) -> None:
-        self._grid, self._times = states.grid, states.times
-        grid = states.grid
-        self.first, self.shear = np.full(len(grid.cells), -1), np.zeros(len(grid.cells))
-        self.dissipated = np.zeros(len(grid.cells))
+        self._numbering, self._times = states.numbering, states.times
+        numbering = states.numbering
+        self.first, self.shear = np.full(len(numbering.cells), -1), np.zeros(len(numbering.cells))
+        self.dissipated = np.zeros(len(numbering.cells))
         if len(states):
             self.dissipated[:] = states.cells_of(-1)[:, HINGE]
         cells = np.flatnonzero(self.dissipated > 0)
         if not len(cells):
             return
-        rows = np.searchsorted(grid.inelastic_cells, cells)
+        rows = np.searchsorted(numbering.inelastic_cells, cells)
         dissipated, V = (states.column("material")[:, rows, k] for k in (HINGE, 1))
         self.first[cells] = first = (dissipated > 0).argmax(axis=0)
         # After a sudden opening V is dominated by vibrations.
@@ -314,17 +314,17 @@ class Opened:
 
     def hinges(self) -> list[OpenedHinges]:
         """Return the embedded hinges (laws of sections) that opened in the run, beam by beam."""
-        grid = self._grid
+        numbering = self._numbering
         hinges = []
-        for beam in grid.scene.beams:
+        for beam in numbering.scene.beams:
             law = beam.section.hinge
-            cells, laws = grid.cells_of(beam), grid.hinges(beam)
+            cells, laws = numbering.cells_of(beam), numbering.hinges(beam)
             cells = cells[[other_law is law for other_law in laws] & (self.first[cells] > 0)]
             if law is None or not len(cells) or law.limit == 0:
                 continue
-            errors = self.shear[cells] * grid.lengths(cells) / (2 * law.limit)
+            errors = self.shear[cells] * numbering.lengths(cells) / (2 * law.limit)
             worst = int(np.argmax(errors))
-            place = grid.middle(int(cells[worst]))
+            place = numbering.middle(int(cells[worst]))
             hinges.append(OpenedHinges(beam, len(cells), float(errors[worst]), place))
         return hinges
 
@@ -334,20 +334,20 @@ class Opened:
         Resistances that fall faster with the opening than the stress of the cell come first.  The
         stiffness of a cell against an opening is θ EI/h, or θ E/h of a fibre.
         """
-        grid, times = self._grid, self._times
-        for beam in grid.scene.beams:
-            cells, laws = grid.cells_of(beam), grid.hinges(beam)
+        numbering, times = self._numbering, self._times
+        for beam in numbering.scene.beams:
+            cells, laws = numbering.cells_of(beam), numbering.hinges(beam)
             fall = {law: _fall(beam.section.layout(law), scheme) for law in set(laws)}
             falls, energies = np.array([fall[law] for law in laws]).T
             opened = (self.first[cells] > 0) & (self.dissipated[cells] >= energies)
-            lengths = grid.lengths(cells)
+            lengths = numbering.lengths(cells)
             ratios = np.where(opened, lengths, 0.0) * falls
             worst = int(np.argmax(ratios))
             ratio, length, t = ratios[worst], lengths[worst], times[self.first[cells[worst]]]
             if ratio > 1:
                 warn(
                     f"{beam.name}: the hinge in the cell at "
-                    f"s = {grid.middle(int(cells[worst])).s:.3g} opened suddenly by "
+                    f"s = {numbering.middle(int(cells[worst])).s:.3g} opened suddenly by "
                     f"t = {t:.6g} s: its resistance falls {ratio:.3g} times as fast as its cell of "
                     f"{length:.3g} m can follow. Energy that the cell released and the opening did "
                     "not dissipate went to the rest of the scene. Use cells shorter than "
@@ -409,10 +409,10 @@ TIME_FUNCTIONS = ("amplitude", "u", "v", "psi", "motion", "force", "numbers")
 def _used_curve(solution: Solution, curve: Curve) -> SavedCurve:
     """Return the used interval of a guide curve, with a tenth and the steps of tangents added."""
     scene, used = solution.scene, [0.0]
-    for link in scene.links:
-        if isinstance(link.law, Guide) and link.law.curve is curve:
+    for connector in scene.all_connectors:
+        if isinstance(connector.law, Guide) and connector.law.curve is curve:
             s = 0.0
-            for point in solution.position(link.b):
+            for point in solution.position(connector.b):
                 s = nearest(curve, point, s, parameter_step(curve, s, scene.size), scene.size)
                 used.append(s)
     first, last = float(np.nanmin(used)), float(np.nanmax(used))

@@ -130,10 +130,10 @@ class AdaptiveSteps:
         apart = [t for before, t in pairwise([t0, *inside]) if t - before > same]
         self._stops = [*apart, t1]
         self._fresh = True
-        share = simulation.share
-        self._rotations, (self._x, self._y) = share.rotations, share.translations()
+        subdomain = simulation.subdomain
+        self._rotations, (self._x, self._y) = subdomain.rotations, subdomain.translations()
         M = simulation.inertia.M
-        bears = np.bincount(M.rows(), weights=np.abs(M.data), minlength=share.size)
+        bears = np.bincount(M.rows(), weights=np.abs(M.data), minlength=subdomain.size)
         self._massless = np.flatnonzero(bears == 0.0)
         self.steps, self.error = 0, 0.0
 
@@ -210,7 +210,7 @@ class AdaptiveSteps:
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
         rotations = np.abs(error[self._rotations]).max(initial=0.0)
         load_error = simulation.together(self._load_error, dt)
-        return trial, simulation.share.largest(
+        return trial, simulation.subdomain.largest(
             float(max(moves / simulation.scene.size, rotations, load_error))
         )
 

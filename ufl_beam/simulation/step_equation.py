@@ -16,10 +16,10 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.compiled.csr import Csr, Product
-from ufl_beam.discretization.dof_numbering import Grid
+from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import NOWHERE, Memory, State
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_io import NOWHERE, Archive, State
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
 from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
@@ -31,7 +31,7 @@ from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.terms.beam_forces import Cells, ElasticBeams, InelasticBeams
 from ufl_beam.terms.boundary_conditions import Supports
 from ufl_beam.terms.cell_forces import CellForces
-from ufl_beam.terms.connector_forces import couplings
+from ufl_beam.terms.connector_forces import connector_terms
 from ufl_beam.terms.connector_rows import Setting
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.inertia_and_damping import (
@@ -61,9 +61,9 @@ class StepEquation:
         ledger: Energies of this process.
         controllers: Forces of controllers and limits of friction in the step.
         beams: Terms of cells; ``inelastic`` cells, which have material points, come first.
-        couplings: Terms of connectors, grouped by kind.
+        connector_terms: Terms of connectors, grouped by kind.
         inertia: Inertia; None in statics.
-        terms: All terms; the forces of ``inner`` terms, ``beams`` and ``couplings``, are internal.
+        terms: All terms; the forces of ``inner`` terms, ``beams`` and ``connectors``, are internal.
         weights: Weights of residuals: 1 for forces, 1 over the size of the scene for moments, 0
             for ghosts and forces of connectors.
         force: Internal forces in the latest residual, in statics; else empty.
@@ -74,44 +74,46 @@ class StepEquation:
     """
 
     def __init__(
-        self, share: Share, scheme: Scheme, t0: float, v: Array, together: Agreement
+        self, subdomain: Subdomain, scheme: Scheme, t0: float, v: Array, together: Agreement
     ) -> None:
-        self.share, self.scheme, self.weights = share, scheme, share.weights()
-        scene = share.grid.scene
+        self.subdomain, self.scheme, self.weights = subdomain, scheme, subdomain.weights()
+        scene = subdomain.numbering.scene
         search, switched = np.zeros(lib.SEARCH_FLAGS, np.int32), np.zeros(1, np.int32)
-        self.ledger, self.fields = ledger, fields = Ledger(), Fields(share)
+        self.ledger, self.fields = ledger, fields = Ledger(), Fields(subdomain)
         self.A = A = fields.matrix()
         setting = (scheme, A, ledger)
 
         # Each kind makes its entries of the ledger, in the order of the columns of tables.  The
         # order follows from the scene alone, even if a process lacks cells or connectors of a kind.
-        self.inelastic, elastic = list[InelasticBeams](), np.ones(len(share.cells), dtype=bool)
-        for layout, cells in share.grid.inelastic:
+        self.inelastic, elastic = list[InelasticBeams](), np.ones(len(subdomain.cells), dtype=bool)
+        for layout, cells in subdomain.numbering.inelastic:
             expect_entries(layout, scheme, ledger)
-            indices = np.flatnonzero(np.isin(share.cells, cells))
+            indices = np.flatnonzero(np.isin(subdomain.cells, cells))
             if len(indices):
                 elastic[indices] = False
-                subset = Fields(share, indices)
+                subset = Fields(subdomain, indices)
                 self.inelastic.append(InelasticBeams(subset, layout, *setting, search))
         self.beams: list[Cells] = [*self.inelastic]
         loses = scheme.alpha or isinstance(scheme, EnergyMomentumDecaying)
-        if loses and sum(len(cells) for _, cells in share.grid.inelastic) < len(share.grid.cells):
+        if loses and sum(len(cells) for _, cells in subdomain.numbering.inelastic) < len(
+            subdomain.numbering.cells
+        ):
             ledger.lost["numerical"] += 0.0
         others: list[Term] = []
         if elastic.any():
-            subset = fields if elastic.all() else Fields(share, np.flatnonzero(elastic))
+            subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
             self.beams.append(ElasticBeams(subset, *setting))
             if isinstance(scheme, EnergyMomentumDecaying):
                 others.append(SecondDifferences(scheme, subset, A, ledger))
 
-        self.controllers = Controllers(share)
+        self.controllers = Controllers(subdomain)
         inertia = Inertia(fields, scheme, A, ledger, v) if has_inertia(scheme) else None
         self.inertia = inertia
         connectors = Setting(
             self.controllers.place, None if inertia is None else inertia.c, scene.size, scheme,
             ledger, friction_repeats(scene), search, switched,
         )  # fmt: skip
-        self.couplings = together(couplings, share, connectors, A)
+        self.connector_terms = together(connector_terms, subdomain, connectors, A)
 
         if scene.loads:
             ledger.supplied["loads"] += 0.0
@@ -120,12 +122,12 @@ class StepEquation:
         dead = [load for load in scene.loads if load not in (*followers, *frames)]
         self.loads: list[LoadTerm] = [FrameForces(x, fields, scheme, ledger, A) for x in frames]
         if dead:
-            self.loads.append(DeadLoads(dead, share, scheme, ledger))
+            self.loads.append(DeadLoads(dead, subdomain, scheme, ledger))
         if followers:
-            self.loads.append(FollowerLoads(followers, share, scheme, ledger, A))
+            self.loads.append(FollowerLoads(followers, subdomain, scheme, ledger, A))
         if scene.works:
             self.loads.append(together(Works, fields, scheme, ledger, A, t0))
-        self.supports = Supports(share, scheme, ledger, A)
+        self.supports = Supports(subdomain, scheme, ledger, A)
         if inertia is not None:
             self.supports.stop(v)
             inertia.take(v, v, math.inf)
@@ -136,18 +138,18 @@ class StepEquation:
             others += damping_forces(damping, fields, *setting, inertia)
         if scene.beams:
             ledger.state["stored"] += 0.0
-        self.inner: list[Term] = [*self.beams, *self.couplings]
+        self.inner: list[Term] = [*self.beams, *self.connector_terms]
         self.others: list[Term] = [*self.loads, *others]
         self.terms: list[Term] = [*self.inner, *self.others]
         self._fill_c(search, switched)
         in_cells = [forces for term in self.terms for forces in term.in_cells]
         in_c = [term.loads_in_cells() for term in self.loads if isinstance(term, DeadLoads)]
-        self.cell_forces = CellForces(share, in_cells, *in_c)
+        self.cell_forces = CellForces(subdomain, in_cells, *in_c)
 
     def _fill_c(self, search: Index, switched: Index) -> None:
         """Fill ``equation`` of loops.h, and get the phases of the terms."""
-        share, A, supports = self.share, self.A, self.supports
-        self.c = struct("equation", size=A.size, owned=share.num_owned, weight=self.weights)
+        subdomain, A, supports = self.subdomain, self.A, self.supports
+        self.c = struct("equation", size=A.size, owned=subdomain.num_owned, weight=self.weights)
         self.callbacks = callbacks = Callbacks(self.c)
         loops = [term.loops for term in self.terms]
         stiffnesses = [stiffness for _, stiffness in loops if stiffness is not None]
@@ -162,7 +164,7 @@ class StepEquation:
 
         product, cells = pop("add_step_tangent"), pop("add_cells")
         demands = [term.demand for term in self.inner if term.demand is not None]
-        demanding = share.largest(float(bool(demands)))
+        demanding = subdomain.largest(float(bool(demands)))
         predicted = [term.predicted for term in self.beams if term.predicted is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
@@ -175,14 +177,14 @@ class StepEquation:
             held=len(supports.dofs), hold=supports.dofs.astype(np.int32),
             reactions=supports.reactions, pivots=supports.pivots,
             turned=supports.turned, axes=supports.axes,
-            plane=np.zeros(share.size if supports.turned else 0),
+            plane=np.zeros(subdomain.size if supports.turned else 0),
             demands=len(demands), demand=ffi.new("demand[]", demands), demanding=int(demanding),
             predictions=len(predicted), predicted=ffi.new("predicted_strains *[]", predicted),
             search=search, switched=switched,
         )  # fmt: skip
         self._alive = loops, demands, predicted
         # In statics the work of the internal forces is compared with energies.
-        self.force = np.zeros(0 if self.inertia is not None else share.size)
+        self.force = np.zeros(0 if self.inertia is not None else subdomain.size)
         if self.inertia is None:
             fill(self.c, inner_force=self.force)
         # The ledger has all its entries now.  Phases write to their addresses.
@@ -192,44 +194,46 @@ class StepEquation:
 
     def internal_variables(self, q: Array, t: float) -> State:
         """Return the data for a run that starts here: internal variables, reactions, rates."""
-        memory = Memory(self.share)
-        self.controllers.remember(memory, t)
-        for term in (*self.inelastic, *self.couplings):
-            term.remember(memory, q)
-        friction = any(rubs(link.law) for link in self.share.grid.scene.links)
+        archive = Archive(self.subdomain)
+        self.controllers.save_or_restore(archive, t)
+        for term in (*self.inelastic, *self.connector_terms):
+            term.save_or_restore(archive, q)
+        friction = any(
+            rubs(connector.law) for connector in self.subdomain.numbering.scene.all_connectors
+        )
         if self.inertia is None or self.supports.work or friction:
-            self.supports.carry_on(memory, q)
+            self.supports.carry_on(archive, q)
         if self.inertia is not None:
-            self.inertia.carry_on(memory, len(self.inertia.more))
-            self._pass_on_step(memory, q)
+            self.inertia.carry_on(archive, len(self.inertia.more))
+            self._pass_on_step(archive, q)
         for load in self.loads:
-            load.pass_on(memory)
-        return memory.state()
+            load.pass_on(archive)
+        return archive.state()
 
     def set_internal_variables(self, q: Array, t: float, internal: State, *, same: bool) -> None:
         """Take over :meth:`internal_variables` of another run at the local configuration ``q``.
 
         ``same`` says that no force has changed since, so that accelerations are unchanged.
         """
-        memory = Memory(self.share, internal)
-        self.controllers.remember(memory, t)
-        for term in (*self.inelastic, *self.couplings):
-            term.remember(memory, NOWHERE)
+        archive = Archive(self.subdomain, internal)
+        self.controllers.save_or_restore(archive, t)
+        for term in (*self.inelastic, *self.connector_terms):
+            term.save_or_restore(archive, NOWHERE)
         if "reactions" in internal:
-            self.supports.carry_on(memory, q)
+            self.supports.carry_on(archive, q)
         if self.inertia is not None and same:
             known = sum(name in internal for name in self.inertia.scheme.kept)
-            self.inertia.carry_on(memory, known)
+            self.inertia.carry_on(archive, known)
             if BEFORE in internal:
-                self._pass_on_step(memory, q)
+                self._pass_on_step(archive, q)
 
-    def _pass_on_step(self, memory: Memory, q: Array) -> None:
+    def _pass_on_step(self, archive: Archive, q: Array) -> None:
         """Save or restore the increments of the last step, if the next step depends on them."""
         if self.inertia is not None and isinstance(self.scheme, EnergyMomentumDecaying):
-            self.inertia.pass_on_step(memory)
+            self.inertia.pass_on_step(archive)
             for term in self.terms:
                 if isinstance(term, SecondDifferences):
-                    term.remember(memory, q)
+                    term.save_or_restore(archive, q)
 
     # -- forces and tangent --------------------------------------------------------------------
 
@@ -260,14 +264,14 @@ class StepEquation:
 
         With a time ``t``, forces of connectors at ``t``, which are unknowns in ``q``, are added.
         """
-        short, forces = sys.float_info.min, np.zeros(self.share.size)
+        short, forces = sys.float_info.min, np.zeros(self.subdomain.size)
         self.begin(Step.of(self.scheme, 0.0, short, short, q), self.beams)
         for beam in self.beams:
             beam.add_residual(q, forces)
         if t is not None:
             step = Step.of(self.scheme, t, t + 1.0, t + 1.0, q)
-            self.begin(step._replace(load_time=t, motion_time=t), self.couplings)
-            for group in self.couplings:
+            self.begin(step._replace(load_time=t, motion_time=t), self.connector_terms)
+            for group in self.connector_terms:
                 group.add_residual(q, forces)
         return forces
 
@@ -300,11 +304,11 @@ class StepEquation:
         except StepFailed:
             self.c.raised = 1
         self.tangent(q1)
-        return self.share.largest(float(self.c.raised)) == 0.0
+        return self.subdomain.largest(float(self.c.raised)) == 0.0
 
     def forces(self, q1: Array) -> Array:
         """Return the sum of the forces of all terms at ``q1`` on this process."""
-        r = np.zeros(self.share.size)
+        r = np.zeros(self.subdomain.size)
         with self.callbacks.raising():
             for term in self.terms:
                 term.add_residual(q1, r)
@@ -324,7 +328,7 @@ class StepEquation:
         They are the step itself, with motions of connectors instead of their forces.
         """
         v, works = self.supports.in_plane(y), y.copy()
-        for group in self.couplings:
+        for group in self.connector_terms:
             group.put_motions(q, v, works)
         return works
 
@@ -335,7 +339,7 @@ class StepEquation:
 
         Both are in the axes of the plane, without supports; derivatives are entries of the matrix.
         """
-        r = np.zeros(self.share.size)
+        r = np.zeros(self.subdomain.size)
         self.begin(step)
         self.A.data.fill(0.0)
         with self.callbacks.raising():
@@ -355,7 +359,7 @@ class StepEquation:
     def stiffness_works(self, q: Array, X: Array, Y: Array) -> Array:
         """Return works of the tangent of :meth:`linearise` for pairs of columns of X and Y; J."""
         self.A.data.fill(0.0)
-        for term in (*self.couplings, *self.others):
+        for term in (*self.connector_terms, *self.others):
             if term.kind != "inertia":
                 term.add_tangent(q)
         times, works = Product(self.A), np.zeros(X.shape[1])
@@ -373,7 +377,7 @@ class StepEquation:
             works[1, i, j] = sum(beams.tangent_work(q, x, y, u) for beams in self.beams)
         for k, work in enumerate(works):
             self.A.data.fill(0.0)
-            for term in (*self.couplings, *self.loads):
+            for term in (*self.connector_terms, *self.loads):
                 if k == 0:
                     term.add_tangent(q)
                 else:
@@ -384,7 +388,7 @@ class StepEquation:
         return works[0], works[1]
 
 
-def forces_of_scene(grid: Grid, scheme: Scheme, t0: float) -> Callable[..., Array]:
+def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Callable[..., Array]:
     """Return :meth:`CellForces.of_record` of all cells, for a record of several processes.
 
     The equation of the whole scene is made at the first call, without communication.
@@ -392,8 +396,10 @@ def forces_of_scene(grid: Grid, scheme: Scheme, t0: float) -> Callable[..., Arra
 
     @cache
     def equation() -> StepEquation:
-        share = Share(grid, MPI.COMM_SELF)
-        return StepEquation(share, scheme, t0, np.zeros(grid.size), Agreement(share.comm))
+        subdomain = Subdomain(numbering, MPI.COMM_SELF)
+        return StepEquation(
+            subdomain, scheme, t0, np.zeros(numbering.size), Agreement(subdomain.comm)
+        )
 
     return lambda *state: equation().cell_forces.of_record(*state)
 
@@ -427,29 +433,29 @@ class StaticPath:
         self, equation: StepEquation, q: Array, t0: float, loads: Sequence[Array],
         together: Agreement, *, goes_on: bool,
     ) -> None:  # fmt: skip
-        share, scheme, ledger = equation.share, equation.scheme, equation.ledger
+        subdomain, scheme, ledger = equation.subdomain, equation.scheme, equation.ledger
         supports = equation.supports
         self.force = together(equation.inner_forces, q, t0)
         equation.cell_forces.accept()
         if not goes_on:
             r = np.asarray(self.force - sum(loads))
             supports.enter(r)
-            supports.hold(share.added(r))
+            supports.hold(subdomain.added(r))
             supports.take()
         changes = [phases.change for phases in equation.phases if phases.change is not None]
         parts = ledger.state, ledger.supplied, ledger.lost
         self.c = struct(
             "static_path", slack=scheme.slack, far=LARGEST_MOTION, kink=KINK_IMBALANCE,
-            per_far=share.grid.scales[share.dofs],
+            per_far=subdomain.numbering.scales[subdomain.dofs],
             force=self.force, terms=len(changes), weight_of_before=scheme.weight_of_before,
             change=ffi.new("change_call[]", changes), accounts=len(parts),
-            account=ffi.new("double *[]", [doubles(entries.numbers) for entries in parts]),
+            account=ffi.new("double *[]", [doubles(entries.amounts) for entries in parts]),
             entries=np.array([len(entries) for entries in parts], dtype=np.int32),
         )  # fmt: skip
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the internal forces at the end of the last step."""
-        self.force[:] = memory.added("internal forces", self.force)
+        self.force[:] = archive.added("internal forces", self.force)
 
     def failure(self, mechanism: bool) -> StepFailed:
         """Return why the latest step is rejected: it leaves a mechanism, or changes the branch."""

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Steps of a scene in march.c: they are solved, checked, accepted, and divided if they fail.
+"""Steps of a scene in time_loop.c: they are solved, checked, accepted, and divided if they fail.
 
 In statics, if forces act before the end of a step, a step with large nodal rotations does not end
 in equilibrium.  So loads that act from the start are applied in substeps with small rotations, and
@@ -19,8 +19,8 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError, StepFailed, warn
 from ufl_beam.mechanics.time_schemes import Step, with_half_tangents
 from ufl_beam.model.constraint_checks import INSTEAD
@@ -52,27 +52,27 @@ class Prediction:
         c: ``prediction`` of loops.h; C writes to it when a step is accepted.
     """
 
-    def __init__(self, share: Share, q: Array, weights: Array, *, in_motion: bool) -> None:
-        self._share, self._in_motion = share, in_motion
-        self.c = struct("prediction", size=share.size, dt=math.inf)
+    def __init__(self, subdomain: Subdomain, q: Array, weights: Array, *, in_motion: bool) -> None:
+        self._subdomain, self._in_motion = subdomain, in_motion
+        self.c = struct("prediction", size=subdomain.size, dt=math.inf)
         self._q_before = q.copy()
         fill(self.c, q_before=self._q_before)
         if in_motion:
-            self._second = np.zeros(share.size)
-            size = {"scene": share.grid.scene.size, "unknowns": share.grid.size}
+            self._second = np.zeros(subdomain.size)
+            size = {"scene": subdomain.numbering.scene.size, "unknowns": subdomain.numbering.size}
             fill(self.c, second=self._second, weight=weights, **size)
 
-    def remember(self, memory: Memory) -> None:
-        """Save or restore the data in the numbering of the grid; see state_io.py."""
-        self.c.dt = memory.number("last dt", self.c.dt)
-        bytes_now = ffi.buffer(self.c.q_before, 8 * self._share.size)
-        q_before = memory.at_dofs("q before", np.frombuffer(bytes_now).copy())
+    def save_or_restore(self, archive: Archive) -> None:
+        """Save or restore the data in the numbering of the scene; see state_io.py."""
+        self.c.dt = archive.number("last dt", self.c.dt)
+        bytes_now = ffi.buffer(self.c.q_before, 8 * self._subdomain.size)
+        q_before = archive.at_dofs("q before", np.frombuffer(bytes_now).copy())
         ffi.memmove(self.c.q_before, doubles(q_before), q_before.nbytes)
         if self._in_motion:
-            self.c.equal = int(memory.number("equal steps", self.c.equal))
-            self.c.repeated = memory.number("part that repeats itself", self.c.repeated)
-            self.c.now = memory.number("square of the second difference", self.c.now)
-            self._second[:] = memory.at_dofs("second difference", self._second)
+            self.c.equal = int(archive.number("equal steps", self.c.equal))
+            self.c.repeated = archive.number("part that repeats itself", self.c.repeated)
+            self.c.now = archive.number("square of the second difference", self.c.now)
+            self._second[:] = archive.at_dofs("second difference", self._second)
 
 
 # -- check of static steps -------------------------------------------------------------------------
@@ -100,7 +100,7 @@ forces over the size of the scene.  Weights and tensions reach some tenths."""
 SHORT_SUBSTEP = 512
 """Substeps shorter by this factor have no such limit: still shorter substeps rotate as far."""
 
-MOST_PARTS: int = lib.MOST_PARTS
+MOST_SUBSTEPS: int = lib.MOST_SUBSTEPS
 """Largest number of substeps of a step."""
 
 
@@ -117,7 +117,7 @@ class Trial(NamedTuple):
 
 
 class Stepper(StateView):
-    """Steps of a scene in C, see march.c: the base class of :class:`Simulation`.
+    """Steps of a scene in C, see time_loop.c: the base class of :class:`Simulation`.
 
     C holds the state.  After each call Python has its time, configuration, velocities, reactions
     and ledger.
@@ -137,7 +137,7 @@ class Stepper(StateView):
         solver: Newton's method.
         prediction: Data of the last steps from which the initial guess is extrapolated.
         solution: Solution so far.
-        march: ``march`` of loops.h.
+        time_loop: ``time_loop`` of loops.h.
         copies: Comparison of the processes if each computes the scene as a whole.
         together: Calls whose errors are raised on all processes that share the scene.
     """
@@ -146,63 +146,68 @@ class Stepper(StateView):
         self, comm: MPI.Intracomm, equation: StepEquation, newton: Newton, t: float, q: Array,
         path: StaticPath | None, solution: Solution, together: Agreement, loose: str,
     ) -> None:  # fmt: skip
-        share, scheme, ledger = equation.share, equation.scheme, equation.ledger
-        self.comm, self.share, self.grid, self.scene = comm, share, share.grid, share.grid.scene
+        subdomain, scheme, ledger = equation.subdomain, equation.scheme, equation.ledger
+        self.comm, self.subdomain, self.numbering, self.scene = (
+            comm,
+            subdomain,
+            subdomain.numbering,
+            subdomain.numbering.scene,
+        )
         self.equation, self.scheme, self.ledger, self.solution = equation, scheme, ledger, solution
         self.together, self._path, self._loose = together, path, loose
-        self.copies, self.parameter = Copies(comm, share), solution.parameter
+        self.copies, self.parameter = Copies(comm, subdomain), solution.parameter
         self.fields, self.terms, self.supports = equation.fields, equation.terms, equation.supports
         self.beams, self.inelastic = equation.beams, equation.inelastic
-        self.couplings, self.loads = equation.couplings, equation.loads
+        self.connector_terms, self.loads = equation.connector_terms, equation.loads
         self.controllers, self.cell_forces = equation.controllers, equation.cell_forces
         if equation.inertia is not None:
             self.inertia = equation.inertia
         in_motion, phases = equation.inertia is not None, equation.phases
         self._begun_at: Array | None = None  # of the state before the first step
         self.parts = 0
-        self.prediction = Prediction(share, q, equation.weights, in_motion=in_motion)
+        self.prediction = Prediction(subdomain, q, equation.weights, in_motion=in_motion)
 
         again = [phase.again for phase in phases if phase.again is not None]
         fill(equation.c, agains=len(again), again=ffi.new("again_call[]", again))
         least = LEAST_IN_MOTION if in_motion else LEAST_AT_REST
-        self.solver = solver = Solver(share, equation, newton, least)
-        rotations = share.rotations
+        self.solver = solver = Solver(subdomain, equation, newton, least)
+        rotations = subdomain.rotations
         half_tangents = with_half_tangents(scheme, rotations)
         loads = [load.vector for load in equation.loads]
-        multipliers = share.multipliers.astype(np.int32)
+        multipliers = subdomain.multipliers.astype(np.int32)
         opens = [phase.opens for phase in phases if phase.opens is not None]
         places = ffi.new("openable[]", opens)
         admits = [phase.admits for phase in phases if phase.admits is not None]
-        s = np.zeros(share.size) if equation.supports.turned else solver.change
-        self.march = fill(
-            ffi.new("march *"),
-            equation=equation.c, size=share.size, t=t, q=q.copy(), x=solver.unknowns, s=s,
+        s = np.zeros(subdomain.size) if equation.supports.turned else solver.change
+        self.time_loop = fill(
+            ffi.new("time_loop *"),
+            equation=equation.c, size=subdomain.size, t=t, q=q.copy(), x=solver.unknowns, s=s,
             prediction=self.prediction.c,
-            guess=np.zeros(share.size), in_parts=not in_motion,
+            guess=np.zeros(subdomain.size), in_parts=not in_motion,
             load_weight=scheme.load_weight, at=1.0 if in_motion else scheme.load_weight,
-            limits_turn=scheme.limits_turn,
+            limits_rotation=scheme.limits_rotation,
             largest_turn=LARGEST_ROTATION, rotations=len(rotations), rotation=rotations,
             half_tangents=len(half_tangents), half_tangent=half_tangents,
             multipliers=len(multipliers), multiplier=multipliers,
             loads=len(loads), load=ffi.new("vector *[]", loads),
             supports=equation.supports.in_c(equation.callbacks),
-            states=len(ledger.state), state=ledger.state.numbers, cell_forces=self.cell_forces.c,
-            opens=int(share.largest(float(bool(opens)))), places=len(opens), place=places,
+            states=len(ledger.state), state=ledger.state.amounts, cell_forces=self.cell_forces.c,
+            opens=int(subdomain.largest(float(bool(opens)))), places=len(opens), place=places,
             admissions=len(admits), admission=ffi.new("admission_call[]", admits),
-            judges=int(share.largest(float(bool(admits)))),
+            judges=int(subdomain.largest(float(bool(admits)))),
             applying_turn=APPLYING_ROTATION, short_part=SHORT_SUBSTEP,
         )  # fmt: skip
-        if self.march.opens:
-            fill(self.march, found=np.zeros(share.size))
+        if self.time_loop.opens:
+            fill(self.time_loop, found=np.zeros(subdomain.size))
         if equation.supports.turned:
-            fill(self.march, x=np.zeros(share.size))
+            fill(self.time_loop, x=np.zeros(subdomain.size))
         if path is not None:
-            fill(self.march, path=path.c)
+            fill(self.time_loop, path=path.c)
         self._alive: list[Any] = [opens]
         self._watches = list[Any]()  # extremes that C updates after each step
-        self._force_watch = ForceWatch(equation.couplings, self.controllers, self.scene.size)
+        self._force_watch = ForceWatch(equation.connector_terms, self.controllers, self.scene.size)
         if self._force_watch.c is not None:
-            fill(self.march, forces=self._force_watch.c)
+            fill(self.time_loop, forces=self._force_watch.c)
         self._add_callbacks()
         self._moved(t)
 
@@ -211,7 +216,7 @@ class Stepper(StateView):
 
         `fill` does not store references to them, which would keep this object alive.
         """
-        c, callbacks, controllers = self.march, self.equation.callbacks, self.controllers
+        c, callbacks, controllers = self.time_loop, self.equation.callbacks, self.controllers
         loops = {
             name: [x for phases in self.equation.phases for x in getattr(phases, name)]
             for name in ("begin", "accept", "add_state")
@@ -243,17 +248,17 @@ class Stepper(StateView):
 
     def _evaluate_controllers(self, *_: Any) -> None:
         """Evaluate controllers and limits of friction in the state of C."""
-        self._moved(self.march.t)
+        self._moved(self.time_loop.t)
         self.together(self.controllers.ask, self)
 
     def _prepare(self) -> None:
         """Store the quantities of a trial step that the scheme keeps besides the velocities."""
-        c = self.march
+        c = self.time_loop
         _, *more = self.inertia.after(self._copy(c.s), c.step.dt)
         self.inertia.keep(*more)
         self.supports.take()
         q1 = self._copy(c.x)
-        for group in self.couplings:
+        for group in self.connector_terms:
             group.take(q1)
 
     def _require_stiffness(self, step: Any, q1: Any, s: Any) -> None:
@@ -262,16 +267,16 @@ class Stepper(StateView):
         If loads hold it, the tangent is regular without stiffness against zero-energy modes.  All
         processes call it together.
         """
-        equation, newton, grid, loose = self.equation, self.solver, self.grid, self._loose
+        equation, newton, numbering, loose = self.equation, self.solver, self.numbering, self._loose
         if not loose:
             return
         newton.forget_idle()
         if equation.evaluate(self._copy(q1)):
-            K, free = free_matrix(self.share, equation.A, self.supports.dofs)
-            x, scales = null_vectors(K)[1][:, -1], grid.scales[free]
+            K, free = free_matrix(self.subdomain, equation.A, self.supports.dofs)
+            x, scales = null_vectors(K)[1][:, -1], numbering.scales[free]
             motion = np.abs(x * scales).max()
             forces = np.linalg.norm((K @ x)[scales > 0] / scales[scales > 0])
-            if forces <= FREE_STIFFNESS * newton.scale() * grid.scene.size * motion:
+            if forces <= FREE_STIFFNESS * newton.scale() * numbering.scene.size * motion:
                 raise ArgumentError(f"{loose}The loads do not hold it either. {INSTEAD}")
         self._loose = ""
 
@@ -288,7 +293,7 @@ class Stepper(StateView):
             StepFailed: There is no equilibrium, or it is too far away.
         """
         with self._in_c():
-            solved = lib.attempt_step(self.march, t1, t1 if end is None else end)
+            solved = lib.attempt_step(self.time_loop, t1, t1 if end is None else end)
         return self._trial(solved)
 
     def attempt_along(self, step: Step, guess: Array, border: Any, *, hold: bool = True) -> Trial:
@@ -297,7 +302,7 @@ class Stepper(StateView):
         With ``hold`` points that do not flow are held closed if possible, see material_points.py.
         The guess is in the axes of supports.
         """
-        c = self.march
+        c = self.time_loop
         self.solver.follow(border)
         with self._in_c():
             trial = c.step
@@ -312,16 +317,16 @@ class Stepper(StateView):
 
     def accept(self, trial: Trial) -> None:
         """Accept the step of the latest :meth:`attempt`."""
-        self.march.step.t1 = trial.step.t1
+        self.time_loop.step.t1 = trial.step.t1
         with self._in_c():
-            accepted = lib.accept_step(self.march)
+            accepted = lib.accept_step(self.time_loop)
         if not accepted:
             self._fail()
 
     def _trial(self, solved: int) -> Trial:
         if not solved:
             self._fail()
-        c = self.march
+        c = self.time_loop
         q0, q1, s, q_before = map(self._copy, (c.q, c.x, c.s, c.step.q_before))
         step = c.step
         instants = step.load_time, step.motion_time, step.fraction, step.at
@@ -330,7 +335,7 @@ class Stepper(StateView):
     @contextmanager
     def _in_c(self) -> Iterator[None]:
         """Context in which C takes steps; at its end Python gets the new state."""
-        c = self.march
+        c = self.time_loop
         c.parts, c.failure, self.equation.callbacks.error = 0, lib.SUCCEEDS, None
         try:
             yield
@@ -344,19 +349,19 @@ class Stepper(StateView):
                 self._begun_at = None
             for extremes in self._watches:
                 extremes.seen = self.parts
-        self.warn(self._force_watch.told(), local=not self.share.alone)
+        self.warn(self._force_watch.told(), local=not self.subdomain.alone)
 
     def _fail(self) -> None:
         """Raise the error of the latest step; all processes call it together."""
-        c, callbacks = self.march, self.equation.callbacks
+        c, callbacks = self.time_loop, self.equation.callbacks
         error, callbacks.error = callbacks.error, None
         if not self.equation.c.raised:  # at a discarded iterate
             error = None
         failure, c.failure = c.failure, lib.SUCCEEDS
         if failure == lib.RAISED:
-            self.together.settle(error)
+            self.together.synchronize(error)
         if failure == lib.NO_EQUILIBRIUM:
-            self.together.settle(self.solver.error() or error)
+            self.together.synchronize(self.solver.error() or error)
             raise self.solver.failure()
         if failure == lib.TURNS_TOO_FAR:
             raise StepFailed(
@@ -398,15 +403,15 @@ class Stepper(StateView):
     def q(self) -> Array:
         """Configuration at the local degrees of freedom."""
         if self._q is None:
-            self._q = self._copy(self.march.q)
+            self._q = self._copy(self.time_loop.q)
         return self._q
 
     @property
     def q_before(self) -> Array:
         """Configuration at the beginning of the last step."""
-        if self._begun_at is not None and not self.march.parts:  # C may have gone on since
+        if self._begun_at is not None and not self.time_loop.parts:  # C may have gone on since
             return self._begun_at
-        return self._copy(self.march.prediction.q_before)
+        return self._copy(self.time_loop.prediction.q_before)
 
     def _copy(self, values: Any) -> Array:
-        return np.frombuffer(ffi.buffer(values, 8 * self.share.size)).copy()
+        return np.frombuffer(ffi.buffer(values, 8 * self.subdomain.size)).copy()

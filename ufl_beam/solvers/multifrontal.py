@@ -36,10 +36,10 @@ class Multifrontal:
 
     def __init__(self, inner: Any, stays: npt.NDArray[np.bool_]) -> None:
         self._inner, A = inner, inner.left
-        self.numbers = inner.numbers[stays]
+        self.dofs = inner.dofs[stays]
         *structure, at, space = _structure(A.indptr, A.indices, stays)
         arrays = dict(zip(STRUCTURE, structure, strict=True))
-        n, eliminated = len(self.numbers), A.size - len(self.numbers)
+        n, eliminated = len(self.dofs), A.size - len(self.dofs)
         schur, x = np.zeros(n * n), np.zeros(A.size)
         self.left = Csr(schur, np.tile(np.arange(n), n), n * np.arange(n + 1))
         self.f = x[eliminated:]

@@ -27,8 +27,8 @@ from ufl_beam.compiled.c_library import (
     petsc,
     struct,
 )
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import StepFailed
 from ufl_beam.solvers.newton_options import PREFIX, Newton, apply_options, database
 from ufl_beam.solvers.null_vectors import stiffen_zero_modes
@@ -49,16 +49,16 @@ REASONS = {
 """Explanations why Newton's method stops, by values of SNESConvergedReason."""
 
 
-def _vector(share: Share) -> tuple[PETSc.Vec, Array]:
+def _vector(subdomain: Subdomain) -> tuple[PETSc.Vec, Array]:
     """Create a vector of the unknowns; return it and its local values.
 
     It has ghosts if processes share a scene.  PETSc does not move the values.
     """
-    if share.alone:
-        vector = PETSc.Vec().createSeq(share.size)
+    if subdomain.alone:
+        vector = PETSc.Vec().createSeq(subdomain.size)
         return vector, vector.array_w
-    size = (share.num_owned, share.grid.size)
-    vector = PETSc.Vec().createGhost(share.ghosts, size=size, comm=share.comm)
+    size = (subdomain.num_owned, subdomain.numbering.size)
+    vector = PETSc.Vec().createGhost(subdomain.ghosts, size=size, comm=subdomain.comm)
     with vector.localForm() as local:
         return vector, local.array_w
 
@@ -79,32 +79,33 @@ class Solver:
         unknowns: Local values of the latest iterate, converged or not; C writes them.
     """
 
-    def __init__(self, share: Share, equation: Any, newton: Newton, least: int) -> None:
-        self._share, self._equation, self._newton = share, equation, newton
-        self._weights, A = share.weights(), equation.A
-        self._factors = CondensedSolver(share, A)
+    def __init__(self, subdomain: Subdomain, equation: Any, newton: Newton, least: int) -> None:
+        self._subdomain, self._equation, self._newton = subdomain, equation, newton
+        self._weights, A = subdomain.weights(), equation.A
+        self._factors = CondensedSolver(subdomain, A)
         (self._x, self.unknowns), (self._f, self._r), (self._y, self.change) = (
-            _vector(share) for _ in range(3)
+            _vector(subdomain) for _ in range(3)
         )
-        every = np.arange(share.size, dtype=np.int32)
+        every = np.arange(subdomain.size, dtype=np.int32)
         self._diagonal = A.positions(every, every)
         self._stiffness: Array | None = None  # of zero-energy modes, after a singular tangent
-        self._moves = np.ones(share.size, dtype=np.uint8)
+        self._moves = np.ones(subdomain.size, dtype=np.uint8)
         self._moves[equation.supports.dofs] = 0
         c = self.c = equation.c
         fill(
             c,
-            scene=share.grid.scene.size, rtol=newton.rtol, most=newton.max_iterations, least=least,
-            space=share.scratch, lengths=share.lengths(), diagonal=self._diagonal,
+            scene=subdomain.numbering.scene.size, rtol=newton.rtol, most=newton.max_iterations,
+            least=least, space=subdomain.scratch, lengths=subdomain.lengths(),
+            diagonal=self._diagonal,
             moves=ffi.from_buffer("uint8_t[]", self._moves),
             unknowns=self.unknowns, residual=self._r, change=self.change,
             x=opaque(self._x), f=opaque(self._f), y=opaque(self._y),
             find_conjugates=lib.find_conjugates_in_python,
             find_idle=lib.find_idle_in_python, forget_idle=lib.forget_idle_in_python,
-            aside=np.zeros(share.size if c.search != ffi.NULL else 0),
+            aside=np.zeros(subdomain.size if c.search != ffi.NULL else 0),
         )  # fmt: skip
         c.handle = equation.callbacks.handle(self)  # `fill` would keep this object alive
-        if share.alone:
+        if subdomain.alone:
             self._factors.drive(c)
         else:
             fill(c, agree=lib.agree_in_python, solve=lib.solve_in_python)
@@ -138,14 +139,16 @@ class Solver:
 
     def _let_c_fill(self) -> None:
         """Give SNES a matrix of PETSc if PETSc's own method needs it, else an empty matrix."""
-        if self._share.alone and self.c.monitored:
+        if self._subdomain.alone and self.c.monitored:
             self._matrix = self._equation.A.petsc()
         else:
             # Only the preconditioner needs the matrix, and it has its own.
             self._equation.A.release()
-            give_back_memory(self._share.size)
-            sizes = (self._share.num_owned, self._share.grid.size)
-            self._matrix = PETSc.Mat().createPython([sizes, sizes], object(), comm=self._share.comm)
+            give_back_memory(self._subdomain.size)
+            sizes = (self._subdomain.num_owned, self._subdomain.numbering.size)
+            self._matrix = PETSc.Mat().createPython(
+                [sizes, sizes], object(), comm=self._subdomain.comm
+            )
             self._matrix.setUp()
         matrices = self._matrix, self._matrix
         petsc("SNESSetJacobian", self._snes, *matrices, *loop("snes_jacobian", self.c))
@@ -169,7 +172,7 @@ class Solver:
 
     def agree(self, how: Sequence[int], values: Array) -> None:
         """Combine numbers over all processes; a maximum is infinite if a number is NaN."""
-        comm = self._share.comm
+        comm = self._subdomain.comm
         everywhere = np.empty((comm.size, len(values)))
         comm.Allgather(values, everywhere)
         for k, (kind, column) in enumerate(zip(how, everywhere.T, strict=True)):
@@ -180,7 +183,7 @@ class Solver:
 
     def solve(self, anew: bool) -> bool:
         """Solve for the change of an iteration on all processes; return whether that fails."""
-        owned = slice(self._share.num_owned)
+        owned = slice(self._subdomain.num_owned)
         if anew and not self._factors.factor(self._r[owned]):
             return True
         return not self._factors.solve(self._r[owned], self.change[owned], reduced=bool(anew))
@@ -193,16 +196,16 @@ class Solver:
     def find_idle(self) -> bool:
         """Find new zero-energy modes and hold them by springs; return whether there are any."""
         if self._stiffness is None:
-            self._stiffness = np.zeros(self._share.size)
+            self._stiffness = np.zeros(self._subdomain.size)
         tangent = self._equation.A, self._diagonal, self._equation.supports.dofs
         forces = self._residuals(), self.scale()
-        new = stiffen_zero_modes(self._stiffness, self._share, *tangent, *forces)
+        new = stiffen_zero_modes(self._stiffness, self._subdomain, *tangent, *forces)
         self._set_stiffness(self._stiffness)
         return new
 
     def forget_idle(self) -> bool:
         """Release all zero-energy modes; return whether any were held, on any process."""
-        if self._share.largest(float(self.c.idle)) == 0.0:
+        if self._subdomain.largest(float(self.c.idle)) == 0.0:
             return False
         if self._stiffness is not None:
             self._stiffness[:] = 0.0
@@ -248,18 +251,18 @@ class Solver:
         The border is eliminated by one factorisation and two solutions, as only the tangent is
         banded.  If the tangent is nearly singular, the next iteration recovers the lost digits.
         """
-        border, share, owned = self._border, self._share, slice(self._share.num_owned)
+        border, subdomain, owned = self._border, self._subdomain, slice(self._subdomain.num_owned)
         rates, y, z = np.zeros((3, len(x)))
         border.tangent(x, rates)
         if self._stiffness is not None:
             self._equation.A.data[self._diagonal] += self._stiffness
-        rates = share.added(rates)
+        rates = subdomain.added(rates)
         rates[self._equation.supports.dofs] = 0.0
         if not self._factors.factor(self._r[owned]):
             return True
         self._factors.solve(self._r[owned], y[owned], reduced=True)
         good = self._factors.solve(rates[owned], z[owned], reduced=False)
-        y, z = (share.gather(v)[share.dofs] for v in (y, z))
+        y, z = (subdomain.gather(v)[subdomain.dofs] for v in (y, z))
         border.correct(y, z)
         self.change[:], self._t[0] = y, border.t
         return not good
@@ -268,7 +271,7 @@ class Solver:
 
     def size(self, forces: Array) -> float:
         """Return the Euclidean norm of forces, and moments over the size of the scene; N."""
-        local = lib.norm(self._share.size, ffi.NULL, doubles(self._weights), doubles(forces))
+        local = lib.norm(self._subdomain.size, ffi.NULL, doubles(self._weights), doubles(forces))
         return float(lib.over_processes(self.c, lib.HYPOT, local))
 
     def scale(self) -> float:
@@ -277,11 +280,11 @@ class Solver:
 
     def random_work(self, x: Array, s: Array) -> float:
         """Return the work of the round-off forces at ``x`` in a step ``s``, if independent; J."""
-        forces = np.empty(self._share.size)
+        forces = np.empty(self._subdomain.size)
         lib.find_motion(self.c, doubles(x))
         lib.find_round_off(self.c, doubles(x), doubles(forces))
-        works = (forces * s)[: self._share.num_owned]
-        return math.sqrt(self._share.total(float(np.sum(works**2))))
+        works = (forces * s)[: self._subdomain.num_owned]
+        return math.sqrt(self._subdomain.total(float(np.sum(works**2))))
 
     def _residuals(self) -> Array:
         """Return magnitudes of the latest residual, moments over the size of the scene; N.
@@ -298,7 +301,7 @@ class Solver:
         """Return an error that describes why Newton's method has stopped without a solution."""
         names = {v: k for k, v in vars(PETSc.SNES.ConvergedReason).items() if isinstance(v, int)}
         reason, residuals = self.c.reason, self._residuals()
-        worst = self._share.grid.worst(self._share.gather(residuals))
+        worst = self._subdomain.numbering.worst(self._subdomain.gather(residuals))
         places = [f"{size:.1e} N in {place}" for place, size in [*worst.items()][:3]]
         size = lib.over_processes(self.c, lib.HYPOT, float(np.linalg.norm(residuals)))
         failure = StepFailed(
@@ -309,14 +312,14 @@ class Solver:
         failure.residuals, failure.reason = worst, str(names.get(reason, reason))
         return failure
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Serialize the number of iterations and the stiffnesses against zero-energy modes."""
-        self.c.total = int(memory.number("iterations", self.c.total))
+        self.c.total = int(archive.number("iterations", self.c.total))
         known = float(self._stiffness is not None)
-        if memory.number("idle motions are known", known):
+        if archive.number("idle motions are known", known):
             if self._stiffness is None:
-                self._stiffness = np.zeros(self._share.size)
-            self._stiffness[:] = memory.at_dofs("idle motions", self._stiffness)
+                self._stiffness = np.zeros(self._subdomain.size)
+            self._stiffness[:] = archive.at_dofs("idle motions", self._stiffness)
             self._set_stiffness(self._stiffness)
 
 

@@ -16,7 +16,7 @@ from scipy.sparse.linalg import splu
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.partition import Subdomain
 
 DENSE = 300
 """Number of unknowns up to which null vectors come from a singular value decomposition."""
@@ -28,15 +28,20 @@ ROUNDS = 40
 """Largest number of scaling passes."""
 
 
-def free_matrix(share: Share, A: Csr, constrained: Index) -> tuple[csc_array, Index]:
+def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_array, Index]:
     """Assemble the tangent of the dofs that no support holds; return it and their global numbers.
 
     All processes call it together, each with its part ``A`` and its ``constrained`` local dofs.
     """
-    local = (share.dofs[A.rows()], share.dofs[A.indices], A.data, share.dofs[constrained])
-    parts = share.comm.allgather(local) if not share.alone else [local]
+    local = (
+        subdomain.dofs[A.rows()],
+        subdomain.dofs[A.indices],
+        A.data,
+        subdomain.dofs[constrained],
+    )
+    parts = subdomain.comm.allgather(local) if not subdomain.alone else [local]
     rows, columns, data, fixed = (np.concatenate(x) for x in zip(*parts, strict=True))
-    n = share.grid.size
+    n = subdomain.numbering.size
     free = np.setdiff1d(np.arange(n), fixed)
     K = coo_array((data, (rows, columns)), shape=(n, n)).tocsc()
     return csc_array(K[:, free][free]), free
@@ -85,14 +90,14 @@ FORCED = 1e-6
 
 
 def stiffen_zero_modes(
-    stiffness: Array, share: Share, A: Csr, diagonal: Index, constrained: Index, forces: Array,
-    scale: float,
+    stiffness: Array, subdomain: Subdomain, A: Csr, diagonal: Index, constrained: Index,
+    forces: Array, scale: float,
 ) -> bool:  # fmt: skip
     """Add stiffnesses against zero-energy modes of the latest tangent; all processes call it.
 
     Args:
         stiffness: Stiffnesses of the local degrees of freedom; N/m, N m/rad.
-        share: Subdomain of this process.
+        subdomain: Subdomain of this process.
         A: Tangent of this process.
         diagonal: Positions of the diagonal entries in it.
         constrained: Degrees of freedom that supports hold.
@@ -102,26 +107,29 @@ def stiffen_zero_modes(
     Returns:
         Whether there are new modes; false if a force drives a motion without resistance.
     """
-    grid, (K, free) = share.grid, free_matrix(share, A, constrained)
+    numbering, (K, free) = subdomain.numbering, free_matrix(subdomain, A, constrained)
     if not len(free) or not np.isfinite(K.data).all():
         return False
     try:
         _, vectors = null_vectors(K)
     except (np.linalg.LinAlgError, RuntimeError):
         return False
-    motions = grid.scales[free, None] * vectors
+    motions = numbering.scales[free, None] * vectors
     # One degree of freedom for each mode, chosen so that the modes are independent there.
     pivots = qr(motions.T, mode="r", pivoting=True)[1][: vectors.shape[1]]
     dofs = free[pivots[np.abs(motions[pivots]).max(axis=1) > 0.0]]
-    chosen = np.isin(share.dofs, dofs)
+    chosen = np.isin(subdomain.dofs, dofs)
     new = chosen & (stiffness == 0.0)
     forced = chosen & (forces > FORCED * scale)
-    if not share.total(float(new.any())) or share.total(float(forced.any())):
+    if not subdomain.total(float(new.any())) or subdomain.total(float(forced.any())):
         return False
-    turns, owned = np.isin(share.dofs, grid.rotations), np.arange(share.size) < share.num_owned
-    owned[share.multipliers] = False
+    turns, owned = (
+        np.isin(subdomain.dofs, numbering.rotations),
+        np.arange(subdomain.size) < subdomain.num_owned,
+    )
+    owned[subdomain.multipliers] = False
     sizes = np.abs(A.data[diagonal])
     for alike in (turns & owned, ~turns & owned):
-        stiffest = share.largest(float(sizes[alike].max(initial=0.0)))
+        stiffest = subdomain.largest(float(sizes[alike].max(initial=0.0)))
         stiffness[new & alike] = STIFFNESS * stiffest
     return True

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.partition import Share
+from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.memory import of_structure
 from ufl_beam.solvers.multifrontal import ONE_FRONT, Multifrontal
 from ufl_beam.solvers.substructuring import BAD_PIVOT, GOOD, Klu, Summed, succeeds
@@ -177,12 +177,19 @@ class Elimination:
         c: ``chains`` of loops.h.
     """
 
-    def __init__(self, share: Share, A: Csr) -> None:
-        ghosts = np.concatenate(share.comm.allgather(share.dofs[share.num_owned :]))
-        alone = ~np.isin(share.dofs, ghosts)
-        pattern = share.cell_dofs, A.indptr, A.indices, alone, share.dofs, share.num_owned
+    def __init__(self, subdomain: Subdomain, A: Csr) -> None:
+        ghosts = np.concatenate(subdomain.comm.allgather(subdomain.dofs[subdomain.num_owned :]))
+        alone = ~np.isin(subdomain.dofs, ghosts)
+        pattern = (
+            subdomain.cell_dofs,
+            A.indptr,
+            A.indices,
+            alone,
+            subdomain.dofs,
+            subdomain.num_owned,
+        )
         remaining, at, indptr, columns, *arrays = _plan(*pattern)
-        self.numbers, self.shared = share.dofs[remaining], ~alone[remaining]
+        self.dofs, self.shared = subdomain.dofs[remaining], ~alone[remaining]
         self.left = Csr(np.zeros(len(columns)), columns, indptr)
         self.f: Array = np.zeros(len(remaining))
         indices = dict(zip(INDICES, arrays, strict=True))
@@ -193,7 +200,7 @@ class Elimination:
             rows=len(indices["kept"]), left_size=len(remaining), left_data=self.left.data,
             left_f=self.f, data=A.data, swaps=ffi.new("uint8_t[]", 3 * vertices),
             pivots=np.empty(lib.BLOCK * vertices), to_next=np.empty(lib.BLOCK * vertices),
-            f=np.empty(share.size), at=ffi.from_buffer("uint8_t[]", at), **indices,
+            f=np.empty(subdomain.size), at=ffi.from_buffer("uint8_t[]", at), **indices,
         )  # fmt: skip
 
     def factor(self, b: Array) -> bool:
@@ -217,17 +224,17 @@ class CondensedSolver:
     unknowns is small; each process factors it, so that none waits for another.
     """
 
-    def __init__(self, share: Share, A: Csr) -> None:
-        self._elimination, self._is_new, self._good = Elimination(share, A), False, False
+    def __init__(self, subdomain: Subdomain, A: Csr) -> None:
+        self._elimination, self._is_new, self._good = Elimination(subdomain, A), False, False
         # If only a connector holds a part, the part's own stiffness may leave zeros or round-off on
         # the diagonal.  Several fronts exchange too few rows for that, KLU exchanges enough.
-        few_rows = not len(share.grid.multipliers)
+        few_rows = not len(subdomain.numbering.multipliers)
         rest: Any = self._elimination
-        if not share.alone:
+        if not subdomain.alone:
             if few_rows:
                 rest = Multifrontal(rest, self._elimination.shared)
-            rest = Summed(rest, share.comm)
-        none = np.zeros(len(rest.numbers), dtype=bool)
+            rest = Summed(rest, subdomain.comm)
+        none = np.zeros(len(rest.dofs), dtype=bool)
         fronts = few_rows or len(none) <= ONE_FRONT
         self._solved = Multifrontal(rest, none) if fronts else Klu(rest)
         self.factor = self._solved.factor

@@ -37,9 +37,9 @@ class Summed:
 
     def __init__(self, inner: Any, comm: MPI.Intracomm) -> None:
         self._inner, self._comm = inner, comm
-        self.numbers = np.unique(np.concatenate(comm.allgather(inner.numbers)))
-        size = len(self.numbers)
-        self._number = np.searchsorted(self.numbers, inner.numbers)
+        self.dofs = np.unique(np.concatenate(comm.allgather(inner.dofs)))
+        size = len(self.dofs)
+        self._number = np.searchsorted(self.dofs, inner.dofs)
         A = inner.left
         mine = self._number[A.rows()].astype(np.int64) * size + self._number[A.indices]
         keys = np.unique(np.concatenate(comm.allgather(mine)))
@@ -94,8 +94,8 @@ class Klu:
 
     def __init__(self, inner: Any) -> None:
         self._inner, self._matrix = inner, inner.left.petsc()
-        self.numbers = inner.numbers[:0]
-        self.left, self.f = Csr(np.empty(0), self.numbers, np.zeros(1)), np.empty(0)
+        self.dofs = inner.dofs[:0]
+        self.left, self.f = Csr(np.empty(0), self.dofs, np.zeros(1)), np.empty(0)
         self._factors = PETSc.PC().create(PETSc.COMM_SELF)
         self._factors.setOperators(self._matrix)
         self._factors.setType("lu")

@@ -20,7 +20,7 @@ from ufl_beam.compiled.c_library import doubles, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
@@ -50,7 +50,7 @@ class FormForces(Term):
         self.loops = loop("add_cells", force.cells), loop("add_cells", tangent.cells)
         self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
         self._losses = [fields.kernel(form, self._q1) for form in losses]
-        self._step_kernels = [force, *(loss for loss in self._losses if not loss.share(force))]
+        self._step_kernels = [force, *(loss for loss in self._losses if not loss.subdomain(force))]
         if losses:
             ledger.lost[self._entry] += 0.0
 
@@ -87,8 +87,8 @@ def predicted_strains(fields: Fields) -> Any:
     """
     form, about = _linear_strains(fields.element)
     kernel = fields.kernel(form, fields.element.q1)
-    weights = fields.share.grid.mesh.point_weights.repeat(3)
-    last, change = np.zeros((2, fields.share.size))
+    weights = fields.subdomain.numbering.mesh.point_weights.repeat(3)
+    last, change = np.zeros((2, fields.subdomain.size))
     return struct(
         "predicted_strains", size=len(change), of_cell=len(weights), weight=weights,
         about=last, change=change, e=np.zeros((len(fields.order), len(weights))),
@@ -213,7 +213,7 @@ class ElasticBeams(FormForces, Cells):
             )  # fmt: skip
         super().__init__(forms.work, forms.losses, fields, A, ledger, tangent)
         self._work_form, self._stored = forms.work, fields.kernel(forms.stored, q1)
-        self._stored.share(self._force)
+        self._stored.subdomain(self._force)
         if tangent is not None:
             self._step_kernels.append(tangent)
             self.loops = self.loops[0], loop("add_static_tangent", self._static)
@@ -276,10 +276,10 @@ class InelasticBeams(Cells):
         self._A, self._ledger = A, ledger
         self.kept_factors = np.ones(6) if layout.hinges else WITHOUT_JUMP
         self.predicted = None if has_inertia(scheme) else predicted_strains(fields)
-        self._cells = fields.share.cells[fields.order]
+        self._cells = fields.subdomain.cells[fields.order]
         self._strains = Strains(fields)
-        share, lengths = fields.share, fields.share.grid.lengths(self._cells)
-        keys = share.grid.keys(self._cells)
+        subdomain, lengths = fields.subdomain, fields.subdomain.numbering.lengths(self._cells)
+        keys = subdomain.numbering.keys(self._cells)
         self.points = Points(layout, keys, lengths, scheme, search, predicts=True)
 
         forms = inelastic_forms(fields.element, scheme)
@@ -291,10 +291,10 @@ class InelasticBeams(Cells):
         self._tangent.place(A)
         self.must_dissipate = layout.kind.law.must_dissipate
 
-        self._latest: Array = np.full(share.size, np.nan)
+        self._latest: Array = np.full(subdomain.size, np.nan)
         self._in_c = struct(
-            "inelastic", size=share.size, latest=self._latest, points=self.points.c,
-            scene=share.grid.scene.size,
+            "inelastic", size=subdomain.size, latest=self._latest, points=self.points.c,
+            scene=subdomain.numbering.scene.size,
             strains=self._strains.kernel.cells, force=self._force.cells,
             tangent=self._tangent.cells, at_r=self._force.position(forms.r),
             at_b=self._tangent.position(forms.b), at_D=self._tangent.position(forms.D),
@@ -334,8 +334,8 @@ class InelasticBeams(Cells):
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a point generates energy in the step to ``q1``."""
         lib.respond_at(self._in_c, doubles(q1))
-        grid = self._fields.share.grid
-        self.points.require_dissipation(lambda cell: grid.describe_cell(self._cells[cell]))
+        numbering = self._fields.subdomain.numbering
+        self.points.require_dissipation(lambda cell: numbering.describe_cell(self._cells[cell]))
 
     def dissipation(self, q1: Array) -> float:
         """Return the energy that cells of this process dissipate in the step to ``q1``; J."""
@@ -351,7 +351,7 @@ class InelasticBeams(Cells):
         return {self._b: around, self._D: D}
 
     def about_state(self) -> tuple[Index, Array, Array]:
-        """Return cells (numbers of the grid), and b, D of b + D e about the accepted state.
+        """Return cells (numbers of the scene), and b, D of b + D e about the accepted state.
 
         Shapes (num_cells, 3) and (num_cells, 9).  D belongs to a step like the last one.
         """
@@ -361,10 +361,10 @@ class InelasticBeams(Cells):
 
     # -- the state -----------------------------------------------------------------------------
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the internal variables."""
-        self.points.restore(memory.rows("cells", self._cells, self.points.state()))
+        self.points.restore(archive.rows("cells", self._cells, self.points.state()))
 
     def kept(self) -> tuple[Index, Array]:
-        """Return cells (numbers of the grid), and their :attr:`Points.kept`; (num_cells, 6)."""
+        """Return cells (numbers of the scene), and their :attr:`Points.kept`; (num_cells, 6)."""
         return self._cells, self.points.kept * self.kept_factors

@@ -11,8 +11,8 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, struct
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.time_schemes import Scheme, Step
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.functions import TimeFunction, value_at
@@ -37,18 +37,18 @@ class Supports:
         moving: Local degrees of freedom whose values depend on time.
     """
 
-    def __init__(self, share: Share, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
+    def __init__(self, subdomain: Subdomain, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
         turned: list[tuple[Any, ...]] = []
         constrained: list[int] = []
         self._motions: list[tuple[int, TimeFunction, Support]] = []
-        if GROUND in share.grid.scene.rigid_bodies:
-            constrained.extend(share.local(share.grid.node(GROUND.middle)))
-        for support in share.grid.scene.supports:
-            dofs = share.grid.node(support.place)
-            if support.angle and len(share.local(dofs[:2])):
-                turned.append(_turned_axes(share.local(dofs[:2]), support.angle, A))
+        if GROUND in subdomain.numbering.scene.rigid_bodies:
+            constrained.extend(subdomain.local(subdomain.numbering.node(GROUND.middle)))
+        for support in subdomain.numbering.scene.supports:
+            dofs = subdomain.numbering.node(support.place)
+            if support.angle and len(subdomain.local(dofs[:2])):
+                turned.append(_turned_axes(subdomain.local(dofs[:2]), support.angle, A))
             for component, motion in support.held.items():
-                local_dofs = share.local(dofs[[component]])
+                local_dofs = subdomain.local(dofs[[component]])
                 constrained.extend(local_dofs)
                 if component in support.moving:
                     self._motions.extend((dof, motion, support) for dof in local_dofs)
@@ -62,7 +62,7 @@ class Supports:
         self.pivots: Array = np.ones(len(self.dofs))
         self._scheme, self._ledger = scheme, ledger
         # True if values depend on time anywhere in the scene
-        self.work = any(support.moving for support in share.grid.scene.supports)
+        self.work = any(support.moving for support in subdomain.numbering.scene.supports)
         if self.work:
             ledger.supplied["supports"] += 0.0
         self.reactions: Array = np.zeros(len(self.dofs))
@@ -127,19 +127,19 @@ class Supports:
         """Return to the reactions of the accepted state after a failed step."""
         self.reactions[:] = self._before
 
-    def carry_on(self, memory: Memory, q: Array) -> None:
+    def carry_on(self, archive: Archive, q: Array) -> None:
         """Save or restore the reactions."""
         reactions: Array = np.zeros(len(q))
         reactions[self.dofs] = self._before
-        self.reactions[:] = memory.at_dofs("reactions", reactions)[self.dofs]
+        self.reactions[:] = archive.at_dofs("reactions", reactions)[self.dofs]
         self.take()
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the reactions and the pivots."""
-        self.carry_on(memory, q)
+        self.carry_on(archive, q)
         pivots = np.zeros(len(q))
         pivots[self.dofs] = self.pivots
-        self.pivots[:] = memory.at_dofs("pivots", pivots)[self.dofs]
+        self.pivots[:] = archive.at_dofs("pivots", pivots)[self.dofs]
 
 
 def _turned_axes(dofs: Index, angle: float, A: Csr) -> tuple[Any, ...]:

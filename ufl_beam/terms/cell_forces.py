@@ -15,8 +15,8 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
 from ufl_beam.discretization.compiled_forms import Kernel
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.terms.term import InCells
 
@@ -33,8 +33,10 @@ class CellForces:
             load factors, which are equal on all processes.
     """
 
-    def __init__(self, share: Share, forces: Sequence[InCells], loads: Any = ffi.NULL) -> None:
-        self._share, self._space = share, np.zeros(share.size)
+    def __init__(
+        self, subdomain: Subdomain, forces: Sequence[InCells], loads: Any = ffi.NULL
+    ) -> None:
+        self._subdomain, self._space = subdomain, np.zeros(subdomain.size)
         self._alive: list[Any] = [forces]
         self._unmade = list[tuple[InCells, Any]]()
         self._step_forms: list[tuple[Kernel, fem.Function, Any, Array]] = []
@@ -44,11 +46,11 @@ class CellForces:
         vectors: dict[Any, Any] = {}  # latest vectors: accepted vectors, as pointers
         for c, force in zip(self._forces, forces, strict=True):
             c.kind, c.factor, c.number = force.kind, force.factor, len(force.order)
-            if not np.array_equal(force.order, np.arange(len(share.cells))):
+            if not np.array_equal(force.order, np.arange(len(subdomain.cells))):
                 order = force.order.astype(np.int32)
                 c.cell = integers(order)
                 self._alive.append(order)
-            accepted, accepted_values = ffi.addressof(c, "accepted"), np.zeros(share.size)
+            accepted, accepted_values = ffi.addressof(c, "accepted"), np.zeros(subdomain.size)
             if force.vector is not None:
                 if force.vector not in vectors:
                     c.latest, vectors[force.vector] = force.vector, accepted
@@ -71,10 +73,10 @@ class CellForces:
         if loads != ffi.NULL:
             self.factors.append((ffi.addressof(loads, "accepted"), loads.vectors))
         self.asks_for_before = any(form.uses(q0) for form, q0, *_ in self._step_forms)
-        first, *between, last = share.grid.mesh.nodes - 0.5
+        first, *between, last = subdomain.numbering.mesh.nodes - 0.5
         from_middle = np.array([first, last, *between])
         self.c = fill(
-            ffi.new("cell_forces *"), cells=len(share.cells), nodes=2 + len(between),
+            ffi.new("cell_forces *"), cells=len(subdomain.cells), nodes=2 + len(between),
             forces=len(forces), force=self._forces, loads=loads, from_middle=from_middle,
         )  # fmt: skip
 
@@ -133,7 +135,7 @@ class CellForces:
 
     def of_record(self, record: Array, q: Array, before: Array) -> Array:
         """Return the numbers of a call from saved vectors, entries and factors, in this order."""
-        arrays = [*((x, self._share.size) for x in self.vectors), *self.entries, *self.factors]
+        arrays = [*((x, self._subdomain.size) for x in self.vectors), *self.entries, *self.factors]
         values, addresses, at = self.c.given, [place[0] for place, _ in arrays], 0
         record = np.array(record)
         try:
@@ -147,7 +149,7 @@ class CellForces:
             for (place, _), old in zip(arrays, addresses, strict=True):
                 place[0] = old
 
-    def remember(self, memory: Memory, q: Array, before: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array, before: Array) -> None:
         """Save or restore the forces of the accepted step."""
-        values = memory.rows("forces of cells", self._share.cells, self(q, before).T)
+        values = archive.rows("forces of cells", self._subdomain.cells, self(q, before).T)
         fill(self.c, given=np.ascontiguousarray(values.T))

@@ -37,7 +37,10 @@ from ufl_beam.terms.term import Callbacks
 def inputs(law: ConnectorLaw) -> tuple[str, ...]:
     """Return the names of the inputs of a compiled law; loops.h explains their order."""
     motions = (f"{when} {i}" for when in ("motion", "before") for i in range(law.components))
-    data = (*(f"state {name}" for name in law.variables), *(f"number {n}" for n in law.numbers()))
+    data = (
+        *(f"state {name}" for name in law.variables),
+        *(f"number {n}" for n in law.parameters()),
+    )
     return (*motions, "dt", "theta", *data)
 
 
@@ -62,8 +65,8 @@ class LawForms:
             end = in_order("law_output", by_name, "law_")
             self.end = self._compile(*end, *variables)
             old = State({name: at[f"state {name}"] for name in law.variables})
-            parameters = {name: at[f"number {name}"] for name in law.numbers()}
-            self.limit = self._compile(ufl.as_ufl(law.of(parameters).limit(old)))
+            parameters = {name: at[f"number {name}"] for name in law.parameters()}
+            self.limit = self._compile(ufl.as_ufl(law.with_parameters(parameters).limit(old)))
         except Exception as error:
             raise ModelError(
                 f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
@@ -94,10 +97,12 @@ _law_forms = stated(LawForms)
 class CompiledLaws(Response):
     """Connectors with laws of one class; each law has its own numbers."""
 
-    def __init__(self, law: ConnectorLaw, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links, setting, f"{type(law).__qualname__}{[*law.variables]}")
+    def __init__(
+        self, law: ConnectorLaw, connectors: Sequence[Connector], setting: Setting
+    ) -> None:
+        super().__init__(connectors, setting, f"{type(law).__qualname__}{[*law.variables]}")
         scheme, ledger, k = setting.scheme, setting.ledger, law.components
-        n = len(links) // k
+        n = len(connectors) // k
         self._law, self._components, self.opens = law, k, law.holds
         self._enter(stored=(ledger.state, "stored"))
         if not law.elastic:
@@ -110,13 +115,13 @@ class CompiledLaws(Response):
         at["theta"][:], at["dt"][:] = scheme.theta, 1.0
         for name, value in law.variables.items():
             at[f"state {name}"][:] = value
-        for name in law.numbers():
+        for name in law.parameters():
             at[f"number {name}"][:] = [getattr(x, name) for x in self._laws[::k]]
         self._stored, lost = np.zeros(n), np.zeros(n * k)  # losses, in the first component
         self.dissipated = (lost,)
         variables = [at[f"state {name}"] for name in law.variables]
         self._variables = [*variables, self._stored, lost[::k]]
-        self._forms = _law_forms(law.of(dict.fromkeys(law.numbers(), 1.0)), scheme)
+        self._forms = _law_forms(law.with_parameters(dict.fromkeys(law.parameters(), 1.0)), scheme)
         outputs = int(lib.LAW_OUTPUTS) + len(law.variables)
         self._c = struct(
             "connector_laws", number=n, width=len(columns), variables=len(law.variables),
@@ -147,7 +152,7 @@ class CompiledLaws(Response):
     def _accepted_state(self) -> tuple[ConnectorLaw, list[Array], State]:
         """Return the law with the numbers of all connectors, their motions and their variables."""
         law, at = self._law, self._at
-        laws = law.of({name: at[f"number {name}"] for name in law.numbers()})
+        laws = law.with_parameters({name: at[f"number {name}"] for name in law.parameters()})
         motions = [at[f"before {i}"] for i in range(law.components)]
         return laws, motions, State({name: at[f"state {name}"] for name in law.variables})
 
@@ -157,7 +162,7 @@ class CompiledLaws(Response):
         self._w[:, k : 2 * k] = e.reshape(-1, k)
         with np.errstate(all="ignore"):
             law, motions, variables = self._accepted_state()
-            self._stored[:] = law.energy(law.given(motions), variables)
+            self._stored[:] = law.energy(law.as_argument(motions), variables)
 
     def borne(self) -> Array | None:
         """Return the elastic forces at the motions of :meth:`start`; None if laws hold."""
@@ -203,11 +208,11 @@ class UserLaw:
     """
 
     def __init__(
-        self, link: Connector, law: ForceLaw, size: float, load_weight: float, state: Array
+        self, connector: Connector, law: ForceLaw, size: float, load_weight: float, state: Array
     ) -> None:
-        self._link, self._law, self._arguments = link, law.force, law.asked
+        self._connector, self._law, self._arguments = connector, law.force, law.asked
         self._small, self._weight = 1e-3 * size, load_weight
-        self.energy, self._stored_arguments = law.stored, law.asked_by_stored
+        self.energy, self._stored_arguments = law.stored, law.stored_arguments
         self._e0, self._dt, self._known = 0.0, 1.0, dict[str, Any]()
         self.last: Iterate | None = None
         self.state = state
@@ -240,10 +245,10 @@ class UserLaw:
         if isinstance(value, float) and math.isfinite(value) and not self.state.size:
             return value, state
         at = f"motion = {motion:.6g}, rate = {rate:.6g}, t = {self._known['t']:.9g} s"
-        force = require_returned(value, f"{self._link}: the function", at)
+        force = require_returned(value, f"{self._connector}: the function", at)
         for number in (force, *map(float, state)):
             if not math.isfinite(number):  # a shorter step may avoid this motion
-                raise NoNumber(f"{self._link}: the function returned {number} at {at}")
+                raise NoNumber(f"{self._connector}: the function returned {number} at {at}")
         return force, state
 
     def _pair(self, returned: Any) -> tuple[Any, Array]:
@@ -252,7 +257,7 @@ class UserLaw:
             state = np.array(state, dtype=np.float64).reshape(self.state.shape)
         except (TypeError, ValueError):
             raise ModelError(
-                f"{self._link}: the function returned {shorten(returned)}; it must return the "
+                f"{self._connector}: the function returned {shorten(returned)}; it must return the "
                 f"force and the state, a list of {self.state.size} numbers"
             ) from None
         return force, state
@@ -264,7 +269,7 @@ class UserLaw:
         value = self.energy(motion, **dict.fromkeys(self._stored_arguments, self.state.copy()))
         t = f", t = {self._known['t']:.9g} s" if self._known else ""
         at = f"motion = {motion:.6g}{t}"
-        return require_returned(value, f"{self._link}: the energy", at, finite=True)
+        return require_returned(value, f"{self._connector}: the energy", at, finite=True)
 
     # -- the law around an iterate -------------------------------------------------------------
 
@@ -327,20 +332,22 @@ class UserLaw:
 class UserLaws(Response):
     """Forces by functions; all laws have the same number of internal variables."""
 
-    def __init__(self, law: ForceLaw, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links, setting, "AskedLaws")
-        n, ledger = len(links), setting.ledger
+    def __init__(self, law: ForceLaw, connectors: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(connectors, setting, "AskedLaws")
+        n, ledger = len(connectors), setting.ledger
         self._work = ledger.lost, "functions"
         self._enter(entry=self._work, stored=(ledger.state, "stored"))
         self._in_steps["sign"] = 1.0
         states, weight = np.zeros((n, len(law.state))), setting.scheme.load_weight
         self._variables = list(states.T)
-        arguments = zip(links, self._laws, self._lengths, states, strict=True)
-        self._each = [UserLaw(link, record, size, weight, x) for link, record, size, x in arguments]
+        arguments = zip(connectors, self._laws, self._lengths, states, strict=True)
+        self._each = [
+            UserLaw(connector, record, size, weight, x) for connector, record, size, x in arguments
+        ]
         self.asks_at_ends = any(law.state.size or law.energy for law in self._each)
         self._stored, self._force, self._rows = np.zeros(1), np.zeros(n), np.zeros((n, 3))
         self._rows[:, 1] = 1.0
-        self._c = struct("asked_laws", force=self._force, rows=self._rows, held=self._stored)
+        self._c = struct("called_laws", force=self._force, rows=self._rows, held=self._stored)
         self.in_c = {"asked": self._c}
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
@@ -351,9 +358,9 @@ class UserLaws(Response):
         c.again_self = handle(self._again)
         return super().in_steps(callbacks)
 
-    def know(self, couplings: Any) -> None:
+    def know(self, connector_terms: Any) -> None:
         """Set the arrays of motions in the accepted state and in the iterate."""
-        self._e0, self._e1 = couplings.motions
+        self._e0, self._e1 = connector_terms.motions
 
     def _begin(self, t: float, dt: float) -> None:
         for law, e0 in zip(self._each, self._e0.tolist(), strict=True):

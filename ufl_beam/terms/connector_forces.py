@@ -18,8 +18,8 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, names, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel, stated
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import NoNumber
@@ -39,20 +39,20 @@ from ufl_beam.terms.connector_rows import (
 from ufl_beam.terms.term import Callbacks, Phases, Term, beginning
 
 
-def respond(law: Any, links: Sequence[Connector], setting: Setting) -> Response:
+def respond(law: Any, connectors: Sequence[Connector], setting: Setting) -> Response:
     """Make the response of connectors whose laws are of the kind of ``law``."""
     if isinstance(law, ConnectorLaw):
-        return CompiledLaws(law, links, setting)
+        return CompiledLaws(law, connectors, setting)
     kinds: dict[type, Any] = {Spring: Springs, RigidPlastic: RigidPlasticLaws, ForceLaw: UserLaws}
-    made: Response = kinds.get(type(law), PrescribedLaws)(law, links, setting)
+    made: Response = kinds.get(type(law), PrescribedLaws)(law, connectors, setting)
     return made
 
 
-class Links(Term):
+class ConnectorTerm(Term):
     """Connectors of the same kind; each has a force among the unknowns.
 
     Attributes:
-        numbers: Indices of the connectors in the scene's links.
+        indices: Indices of the connectors in :attr:`Scene.all_connectors`.
         forces_at: Local degrees of freedom of the forces; (num_links,).
         response: Response of their law to motions and forces.
         rate: Mean rate of the motions in the last step; (num_links,); m/s or rad/s.
@@ -62,18 +62,20 @@ class Links(Term):
 
     kind = "connectors"
 
-    def __init__(self, share: Share, positions: Index, setting: Setting, A: Csr) -> None:
-        self.numbers: Index = share.links[positions]
-        self.links: list[Connector] = [share.grid.scene.links[i] for i in self.numbers]
-        self._dofs = share.link_dofs[positions].astype(np.int32)
+    def __init__(self, subdomain: Subdomain, positions: Index, setting: Setting, A: Csr) -> None:
+        self.indices: Index = subdomain.connectors[positions]
+        self.connectors: list[Connector] = [
+            subdomain.numbering.scene.all_connectors[i] for i in self.indices
+        ]
+        self._dofs = subdomain.connector_dofs[positions].astype(np.int32)
         self.forces_at: Index = self._dofs[:, 6]
         self._A = A
         self._callbacks: Callbacks  # set when the phases are made
-        self.response = response = respond(self.links[0].law, self.links, setting)
+        self.response = response = respond(self.connectors[0].law, self.connectors, setting)
         self.must_dissipate = response.must_dissipate
         # Motions and forces of the accepted state, and `connector_number` of loops.h
-        self._e, self._before = np.zeros((2, len(self.links)))
-        self._numbers_kept: Array = np.zeros((lib.CONNECTOR_NUMBERS, len(self.links)))
+        self._e, self._before = np.zeros((2, len(self.connectors)))
+        self._numbers_kept: Array = np.zeros((lib.CONNECTOR_NUMBERS, len(self.connectors)))
         self.rate: Array = self._numbers_kept[lib.CONNECTOR_RATE]
         motion = self._e if response.motion is None else response.motion
         fields = names("connector_number", "connector_")
@@ -115,11 +117,11 @@ class Links(Term):
         return self.response.dissipation(self.motion(q1), q1[self.forces_at])
 
 
-def _motions_with(link: Connector) -> tuple[str, ...]:
-    """Return the motions that the law of a link acts on, including its own."""
-    if isinstance(link.law, ConnectorLaw) and link.law.components > 1:
-        return ("sliding", "sliding", "turning")[: link.law.components]
-    return (link.motion,)
+def _motions_with(connector: Connector) -> tuple[str, ...]:
+    """Return the motions that the law of a connector acts on, including its own."""
+    if isinstance(connector.law, ConnectorLaw) and connector.law.components > 1:
+        return ("sliding", "sliding", "turning")[: connector.law.components]
+    return (connector.motion,)
 
 
 def _kind(law: Law) -> object:
@@ -138,27 +140,27 @@ def _unit_cell() -> meshes.Mesh:
     return line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
 
 
-class Couplings(Links):
+class ConnectorForces(ConnectorTerm):
     """Connectors of the same relative motions with laws of one kind.
 
     Each is a cell of unit length between both nodes; its forces follow the unknowns of the nodes.
-    Components of a :class:`Bushing` are consecutive links.  C evaluates forms, and laws of many
-    kinds.
+    Components of a :class:`Bushing` are consecutive connectors.  C evaluates forms, and laws of
+    many kinds.
 
     Attributes:
         forms: Forms of a connector, and the functions in them.
         motions: Motions in the accepted state and in the latest iterate, as C has them.
     """
 
-    def __init__(self, share: Share, positions: Index, setting: Setting, A: Csr) -> None:
-        super().__init__(share, positions, setting, A)
-        links, scheme = self.links, setting.scheme
-        motions = _motions_with(links[0])
-        k, n = len(motions), len(links)
+    def __init__(self, subdomain: Subdomain, positions: Index, setting: Setting, A: Csr) -> None:
+        super().__init__(subdomain, positions, setting, A)
+        connectors, scheme = self.connectors, setting.scheme
+        motions = _motions_with(connectors[0])
+        k, n = len(motions), len(connectors)
         self._cells = n // k
         self._dofs = np.column_stack([self._dofs[::k, :6], self.forces_at.reshape(-1, k)])
         self.forms = forms = connector_forms(motions, scheme, _unit_cell())
-        geometry = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in links]
+        geometry = [(*c.arms[0], *c.arms[1], *c.apart, *c.axis) for c in connectors]
         self._geometry = np.reshape(geometry, (self._cells, 8 * k))
         step_forms = forms.work, forms.tangent, forms.motion
         work, tangent, value = (self._form(form) for form in step_forms)
@@ -170,18 +172,18 @@ class Couplings(Links):
         for kernel in self._step_kernels:
             kernel.put(forms.row, self._rows.reshape(self._cells, -1))
         self._in_c = struct(
-            "couplings", number=self._cells, components=k,
-            link=np.arange(self._cells, dtype=np.int32), dofs=self._dofs,
+            "connectors", number=self._cells, components=k,
+            connector=np.arange(self._cells, dtype=np.int32), dofs=self._dofs,
             force=self.forces_at.copy(), size=setting.size,
-            length=np.where([c.turns for c in links], 1.0, setting.size),
+            length=np.where([c.turns for c in connectors], 1.0, setting.size),
             work=work.cells, tangent=tangent.cells, motion=value.cells,
             row=work.position(forms.row), row_of_tangent=tangent.position(forms.row),
             by_cell=np.zeros(n), e0=self._e, e1=self._now, before=self._before,
             kept=[doubles(numbers) for numbers in self._numbers_kept],
             weight_of_before=scheme.weight_of_before, **self.response.in_c,
         )  # fmt: skip
-        self.loops = loop("add_couplings_force", self._in_c), loop("add_cells", tangent.cells)
-        self.demand = loop("missed_by_couplings", self._in_c)
+        self.loops = loop("add_connectors_force", self._in_c), loop("add_cells", tangent.cells)
+        self.demand = loop("missed_by_connectors", self._in_c)
         self.response.know(self)
 
     def _form(self, form: ufl.Form) -> Kernel:
@@ -196,18 +198,18 @@ class Couplings(Links):
         """Return loops over the connectors, with callbacks for laws of a user with a history."""
         self._callbacks, response = callbacks, self.response
         law_fields = response.in_steps(callbacks)
-        fields = {name for name, _ in ffi.typeof("coupling_term").fields}
+        fields = {name for name, _ in ffi.typeof("connector_term").fields}
         mine = {name: x for name, x in law_fields.items() if name in fields}
         points = struct(
             "inelastic_term", **{k: x for k, x in law_fields.items() if k not in fields}
         )
-        c = struct("coupling_term", links=self._in_c, points=points, **mine)
+        c = struct("connector_term", connectors=self._in_c, points=points, **mine)
 
         begin = beginning(self._step_kernels, self.forms.q0)
-        phases = ("begin_couplings", "accept_couplings", "add_energy_of_couplings")
+        phases = ("begin_connectors", "accept_connectors", "add_energy_of_connectors")
         first, accept, state = ([loop(name, c)] for name in phases)
         admits = loop("springs_dissipate", c) if response.must_dissipate else None
-        change, opens, again = loop("change_of_couplings", c), None, None
+        change, opens, again = loop("change_of_connectors", c), None, None
         if response.asks_at_ends:
 
             def accept_user_laws(step: Any, q1: Any, s: Any) -> None:
@@ -224,7 +226,7 @@ class Couplings(Links):
             if "way_before" in opens:
                 opens["way_before"] = integers(opens["way_before"])
         if response.in_c.keys() & {"rigid_plastic", "friction", "asked"}:
-            again = loop("begin_couplings_again", c)
+            again = loop("begin_connectors_again", c)
         return Phases([*begin, *first], accept, state, change, opens, admits, again)
 
     # -- the step ------------------------------------------------------------------------------
@@ -248,7 +250,7 @@ class Couplings(Links):
             about_force = self.response.sticks == 0
             factors = np.where(about_force, -1.0, 0.0)
         if about_force.any():
-            rates = np.zeros(len(self.links))
+            rates = np.zeros(len(self.connectors))
             self.motion_rate.set(self.forms.u, v)
             self.motion_rate.add(q, rates)
             at = self.forces_at
@@ -283,18 +285,18 @@ class Couplings(Links):
         self._e[:] = self.motion(q)
         self.response.start(self._e)
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore motions, forces, works, and internal variables of laws."""
         response = self.response
         mine = *self._numbers_kept, self._before, self._e
         rows = np.column_stack([*mine, response.state()])
-        rows = memory.rows(response.name, self.numbers, rows)
+        rows = archive.rows(response.name, self.indices, rows)
         for numbers, column in zip(mine, rows.T, strict=False):
             numbers[:] = column
         response.restore(rows[:, len(mine) :])
 
 
-class Guides(Links):
+class Guides(ConnectorTerm):
     """Forces across curves; over a step they are normal to the chord and do no work.
 
     Round-off of the curve spoils the direction of a short chord.  If it spoils more than the
@@ -305,13 +307,15 @@ class Guides(Links):
     computed in guide_curves.c, which calls Python for points of the curves.
     """
 
-    def __init__(self, share: Share, positions: Index, setting: Setting, A: Csr) -> None:
-        super().__init__(share, positions, setting, A)
-        n, size = len(self.links), setting.size
-        self._curves = [link.law.curve for link in self.links if isinstance(link.law, Guide)]
+    def __init__(self, subdomain: Subdomain, positions: Index, setting: Setting, A: Csr) -> None:
+        super().__init__(subdomain, positions, setting, A)
+        n, size = len(self.connectors), setting.size
+        self._curves = [
+            connector.law.curve for connector in self.connectors if isinstance(connector.law, Guide)
+        ]
         x, y, λ = self._x, self._y, _ = [self._dofs[:, k] for k in (1, 3, 6)]
         pairs = (x, x), (x, y), (y, x), (y, y), (x, λ), (y, λ), (λ, x), (λ, y)
-        points = np.array([link.b.point for link in self.links], dtype=np.float64)
+        points = np.array([connector.b.point for connector in self.connectors], dtype=np.float64)
         last_digit = np.spacing(size + np.abs(points).max(axis=1))
         self._s, self._s0 = np.zeros((2, n))
         self._steps = np.array([parameter_step(curve, 0.0, size) for curve in self._curves])
@@ -338,7 +342,7 @@ class Guides(Links):
         return Phases([begin], [accept], again=loop("begin_guides_again", self._c))
 
     def _report(self) -> None:
-        place = self.links[self._c.lost].b
+        place = self.connectors[self._c.lost].b
         raise NoNumber(f"{place}: no nearest point was found on its guide curve")
 
     def motion(self, q: Array) -> Array:
@@ -346,7 +350,7 @@ class Guides(Links):
         lib.begin_guides_again(self._c)
         with self._callbacks.raising():
             lib.find_frames(self._c, doubles(q))
-        return np.array([self._c.frame[k].distance for k in range(len(self.links))])
+        return np.array([self._c.frame[k].distance for k in range(len(self.connectors))])
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``.
@@ -364,33 +368,37 @@ class Guides(Links):
             change += weight / (12 * ε) * data
         data[:] = before + change
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore points on curves, their parameters, and parameter steps for tangents."""
         arrays = (self._e, self._s, self._s0, self._steps)
-        rows = memory.rows("guides", self.numbers, np.column_stack([*arrays, self._on0]))
+        rows = archive.rows("guides", self.indices, np.column_stack([*arrays, self._on0]))
         for array, column in zip(arrays, rows.T, strict=False):
             array[:] = column
         self._on0[:] = rows[:, 4:]
 
 
-def couplings(share: Share, setting: Setting, A: Csr) -> list[Links]:
+def connector_terms(subdomain: Subdomain, setting: Setting, A: Csr) -> list[ConnectorTerm]:
     """Make the connectors of a process, grouped by kind, and its guides.
 
     Each process makes the entries of the ledger in the order of the scene, including the entries
     that only other processes write.
     """
-    links = share.grid.scene.links
+    connectors = subdomain.numbering.scene.all_connectors
     groups: dict[tuple[tuple[str, ...], object], list[int]] = {}
-    keys = [(_motions_with(link), _kind(link.law)) for link in links]
-    for i, number in enumerate(share.links):
+    keys = [(_motions_with(connector), _kind(connector.law)) for connector in connectors]
+    for i, number in enumerate(subdomain.connectors):
         groups.setdefault(keys[number], []).append(i)
-    made: list[Links] = []
-    for key, link in dict(zip(keys, links, strict=True)).items():
-        if link.motion in MOTIONS and key in groups:
-            made.append(Couplings(share, np.array(groups[key]), setting, A))
-        elif link.motion in MOTIONS:
-            respond(link.law, (), setting)
-    guides = [i for i, number in enumerate(share.links) if isinstance(links[number].law, Guide)]
+    made: list[ConnectorTerm] = []
+    for key, connector in dict(zip(keys, connectors, strict=True)).items():
+        if connector.motion in MOTIONS and key in groups:
+            made.append(ConnectorForces(subdomain, np.array(groups[key]), setting, A))
+        elif connector.motion in MOTIONS:
+            respond(connector.law, (), setting)
+    guides = [
+        i
+        for i, number in enumerate(subdomain.connectors)
+        if isinstance(connectors[number].law, Guide)
+    ]
     if guides:
-        made.append(Guides(share, np.array(guides), setting, A))
+        made.append(Guides(subdomain, np.array(guides), setting, A))
     return made

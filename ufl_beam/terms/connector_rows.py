@@ -74,7 +74,7 @@ class Response:
 
     Attributes:
         name: Name of the internal variables in files.
-        in_c: Data of laws in C, by names in ``couplings`` of loops.h.
+        in_c: Data of laws in C, by names in ``connectors`` of loops.h.
         must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
             accepted.
         opens: True if connectors yield beyond a limit.
@@ -92,12 +92,12 @@ class Response:
     sticks: Index | None = None
     dissipated: Sequence[Array] = ()
 
-    def __init__(self, links: Sequence[Connector], setting: Setting, name: str) -> None:
-        self._links, self._setting, self.name = links, setting, name
-        self._laws: list[Any] = [link.law for link in links]
+    def __init__(self, connectors: Sequence[Connector], setting: Setting, name: str) -> None:
+        self._connectors, self._setting, self.name = connectors, setting, name
+        self._laws: list[Any] = [connector.law for connector in connectors]
         # Scale of motions: the size of the scene, or a radian
-        self._lengths = np.where([link.turns for link in links], 1.0, setting.size)
-        self.way: Index = np.zeros(len(links), dtype=np.int32)
+        self._lengths = np.where([connector.turns for connector in connectors], 1.0, setting.size)
+        self.way: Index = np.zeros(len(connectors), dtype=np.int32)
         self.in_c: dict[str, Any] = {}
         self._in_steps: dict[str, Any] = {}
         self._time_functions: dict[str, list[tuple[TimeFunction, object]]] = {}
@@ -114,7 +114,7 @@ class Response:
 
     def _rub(self, limits: list[Any], **law_fields: Any) -> None:
         """Let connectors stick or slip; ``limits`` are addresses of the limits of the forces."""
-        n, setting = len(self._links), self._setting
+        n, setting = len(self._connectors), self._setting
         # Direction of slip, or 0, in the step and in the accepted state
         self._direction, self._accepted, distance, creep = np.zeros((4, n))
         self.sticks, against = np.zeros((2, n), dtype=np.int32)
@@ -133,16 +133,16 @@ class Response:
         self._variables.insert(0, self._accepted)
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
-        """Return fields of ``coupling_term`` and of its ``inelastic_term``, see loops.h."""
+        """Return fields of ``connector_term`` and of its ``inelastic_term``, see loops.h."""
         places = {field: account.pointer(name) for field, (account, name) in self._accounts.items()}
         wanted = self._time_functions.items()
         functions = {field: callbacks.time_functions(some) for field, some in wanted}
         return {**self._in_steps, **functions, **places}
 
-    def know(self, couplings: Any) -> None:
+    def know(self, connector_terms: Any) -> None:
         """Set the arrays and forms of connectors that the laws need."""
         if self.sticks is not None:
-            rate, v = couplings.motion_rate, couplings.forms.u
+            rate, v = connector_terms.motion_rate, connector_terms.forms.u
             fill(self.in_c["friction"], rate=rate.cells, at_v=rate.position(v))
 
     def accept_end(self, e1: Array) -> None:
@@ -161,11 +161,11 @@ class Response:
 
     def bends(self, e1: Array) -> Array:
         """Return derivatives of α by motions at constant variables; (num_connectors, n)."""
-        return np.zeros((len(self._links), 1))
+        return np.zeros((len(self._connectors), 1))
 
     def state(self) -> Array:
         """Return the internal variables; (num_links, k)."""
-        rows = np.zeros((len(self._links) // self._components, len(self._variables)))
+        rows = np.zeros((len(self._connectors) // self._components, len(self._variables)))
         for column, values in zip(rows.T, self._variables, strict=True):
             column[:] = values
         return np.repeat(rows, self._components, axis=0)
@@ -206,34 +206,42 @@ class PrescribedLaws(Response):
     Joints and guides constrain a motion, without work.
     """
 
-    def __init__(self, law: Any, links: Sequence[Connector], setting: Setting) -> None:
+    def __init__(self, law: Any, connectors: Sequence[Connector], setting: Setting) -> None:
         constrained = law is HELD or isinstance(law, Guide)
         name, account, entry, sign = (
             ("_Held", "", "", 0.0) if constrained else PRESCRIBED[type(law)]
         )
-        super().__init__(links, setting, name)
+        super().__init__(connectors, setting, name)
         if not constrained:
             self._enter(entry=(getattr(setting.ledger, account), entry))
             self._in_steps["sign"] = sign
-        both = list(zip(self._laws, links, strict=True))
+        both = list(zip(self._laws, connectors, strict=True))
         if isinstance(law, PrescribedMotion) and not constrained:
-            self._time_functions["wanted_motion"] = [(motor.motion, link) for motor, link in both]
+            self._time_functions["wanted_motion"] = [
+                (motor.motion, connector) for motor, connector in both
+            ]
         elif isinstance(law, Damper):
             self._in_steps["viscosity"] = np.array([damper.viscosity for damper in self._laws])
         elif isinstance(law, Coulomb):
-            self._rub([setting.asked(link) for link in links])
+            self._rub([setting.asked(connector) for connector in connectors])
         elif isinstance(law, PrescribedForce | Controller):
             # The forces at the ends of this step and of the last step
-            end, reached = np.zeros((2, len(links)))
+            end, reached = np.zeros((2, len(connectors)))
             self._in_steps.update(end=end, reached=reached)
             self._variables = [reached]
             if isinstance(law, PrescribedForce):
-                self._time_functions["wanted_force"] = [(load.force, link) for load, link in both]
+                self._time_functions["wanted_force"] = [
+                    (load.force, connector) for load, connector in both
+                ]
             else:  # the values of controllers at the beginning of the step
                 self._always = np.zeros(1)
-                wanted = ffi.new("time_function[]", len(links))
-                for place, link in zip(wanted, links, strict=True):
-                    place.points, place.t, place.y = 1, doubles(self._always), setting.asked(link)
+                wanted = ffi.new("time_function[]", len(connectors))
+                for place, connector in zip(wanted, connectors, strict=True):
+                    place.points, place.t, place.y = (
+                        1,
+                        doubles(self._always),
+                        setting.asked(connector),
+                    )
                 self._in_steps["wanted_force"] = wanted
 
 
@@ -243,9 +251,9 @@ class PrescribedLaws(Response):
 class Springs(Response):
     """Springs of one law that may yield and break: points whose strain is the motion."""
 
-    def __init__(self, law: Spring, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links, setting, "_Sprung")
-        softening, number = law.softening, len(links)
+    def __init__(self, law: Spring, connectors: Sequence[Connector], setting: Setting) -> None:
+        super().__init__(connectors, setting, "_Sprung")
+        softening, number = law.softening, len(connectors)
         layout = Layout(
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),
@@ -279,7 +287,7 @@ class Springs(Response):
     def require_dissipation(self, e1: Array) -> None:
         """Raise :class:`StepFailed` if a law generates energy in a step to motions ``e1``."""
         self.points.respond(self._at(e1))
-        self.points.require_dissipation(lambda number: str(self._links[number]))
+        self.points.require_dissipation(lambda number: str(self._connectors[number]))
 
     def remaining(self) -> Array:
         """Return the remaining fraction of elastic stiffness in the iterate; (num_links,)."""
@@ -350,18 +358,20 @@ LEAST_SLOPE = 1e-9
 """Least factor of motions, over EI of the member divided by the size of the scene."""
 
 
-def _slope(link: Connector, size: float) -> float:
+def _slope(connector: Connector, size: float) -> float:
     """Return the factor of motions in the equation of a connector, see rigid_plastic.c.
 
     It exceeds the steepest softening, so that an open branch stays open.  It is so large that
     motions, not the round-off of forces, decide in which direction a weak hinge slips.
     """
-    law = law_of(link)
+    law = law_of(connector)
     if not 0.0 < law.limit < np.inf:
         return 1.0
     steepest, _ = law.steepest
-    early = law.limit / (REFERENCE_MOTION * (1.0 if link.turns else size))
-    least = LEAST_SLOPE * link.a.beam.section.EI / size if isinstance(link.a, Place) else 0.0
+    early = law.limit / (REFERENCE_MOTION * (1.0 if connector.turns else size))
+    least = (
+        LEAST_SLOPE * connector.a.beam.section.EI / size if isinstance(connector.a, Place) else 0.0
+    )
     return float(max(early, least)) + (2 * steepest if steepest < np.inf else 0.0)
 
 
@@ -374,9 +384,11 @@ class RigidPlasticLaws(Response):
 
     opens = True
 
-    def __init__(self, law: RigidPlastic, links: Sequence[Connector], setting: Setting) -> None:
-        super().__init__(links, setting, "CompiledSlips")
-        n, ledger, scheme = len(links), setting.ledger, setting.scheme
+    def __init__(
+        self, law: RigidPlastic, connectors: Sequence[Connector], setting: Setting
+    ) -> None:
+        super().__init__(connectors, setting, "CompiledSlips")
+        n, ledger, scheme = len(connectors), setting.ledger, setting.scheme
         self._enter(hinges=(ledger.lost, "hinges"))
         self._hardens = isinstance(law.law, ElastoPlastic)
         loss = 2 * scheme.alpha if self._hardens else 0.0
@@ -387,8 +399,8 @@ class RigidPlasticLaws(Response):
         inputs = (*INPUTS, *parameters(law.law))
         self._storage = np.zeros((n, len(inputs)))
         self._at = {name: self._storage[:, i] for i, name in enumerate(inputs)}
-        for i, link in enumerate(links):
-            for name, value in parameters(law_of(link)).items():
+        for i, connector in enumerate(connectors):
+            for name, value in parameters(law_of(connector)).items():
                 self._at[name][i] = value
         self._at["θ"][:], self._at["dt"][:] = scheme.theta, 1.0
         self._initial_limit = self._at["number yield_limit" if self._hardens else "number limit"]
@@ -407,8 +419,8 @@ class RigidPlasticLaws(Response):
             "rigid_plastic", number=n, width=len(inputs), w=self._storage,
             force=self._forms.force, end=self._forms.end, search=setting.search,
             limit=self._limit, back_force=back_force, dissipated=dissipated,
-            slope=np.array([_slope(link, setting.size) for link in links]), excess=excess,
-            slipped=self._slipped, way=self.way, rows=np.zeros((n, 3)),
+            slope=np.array([_slope(connector, setting.size) for connector in connectors]),
+            excess=excess, slipped=self._slipped, way=self.way, rows=np.zeros((n, 3)),
         )  # fmt: skip
         self.in_c = {"rigid_plastic": self._c}
         self._in_steps = {
@@ -423,7 +435,7 @@ class RigidPlasticLaws(Response):
 
     def state(self) -> Array:
         """Return the internal variables; (num_links, 7)."""
-        stored = np.zeros(len(self._links))
+        stored = np.zeros(len(self._connectors))
         stored[:1] = self._stored
         return np.column_stack([super().state(), stored])
 

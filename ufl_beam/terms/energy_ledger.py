@@ -12,9 +12,9 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.display import Rich
-from ufl_beam.model.connector_law import ENTRIES
+from ufl_beam.model.connector_law import CONTRIBUTIONS
 
 EXPLAINED = 0.1
 """Fraction of an imbalance above which an estimate of round-off explains it."""
@@ -35,21 +35,21 @@ class Account(Mapping[str, float]):
 
     def __init__(self) -> None:
         self._at: dict[str, int] = {}
-        self.numbers: Array = np.zeros(16)
+        self.amounts: Array = np.zeros(16)
         self._fixed = False  # C has addresses
 
     def __getitem__(self, name: str) -> float:
-        return float(self.numbers[self._at[name]]) if name in self._at else 0.0
+        return float(self.amounts[self._at[name]]) if name in self._at else 0.0
 
     def __setitem__(self, name: str, value: float) -> None:
         at = self._at.setdefault(name, len(self._at))
-        if at == len(self.numbers):
+        if at == len(self.amounts):
             if self._fixed:
                 raise RuntimeError(
                     f"the entry {name!r} must be made before C gets addresses of entries"
                 )
-            self.numbers = np.append(self.numbers, np.zeros(at))
-        self.numbers[at] = value
+            self.amounts = np.append(self.amounts, np.zeros(at))
+        self.amounts[at] = value
 
     def __contains__(self, name: object) -> bool:
         return name in self._at
@@ -64,7 +64,7 @@ class Account(Mapping[str, float]):
         """Return the address of an entry; afterwards the array cannot grow."""
         self[name] += 0.0
         self._fixed = True
-        return doubles(self.numbers) + self._at[name]
+        return doubles(self.amounts) + self._at[name]
 
 
 @dataclass
@@ -82,17 +82,17 @@ class Ledger:
     def size(self) -> float:
         """Return the sum of the absolute values of all entries; J."""
         accounts = self.state, self.supplied, self.lost
-        return float(sum(np.abs(account.numbers).sum() for account in accounts))
+        return float(sum(np.abs(account.amounts).sum() for account in accounts))
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the works and losses since the beginning."""
         for kind, entries in (("supplied", self.supplied), ("lost", self.lost)):
             for name, value in entries.items():
-                entries[name] = memory.total(f"{kind}: {name}", value)
+                entries[name] = archive.total(f"{kind}: {name}", value)
 
     def begin(self) -> None:
         """Clear the state; supplied work and losses remain."""
-        self.state.numbers.fill(0.0)
+        self.state.amounts.fill(0.0)
 
 
 class Entries(dict[str, Array]):
@@ -169,7 +169,7 @@ class Energy(Mapping[str, Array], Rich):
         return np.asarray(since - since[0])
 
     @property
-    def throughput(self) -> float:
+    def energy_transferred(self) -> float:
         """Energy that went through: maximum energy in the scene plus all work on or by it; J."""
         works = sum(float(np.sum(np.abs(np.diff(work)))) for work in self.supplied.values())
         return float(np.max(self._in_scene)) + works
@@ -177,13 +177,13 @@ class Energy(Mapping[str, Array], Rich):
     @property
     def _in_scene(self) -> Array:
         """Energy in the scene, with changes of a user's potentials, whose zero is arbitrary."""
-        sizes = {n: e if n in ENTRIES else np.abs(e - e[0]) for n, e in self.state.items()}
+        sizes = {n: e if n in CONTRIBUTIONS else np.abs(e - e[0]) for n, e in self.state.items()}
         return _sum(sizes)
 
     @property
     def worst(self) -> float:
         """Largest imbalance over the energy that went through."""
-        largest, throughput = float(np.max(np.abs(self.imbalance))), self.throughput
+        largest, throughput = float(np.max(np.abs(self.imbalance))), self.energy_transferred
         return largest / throughput if throughput > 0 else largest
 
     def opened(self, claimed: float, round_off: float) -> str:
@@ -194,14 +194,14 @@ class Energy(Mapping[str, Array], Rich):
             round_off: Estimate of the energy by round-off of the unknowns; J.
         """
         # Squares of the smallest numbers have lost their digits.
-        if not self.throughput > sys.float_info.min / sys.float_info.epsilon:
+        if not self.energy_transferred > sys.float_info.min / sys.float_info.epsilon:
             return ""
         if self.worst <= claimed:
             return ""
-        fraction = round_off / self.throughput
+        fraction = round_off / self.energy_transferred
         stored = float(np.max(self._in_scene))
         lost = sum(float(losses[-1]) for losses in self.lost.values())
-        if fraction >= 1.0 and stored + lost <= ROUND_OFF_ENERGY * self.throughput:
+        if fraction >= 1.0 and stored + lost <= ROUND_OFF_ENERGY * self.energy_transferred:
             return ""  # all works are round-off, as in rigid motion by supports
         reason = (
             ", the last digits of positions times the largest stiffness; lower the stiffness of "
@@ -225,7 +225,7 @@ class Energy(Mapping[str, Array], Rich):
 
     def balance(self) -> str:
         """Return the largest imbalance and the throughput in words."""
-        return f"imbalance at most {self.worst:.1e} of {self.throughput:.6e} J throughput"
+        return f"imbalance at most {self.worst:.1e} of {self.energy_transferred:.6e} J throughput"
 
     def __str__(self) -> str:
         entries = [f"{kind:9s} {name:12s} {value: .6e} J" for kind, name, value in self.entries()]

@@ -26,7 +26,7 @@ from ufl_beam.discretization.function_spaces import (
     mass_kernel,
     mass_matrix,
 )
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ModelError
 from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
@@ -116,8 +116,8 @@ class Inertia(Term):
     def __init__(
         self, fields: Fields, scheme: DynamicScheme, A: Csr, ledger: Ledger, v: Array
     ) -> None:
-        rotations = with_half_tangents(scheme, fields.share.rotations)
-        self._times = StepProduct(mass_matrix(fields), rotations, A, fields.share.scratch)
+        rotations = with_half_tangents(scheme, fields.subdomain.rotations)
+        self._times = StepProduct(mass_matrix(fields), rotations, A, fields.subdomain.scratch)
         self.loops, at = self._times.loops, (fields.order, self._times.rate)
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at)]
         self._ledger, self._A, self.scheme = ledger, A, scheme
@@ -125,14 +125,14 @@ class Inertia(Term):
         self.slips = checked_coefficients(scheme).slip is not None
         # Changes are stored elsewhere.  Velocities before the last step are not computed anew; if
         # nothing needs them, new velocities use their memory.
-        asks = self.slips or scheme.looks_back
+        asks = self.slips or scheme.uses_last_step
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
         self._slip = np.zeros(size if self.slips else 0)
         handle = ffi.new_handle((scheme, number))
         find = lib.numbers_in_python
         self.c = struct("rates", size=size, number=number, find=find, handle=handle)
-        self.c.after_any = not scheme.looks_back
+        self.c.after_any = not scheme.uses_last_step
         first, *more = self._next if asks else (self._now[1], *self._next)
         for k, (rate, new) in enumerate(
             zip(self._now, (first, self._slip, *more), strict=True), start=V
@@ -199,23 +199,23 @@ class Inertia(Term):
 
     # -- in files ------------------------------------------------------------------------------
 
-    def carry_on(self, memory: Memory, known: int) -> None:
+    def carry_on(self, archive: Archive, known: int) -> None:
         """Save or restore the first ``known`` further rates of the scheme."""
         more = self.more or (self.v,) * known
-        self.keep(*map(memory.at_dofs, self.scheme.kept[:known], more))
+        self.keep(*map(archive.at_dofs, self.scheme.kept[:known], more))
 
-    def pass_on_step(self, memory: Memory) -> None:
+    def pass_on_step(self, archive: Archive) -> None:
         """Save or restore velocities before the last step and its length, by degree of freedom."""
-        v_before = memory.at_dofs(BEFORE, self.v_before)
-        lengths = memory.at_dofs("last step", np.full(self.c.size, self.c.last_dt))
+        v_before = archive.at_dofs(BEFORE, self.v_before)
+        lengths = archive.at_dofs("last step", np.full(self.c.size, self.c.last_dt))
         self.take(self.v, v_before, float(lengths[0]) if len(lengths) else self.c.last_dt)
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore velocities and the last step."""
-        v = memory.at_dofs("velocity", self.v)
-        v_before = memory.at_dofs(BEFORE, self.v_before)
-        self.take(v, v_before, memory.number("step of velocity", self.c.last_dt))
-        self.carry_on(memory, int(memory.number("further rates", len(self.more))))
+        v = archive.at_dofs("velocity", self.v)
+        v_before = archive.at_dofs(BEFORE, self.v_before)
+        self.take(v, v_before, archive.number("step of velocity", self.c.last_dt))
+        self.carry_on(archive, int(archive.number("further rates", len(self.more))))
 
 
 # -- damping ---------------------------------------------------------------------------------------
@@ -280,8 +280,8 @@ class RayleighForces(Term):
         C, M, form = fields.matrix(), mass_matrix(fields), _reference_stiffness(fields.element)
         K = fields.assembled(form)
         C.data[:] = damping.mass * M.data + damping.stiffness * K.data  # P(92)
-        rotations = with_half_tangents(scheme, fields.share.rotations)
-        self._times = StepProduct(C, rotations, A, fields.share.scratch)
+        rotations = with_half_tangents(scheme, fields.subdomain.rotations)
+        self._times = StepProduct(C, rotations, A, fields.subdomain.scratch)
         self.loops = self._times.loops
         self._ledger, self._rates, self._A = ledger, rates, A
         at, q1 = (fields.order, self._times.rate), fields.element.q1
@@ -313,14 +313,14 @@ def damping_forces(
                 "KelvinVoigt, which acts in the time of a static run"
             )
         return [RayleighForces(damping, fields, scheme, A, ledger, rates)]
-    grid = fields.share.grid
-    beams = grid.scene.beams if damping.beams is None else damping.beams
-    pairs = (zip(grid.cells_of(beam), grid.hinges(beam), strict=True) for beam in beams)
+    numbering = fields.subdomain.numbering
+    beams = numbering.scene.beams if damping.beams is None else damping.beams
+    pairs = (zip(numbering.cells_of(beam), numbering.hinges(beam), strict=True) for beam in beams)
     cells = [cell for beam_cells in pairs for cell, hinge in beam_cells if hinge is None]
-    positions = np.flatnonzero(np.isin(fields.share.cells, cells))
+    positions = np.flatnonzero(np.isin(fields.subdomain.cells, cells))
     if not len(positions):
         return []
-    return [KelvinVoigtForces(damping, Fields(fields.share, positions), scheme, A, ledger)]
+    return [KelvinVoigtForces(damping, Fields(fields.subdomain, positions), scheme, A, ledger)]
 
 
 # -- numerical damping -----------------------------------------------------------------------------
@@ -346,7 +346,7 @@ class SecondDifferences(FormForces):
         work, lost, self._before = _change_forms(fields.element, scheme)
         super().__init__(work, [lost], fields, A, ledger)
         self._strains = Strains(fields)
-        self._cells = fields.share.cells[fields.order]
+        self._cells = fields.subdomain.cells[fields.order]
         self._e, self._change = np.zeros((2, *self._strains.shape))
         self._last_dt = np.full(1, math.inf)
 
@@ -365,10 +365,10 @@ class SecondDifferences(FormForces):
         """Set the strains to those at ``q``."""
         self._e[:] = self._strains(q)
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore changes of the strains in the last step, and its length."""
         # The length is in the rows: the process that saves numbers for all may have no such cells.
         rows = np.column_stack([self._change, np.full(len(self._change), self._last_dt)])
-        rows = memory.rows("changes of strains", self._cells, rows)
+        rows = archive.rows("changes of strains", self._cells, rows)
         self._change[:], self._last_dt[0] = rows[:, :-1], rows[0, -1]
         self.start(q)

@@ -23,8 +23,8 @@ from ufl_beam.discretization.function_spaces import (
     mass_kernel,
     mass_matrix,
 )
-from ufl_beam.discretization.partition import Share
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.partition import Subdomain
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.kinematics import perpendicular, split
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model.bodies import carries
@@ -47,13 +47,13 @@ class LoadTerm(Term):
     _ledger: Ledger
 
     @abstractmethod
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them.
 
         ``v`` are the velocities, None in statics; ``past`` is the end of a run of the same scene.
         """
 
-    def pass_on(self, memory: Memory) -> None:
+    def pass_on(self, archive: Archive) -> None:
         """Save the forces of the last step that :meth:`carry_on` cannot recompute."""
 
 
@@ -66,11 +66,11 @@ class _AtDofs(LoadTerm):
 
     _forces: Array  # rows of forces: the first is in the equation
 
-    def _load(self, share: Share, loaded: Array, owners: Sequence[Load], rows: int) -> None:
+    def _load(self, subdomain: Subdomain, loaded: Array, owners: Sequence[Load], rows: int) -> None:
         """Make ``dofs`` of the nonzero entries of ``loaded`` on any process, and the forces."""
         # Other processes may load degrees of freedom that this process owns.
-        self.dofs: Index = np.flatnonzero(share.added(loaded)).astype(np.int32)
-        self._size, self._in_time = share.size, [(load.amplitude, load) for load in owners]
+        self.dofs: Index = np.flatnonzero(subdomain.added(loaded)).astype(np.int32)
+        self._size, self._in_time = subdomain.size, [(load.amplitude, load) for load in owners]
         self._forces = np.zeros((rows, len(self.dofs)))
         self.vector = struct("vector", size=len(self.dofs), dof=self.dofs, values=self._forces[0])
 
@@ -87,7 +87,9 @@ class _AtDofs(LoadTerm):
 class DeadLoads(_AtDofs):
     """Forces and moments that keep their direction: vectors times functions of time."""
 
-    def __init__(self, loads: Sequence[Load], share: Share, scheme: Scheme, ledger: Ledger) -> None:
+    def __init__(
+        self, loads: Sequence[Load], subdomain: Subdomain, scheme: Scheme, ledger: Ledger
+    ) -> None:
         self._scheme, self._ledger = scheme, ledger
         # Loads with the same time function share a vector; messages name the first of them.
         # Functions need not be hashable.
@@ -95,14 +97,14 @@ class DeadLoads(_AtDofs):
         in_cells: dict[int, Array] = {}
         for load in loads:
             key = id(load.amplitude)
-            _, vector = vectors.setdefault(key, (load, np.zeros(share.size)))
-            if (along := _add_forces(load, share, vector)) is not None:
+            _, vector = vectors.setdefault(key, (load, np.zeros(subdomain.size)))
+            if (along := _add_forces(load, subdomain, vector)) is not None:
                 in_cells[key] = in_cells.get(key, 0.0) + along
         for key, along in in_cells.items():
-            np.add.at(vectors[key][1], share.cell_dofs, along)
+            np.add.at(vectors[key][1], subdomain.cell_dofs, along)
         owners, whole = zip(*vectors.values(), strict=True)
         # Forces in the equation, at the end of the step, and at the end of the last step.
-        self._load(share, np.any(whole, axis=0) * 1.0, owners, rows=3)
+        self._load(subdomain, np.any(whole, axis=0) * 1.0, owners, rows=3)
         self._vectors = [vector[self.dofs] for vector in whole]
         # Factors of the vectors: now, at the end of the step, at the end of the last step, and in
         # the equation of the last step.
@@ -135,47 +137,50 @@ class DeadLoads(_AtDofs):
         )  # fmt: skip
         return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
 
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them."""
         self._factors[:3] = factors = self._factors_at(t)
         self._forces[:] = sum(f * vector for f, vector in zip(factors, self._vectors, strict=True))
         return self._whole(self._forces[0])
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the forces at the end of the last step."""
-        self._forces[:] = memory.added("dead loads", self._whole(self._forces[2]))[self.dofs]
+        self._forces[:] = archive.added("dead loads", self._whole(self._forces[2]))[self.dofs]
         for k, factor in enumerate(self._factors[2]):
             self._c.factors[k] = math.nan
-            self._factors[2, k] = memory.number(f"part of dead loads {k}", factor)
+            self._factors[2, k] = archive.number(f"part of dead loads {k}", factor)
 
 
-def _add_forces(load: Load, share: Share, forces: Array) -> Array | None:
+def _add_forces(load: Load, subdomain: Subdomain, forces: Array) -> Array | None:
     """Add the nodal forces of a dead load with factor one, consistent with displacements.
 
     Returns:
         Forces on the nodes of the cells, (num_cells, dofs of a cell); None if there are none.
     """
-    grid, per_beam, at_places = share.grid, None, []
+    numbering, per_beam, at_places = subdomain.numbering, None, []
     if isinstance(load, PointLoad):
         at_places = [(load.place, (*load.force, load.moment))]
     elif isinstance(load, LineLoad):
-        loaded = [beam is load.beam for beam in grid.scene.beams]
+        loaded = [beam is load.beam for beam in numbering.scene.beams]
         per_beam = np.outer(loaded, [*load.force, load.moment])
     elif isinstance(load, Gravity):
         g_x, g_y = load.acceleration
-        at_places = [(at, (mass * g_x, mass * g_y, 0.0)) for at, mass, _ in lumps(grid.scene)]
-        per_beam = np.outer([beam.section.rhoA for beam in grid.scene.beams], [g_x, g_y, 0.0])
+        at_places = [(at, (mass * g_x, mass * g_y, 0.0)) for at, mass, _ in lumps(numbering.scene)]
+        per_beam = np.outer([beam.section.rhoA for beam in numbering.scene.beams], [g_x, g_y, 0.0])
     else:
         raise TypeError(f"{type(load).__name__} is not a dead load")
     for place, force in at_places:
-        if carries(place):  # else Scene.links has connectors for it
-            dofs = share.grid.node(place)
-            mine = share.owns(dofs)
-            forces[share.local(dofs[mine])] += np.array(force)[mine]
+        if carries(place):  # else Scene.all_connectors has connectors for it
+            dofs = subdomain.numbering.node(place)
+            mine = subdomain.owns(dofs)
+            forces[subdomain.local(dofs[mine])] += np.array(force)[mine]
     if per_beam is None:
         return None
-    loads = per_beam[grid.beam_of_cell[share.cells]] * share.grid.lengths(share.cells)[:, None]
-    first, *between, last = grid.mesh.parts
+    loads = (
+        per_beam[numbering.beam_of_cell[subdomain.cells]]
+        * subdomain.numbering.lengths(subdomain.cells)[:, None]
+    )
+    first, *between, last = numbering.mesh.fractions
     return np.kron(loads, [first, last, *between])
 
 
@@ -183,19 +188,24 @@ class FollowerLoads(_AtDofs):
     """Forces that rotate with the cross-section they act on."""
 
     def __init__(
-        self, loads: Sequence[FollowerLoad], share: Share, scheme: Scheme, ledger: Ledger, A: Csr
+        self,
+        loads: Sequence[FollowerLoad],
+        subdomain: Subdomain,
+        scheme: Scheme,
+        ledger: Ledger,
+        A: Csr,
     ) -> None:
         self._ledger = ledger
-        indices = [i for i, load in enumerate(loads) if share.computes(load.place)]
+        indices = [i for i, load in enumerate(loads) if subdomain.computes(load.place)]
         owners = [loads[i] for i in indices]
         self._indices: Index = np.array(indices, dtype=np.int64)
-        places = [share.local(share.grid.node(load.place)) for load in owners]
+        places = [subdomain.local(subdomain.numbering.node(load.place)) for load in owners]
         dofs = np.array(places, dtype=np.int32).reshape(-1, 3)
         x, y, self._turning = np.ascontiguousarray(dofs.T)
-        loaded: Array = np.zeros(share.size)
+        loaded: Array = np.zeros(subdomain.size)
         loaded[dofs] = 1.0
         # Forces in the latest residual, and in the residual of the last step.
-        self._load(share, loaded, owners, rows=2)
+        self._load(subdomain, loaded, owners, rows=2)
         forces = [[*load.force, load.moment] for load in owners]
         self._unit_forces = np.array(forces, dtype=np.float64).reshape(-1, 3)
         # In the equation, at the end of the step, and at the end of the last step.
@@ -219,7 +229,7 @@ class FollowerLoads(_AtDofs):
         c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
 
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them."""
         self._sizes[:] = self._unit_forces * self._factors_at(t).reshape(-1, 1)
         self._rotations[:] = q[self._turning]
@@ -227,10 +237,10 @@ class FollowerLoads(_AtDofs):
         self._forces[1] = self._forces[0]
         return self._whole(self._forces[0])
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the forces in the equation of the last step, and their sizes."""
-        self._forces[:] = memory.added("follower loads", self._whole(self._forces[1]))[self.dofs]
-        self._sizes[:] = memory.rows("follower loads", self._indices, self._sizes[2])
+        self._forces[:] = archive.added("follower loads", self._whole(self._forces[1]))[self.dofs]
+        self._sizes[:] = archive.rows("follower loads", self._indices, self._sizes[2])
 
 
 @stated
@@ -248,35 +258,35 @@ class FrameForces(LoadTerm):
     def __init__(
         self, frame: RotatingFrame, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr
     ) -> None:
-        share = fields.share
+        subdomain = fields.subdomain
         self._ledger = ledger
         # Mass times a quarter turn; Coriolis' force is 2 Ω times it times the velocities
         S, G = mass_matrix(fields), fields.assembled(_turned_mass(fields.element))
-        for at, mass, _ in lumps(share.grid.scene):
-            dofs = share.grid.node(at)[:2]
-            if share.owns(dofs).all():
-                u, v = share.local(dofs)
+        for at, mass, _ in lumps(subdomain.numbering.scene):
+            dofs = subdomain.numbering.node(at)[:2]
+            if subdomain.owns(dofs).all():
+                u, v = subdomain.local(dofs)
                 G.data[G.positions(np.array([u, v]), np.array([v, u]))] += (-mass, mass)
         coriolis = 2 * frame.rate if has_inertia(scheme) else 0.0
-        S.data[np.isin(S.rows(), share.rotations)] = 0.0
+        S.data[np.isin(S.rows(), subdomain.rotations)] = 0.0
         S.data *= frame.rate**2
         G.data *= coriolis
         self._matrices, self._A = (Product(S), Product(G)), A
-        x, y = (np.ascontiguousarray(axis, dtype=np.int32) for axis in share.translations())
+        x, y = (np.ascontiguousarray(axis, dtype=np.int32) for axis in subdomain.translations())
         # Vectors from the axis to the places of all displacements.  Beams come last: beams joined
         # to the ground share its displacement, not the place of its centre.
-        grid, from_axis = share.grid, np.zeros(share.grid.size)
-        centers = np.array([body.center for body in grid.scene.rigid_bodies]).reshape(-1, 2)
-        points = np.concatenate([centers, grid.points]) - frame.about
-        from_axis[np.concatenate([grid.dofs_of_bodies, grid.dofs])[:, :2]] = points
-        change, place, space, self._force, self._before, rest = np.zeros((6, share.size))
+        numbering, from_axis = subdomain.numbering, np.zeros(subdomain.numbering.size)
+        centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
+        points = np.concatenate([centers, numbering.points]) - frame.about
+        from_axis[np.concatenate([numbering.dofs_of_bodies, numbering.dofs])[:, :2]] = points
+        change, place, space, self._force, self._before, rest = np.zeros((6, subdomain.size))
         accelerations = ffi.new("double *[1]", [doubles(rest)])
         self._rest = rest, accelerations
-        self.vector = struct("vector", size=share.size, values=self._force)
+        self.vector = struct("vector", size=subdomain.size, values=self._force)
         c = self._c = struct(
-            "rotating_frame", size=share.size, entries=len(A.data), places=len(x), x=x, y=y,
+            "rotating_frame", size=subdomain.size, entries=len(A.data), places=len(x), x=x, y=y,
             pull=self._matrices[0].c, turn=self._matrices[1].c, pulls=S.data, turns=G.data,
-            from_centre=from_axis[share.dofs], rate=frame.rate, coriolis=coriolis,
+            from_centre=from_axis[subdomain.dofs], rate=frame.rate, coriolis=coriolis,
             part=scheme.load_weight, weight_of_before=scheme.weight_of_before, change=change,
             place=place, space=space, force=self._force, before=self._before,
             accelerations=accelerations,
@@ -290,7 +300,7 @@ class FrameForces(LoadTerm):
         self._c.work = self._ledger.supplied.pointer("loads")
         return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
 
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Return the forces at ``q``; this state is assumed in equilibrium with them."""
         self._c.grown = 1.0
         still = np.zeros(len(q))
@@ -300,7 +310,7 @@ class FrameForces(LoadTerm):
         lib.accept_frame(self._c, step, doubles(q), doubles(still))
         return self._force.copy()
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the forces in the equation of the last step, and their growth."""
-        self._force[:] = self._before[:] = memory.added("rotating frame", self._before)
-        self._c.grown = memory.number("growth of the rotating frame", self._c.grown)
+        self._force[:] = self._before[:] = archive.added("rotating frame", self._before)
+        self._c.grown = archive.number("growth of the rotating frame", self._c.grown)

@@ -156,7 +156,7 @@ class Points:
 
     Args:
         layout: The points of a cell.
-        keys: See :meth:`Layout.numbers`.
+        keys: See :meth:`Layout.parameters`.
         length: Lengths of the cells; (cells,); m.
         scheme: The time scheme.
         search: Flags of the present search for an equilibrium, see loops.h, shared by all points
@@ -206,7 +206,7 @@ class Points:
         stiffness = np.reshape(layout.stiffness, (len(layout.weights), -1)).T
         for name, value in zip(rows(law, "stiffness"), stiffness, strict=True):
             self._at[name][:] = value
-        for name, value in layout.numbers(keys).items():
+        for name, value in layout.parameters(keys).items():
             self._at[f"number {name}"][:] = value
         for name, initial in law.variables.items():
             self._at[f"state {name}"][:] = initial
@@ -216,7 +216,7 @@ class Points:
         self._at["dt"][:] = self.dt
         self._at["traction"][:] = np.inf
         if layout.softening is not None:
-            for name, value in layout.softening.numbers().items():
+            for name, value in layout.softening.parameters().items():
                 self._at[f"softening {name}"][:] = value
             self._resist()
 

@@ -22,7 +22,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import Loop, doubles, ffi, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import StepFailed
 from ufl_beam.model.functions import Constant, Table, TimeFunction, steady, value_at
@@ -37,7 +37,7 @@ class InCells(NamedTuple):
     Attributes:
         form: Makes the form whose entries are the forces; its latest evaluation counts.
         kind: ``force_kind`` of loops.h.
-        order: Positions in ``share.cells`` of its cells.
+        order: Positions in ``subdomain.cells`` of its cells.
         vector: Pointer to the address of the vector that the form is evaluated at, if the form is
             linear and nothing else evaluates it.
         factor: Factor of the forces.
@@ -115,7 +115,7 @@ class Term(ABC):
     def start(self, q: Array) -> None:
         """Set the accepted configuration to ``q``, without a step."""
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the data for later steps; ``q`` is the configuration of the state."""
 
 
@@ -159,7 +159,7 @@ class Callbacks:
 
     # -- exceptions -------------------------------------------------------------------------------
 
-    def settle(self) -> None:
+    def synchronize(self) -> None:
         """Raise the exception of a function that C has called."""
         error, self.error = self.error, None
         if error is not None:
@@ -171,7 +171,7 @@ class Callbacks:
         before, self.error = (self.error, self.c.raised), None
         try:
             yield
-            self.settle()
+            self.synchronize()
         finally:
             self.error, self.c.raised = before
 

@@ -16,7 +16,7 @@ from ufl_beam.compiled.c_library import ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.compiled_forms import Kernel
 from ufl_beam.discretization.function_spaces import Fields, element_of
-from ufl_beam.discretization.state_io import Memory
+from ufl_beam.discretization.state_io import Archive
 from ufl_beam.discretization.work_forms import Statement, statement
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ModelError, shorten
@@ -32,7 +32,7 @@ class Acting:
     """Work on the cells of a process on which it acts.
 
     Attributes:
-        order: Positions of the cells in ``share.cells``.
+        order: Positions of the cells in ``subdomain.cells``.
         residual: Form of the forces.
         tangent: Form of their derivative, if there is any.
         passes_on: True if forces depend on the motion of the last step and enter the work of the
@@ -58,7 +58,7 @@ class Acting:
             self.tangent.place(A)
         self._values: Array = np.full(len(work_forms.numbers), math.nan)
         # Forces of a virtual work in the equation of the last step
-        self._before = np.zeros(0 if self._energy else fields.share.size)
+        self._before = np.zeros(0 if self._energy else fields.subdomain.size)
 
     def in_c(self, ledger: Ledger, callbacks: Callbacks) -> Any:
         """Return ``user_work`` of loops.h, with entries of the ledger."""
@@ -83,7 +83,7 @@ class Acting:
             of_time=callbacks.time_functions([(value, work) for value in values]), **pointers,
         )  # fmt: skip
 
-    def initial_forces(self, q: Array, past: Memory | None) -> Array:
+    def initial_forces(self, q: Array, past: Archive | None) -> Array:
         """Return the forces at ``q`` or in ``past``, and keep them for the next step."""
         force = np.zeros(len(q))
         self.residual.add(q, force)
@@ -91,13 +91,13 @@ class Acting:
             return -force
         self._before[:] = -force
         if past is not None and past.has(self._saved_as):
-            self.remember(past)
+            self.save_or_restore(past)
         return self._before
 
-    def remember(self, memory: Memory) -> None:
+    def save_or_restore(self, archive: Archive) -> None:
         """Save or restore the forces of a virtual work in the equation of the last step."""
         if self._energy is None:
-            self._before[:] = memory.added(self._saved_as, self._before)
+            self._before[:] = archive.added(self._saved_as, self._before)
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
@@ -138,11 +138,11 @@ class Works(LoadTerm):
 
     def __init__(self, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr, t0: float) -> None:
         self._ledger = ledger
-        share, self._A = fields.share, A
-        grid = share.grid
+        subdomain, self._A = fields.subdomain, A
+        numbering = subdomain.numbering
         self._works: list[Acting] = []
-        for work in grid.scene.works:
-            work_forms = statement(work, element_of(grid.mesh), scheme)
+        for work in numbering.scene.works:
+            work_forms = statement(work, element_of(numbering.mesh), scheme)
             # Make entries also on processes without such cells
             potential = isinstance(work, Potential)
             (ledger.state if potential else ledger.supplied)[work.name] += 0.0
@@ -150,15 +150,21 @@ class Works(LoadTerm):
                 ledger.supplied[work.in_time] += 0.0
             if work_forms.lost is not None:
                 ledger.lost["numerical"] += 0.0
-            cells = np.concatenate([grid.cells_of(beam) for beam in work.on(grid.scene.beams)])
-            positions = np.flatnonzero(np.isin(share.cells, cells))
+            cells = np.concatenate(
+                [numbering.cells_of(beam) for beam in work.on(numbering.scene.beams)]
+            )
+            positions = np.flatnonzero(np.isin(subdomain.cells, cells))
             if len(positions):
-                subset = fields if len(positions) == len(share.cells) else Fields(share, positions)
+                subset = (
+                    fields
+                    if len(positions) == len(subdomain.cells)
+                    else Fields(subdomain, positions)
+                )
                 self._works.append(Acting(work, work_forms, subset, scheme, A))
-        self._force, space = np.zeros((2, share.size))
-        self.vector = struct("vector", size=share.size, values=self._force)
+        self._force, space = np.zeros((2, subdomain.size))
+        self.vector = struct("vector", size=subdomain.size, values=self._force)
         self._c = struct(
-            "user_works", size=share.size, works=len(self._works), t=t0, force=self._force,
+            "user_works", size=subdomain.size, works=len(self._works), t=t0, force=self._force,
             space=space, weight_of_before=scheme.weight_of_before,
         )  # fmt: skip
         tangents = [work.tangent for work in self._works if work.tangent is not None]
@@ -178,7 +184,7 @@ class Works(LoadTerm):
         begin, accept = loop("begin_works", self._c), loop("accept_works", self._c)
         return Phases([begin], [accept], [loop("add_energy_of_works", self._c)])
 
-    def carry_on(self, t: float, q: Array, v: Array | None, past: Memory | None) -> Array:
+    def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
         """Return the forces at ``q``; this state is assumed in equilibrium with them."""
         self._c.t, self._c.grown = t, 1.0
         # As at the end of a second with constant velocities
@@ -186,23 +192,23 @@ class Works(LoadTerm):
         times = {"load_time": t, "motion_time": t, "fraction": 1.0, "at": 1.0}
         step = struct("time_step", q0=before, dt=dt, **times)
         lib.begin_works(self._c, step, ffi.NULL, ffi.NULL)
-        self._callbacks.settle()
+        self._callbacks.synchronize()
         self._force[:] = sum(work.initial_forces(q, past) for work in self._works)
         return self._force.copy()
 
-    def pass_on(self, memory: Memory) -> None:
+    def pass_on(self, archive: Archive) -> None:
         """Save the forces of works that depend on the motion of the last step."""
         for work in self._works:
             if work.passes_on:
-                work.remember(memory)
+                work.save_or_restore(archive)
 
-    def remember(self, memory: Memory, q: Array) -> None:
+    def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore time and growth of the works, and their forces in the last equation."""
-        self._c.t = memory.number("time of works", self._c.t)
-        self._c.grown = memory.number("growth of works", self._c.grown)
-        self._force[:] = memory.added("works", self._force)
+        self._c.t = archive.number("time of works", self._c.t)
+        self._c.grown = archive.number("growth of works", self._c.grown)
+        self._force[:] = archive.added("works", self._force)
         for work in self._works:
-            work.remember(memory)
+            work.save_or_restore(archive)
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``."""

@@ -103,7 +103,7 @@ def test_damage_colours_the_cells_that_yielded(damaged, arm):
     dissipated = damaged.material(arm, 50).plastic
     yielded = np.flatnonzero(dissipated)
     assert 0 < len(yielded) < 4
-    rest = damaged.grid.points[damaged.grid.vertices_of(arm)]
+    rest = damaged.numbering.points[damaged.numbering.vertices_of(arm)]
     points = rest + 2 * (damaged.shape(arm, 50) - rest)
     np.testing.assert_allclose(
         outlines(figure, "yielded"), np.stack([points[yielded], points[yielded + 1]], axis=1)
@@ -194,7 +194,7 @@ def test_dissipation_stacks_the_losses_of_the_ledger(damaged):
             points = np.column_stack([damaged.times, bound])
             # The outline holds them to the rounding of the sum
             apart = np.abs(outline[None] - points[:, None]).sum(axis=2).min(axis=1)
-            assert apart.max() <= 1e-14 * energy.throughput
+            assert apart.max() <= 1e-14 * energy.energy_transferred
         lower = lower + lost
     drawn = {line.get_label(): line.get_ydata() for line in axes.lines}
     assert set(drawn) == {"supplied", "in the scene"}
@@ -202,7 +202,7 @@ def test_dissipation_stacks_the_losses_of_the_ledger(damaged):
     np.testing.assert_array_equal(drawn["in the scene"], energy.total)
     assert axes.get_ylabel() == "energy (J)"
     title = axes.get_title(loc="left")
-    assert title.endswith(f"of {with_unit(energy.throughput, 'J')} throughput")
+    assert title.endswith(f"of {with_unit(energy.energy_transferred, 'J')} throughput")
     assert f"{energy.worst:.1e}".split("e")[0] in title
     assert set(legend(figure)) == {*drawn, *(f"lost: {name}" for name in energy.lost)}
 

@@ -105,7 +105,7 @@ def test_ordinates_are_in_proportion_to_the_values(portal, diagrams):
     s, values, *_ = portal.diagram(roof)
     (outline,) = [x for x in areas_of(diagrams["N"]) if np.ptp(x[:, 0]) > 5.5]
     tips, shape = outline[1 : 1 + len(values)], portal.shape(roof)
-    heights = tips[:, 1] - np.interp(s, portal.grid.parameters(roof), shape[:, 1])
+    heights = tips[:, 1] - np.interp(s, portal.numbering.parameters(roof), shape[:, 1])
     np.testing.assert_allclose(heights / heights[0], values / values[0], rtol=0.01)
 
 
@@ -258,7 +258,7 @@ def test_displacements_are_magnified(portal):
     axes = ub.plot(portal, magnify=10).axes[0]
     roof = portal.scene.beams[1]
     drawn = chains(axes)[2][1]
-    undeformed = portal.grid.points[portal.grid.vertices_of(roof)]
+    undeformed = portal.numbering.points[portal.numbering.vertices_of(roof)]
     np.testing.assert_allclose(drawn - undeformed, 10 * (portal.shape(roof) - undeformed))
     assert "× 10" in axes.get_title(loc="left")
 

@@ -163,8 +163,11 @@ def test_joints_of_a_user_have_a_plain_symbol():
         holders: tuple
         meets: bool
 
-    together, link = (left.end, right.start), ub.RigidLink(right.end, apart.start)
-    joints = [Own(together, (0, 1), (), True), Own(link.places, (2,), link.holders, False)]
+    together, connector = (left.end, right.start), ub.RigidLink(right.end, apart.start)
+    joints = [
+        Own(together, (0, 1), (), True),
+        Own(connector.places, (2,), connector.holders, False),
+    ]
     figure = ub.plot(ub.Scene([left, right, apart], joints=joints))
     np.testing.assert_allclose(middles(figure, "pins"), [(1, 0)], atol=1e-12)
     np.testing.assert_array_equal(outlines(figure, "joints", width=PLAIN), [[(2, 0), (3, 0)]])
@@ -195,9 +198,9 @@ def test_beams_bodies_and_their_joints_are_in_one_picture():
     (curve,) = outlines(figure, "joints", width=RAIL)
     np.testing.assert_allclose(curve[:, 1], (curve[:, 0] - 2.0) ** 2, atol=1e-12)
     assert curve[:, 0].min() < at[0] < curve[:, 0].max()
-    (link,) = outlines(figure, "joints", width=STRUT)
+    (connector,) = outlines(figure, "joints", width=STRUT)
     ends = [solution.position(p)[-1] for p in joints[2].places]
-    np.testing.assert_allclose(link, ends, atol=1e-12)
+    np.testing.assert_allclose(connector, ends, atol=1e-12)
 
 
 # -- connectors --------------------------------------------------------------------------------

@@ -2,39 +2,39 @@
 /* Connectors: rows of their laws linearized at an iterate, and the violation of the laws. */
 
 /* Motions of the connectors at q. */
-void find_motions(const couplings *c, const double *q)
+void find_motions(const connectors *c, const double *q)
 {
   const int n = c->components;
   memset(c->by_cell, 0, (size_t)n * c->number * sizeof *c->by_cell);
   add_cells((void *)c->motion, q, c->by_cell);
-  for (int k = 0; k < c->number; ++k) memcpy(c->e1 + n * c->link[k], c->by_cell + n * k, n * sizeof(double));
+  for (int k = 0; k < c->number; ++k) memcpy(c->e1 + n * c->connector[k], c->by_cell + n * k, n * sizeof(double));
 }
 
 /* Numbers in the rows of a connector; each row has a coefficient for each motion and for the force,
  * and the right side. */
-static int numbers_of_rows(const couplings *c) { return c->components * (c->components + 2); }
+static int numbers_of_rows(const connectors *c) { return c->components * (c->components + 2); }
 
 /* Write the rows of a connector into the coefficients of its cell. */
-static void put_row(const couplings *c, int cell, const double *row)
+static void put_row(const connectors *c, int cell, const double *row)
 {
   put_in_cell(c->work, cell, c->row, numbers_of_rows(c), row);
   put_in_cell(c->tangent, cell, c->row_of_tangent, numbers_of_rows(c), row);
 }
 
 /* Compute the response of springs to their motions e1. */
-static void respond_springs(const couplings *c)
+static void respond_springs(const connectors *c)
 {
   for (int i = 0; i < c->number; ++i) c->points->e1[3 * i] = c->e1[i];
   respond(c->points);
 }
 
 /* Rows of springs, linearized at the motions e1. */
-static void set_rows_of_springs(const couplings *c)
+static void set_rows_of_springs(const connectors *c)
 {
   const points *p = c->points;
   respond_springs(c);
   for (int k = 0; k < c->number; ++k) {
-    const int i = c->link[k];
+    const int i = c->connector[k];
     const double D = p->D[9 * i], row[3] = {-D, 1, p->r[3 * i] - D * c->e1[i]};
     put_row(c, k, row);
   }
@@ -95,7 +95,7 @@ static void find_rows_of_friction(friction *f, const double *e0, const double *e
   f->guessed = 0;
 }
 
-static void get_forces(const couplings *c, const double *q, double *force)
+static void get_forces(const connectors *c, const double *q, double *force)
 {
   for (int i = 0; i < c->number; ++i) force[i] = q[c->force[i]];
 }
@@ -143,7 +143,7 @@ static void commit_law(const connector_laws *p, int i, const double *e1, double 
 }
 
 /* Write the rows that depend on the iterate, linearized at q. */
-static void set_rows(const couplings *c, const double *q)
+static void set_rows(const connectors *c, const double *q)
 {
   const double *rows = 0;
   if (!c->points && !c->rigid_plastic && !c->laws && !c->friction && !c->asked) return;
@@ -164,24 +164,24 @@ static void set_rows(const couplings *c, const double *q)
     c->asked->find_rows(c->asked->rows_self);
     rows = c->asked->rows;
   }
-  for (int k = 0; rows && k < c->number; ++k) put_row(c, k, rows + numbers_of_rows(c) * c->link[k]);
+  for (int k = 0; rows && k < c->number; ++k) put_row(c, k, rows + numbers_of_rows(c) * c->connector[k]);
 }
 
 /* Rows of all connectors, linearized at q; rows that are constant in a step are as its beginning
  * has written them. */
-void find_rows(const couplings *c, const double *q, double *rows)
+void find_rows(const connectors *c, const double *q, double *rows)
 {
   const int n = numbers_of_rows(c);
   set_rows(c, q);
   for (int k = 0; k < c->number; ++k) {
     const double *row = in_cell(c->work, k, c->row);
-    for (int i = 0; i < n; ++i) rows[n * c->link[k] + i] = row[i * c->work->lanes];
+    for (int i = 0; i < n; ++i) rows[n * c->connector[k] + i] = row[i * c->work->lanes];
   }
 }
 
-void add_couplings_force(void *self, const double *q, double *r)
+void add_connectors_force(void *self, const double *q, double *r)
 {
-  const couplings *c = self;
+  const connectors *c = self;
   set_rows(c, q);
   add_cells((void *)c->work, q, r);
 }
@@ -189,14 +189,14 @@ void add_couplings_force(void *self, const double *q, double *r)
 /* Largest residual of a row. Motions are relative to 1 % of the largest motion in the scene, at
  * most to 1 % of the scene; forces are relative to the scale. Round-off of the motions does not
  * count; it grows with the distance from the initial position and with the number of turns. */
-double missed_by_couplings(void *self, const double *q, const double *r, double scale, double moved)
+double missed_by_connectors(void *self, const double *q, const double *r, double scale, double moved)
 {
-  const couplings *c = self;
+  const connectors *c = self;
   const int n = c->components, lanes = c->work->lanes;
   const double amplitude = moved / c->size;
   double most = 0;
   for (int k = 0; k < c->number; ++k) {
-    const int i = c->link[k];
+    const int i = c->connector[k];
     const int32_t *dofs = c->dofs + (6 + n) * i;
     const double *row = in_cell(c->work, k, c->row), *length = c->length + n * i;
     double far = amplitude;
@@ -219,7 +219,7 @@ double missed_by_couplings(void *self, const double *q, const double *r, double 
 }
 
 /* Work that component i takes in a step to the motion e1. */
-static double taken_by(const couplings *c, int i, const double *q)
+static double taken_by(const connectors *c, int i, const double *q)
 {
   const double a = c->weight_of_before, force = a * c->before[i] + (1 - a) * q[c->force[i]];
   return force * (c->e1[i] - c->e0[i]);
@@ -227,7 +227,7 @@ static double taken_by(const couplings *c, int i, const double *q)
 
 /* Accept the end of the step as the new state; returns the work that all connectors have taken in
  * it. */
-static double commit_couplings(const couplings *c, const double *q, double dt)
+static double commit_connectors(const connectors *c, const double *q, double dt)
 {
   double sum = 0;
   find_motions(c, q);

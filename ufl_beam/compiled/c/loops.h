@@ -286,7 +286,7 @@ typedef struct {
   void *begin_self, *rows_self, *again_self; /* data of the functions */
   void (*begin)(void *self, double t, double dt);
   void (*find_rows)(void *self), (*again)(void *self);
-} asked_laws;
+} called_laws;
 
 /* Outputs of a connector law at the end of a step; its variables follow. */
 enum law_output { LAW_STORED, LAW_NUMERICAL, LAW_OUTPUTS };
@@ -301,7 +301,7 @@ typedef struct {
   double *w;                  /* data of the kernels, `width` numbers of each connector */
   double *stored, *lost;      /* energy in the accepted state; energy dissipated by each since the
                                * beginning */
-  double *rows, *answer;      /* rows as in `couplings`; space for the outputs of a law */
+  double *rows, *answer;      /* rows as in `connectors`; space for the outputs of a law */
   double *sum;                /* energy lost in the last step: by the laws, by the scheme */
 } connector_laws;
 
@@ -319,9 +319,9 @@ typedef struct {
   rigid_plastic *rigid_plastic;    /* or none */
   connector_laws *laws;            /* or none */
   friction *friction;              /* or none */
-  asked_laws *asked;               /* or none; if all of these are none, the rows are constant in a step */
+  called_laws *asked;               /* or none; if all of these are none, the rows are constant in a step */
   int number, components;          /* components: 1, except for compiled laws */
-  const int32_t *link, *force;     /* connector of each cell; indices of the forces among the unknowns */
+  const int32_t *connector, *force;     /* connector of each cell; indices of the forces among the unknowns */
   int row, row_of_tangent;         /* positions of the rows in the coefficients of work and tangent */
   double *by_cell, *e1;            /* space; motions at the latest unknowns */
   double *e0, *before, *kept[CONNECTOR_NUMBERS]; /* accepted state: motion, force, numbers kept */
@@ -329,13 +329,13 @@ typedef struct {
   const int32_t *dofs;             /* of each connector: six of its nodes, then the forces */
   const double *length;            /* 1 for a rotation, else the size of the scene */
   double size;                     /* of the scene */
-} couplings;
+} connectors;
 
-void find_motions(const couplings *c, const double *q);
+void find_motions(const connectors *c, const double *q);
 double dissipation_of_rigid_plastic(const rigid_plastic *p, const double *e1, const double *force);
-void find_rows(const couplings *c, const double *q, double *rows);
+void find_rows(const connectors *c, const double *q, double *rows);
 void ask_law(kernel *law, const double *w, int answers, double *s);
-part add_couplings_force, add_guides_force, add_guides_tangent;
+part add_connectors_force, add_guides_force, add_guides_tangent;
 void respond(points *p);
 void respond_at(const inelastic *m, const double *q);
 int gives_energy(const points *p);
@@ -502,7 +502,7 @@ enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU reports a singular matrix by thi
  * moved is the largest motion, see largest_motion. */
 typedef double (miss)(void *self, const double *q, const double *r, double scale, double moved);
 typedef struct { miss *missed; void *self; } demand;
-miss missed_by_couplings, missed_by_points, missed_by_guides;
+miss missed_by_connectors, missed_by_points, missed_by_guides;
 
 /* A point whose displacement is in the axes of a support at an angle; c and s are its cosine and
  * sine. The arrays list the entries of the tangent in the rows and in the columns of both degrees
@@ -623,7 +623,7 @@ int snes_newton(void *snes, void *x);
 int snes_test(void *snes, petsc_int iteration, double x, double s, double f, int *reason,
               void *self);
 
-/* -- prediction of the end of a step, see march.c ------------------------------------------------- */
+/* -- prediction of the end of a step, see time_loop.c ------------------------------------------------- */
 
 /* The last steps. `second` is the second difference of the configuration; in dynamics only. */
 typedef struct {
@@ -644,7 +644,7 @@ void predict(const prediction *p, double dt, const double *q, double *out);
 void enter_step(prediction *p, double dt, const double *q, const double *q1);
 void compare_differences(prediction *p);
 
-/* -- steps one after the other, see march.c ----------------------------------------------------- */
+/* -- steps one after the other, see time_loop.c ----------------------------------------------------- */
 
 /* A step, see Step in time_schemes.py. */
 typedef struct {
@@ -844,7 +844,7 @@ typedef struct {
 /* Connectors of one motion: springs, rigid-plastic connectors, locks, dampers, motors or actuators;
  * their entries of the ledger, or none. */
 typedef struct {
-  couplings *links;
+  connectors *connectors;
   const double *viscosity;            /* of dampers */
   const time_function *wanted_motion; /* of motors */
   const time_function *wanted_force;  /* of actuators */
@@ -856,7 +856,7 @@ typedef struct {
                            * Euler */
   double *lost;           /* ledger entry of compiled laws */
   const inelastic_term *points; /* ledger entries of springs, rigid-plastic connectors and laws */
-} coupling_term;
+} connector_term;
 
 /* Forces of laws of a user, watched for changes of direction at every step; see controllers.py. */
 typedef struct {
@@ -907,7 +907,7 @@ typedef struct {
   const int32_t *way_before; /* of rigid-plastic connectors, after the last step */
 } openable;
 
-enum { MOST_PARTS = 4096 }; /* largest number of substeps of a step */
+enum { MOST_SUBSTEPS = 4096 }; /* largest number of substeps of a step */
 
 /* Reasons why a step is not accepted. */
 enum failure {
@@ -933,7 +933,7 @@ typedef struct {
   int in_parts;          /* whether substeps go in proportion to loads and motions at the end of the step */
   int rotations, half_tangents, multipliers;
   const int32_t *rotation, *half_tangent, *multiplier;
-  int limits_turn;
+  int limits_rotation;
   double turn, largest_turn; /* turn: largest rotation in the step */
   rates *rates;       /* in dynamics */
   int admissions, judges; /* checks of laws; whether any process has checks */
@@ -966,21 +966,21 @@ typedef struct {
    * it. */
   int applies;
   double begin_of_run, applied_by, applying_turn, short_part;
-} march;
+} time_loop;
 
 phase begin_forms, add_values, begin_static_tangent, begin_predicted_strains, begin_dead_loads,
   accept_dead_loads, begin_follower_loads, accept_follower_loads, begin_frame, accept_frame, begin_works,
   accept_works, add_energy_of_works, begin_viscous_forms, begin_second_differences,
   accept_second_differences, begin_inertia, accept_inertia, add_kinetic_energy, begin_rayleigh,
-  accept_rayleigh, begin_inelastic, accept_inelastic, add_energy_of_points, begin_couplings,
-  accept_couplings, add_energy_of_couplings, begin_guides, accept_guides;
-void begin_couplings_again(void *self);
+  accept_rayleigh, begin_inelastic, accept_inelastic, add_energy_of_points, begin_connectors,
+  accept_connectors, add_energy_of_connectors, begin_guides, accept_guides;
+void begin_connectors_again(void *self);
 admission points_dissipate, springs_dissipate;
-change_of_energy change_of_form, change_of_points, change_of_couplings;
+change_of_energy change_of_form, change_of_points, change_of_connectors;
 double value_at(const time_function *f, double t);
-void keep_state(const march *m, double *row);
-int solve_begun_step(march *m, int hold);
-int attempt_step(march *m, double t1, double end);
-int accept_step(march *m);
-int go_to_time(march *m, double end);
-int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows);
+void keep_state(const time_loop *m, double *row);
+int solve_begun_step(time_loop *m, int hold);
+int attempt_step(time_loop *m, double t1, double end);
+int accept_step(time_loop *m);
+int go_to_time(time_loop *m, double end);
+int take_steps(time_loop *m, int steps, const double *ends, double seconds, int keeps, double *rows);

@@ -44,7 +44,7 @@ static int direction_of_slip(const rigid_plastic *p, int i, double *w, double mo
 
 /* Rows of the connectors at their motions c->e1 and forces in q: the equations above over -r, so
  * that the tangent of held connectors is symmetric. */
-static void set_rows_of_rigid_plastic(const couplings *c, const double *q)
+static void set_rows_of_rigid_plastic(const connectors *c, const double *q)
 {
   const rigid_plastic *p = c->rigid_plastic;
   double *w = p->w, s[2];

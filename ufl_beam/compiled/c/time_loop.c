@@ -435,11 +435,11 @@ void add_energy_of_points(void *self, const time_step *step, const double *q1, c
 }
 
 /* Rows of dampers, motors and actuators, which are constant during a step. */
-static void put_rows_of_step(const coupling_term *t, const time_step *step)
+static void put_rows_of_step(const connector_term *t, const time_step *step)
 {
-  const couplings *c = t->links;
+  const connectors *c = t->connectors;
   for (int k = 0; k < c->number; ++k) {
-    const int i = c->link[k];
+    const int i = c->connector[k];
     double a = 0, b = 1, y;
     if (t->viscosity) {
       a = -t->viscosity[i] / step->dt;
@@ -467,7 +467,7 @@ static void begin_friction_again(friction *f)
 
 /* A sticking connector moves by `way` in the step, so that its velocity is zero at the end. Without
  * this motion, the previous velocity would come back. */
-static void begin_friction(const couplings *c, const time_step *step)
+static void begin_friction(const connectors *c, const time_step *step)
 {
   friction *f = c->friction;
   double way_to_rest = 0;
@@ -480,7 +480,7 @@ static void begin_friction(const couplings *c, const time_step *step)
     add_cells((void *)f->rate, step->q0, c->by_cell);
   }
   for (int k = 0; k < c->number; ++k) {
-    const int i = c->link[k];
+    const int i = c->connector[k];
     if (f->laws) {
       ask_law(f->limit_of_law, f->laws->w + i * f->laws->width, 1, f->limit[i]);
       *f->limit[i] = fmax(*f->limit[i], 0);
@@ -492,10 +492,10 @@ static void begin_friction(const couplings *c, const time_step *step)
   begin_friction_again(f);
 }
 
-void begin_couplings(void *self, const time_step *step, const double *q1, const double *s)
+void begin_connectors(void *self, const time_step *step, const double *q1, const double *s)
 {
-  const coupling_term *t = self;
-  const couplings *c = t->links;
+  const connector_term *t = self;
+  const connectors *c = t->connectors;
   const rigid_plastic *p = c->rigid_plastic;
   const connector_laws *l = c->laws;
   if (t->entry && !c->friction && !c->asked) put_rows_of_step(t, step);
@@ -519,21 +519,21 @@ void begin_couplings(void *self, const time_step *step, const double *q1, const 
   }
 }
 
-void begin_couplings_again(void *self)
+void begin_connectors_again(void *self)
 {
-  const coupling_term *t = self;
-  const couplings *c = t->links;
+  const connector_term *t = self;
+  const connectors *c = t->connectors;
   if (c->rigid_plastic)
     memcpy(c->rigid_plastic->way, t->way_before, c->rigid_plastic->number * sizeof *t->way_before);
   if (c->friction) begin_friction_again(c->friction);
   if (c->asked) c->asked->again(c->asked->again_self);
 }
 
-void accept_couplings(void *self, const time_step *step, const double *q1, const double *s)
+void accept_connectors(void *self, const time_step *step, const double *q1, const double *s)
 {
-  coupling_term *t = self;
-  const couplings *c = t->links;
-  const double taken = commit_couplings(c, q1, step->dt);
+  connector_term *t = self;
+  const connectors *c = t->connectors;
+  const double taken = commit_connectors(c, q1, step->dt);
   if (t->entry) *t->entry += t->sign * taken;
   if (t->reached) memcpy(t->reached, t->end, c->number * sizeof *t->end);
   if (c->friction) memcpy(c->friction->accepted, c->friction->slip, c->number * sizeof(double));
@@ -555,14 +555,14 @@ void accept_couplings(void *self, const time_step *step, const double *q1, const
   }
 }
 
-void add_energy_of_couplings(void *self, const time_step *step, const double *q1, const double *s)
+void add_energy_of_connectors(void *self, const time_step *step, const double *q1, const double *s)
 {
-  const coupling_term *t = self;
-  const connector_laws *l = t->links->laws;
-  if (t->links->points) enter_stored(t->points, t->links->points->sum);
-  if (t->links->asked) *t->points->stored += *t->links->asked->held;
+  const connector_term *t = self;
+  const connector_laws *l = t->connectors->laws;
+  if (t->connectors->points) enter_stored(t->points, t->connectors->points->sum);
+  if (t->connectors->asked) *t->points->stored += *t->connectors->asked->held;
   for (int i = 0; l && i < l->number; ++i) *t->points->stored += l->stored[i];
-  if (t->links->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
+  if (t->connectors->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
 }
 
 /* Energy stored and dissipated by points in the latest response, less the present one; see
@@ -584,10 +584,10 @@ void change_of_points(void *self, const double *q1, energy_change *sum)
   sum->in_beams += change_by_response(t->cells->points, t->copy);
 }
 
-void change_of_couplings(void *self, const double *q1, energy_change *sum)
+void change_of_connectors(void *self, const double *q1, energy_change *sum)
 {
-  const coupling_term *t = self;
-  const couplings *c = t->links;
+  const connector_term *t = self;
+  const connectors *c = t->connectors;
   double taken = 0;
   find_motions(c, q1);
   const int loses = !c->laws || c->laws->loses, n = c->components;
@@ -614,10 +614,10 @@ int points_dissipate(void *self, const double *q1)
 
 int springs_dissipate(void *self, const double *q1)
 {
-  const coupling_term *t = self;
-  find_motions(t->links, q1);
-  respond_springs(t->links);
-  return gives_energy(t->links->points) < 0;
+  const connector_term *t = self;
+  find_motions(t->connectors, q1);
+  respond_springs(t->connectors);
+  return gives_energy(t->connectors->points) < 0;
 }
 
 /* -- prediction of the end of a step, from which Newton's method starts; see stepper.py ---------------- */
@@ -678,7 +678,7 @@ void compare_differences(prediction *p)
 /* -- the step ------------------------------------------------------------------------------------ */
 
 /* Set the step from the present time to t1, a substep of one to `end`. */
-static int set_step(march *m, double t1, double end)
+static int set_step(time_loop *m, double t1, double end)
 {
   time_step *step = &m->step;
   const double t0 = m->t, dt = t1 - t0;
@@ -692,7 +692,7 @@ static int set_step(march *m, double t1, double end)
 }
 
 /* Begin the step in all terms; returns whether no function of a user has raised an exception. */
-static int begin_terms(march *m)
+static int begin_terms(time_loop *m)
 {
   run(&m->begin, &m->step, 0, 0);
   return raised_anywhere(m->equation) == NOTHING;
@@ -700,7 +700,7 @@ static int begin_terms(march *m)
 
 /* Initial guess of the end of the step in the axes of supports: extrapolation of the last steps,
  * and the prescribed motions of supports. */
-static void guess(march *m)
+static void guess(time_loop *m)
 {
   const moving_supports *p = m->supports;
   const equation *e = m->equation;
@@ -720,7 +720,7 @@ static void guess(march *m)
 
 /* Begin the step and compute its initial guess; returns whether no function of a user has raised an
  * exception. */
-static int begin_at_guess(march *m)
+static int begin_at_guess(time_loop *m)
 {
   run(&m->begin, &m->step, 0, 0);
   guess(m);
@@ -728,7 +728,7 @@ static int begin_at_guess(march *m)
 }
 
 /* Size of the loads in the step, on all processes. */
-static double size_of_loads(const march *m)
+static double size_of_loads(const time_loop *m)
 {
   const equation *e = m->equation;
   double size = 0;
@@ -746,7 +746,7 @@ static double size_of_loads(const march *m)
  * open in a step. Excesses that differ by less than TIE count as equal. */
 static const double FALL = 0.7, TIE = 1e-9;
 
-static double largest_excess(const march *m)
+static double largest_excess(const time_loop *m)
 {
   double most = 0;
   for (int k = 0; k < m->places; ++k) {
@@ -760,7 +760,7 @@ static double largest_excess(const march *m)
 }
 
 /* Let held places open whose excess is at least `least`. */
-static void open_places(march *m, double least)
+static void open_places(time_loop *m, double least)
 {
   for (int k = 0; k < m->places; ++k) {
     const openable *o = m->place + k;
@@ -778,7 +778,7 @@ static void open_places(march *m, double least)
 }
 
 /* End a search: close the released places again until the step is accepted. */
-static void end_search(march *m, int opened)
+static void end_search(time_loop *m, int opened)
 {
   memset(m->equation->search, 0, SEARCH_FLAGS * sizeof(int32_t));
   for (int k = 0; opened && k < m->places; ++k) {
@@ -793,7 +793,7 @@ static void end_search(march *m, int opened)
 
 /* Find the end of the step from the initial guess. With `hold`, places that do not flow are held
  * closed, except those that must open. */
-static int solve(march *m, int hold)
+static int solve(time_loop *m, int hold)
 {
   equation *e = m->equation;
   const double t = e->border ? *e->border->t : 0;
@@ -822,7 +822,7 @@ static int solve(march *m, int hold)
 
 /* -- whether a step can be trusted ------------------------------------------------------------------ */
 
-static int fails(march *m, enum failure why)
+static int fails(time_loop *m, enum failure why)
 {
   m->failure = why;
   return 0;
@@ -830,7 +830,7 @@ static int fails(march *m, enum failure why)
 
 /* Compute the end of the step in the axes of the plane and the step of the nodes; check that no
  * node rotates further than allowed. */
-static int measure(march *m)
+static int measure(time_loop *m)
 {
   equation *e = m->equation;
   double turn = 0;
@@ -843,7 +843,7 @@ static int measure(march *m)
   m->turn = over_processes(e, LARGEST, turn);
   if (m->applies && m->turn > m->applying_turn && m->short_part * m->step.dt > m->applied_by - m->begin_of_run)
     return fails(m, APPLIED_TOO_FAST);
-  if (m->limits_turn && !(m->turn <= m->largest_turn)) return fails(m, TURNS_TOO_FAR);
+  if (m->limits_rotation && !(m->turn <= m->largest_turn)) return fails(m, TURNS_TOO_FAR);
   for (int k = 0; k < m->half_tangents; ++k) {
     const int i = m->half_tangent[k];
     m->s[i] = 2 * tan(m->s[i] / 2);
@@ -854,7 +854,7 @@ static int measure(march *m)
 
 /* Check that a static step has followed its path: no node moves as a mechanism does, and the work
  * of internal forces equals the energy stored and dissipated; see step_equation.py. */
-static int followed(march *m)
+static int followed(time_loop *m)
 {
   static_path *p = m->path;
   equation *e = m->equation;
@@ -889,7 +889,7 @@ static int followed(march *m)
 
 /* Solve a step that its terms have begun from the initial guess; returns whether its end is
  * accepted. */
-static int solve_step(march *m, int hold)
+static int solve_step(time_loop *m, int hold)
 {
   equation *e = m->equation;
   int admitted = 1;
@@ -907,7 +907,7 @@ static int solve_step(march *m, int hold)
 static const double FIRST_TRIAL = 1. / 16;
 
 /* Solve the step to t1, a substep of one to `end`; the state changes only if it is accepted. */
-int attempt_step(march *m, double t1, double end)
+int attempt_step(time_loop *m, double t1, double end)
 {
   equation *e = m->equation;
   e->raised = NOTHING;
@@ -922,13 +922,13 @@ int attempt_step(march *m, double t1, double end)
 }
 
 /* Solve a step of a path that Python has set. */
-int solve_begun_step(march *m, int hold)
+int solve_begun_step(time_loop *m, int hold)
 {
   m->equation->raised = NOTHING;
   return begin_terms(m) ? solve_step(m, hold) : fails(m, RAISED);
 }
 
-static void accept_supports(march *m)
+static void accept_supports(time_loop *m)
 {
   const moving_supports *p = m->supports;
   const double a = p->weight_of_before;
@@ -941,7 +941,7 @@ static void accept_supports(march *m)
 }
 
 /* Count successive changes of direction of the watched forces, by steps or samples. */
-static void watch_forces(force_watch *w, const march *m)
+static void watch_forces(force_watch *w, const time_loop *m)
 {
   for (int i = 0; i < w->number; ++i) {
     const double force = w->value[i] ? *w->value[i] : m->q[w->dof[i]];
@@ -961,7 +961,7 @@ static void watch_forces(force_watch *w, const march *m)
 
 /* Accept the end of the step as the state. Returns whether no function of a user has raised an
  * exception. The step is accepted even if one has, because some terms have accepted it already. */
-int accept_step(march *m)
+int accept_step(time_loop *m)
 {
   equation *e = m->equation;
   prediction *p = m->prediction;
@@ -991,16 +991,16 @@ int accept_step(march *m)
 }
 
 /* Go to a time in one step or, if that fails, in substeps; returns whether the time is reached. */
-int go_to_time(march *m, double end)
+int go_to_time(time_loop *m, double end)
 {
   const double begin = m->t;
-  for (int done = 0, some = MOST_PARTS; done < MOST_PARTS;) {
-    const double t1 = done + some == MOST_PARTS ? end : begin + (end - begin) * (done + some) / MOST_PARTS;
+  for (int done = 0, some = MOST_SUBSTEPS; done < MOST_SUBSTEPS;) {
+    const double t1 = done + some == MOST_SUBSTEPS ? end : begin + (end - begin) * (done + some) / MOST_SUBSTEPS;
     if (attempt_step(m, t1, end)) {
       if (!accept_step(m)) return 0;
       done += some;
       /* Double the substep at the times where a larger one would begin. */
-      if (done % (2 * some) == 0 && some < MOST_PARTS) some *= 2;
+      if (done % (2 * some) == 0 && some < MOST_SUBSTEPS) some *= 2;
     } else {
       m->failed_end = t1;
       if (some == 1 || m->equation->raised == OTHER || m->equation->error) return 0;
@@ -1017,8 +1017,8 @@ static double seconds_now(void)
   return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
 }
 
-/* Write the state, or the share of this process, into a row; see state_rows.py. */
-void keep_state(const march *m, double *row)
+/* Write the state, or the entries of this process, into a row; see state_rows.py. */
+void keep_state(const time_loop *m, double *row)
 {
   memset(row, 0, m->sums * sizeof *row);
   for (int k = 0; k < m->kinds; ++k) {
@@ -1034,7 +1034,7 @@ void keep_state(const march *m, double *row)
 /* Take steps to the times `ends` until one fails, or ends more than `seconds` after the call;
  * returns the number of steps. If `keeps`, their states are written into `rows`. A step that was
  * divided is the last one, as its last substep does not begin at the end of the previous step. */
-int take_steps(march *m, int steps, const double *ends, double seconds, int keeps, double *rows)
+int take_steps(time_loop *m, int steps, const double *ends, double seconds, int keeps, double *rows)
 {
   const double end = steps > 1 ? seconds_now() + seconds : 0;
   m->failure = SUCCEEDS;
