@@ -241,7 +241,7 @@ def changed(name, make):
 
 WRONG = {
     "shape of q": ("solution", changed("history/q", lambda q: q[:, :-1]), "'q' is float64 of"),
-    "times": ("solution", changed("history/t", lambda t: t[:-1]), "'q' is float64"),
+    "times": ("solution", changed("history/t", lambda t: t[:-1]), "'reactions' is float64 of"),
     "type of q": ("solution", changed("history/q", lambda q: q.astype("f4")), "'q' is float32"),
     "text in q": ("solution", changed("history/q", lambda q: q.astype(str)), "'q' is <U"),
     "velocities": ("solution", changed("history/v", lambda v: v[1:]), "'v' is float64"),

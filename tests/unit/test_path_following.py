@@ -420,7 +420,7 @@ def test_load_factors_are_not_called_times(tmp_path):
         assert table.read_text().startswith("load factor [-],")
     for figure in (ub.plot(path, "history", top), ub.plot(path, "energy"), ub.plot(path)):
         texts = [a.get_xlabel() + a.get_title(loc="left") for a in figure.axes]
-        assert any("load factor" in text or "along the path" in text for text in texts)
+        assert any("load factor" in text or "path length" in text for text in texts)
         assert not any("time" in text or "t =" in text for text in texts)
 
 

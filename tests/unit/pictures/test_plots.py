@@ -360,7 +360,7 @@ def test_values_have_a_decimal_prefix(value, text):
         (lambda s: ub.plot(s, n=3), "n = 3: the solution kept 3 times; give -3 to 2"),
         (lambda s: ub.plot(s, magnify=0), "magnify = 0 must be positive"),
         (lambda s: ub.plot(s, "shapes", count=0), "count = 0 must be at least 1"),
-        (lambda s: ub.plot(s, "shapes", 8), "for so many shapes give count=8"),
+        (lambda s: ub.plot(s, "shapes", 8), "for a number of shapes give count=8"),
         (lambda s: ub.plot(s, "history", s.scene.beams[0].end, component="w"), "component = 'w'"),
         (lambda s: ub.plot(s, "history", s.scene.beams[0].end, component="du/dt"), "static"),
         (lambda s: ub.render(s, "a.jpg"), r"a.jpg: the name must end in .png"),
