@@ -105,16 +105,16 @@ def resident():
 
 def many(members):
     """A study of so many members on the processes of this ``mpirun``."""
-    archive, run = [], member(*CASES["elastic, 8 cells"])
+    memory, run = [], member(*CASES["elastic, 8 cells"])
 
     def watched(number):
         result = run(number)
-        archive.append(resident())
+        memory.append(resident())
         return result
 
     cases = [{"number": number} for number in range(members)]
     study, seconds = timed(lambda: ub.study(watched, cases, progress=False))
-    found = [x for x in MPI.COMM_WORLD.allgather(archive) if x]
+    found = [x for x in MPI.COMM_WORLD.allgather(memory) if x]
     return {
         "case": "study", "members": members, "processes": MPI.COMM_WORLD.size, "seconds": seconds,
         "ms_per_member": 1e3 * seconds / members, "checksum": study["end"].sum(axis=0).tolist(),
@@ -159,10 +159,10 @@ def main():
     for processes in options.processes:
         case = under_mpirun(processes, options.members)
         keep("bench_ensemble", case)
-        archive = ", ".join(f"{a:.0f} to {b:.0f}" for a, b in case["memory_mb"])
+        memory = ", ".join(f"{a:.0f} to {b:.0f}" for a, b in case["memory_mb"])
         print(
             f"study of {case['members']} members, {processes} processes: {case['seconds']:.1f} s, "
-            f"{case['ms_per_member']:.1f} ms each, {archive} MB",
+            f"{case['ms_per_member']:.1f} ms each, {memory} MB",
             flush=True,
         )
 

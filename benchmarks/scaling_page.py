@@ -44,11 +44,11 @@ def modelled(cases, half, lattice):
         border, part = borders(numbering, ranks)
         longer = (CELLS / SAMPLE) ** 0.5 if square else 1
         border, part = border * longer, part * longer
-        seconds, archive = extrapolated(CELLS, ranks, model, border, part, growth)
+        seconds, memory = extrapolated(CELLS, ranks, model, border, part, growth)
         total = sum(seconds.values())
         yield row(
             "square" if square else f"{bays} bays", ranks, f"{border:.0f}",
-            *(f"{t:.3g}" for t in seconds.values()), f"{total:.3g}", f"{archive / 1e9:.1f}",
+            *(f"{t:.3g}" for t in seconds.values()), f"{total:.3g}", f"{memory / 1e9:.1f}",
         )  # fmt: skip
 
 

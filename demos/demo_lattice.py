@@ -125,11 +125,11 @@ for n in range(1, steps + 1):
 files.close()
 simulation.close()
 
-archive = MPI.COMM_WORLD.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+memory = MPI.COMM_WORLD.gather(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
 ub.print_once(f"{steps} steps of {1e3 * end / steps:.2f} ms, {simulation.iterations} iterations")
 ub.print_once(f"{np.median(seconds):.2f} s a step on {MPI.COMM_WORLD.size} process(es)")
 if MPI.COMM_WORLD.rank == 0:
-    ub.print_once("largest memory:", *(f"{megabytes:.0f} MB" for megabytes in archive))
+    ub.print_once("largest memory:", *(f"{megabytes:.0f} MB" for megabytes in memory))
 ub.print_once(solution.energy)
 
 # %% [markdown]

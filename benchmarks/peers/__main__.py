@@ -79,7 +79,7 @@ def show(kept):
         for clock in ("wall", "cpu"):
             line += f" {1e6 * statistics.median(kept[clock]) / kept['steps']:10.1f}"
         line += f" {kept['newton'] / kept['steps']:6.2f} it" if "newton" in kept else " " * 10
-        line += f" {kept['archive']:6.0f} MB"
+        line += f" {kept['memory']:6.0f} MB"
     for what, value in kept.get("measures", {}).items():
         line += f"  {what} {value:.4g}"
     print(line + f"  {kept.get('failed', '')}", flush=True)

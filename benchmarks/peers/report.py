@@ -54,7 +54,7 @@ def row(record):
     error = f"{measures['error']:.2e}" if "error" in measures else ""
     scatter = max(record["wall"]) / min(record["wall"])
     return [
-        *said, f"{unit(record, 'steps'):.4g}{only}", per, f"{record['archive']:.0f}", error,
+        *said, f"{unit(record, 'steps'):.4g}{only}", per, f"{record['memory']:.0f}", error,
         f"{scatter:.2f}",
     ]  # fmt: skip
 

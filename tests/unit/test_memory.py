@@ -114,7 +114,7 @@ def test_a_simulation_gives_everything_back():
 @pytest.mark.serial
 def test_memory_does_not_grow_with_the_members_of_a_study():
     """1000 members of one structure, each with its own numbers, and hinges."""
-    archive = {}
+    memory = {}
 
     def member(number):
         section = ub.Section(EA=1e5 + number, GA=1e5, EI=100.0, rhoA=1.0, rhoI=0.01)
@@ -125,14 +125,14 @@ def test_memory_does_not_grow_with_the_members_of_a_study():
         solution = ub.simulate(scene, ub.EnergyMomentum(), t=(0, 2e-3), dt=1e-3)
         if number in (200, 999):
             gc.collect()
-            archive[number] = resident()
+            memory[number] = resident()
         return {"end": solution.displacement(beam.end)[-1]}
 
     study = ub.study(member, [{"number": number} for number in range(1000)])
     assert not study.failed
     assert len(set(study["end"][:, 1])) == 1000
     # Records of a member take 1 kB; what a simulation holds, some 100 kB, would be 80 MB
-    assert archive[999] - archive[200] < 4 * MEBIBYTE
+    assert memory[999] - memory[200] < 4 * MEBIBYTE
 
 
 @pytest.mark.parametrize("enabled", [True, False])

@@ -201,8 +201,8 @@ def test_energy_of_decaying_midpoint_with_its_memory_never_grows():
         entries.append(simulation.entries()[2]["numerical"])
     simulation.close()
     squares = np.array(states) ** 2 @ [k, m] / 2
-    archive = scheme.part * np.diff(states, axis=0) ** 2 @ [k, m] / 2
-    stored = squares + np.concatenate([[0.0], archive])
+    memory = scheme.part * np.diff(states, axis=0) ** 2 @ [k, m] / 2
+    stored = squares + np.concatenate([[0.0], memory])
     assert np.diff(stored).max() <= 1e-12 * stored[0]
     assert stored[-1] < 0.5 * stored[0]
     assert squares + np.array(entries) == pytest.approx(np.full(201, squares[0]), rel=1e-10)
