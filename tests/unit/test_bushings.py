@@ -430,6 +430,7 @@ def test_a_path_has_no_time_for_friction():
     )
 
 
+@pytest.mark.serial  # files
 def test_bushings_have_pictures(tmp_path):
     _, _, scene = cantilever(LAWS["rough hole"])
     for name, drawn in ("model.png", scene), ("solution.png", run(scene, ub.Static())):

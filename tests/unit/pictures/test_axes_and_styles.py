@@ -120,6 +120,7 @@ def labels_of(axis):
     return axis.get_major_formatter().format_ticks(at)
 
 
+@pytest.mark.serial  # files
 @pytest.mark.parametrize(
     ("limits", "labels"),
     [
