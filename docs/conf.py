@@ -112,9 +112,9 @@ def gallery():
         saved = [*folder.glob(f"{name}*.png")] or [*folder.glob(f"{name.split('_')[-1]}*.png")]
         saved.sort(key=lambda path: ("shapes" not in path.name, path.name))
         picture = [f":img-top: {path.relative_to(DOCS)}" for path in saved[:1]]
-        head = f":::{{numbering-item-card}} {title}"
+        head = f":::{{grid-item-card}} {title}"
         connector = [f":link: demos/{script.removesuffix('.py')}", ":link-type: doc"]
-        return "\n".join([head, *connector, *picture, "", topic, ":::", ""])
+        return "\n".join([head, *link, *picture, "", topic, ":::", ""])
 
     cards = map(card, re.finditer(r"\| `(demo_\w+\.py)` \| (.*) \|", text))
     return "\n".join(["::::{grid} 1 2 3 3", ":gutter: 3", "", *cards, "::::", ""])
