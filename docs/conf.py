@@ -185,8 +185,8 @@ def where_used(app, what, name, obj, options, lines):
     """Append links to the pages and demos that use a name."""
     pages = used.get(name.removeprefix("ufl_beam."), [])
     if pages:
-        connectors = (f":doc:`/{page.relative_to(DOCS).with_suffix('')}`" for page in pages)
-        lines += ["", ".. rubric:: Used in", "", ", ".join(connectors), ""]
+        links = (f":doc:`/{page.relative_to(DOCS).with_suffix('')}`" for page in pages)
+        lines += ["", ".. rubric:: Used in", "", ", ".join(links), ""]
 
 
 def hide_colons(app, what, name, obj, options, lines):
