@@ -113,7 +113,7 @@ def gallery():
         saved.sort(key=lambda path: ("shapes" not in path.name, path.name))
         picture = [f":img-top: {path.relative_to(DOCS)}" for path in saved[:1]]
         head = f":::{{grid-item-card}} {title}"
-        connector = [f":link: demos/{script.removesuffix('.py')}", ":link-type: doc"]
+        link = [f":link: demos/{script.removesuffix('.py')}", ":link-type: doc"]
         return "\n".join([head, *link, *picture, "", topic, ":::", ""])
 
     cards = map(card, re.finditer(r"\| `(demo_\w+\.py)` \| (.*) \|", text))
