@@ -80,7 +80,7 @@ def main():
         for scene in scenes:
             time_loop(scene, 2, dt)  # compiles
         loops = [[time_loop(scene, steps, dt) for scene in scenes] for _ in range(options.repeat)]
-        iterations = [of_scene[1] / steps for of_scene in loops[0]]
+        iterations = [whole_scene[1] / steps for whole_scene in loops[0]]
         ratio = iterations[1] / iterations[0]
         print(
             f"{name:42s} {'iterations':>10} {iterations[0]:8.2f} {iterations[1]:9.2f} {ratio:6.2f}"

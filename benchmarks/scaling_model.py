@@ -131,5 +131,5 @@ def extrapolated(cells, ranks, model, border, part, growth):
         "borders": 2 / 3 * separator**2 * border / rate,
         "messages": model["messages"] * LATENCY * np.log2(ranks) + 16 * entries / BANDWIDTH,
     }
-    fixed, of_scene, own = model["memory"]
-    return seconds, fixed + of_scene * cells + own * here + 8 * part**2 + 16 * entries
+    fixed, whole_scene, own = model["memory"]
+    return seconds, fixed + whole_scene * cells + own * here + 8 * part**2 + 16 * entries

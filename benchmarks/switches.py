@@ -25,7 +25,7 @@ plan = static_condensation._plan
 
 
 def nothing(*_):
-    """Replace `in_lanes`: there is no loop over several cells at once."""
+    """Replace `interleaved`: there is no loop over several cells at once."""
 
 
 def without_chains(cell_dofs, indptr, indices, alone, *more):

@@ -45,6 +45,13 @@ PRIVATE = {
 }  # fmt: skip
 """Words with a meaning of their own, and the field's terms."""
 
+ALONE = (
+    "one", "other", "of", "here", "there", "found", "gone", "near", "back", "take", "give", "leave",
+    "note", "ask", "room", "sure", "unsure", "chance", "doubt", "release", "stage", "cross",
+    "choice", "thin", "entries", "memory",
+)  # fmt: skip
+"""Words that are private only as a whole name, or as its first word for `of`."""
+
 KEPT = ("scene", "place", "ledger", "accept", "node", "jump", "response")
 """Words of that kind that stay; docs/notation.md defines them."""
 
@@ -125,7 +132,12 @@ def counts(commit=None):
     for path, text in texts(commit):
         if path.suffix == ".py":
             for name in identifiers(path, text):
-                private.update({word for word in words_of(name) if word in PRIVATE})
+                words = words_of(name)
+                private.update({
+                    word for word in words
+                    if word in PRIVATE
+                    and (word not in ALONE or words == [word] or word == words[0] == "of")
+                })  # fmt: skip
         where = "package" if path.parts[0] == "ufl_beam" else "pages"
         for sentence in SENTENCE.split(prose(path, text)):
             if len(sentence.split()) < 3:

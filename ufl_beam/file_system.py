@@ -67,7 +67,7 @@ class Lock:
         self.path = path.with_name(path.name + ".lock")
         self._file: IO[str] | None = None
 
-    def take(self) -> str:
+    def acquire(self) -> str:
         """Take the lock, or return who has it; an empty text if it was free.
 
         Raises:

@@ -321,7 +321,7 @@ class Copies:
         self._steps, self._compared = 0, 0
         _left[:] = [pair for pair in _left if not pair[0].Test()]
 
-    def note(self, t: float, q: Array) -> None:
+    def compare(self, t: float, q: Array) -> None:
         """Add the state after a step to the comparison; raise if an earlier comparison failed."""
         self._sum += float(self._weights @ q)
         self._size += float(self._weights @ np.abs(q))
@@ -339,7 +339,7 @@ class Copies:
             self._post()
         self._complete()
 
-    def leave(self) -> None:
+    def finish(self) -> None:
         """Report to the other processes, without waiting, that this process stops."""
         if self._open:
             before, self._open = self._pending, False

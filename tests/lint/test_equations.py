@@ -42,10 +42,10 @@ def test_theory_lists_each_equation_with_its_place():
             tree = next(definitions)
         listed[int(n)] = file, range(tree.lineno, tree.end_lineno + 1)
     assert len(listed) == len(rows)
-    stated = {n: (path, line) for path in FILES for n, _, line in tags(path)}
-    assert sorted(listed) == sorted(stated)
+    cached_forms = {n: (path, line) for path in FILES for n, _, line in tags(path)}
+    assert sorted(listed) == sorted(cached_forms)
     for n, (file, lines) in listed.items():
-        path, line = stated[n]
+        path, line = cached_forms[n]
         assert path == PACKAGE / file, f"P({n}) is in {path}"
         assert line in lines, f"P({n}) is in line {line}"
 

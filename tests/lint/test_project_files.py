@@ -54,13 +54,13 @@ def test_conda_gets_all_dependencies():
     (lists,) = re.findall(r"^dependencies = (\[.*?\n\])\n\n.*?^dev = ", PROJECT, re.M | re.S)
     (view,) = re.findall(r"^view = \[(.*)\]", PROJECT, re.MULTILINE)
     (test,) = re.findall(r"^test = \[(.*)\]", PROJECT, re.MULTILINE)
-    stated = re.findall(r'"([\w-]+)[^"]*"', lists.partition("]")[0] + view + test)
+    cached_forms = re.findall(r'"([\w-]+)[^"]*"', lists.partition("]")[0] + view + test)
     versions = dict(re.findall(r'"([\w-]+)(>=[\d.]+)"', PROJECT))
     text = (ROOT / "environment.yml").read_text("utf-8")
     named = dict(re.findall(r"^ +- ([\w-]+) ?([^\s#]*)", text, re.MULTILINE))
-    assert len(stated) > 12
-    assert set(stated) <= set(named)
-    for name in stated:
+    assert len(cached_forms) > 12
+    assert set(cached_forms) <= set(named)
+    for name in cached_forms:
         assert named[name] == versions.get(name, ""), name
     assert {"fenics-dolfinx", "mpi4py", "petsc4py", "slepc4py", "c-compiler", "pip"} <= set(named)
     assert "petsc=*=real*" in text

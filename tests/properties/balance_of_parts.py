@@ -25,9 +25,9 @@ class Balance:
         for one in self.scene.connectors:
             self._join(one.a, one.b)
 
-    def _of(self, anchor):
+    def _of(self, point):
         """Part of a place: a body, the ground, or a vertex of a beam."""
-        key = node(anchor)
+        key = node(point)
         key = key if not isinstance(key, ub.Place) else (key.beam, round(key.s, 9))
         while key in self._group:
             key = self._group[key]
@@ -86,7 +86,7 @@ class Balance:
         if one.components:
             each = zip(one.components, force, strict=True)
             return sum(self._of_connector(component, x) for component, x in each)
-        if one.turns:
+        if one.is_rotation:
             return np.array([0.0, 0.0, -force])
         away = self.solution.position(one.b)[-1] - np.array(one.a.point)
         axis = away / np.hypot(*away) if one.stretches else np.array(one.axis)

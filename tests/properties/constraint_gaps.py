@@ -42,7 +42,7 @@ def _misses(solution, one):
         wanted = np.array([one.law.motion(t) for t in solution.times])
         # Motions begin where the undeformed scene is.
         motion = _relative(solution, one.motion, one.a, one.b, one.axis)
-        yield ((zero, motion - wanted) if one.turns else (motion - wanted, zero))
+        yield ((zero, motion - wanted) if one.is_rotation else (motion - wanted, zero))
     elif kind in COUPLES:
         point, rotation = COUPLES[kind]
         for a, b in ((one.places[0], other) for other in one.places[1:]):

@@ -126,7 +126,7 @@ def momentum(case):
         add(solution.reaction(support)[1:, :2])
     joints = [joint.holders[0] for joint in scene.joints if node(joint.places[0]) is GROUND]
     for one in (*scene.connectors, *joints):
-        if node(one.a) is GROUND and not one.turns:
+        if node(one.a) is GROUND and not one.is_rotation:
             away = solution.position(one.b) - np.array(one.a.point)
             sums, lengths = away[1:] + away[:-1], np.hypot(*away.T)
             axis = sums / (lengths[1:] + lengths[:-1])[:, None] if one.stretches else one.axis

@@ -99,7 +99,7 @@ def differences(found, reference):
         for name in mine:
             of[name] = np.abs(mine[name] - others[name]).max() / through
     for connector in scene.all_connectors:
-        size = 1.0 if connector.turns else scene.size
+        size = 1.0 if connector.is_rotation else scene.size
         pairs = [*zip(found.connector(connector), reference.connector(connector), strict=True)]
         sizes = size, np.inf, through, size / (found.times[-1] - found.times[0]), through
         for name, pair, of_size in zip(COLUMNS, pairs, sizes, strict=True):
@@ -156,16 +156,16 @@ def test_residuals_and_tangents(seed):
     solver.step_to(t0 + dt)
     random = np.random.default_rng(5)
     to = simulation.q + 1e-3 * scene.size * random.uniform(-1, 1, len(simulation.q))
-    simulation.controllers.ask(simulation)
+    simulation.controllers.evaluate(simulation)
     equation.begin(ub.Step.of(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, simulation.q))
     x = supports.in_axes(to)
     r = equation.forces(to)
     equation.tangent(to)
-    supports.enter(r)
+    supports.into_axes(r)
     K = dense(equation.A)
-    solver.ask()
+    solver.evaluate()
     solver.begin(ub.Step.of(scheme, t0 + dt, t0 + 2 * dt, t0 + 2 * dt, solver.q))
-    (of_solver, K_of_solver), free = solver.respond(x), solver.supports.free
+    (of_solver, K_of_solver), free = solver.response(x), solver.supports.free
     # States of both differ by the tolerance of one step.
     assert difference(r, of_solver) < SAME
     tangent = K_of_solver.toarray()
@@ -327,16 +327,16 @@ def energy_of_points(patch):
 
 def time_of_loads(patch):
     """Loads are taken at the end of the step."""
-    respond = load_vectors.LoadForce.respond
+    respond = load_vectors.LoadForce.response
     wrong = lambda self, step, q1: respond(self, step._replace(load_time=step.t1), q1)  # noqa: E731
-    patch.setattr(load_vectors.LoadForce, "respond", wrong)
+    patch.setattr(load_vectors.LoadForce, "response", wrong)
 
 
 def mass_of_beams(patch):
     """Inertia is too large by a part in a million."""
-    respond = beam_residuals.MatrixForce.respond
+    respond = beam_residuals.MatrixForce.response
     wrong = lambda self, *at: tuple((1 + 1e-6) * x for x in respond(self, *at))  # noqa: E731
-    patch.setattr(beam_residuals.MatrixForce, "respond", wrong)
+    patch.setattr(beam_residuals.MatrixForce, "response", wrong)
 
 
 MISTAKES = [

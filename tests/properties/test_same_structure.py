@@ -10,8 +10,8 @@ from scene_statements import AS_GIVEN, Statement
 from scenes import rigid_chain
 
 import ufl_beam as ub
-from ufl_beam import memory
-from ufl_beam.memory import of_structure
+from ufl_beam import caches
+from ufl_beam.caches import cached_by_structure
 
 OTHERS = (
     Statement("elsewhere", angle=0.7, center=(0.3, -0.2), shift=(5.0, 2.0)),
@@ -28,7 +28,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::ufl_beam.ModelWarning")
 @pytest.fixture
 def forgetful(monkeypatch):
     """`forgetful()`: from now on nothing is kept, as in a process that has built nothing yet."""
-    return lambda: monkeypatch.setattr(memory, "LARGEST", -1)
+    return lambda: monkeypatch.setattr(caches, "LARGEST", -1)
 
 
 def run(seed, statement=AS_GIVEN):
@@ -116,7 +116,7 @@ def doubled():
     """A function of an array that counts its calls."""
     calls = []
 
-    @of_structure
+    @cached_by_structure
     def double(number, array):
         calls.append(number)
         return (2 * array + number,)
@@ -153,9 +153,9 @@ def test_a_changed_argument_changes_nothing_that_was_computed(doubled):
 
 
 def test_large_structures_are_not_kept(doubled):
-    large = np.zeros(memory.LARGEST // 8 + 1, dtype=np.int64)
+    large = np.zeros(caches.LARGEST // 8 + 1, dtype=np.int64)
     (one,), (other,) = doubled(0, large), doubled(0, large)
     assert one is not other
     assert not one.flags.writeable
-    (one,), (other,) = (doubled(memory.LARGEST, np.arange(3)) for _ in range(2))
+    (one,), (other,) = (doubled(caches.LARGEST, np.arange(3)) for _ in range(2))
     assert one is not other  # what has so many numbers may be stated by a few

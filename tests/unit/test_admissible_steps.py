@@ -9,7 +9,7 @@ from user_laws import Dashpot, GivesEnergy, PowerLaw, SameHardening, Swelling, T
 
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import lib
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.terms.material_points import Points
 
 EA, EI, NP, MP = 2e3, 1.0, 4.0, 0.4
@@ -68,9 +68,9 @@ class Cells:
     """Cells of the section whose strains are given."""
 
     def __init__(self, n, law, scheme):
-        layout = section(interaction=law).layout(None)
-        assert isinstance(layout, Layout)
-        self.points = Points(layout, [(0, k) for k in range(n)], np.full(n, 0.5), scheme)
+        section_points = section(interaction=law).section_points(None)
+        assert isinstance(section_points, SectionPoints)
+        self.points = Points(section_points, [(0, k) for k in range(n)], np.full(n, 0.5), scheme)
         self.scale = np.array([NP / EA, 0.01, MP / EI])
 
 
@@ -97,17 +97,17 @@ def test_iterates_far_apart(law, scheme, size):
             one.begin(0.1)
         far = size * 10 ** random.uniform(-2, 0, (3, n, 1))
         for new in strain + random.uniform(-1, 1, (3, n, 3)) * scale * far:
-            r, _ = points.respond(new)
-        asked_once.respond(new)
+            r, _ = points.return_map(new)
+        asked_once.return_map(new)
         assert np.isfinite(r).all()
         largest = stiffness * np.abs(new).max()
         assert np.abs(r - asked_once.r).max() < 1e-11 * largest  # of strains that cancel
         for one, _ in both:
-            before = one.kept[:, 4].copy()
+            before = one.recorded[:, 4].copy()
             assert lib.gives_energy(one.c) == -1
             one.accept()
             # J, of round-off in the energies of the strains
-            assert (one.kept[:, 4] - before).min() >= -1e-14 * largest * np.abs(new).max()
+            assert (one.recorded[:, 4] - before).min() >= -1e-14 * largest * np.abs(new).max()
         strain = new
 
 

@@ -21,7 +21,7 @@ import pytest
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.output.serialization import RECORDS, from_data, to_data
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "properties"))
@@ -125,8 +125,8 @@ def test_a_machine_of_everything(shared_path):
     # What is one object in the scene is one in the other
     (friction,) = (c.law for c in loaded.scene.connectors if isinstance(c.law, ub.Coulomb))
     assert friction.joint in loaded.scene.joints
-    held = [connector.law is HELD for connector in solution.scene.all_connectors]
-    assert [connector.law is HELD for connector in loaded.scene.all_connectors] == held
+    held = [connector.law is RIGID for connector in solution.scene.all_connectors]
+    assert [connector.law is RIGID for connector in loaded.scene.all_connectors] == held
     for picture in (
         lambda s: ub.plot(s, "M"),
         lambda s: ub.plot(s, "shapes"),
@@ -404,8 +404,8 @@ def test_paths_that_cannot_be_written(shared_path):
 
 def test_the_version_is_the_one_of_the_project():
     project = (Path(__file__).parents[2] / "pyproject.toml").read_text(encoding="utf-8")
-    (stated,) = re.findall(r'^version = "([^"]+)"', project, re.MULTILINE)
-    assert ub.__version__ == stated
+    (cached_forms,) = re.findall(r'^version = "([^"]+)"', project, re.MULTILINE)
+    assert ub.__version__ == cached_forms
 
 
 @pytest.mark.serial

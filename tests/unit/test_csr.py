@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from ufl_beam.compiled.c_library import doubles, fill
-from ufl_beam.compiled.csr import Product, StepProduct, coupling
+from ufl_beam.compiled.csr import Product, StepProduct, zero_matrix
 from ufl_beam.compiled.simd_kernels import in_batches
 
 
@@ -13,7 +13,7 @@ from ufl_beam.compiled.simd_kernels import in_batches
 def test_a_joint_of_many(number):
     """What many share has its entries, however often they are counted."""
     pairs = np.array([[0, i + 1] for i in range(number)])
-    structure = coupling(number + 1, pairs)
+    structure = zero_matrix(number + 1, pairs)
     rows = np.repeat(np.arange(number + 1), np.diff(structure.indptr))
     expected = np.eye(number + 1, dtype=bool)
     expected[0], expected[:, 0] = True, True
@@ -26,7 +26,7 @@ def test_pattern_of_groups(size):
     random = np.random.default_rng(size)
     groups = [random.integers(0, size, (n, width)) for n, width in ((20, 3), (0, 4), (5, 7))]
     hub = np.column_stack([np.zeros(size, dtype=np.int32), random.permutation(size)])
-    structure = coupling(size, *groups, hub.astype(np.int32))
+    structure = zero_matrix(size, *groups, hub.astype(np.int32))
     expected = np.eye(size, dtype=bool)
     for group in (row for rows in (*groups, hub) for row in rows):
         expected[np.ix_(group, group)] = True
@@ -41,14 +41,14 @@ def test_pattern_of_groups(size):
 
 
 def test_released_indices_are_found_again():
-    structure = coupling(5, np.array([[0, 2], [3, 1]], dtype=np.int32))
+    structure = zero_matrix(5, np.array([[0, 2], [3, 1]], dtype=np.int32))
     other, before = structure.zeros_like(), structure.indices.copy()
-    structure.release()
+    structure.free()
     assert "indices" not in vars(structure)
     assert np.array_equal(structure.indices, before)
     assert np.array_equal(other.indices, before)
     structure.petsc()
-    structure.release()
+    structure.free()
     assert "indices" in vars(structure)  # PETSc has them
 
 
@@ -57,7 +57,7 @@ def test_released_indices_are_found_again():
 def test_blocks_of_cells(number, lanes):
     """Places of all pairs of a cell, as asked for one by one; the last batch is filled up."""
     dofs = np.random.default_rng(3).permutation(3 * number).reshape(number, 3).astype(np.int32)
-    structure = coupling(3 * number + 1, dofs)
+    structure = zero_matrix(3 * number + 1, dofs)
     one_by_one = structure.positions(np.repeat(dofs, 3, axis=1).ravel(), np.tile(dofs, 3).ravel())
     in_rows = one_by_one - structure.indptr[np.repeat(dofs, 3, axis=1).ravel()]
     found = structure.blocks(dofs, lanes)
@@ -71,7 +71,7 @@ def test_blocks_of_cells(number, lanes):
 def test_blocks_of_a_hub_of_many(number, kind):
     """Rows of more than 256 entries need wider places."""
     pairs = np.array([[0, i + 1] for i in range(number)], dtype=np.int32)
-    structure = coupling(number + 1, pairs)
+    structure = zero_matrix(number + 1, pairs)
     expected = structure.positions(np.repeat(pairs, 2, axis=1).ravel(), np.tile(pairs, 2).ravel())
     if kind == np.uint8:
         expected = expected - structure.indptr[np.repeat(pairs, 2, axis=1).ravel()]
@@ -94,7 +94,7 @@ def add(loop, q, out):
 @pytest.mark.parametrize("number", [255, 256])
 def test_a_constant_matrix_with_a_hub(number):
     """Its zeros are not kept, and its entries are found in the tangent, also in long rows."""
-    A = coupling(number + 1, np.array([[0, i + 1] for i in range(number)], dtype=np.int32))
+    A = zero_matrix(number + 1, np.array([[0, i + 1] for i in range(number)], dtype=np.int32))
     A.data[:] = np.random.default_rng(1).choice([0.0, 1.0, 3.0], len(A.data))
     tangent, nothing = A.zeros_like(), np.zeros(A.size)
     product = StepProduct(A, np.array([2], dtype=np.int32), tangent, np.empty(A.size))
@@ -109,7 +109,7 @@ def masses(*, lumped, size=60):
     """Masses along a chain of vertices, with a hub and rows of nothing; the matrix also dense."""
     cells = np.arange(size).reshape(-1, 3)
     pairs = np.hstack([cells[:-1], cells[1:]])
-    A = coupling(size, pairs.astype(np.int32), np.array([[0, 31, 7, 50]], dtype=np.int32))
+    A = zero_matrix(size, pairs.astype(np.int32), np.array([[0, 31, 7, 50]], dtype=np.int32))
     rows, columns = A.rows(), A.indices
     random, away = np.random.default_rng(4), np.abs(columns - rows)
     A.data[:] = random.uniform(1, 2, len(rows)) * (away == 0 if lumped else away % 3 == 0)
@@ -132,7 +132,7 @@ def test_products_with_runs_of_rows(lumped):
 
 
 def test_an_empty_constant_matrix():
-    product = Product(coupling(0))
+    product = Product(zero_matrix(0))
     assert len(product(np.empty(0))) == product.square(np.empty(0)) == 0
 
 

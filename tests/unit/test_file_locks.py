@@ -50,7 +50,7 @@ def test_a_second_run_is_refused_before_it_touches_a_file(shared_path):
     run(shared_path)
     first = Lock(shared_path / "run.h5")
     if MPI.COMM_WORLD.rank == 0:
-        assert first.take() == ""
+        assert first.acquire() == ""
     MPI.COMM_WORLD.barrier()
     before = contents()
     for t1 in (0.05, 0.1):
@@ -92,17 +92,17 @@ def test_the_lock_ends_with_its_process(tmp_path):
     """Its file may stay behind."""
     script = (
         "import sys; from pathlib import Path; from ufl_beam.file_system import Lock; "
-        "lock = Lock(Path(sys.argv[1])); print(repr(lock.take()), flush=True); sys.stdin.read()"
+        "lock = Lock(Path(sys.argv[1])); print(repr(lock.acquire()), flush=True); sys.stdin.read()"
     )
     command = [sys.executable, "-c", script, str(tmp_path / "run.h5")]
     pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "text": True}
     with subprocess.Popen(command, **pipes) as process:
         assert process.stdout.readline() == "''\n"
         lock = Lock(tmp_path / "run.h5")
-        assert lock.take().startswith(f"process {process.pid} on ")
+        assert lock.acquire().startswith(f"process {process.pid} on ")
         process.kill()
     assert lock.path.exists()
-    assert lock.take() == ""
+    assert lock.acquire() == ""
     lock.release()
     assert not lock.path.exists()
 
@@ -167,4 +167,4 @@ def test_an_owner_that_is_no_text(tmp_path):
     lock.write_bytes(b"\xff\xfe process 1")
     with lock.open() as held:
         fcntl.flock(held, fcntl.LOCK_EX)
-        assert Lock(tmp_path / "run").take() == "\ufffd\ufffd process 1"
+        assert Lock(tmp_path / "run").acquire() == "\ufffd\ufffd process 1"

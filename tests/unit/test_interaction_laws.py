@@ -6,7 +6,7 @@ import pytest
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.terms.material_points import Points
 
 EA, EI, NP, MP = 1000.0, 50.0, 10.0, 2.0
@@ -22,19 +22,19 @@ class Cells:
     """Cells of the section whose strains are given."""
 
     def __init__(self, n, scheme):
-        layout = section(interaction=LAW).layout(None)
-        assert isinstance(layout, Layout)
-        self.points = Points(layout, [(0, k) for k in range(n)], np.full(n, 0.5), scheme)
+        section_points = section(interaction=LAW).section_points(None)
+        assert isinstance(section_points, SectionPoints)
+        self.points = Points(section_points, [(0, k) for k in range(n)], np.full(n, 0.5), scheme)
         self.strain = np.zeros((n, 3))
 
-    def respond(self, strain):
+    def return_map(self, strain):
         self.points.start(self.strain)
         self.points.begin(0.1)
-        r, D = self.points.respond(strain)
+        r, D = self.points.return_map(strain)
         return r.copy(), D.reshape(-1, 3, 3).copy()
 
     def step(self, strain):
-        r, _ = self.respond(strain)
+        r, _ = self.return_map(strain)
         self.points.accept()
         self.strain = strain.copy()
         return r
@@ -52,7 +52,7 @@ def test_resultants_lie_within_the_surface(scheme):
     """On it where it flows, with plastic strains along its normal."""
     cells, flows = Cells(500, scheme), 0
     for strain in histories(500, 6):
-        r, _ = cells.respond(strain)
+        r, _ = cells.return_map(strain)
         assert LAW.excess(r[:, 0], r[:, 2]).max() < 1e-12
         before = [cells.points[f"state {x}"][:, 0].copy() for x in ("stretch", "curvature")]
         cells.step(strain)
@@ -73,10 +73,10 @@ def test_tangents_are_derivatives(scheme):
     *before, last = histories(300, 4)
     for strain in before:
         cells.step(strain)
-    _, D = cells.respond(last)
+    _, D = cells.return_map(last)
     for k, ε in ((0, 1e-8), (2, 1e-7)):
         step = ε * np.eye(3)[k]
-        central = (cells.respond(last + step)[0] - cells.respond(last - step)[0]) / (2 * ε)
+        central = (cells.return_map(last + step)[0] - cells.return_map(last - step)[0]) / (2 * ε)
         # Curvature of the rounded ridge times ε, away from corners; medians beside them
         assert np.median(np.abs(D[:, :, k] - central)) < 1e-6 * EA
         assert np.mean(np.abs(D[:, :, k] - central).max(axis=1) > 1e-3 * EA) < 0.02

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import quad
 
 import ufl_beam as ub
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.material_law import State
 
 C, LIMIT, H, B, ETA = 200.0, 3.0, 20.0, 10.0, 0.5
@@ -272,31 +272,31 @@ def test_laws_of_resultants_stand_at_their_points():
         axial=ub.ElastoPlastic(2.0, 1.0, viscosity=ub.DuvautLions(0.5)),
         bending=ub.ElastoPlastic(4.0, kinematic=6.0, viscosity=ub.Perzyna(9.0)),
     )  # fmt: skip
-    layout = section.layout(None)
-    numbers = layout.parameters([(0, 0), (0, 1)])
-    assert layout.strains.tolist() == [[1, 0, 0], [0, 0, 1]]
-    assert layout.rest.tolist() == [0, 5, 0]
-    assert layout.stiffness.tolist() == [7, 3]
+    section_points = section.section_points(None)
+    numbers = section_points.parameters([(0, 0), (0, 1)])
+    assert section_points.strains.tolist() == [[1, 0, 0], [0, 0, 1]]
+    assert section_points.rest.tolist() == [0, 5, 0]
+    assert section_points.stiffness.tolist() == [7, 3]
     assert numbers["yield_limit"].tolist() == [[2, 4], [2, 4]]
     assert numbers["isotropic"].tolist() == [[1, 0], [1, 0]]
     assert numbers["kinematic"].tolist() == [[0, 6], [0, 6]]
     assert numbers["viscosity"].tolist() == [[0.5 * (7 + 1), 9], [0.5 * (7 + 1), 9]]
-    assert layout.softening is None
-    assert layout.yields
+    assert section_points.softening is None
+    assert section_points.yields
 
 
 def test_a_hinge_in_an_elastic_section_has_one_point():
     section = ub.Section(EA=7.0, GA=5.0, EI=3.0)
     law = ub.Softening(1.0, 1.0)
-    layout = section.layout(law)
-    assert isinstance(layout, Layout)
-    assert layout.strains.tolist() == [[0, 0, 1]]
-    assert layout.rest.tolist() == [7, 5, 0]
-    assert layout.softening is law
-    assert not layout.yields
-    assert section.layout(None) is None
+    section_points = section.section_points(law)
+    assert isinstance(section_points, SectionPoints)
+    assert section_points.strains.tolist() == [[0, 0, 1]]
+    assert section_points.rest.tolist() == [7, 5, 0]
+    assert section_points.softening is law
+    assert not section_points.yields
+    assert section.section_points(None) is None
 
 
 def test_a_hinge_that_never_opens_is_none():
     section = ub.Section(EA=7.0, GA=5.0, EI=3.0)
-    assert section.layout(ub.Softening(math.inf, 1.0)) is None
+    assert section.section_points(ub.Softening(math.inf, 1.0)) is None

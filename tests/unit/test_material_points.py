@@ -114,8 +114,8 @@ def test_tangents_just_before_and_after_onset(law, near, side, scheme):
     onset = limit / (C * scheme.theta)
     one = Bars(1, bulk, softening, scheme)
     strain, ε = np.array([onset * (1 + side * near)]), onset * near / 10
-    exact = one.respond(strain)[1][0]
-    central = (one.respond(strain + ε)[0][0] - one.respond(strain - ε)[0][0]) / (2 * ε)
+    exact = one.return_map(strain)[1][0]
+    central = (one.return_map(strain + ε)[0][0] - one.return_map(strain - ε)[0][0]) / (2 * ε)
     # Round-off of stresses over ε, ε² and curvature of the law
     assert exact == pytest.approx(central, abs=max(1e-15 / near, 1e-6) * 10 * C * scheme.theta)
     if side < 0:
@@ -204,7 +204,7 @@ def test_responses_leave_no_trace(law):
     random = np.random.default_rng(1)
     for strain in histories(200, steps=10):
         for far in random.uniform(-1, 1, (3, 200)):
-            one.respond(far, dt=random.uniform(1e-3, 1))
+            one.return_map(far, dt=random.uniform(1e-3, 1))
         assert (one.step(strain) == other.step(strain)).all()
     assert (one.points.state() == other.points.state()).all()
 

@@ -11,8 +11,8 @@ import pytest
 from scenes import clamped, rigid_chain, swing
 
 import ufl_beam as ub
+from ufl_beam.caches import no_garbage_collection
 from ufl_beam.compiled import jit
-from ufl_beam.memory import no_garbage_collection
 
 unsanitized = pytest.mark.skipif(
     bool(jit.EXTRA), reason="the address sanitizer keeps what is freed for a while"

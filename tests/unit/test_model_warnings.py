@@ -135,14 +135,14 @@ def test_massless_parts_of_large_scenes():
 
 def test_a_forgotten_density():
     """Of one section beside others; stated as zero it is meant, as in cables of a swing."""
-    for forgotten, stated in (
+    for forgotten, cached_forms in (
         (ub.Section(**LIGHT), ub.Section(**LIGHT, rhoA=0.0)),
         (
             ub.Section.circle(0.1, E=1e9, nu=0.3),
             ub.Section.circle(0.1, E=1e9, nu=0.3, rho=0.0),
         ),
     ):
-        for section, context in ((forgotten, warns("b: without mass")), (stated, None)):
+        for section, context in ((forgotten, warns("b: without mass")), (cached_forms, None)):
             a, b = beam(name="a"), beam((1, 0), (2, 0), section, name="b")
             parts = {"joints": [ub.Rigid(a.end, b.start)]}
             if context is None:

@@ -38,8 +38,10 @@ def work(kind):
     """A work whose number is a function."""
 
     def make(value):
-        stated = (lambda w, c: c * w[1]) if kind is ub.VirtualWork else (lambda q, c: c * q[1])
-        return girder(works=lambda b: kind("push", stated, numbers={"c": after(value)}))
+        cached_forms = (
+            (lambda w, c: c * w[1]) if kind is ub.VirtualWork else (lambda q, c: c * q[1])
+        )
+        return girder(works=lambda b: kind("push", cached_forms, numbers={"c": after(value)}))
 
     return make
 

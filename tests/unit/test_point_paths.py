@@ -54,8 +54,8 @@ def test_tangents_are_derivatives(law, scheme):
     for strain in before:
         some.step(strain)
     ε = 1e-8
-    exact = some.respond(last)[1]
-    central = (some.respond(last + ε)[0] - some.respond(last - ε)[0]) / (2 * ε)
+    exact = some.return_map(last)[1]
+    central = (some.return_map(last + ε)[0] - some.return_map(last - ε)[0]) / (2 * ε)
     # 1e-16/ε of strains of 0.3, and curvature of the power law times ε
     assert np.abs(exact - central).max() < 1e-5 * C
 
@@ -83,7 +83,7 @@ def test_hardening_by_residuals_is_hardening():
     for scheme in SCHEMES[1:]:
         one, other = (Bars(500, law, SOFTENS, scheme) for law in laws)
         for strain in histories(500, steps=10):
-            for x, y in zip(one.respond(strain), other.respond(strain), strict=True):
+            for x, y in zip(one.return_map(strain), other.return_map(strain), strict=True):
                 assert np.abs(x - y).max() < 1e-10 * C
             one.step(strain)
             other.step(strain)
@@ -100,5 +100,5 @@ def test_residuals_that_have_no_solution_are_no_number():
         def residuals(self, strain, old, new, dt):
             return {"largest": new.largest**2 + 1, "plastic": new.plastic}
 
-    σ, _ = Bars(3, Impossible(1.0, 1.0, 2.0), None, SCHEMES[0]).respond(np.ones(3))
+    σ, _ = Bars(3, Impossible(1.0, 1.0, 2.0), None, SCHEMES[0]).return_map(np.ones(3))
     assert np.isnan(σ).all()

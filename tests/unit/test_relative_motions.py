@@ -10,7 +10,7 @@ import pytest
 from test_tangent import Probe
 
 import ufl_beam as ub
-from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.connectors import Component
 
 SCHEMES = [
@@ -35,7 +35,7 @@ def bodies():
     return a, b
 
 
-def pair(motion, law=HELD):
+def pair(motion, law=RIGID):
     """Two bodies and a connector between points of them that are not their centres."""
     a, b = bodies()
     axis = (math.cos(0.4), math.sin(0.4))
@@ -46,9 +46,9 @@ def pair(motion, law=HELD):
 def by_hand(connector, q):
     """The relative motion, from the coordinates of both points."""
     points = []
-    for anchor, motion in zip((connector.a, connector.b), q, strict=True):
-        center = np.array(anchor.body.center)
-        points.append(center + motion[:2] + rotation(motion[2]) @ (anchor.point - center))
+    for point, motion in zip((connector.a, connector.b), q, strict=True):
+        center = np.array(point.body.center)
+        points.append(center + motion[:2] + rotation(motion[2]) @ (point.point - center))
     d, d0 = points[1] - points[0], np.subtract(connector.b.point, connector.a.point)
     axis = np.array(connector.axis)
     return {
@@ -75,7 +75,7 @@ class Between:
                 connectors=[self.connector, ub.Turn(*ends, soft), *springs],
             )  # fmt: skip
         self.simulation = ub.Simulation(scene, scheme, comm=MPI.COMM_SELF)
-        self.coupling = next(
+        self.zero_matrix = next(
             c
             for c in self.simulation.connector_terms
             if self.connector in c.connectors and len(c.connectors) == 1
@@ -97,12 +97,12 @@ class Between:
     def gradient(self):
         """Virtual work of a unit force: the residual is linear in it."""
         step = ub.Step.of(self.scheme, 0.0, 0.1, 0.1, self.q0)
-        self.simulation.equation.begin(step, [self.coupling])
+        self.simulation.equation.begin(step, [self.zero_matrix])
         r = np.zeros((2, len(self.q0)))
         for force, row in zip((0.0, 1.0), r, strict=True):
             q = self.q1.copy()
-            q[self.simulation.subdomain.multipliers[self.coupling.indices]] = force
-            self.coupling.add_residual(q, row)
+            q[self.simulation.subdomain.multipliers[self.zero_matrix.indices]] = force
+            self.zero_matrix.add_residual(q, row)
         difference = r[1] - r[0]
         difference[self.simulation.subdomain.multipliers] = 0.0
         return difference
@@ -113,9 +113,9 @@ class Between:
 def test_relative_motions_are_those_by_hand(motion, seed):
     some = Between(motion, ub.EnergyMomentum(), seed)
     expected = by_hand(some.connector, some.q1[some.dofs])
-    (value,) = some.coupling.motion(some.q1)
+    (value,) = some.zero_matrix.motion(some.q1)
     assert value == pytest.approx(expected, abs=1e-14)  # round-off of lengths near one
-    assert some.coupling.motion(np.zeros_like(some.q1)) == pytest.approx(0.0, abs=1e-15)
+    assert some.zero_matrix.motion(np.zeros_like(some.q1)) == pytest.approx(0.0, abs=1e-15)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -170,7 +170,7 @@ def test_rigid_motions_are_free(motion, scheme, seed):
 
 
 LAWS = {
-    "held": HELD,
+    "held": RIGID,
     "motor": ub.PrescribedMotion(lambda t: 0.2 * t),
     "actuator": ub.PrescribedForce(lambda t: 3.0),
     "controller": ub.Controller(lambda simulation: 2.0),

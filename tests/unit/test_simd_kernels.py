@@ -28,8 +28,8 @@ def pointwise(expression, values, *, several=False):
     f, z = fem.Function(space), ufl.TestFunction(space)
     form = expression(f) * z * ufl.dx(domain=mesh, metadata={"quadrature_degree": 0})
     x = cell_coordinates(mesh)[:, :, :2]
-    in_lanes = [in_batches(x, simd_kernels.LANES)] if several else []
-    kernel = Kernel(form, f, np.asarray(space.dofmap.list), x, *in_lanes)
+    interleaved = [in_batches(x, simd_kernels.LANES)] if several else []
+    kernel = Kernel(form, f, np.asarray(space.dofmap.list), x, *interleaved)
     by_cell = np.empty(n)
     by_cell[np.asarray(space.dofmap.list)[:, 0]] = values
     return kernel, by_cell
@@ -162,9 +162,9 @@ def test_logical_operators_choose_exactly(condition):
 def fresh(tmp_path, monkeypatch):
     """Nothing is compiled or known yet."""
     monkeypatch.setattr(code_cache, "_place", lambda: tmp_path)
-    simd_kernels.in_lanes.cache_clear()
+    simd_kernels.interleaved.cache_clear()
     yield
-    simd_kernels.in_lanes.cache_clear()
+    simd_kernels.interleaved.cache_clear()
 
 
 @pytest.mark.serial
@@ -184,7 +184,7 @@ def test_wrong_vectors_are_found_once(fresh, monkeypatch, caplog):
         kernel.add(q, values)
         assert np.allclose(values, np.sin(q), rtol=1e-14)
         caplog.clear()
-        simd_kernels.in_lanes.cache_clear()
+        simd_kernels.interleaved.cache_clear()
 
 
 @pytest.mark.serial
@@ -210,7 +210,7 @@ def test_the_check_is_made_once(fresh, monkeypatch):
     for _ in range(2):
         kernel, _ = pointwise(ufl.cos, np.ones(2), several=True)
         assert kernel.cells.lanes > 1
-        simd_kernels.in_lanes.cache_clear()
+        simd_kernels.interleaved.cache_clear()
     assert len(calls) == 1
 
 

@@ -104,7 +104,7 @@ def test_tangents_of_points(law, scheme):
     some = Bars(1, ub.ElastoPlastic(np.inf), law, scheme, C=2e3)
     for strain in np.linspace(0.013, 3.0, 31):
         ε = 1e-6
-        (_, D), *sides = (some.respond([strain + x]) for x in (0.0, -ε, ε))
+        (_, D), *sides = (some.return_map([strain + x]) for x in (0.0, -ε, ε))
         central = (sides[1][0] - sides[0][0]) / (2 * ε)
         assert D[0] == pytest.approx(central[0], abs=1e-5 * 2e3)
         some.step([strain])

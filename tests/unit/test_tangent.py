@@ -91,7 +91,7 @@ class Probe:
             self.in_motion(simulation, random)
         for inelastic in simulation.inelastic:
             self.at_random(inelastic, random)
-        simulation.controllers.ask(simulation)
+        simulation.controllers.evaluate(simulation)
         for term in simulation.terms:
             term.start(simulation.q)
         simulation.equation.begin(ub.Step.of(scheme, 0.0, 0.3, 0.3, simulation.q))
@@ -102,7 +102,7 @@ class Probe:
     def in_motion(simulation, random):
         """Random velocities and whatever else schemes keep, as after a step."""
         rates = simulation.inertia
-        rates.take(*random.uniform(-1, 1, (2, len(rates.v))), last_dt=0.2)
+        rates.commit(*random.uniform(-1, 1, (2, len(rates.v))), last_dt=0.2)
         rates.keep(*random.uniform(-1, 1, (len(simulation.scheme.kept), len(rates.v))))
         numerical = (one for one in simulation.terms if isinstance(one, SecondDifferences))
         for term in numerical:
@@ -123,7 +123,7 @@ class Probe:
     def residual(self, x):
         supports = self.simulation.supports
         r = self.simulation.equation.forces(supports.in_plane(x))
-        supports.enter(r)
+        supports.into_axes(r)
         return r[self.free]
 
     def tangent(self):

@@ -81,12 +81,12 @@ def falling(after, entry="plastic"):
         grow(self, number)
         for n in range(len(self) - number, len(self)):
             columns, row = self.row(n)
-            if columns.of_rows("t", row) > after:
-                columns.of_rows(f"lost: {entry}", row)[...] -= FALL
-                columns.of_rows("material", row)[0:1, PLASTIC if entry == "plastic" else HINGE] -= (
-                    FALL
-                )
-                columns.of_rows("connectors", row)[0:1, DISSIPATED] -= FALL
+            if columns.column_of("t", row) > after:
+                columns.column_of(f"lost: {entry}", row)[...] -= FALL
+                columns.column_of("material", row)[
+                    0:1, PLASTIC if entry == "plastic" else HINGE
+                ] -= FALL
+                columns.column_of("connectors", row)[0:1, DISSIPATED] -= FALL
 
     return grow_less
 

@@ -123,7 +123,7 @@ def polynomial(scheme, Ω):
     """[closed] Characteristic polynomial of the steps of a mode, Ω = ω dt; highest power first."""
     if isinstance(scheme, ub.EnergyMomentumDecaying):
         # u and v/ω are parts of one complex number: p(λ) = λ(λ-1) - iΩ q(λ), for ω and -ω
-        difference, mean = np.array([1, -1, 0]), scheme.part * np.array([1, -2, 1])
+        difference, mean = np.array([1, -1, 0]), scheme.lost_fraction * np.array([1, -2, 1])
         mean = mean + np.array([0.5, 0.5, 0])
         return np.polymul(difference, difference) + Ω**2 * np.polymul(mean, mean)
     α_m, α_f, γ, β = scheme.weights
@@ -182,7 +182,9 @@ def test_decaying_midpoint_never_amplifies(rho_inf, Ω):
     assert largest <= 1 + 1e-12
     if Ω <= 0.1:
         # What the docstring says: the part c Ω⁴ of the energy, to the next order in Ω²
-        assert 1 - largest**2 == pytest.approx(scheme.part * Ω**4, rel=20 * Ω**2, abs=1e-14)
+        assert 1 - largest**2 == pytest.approx(
+            scheme.lost_fraction * Ω**4, rel=20 * Ω**2, abs=1e-14
+        )
 
 
 # -- energy and momenta ------------------------------------------------------------------------
@@ -201,7 +203,7 @@ def test_energy_of_decaying_midpoint_with_its_memory_never_grows():
         entries.append(simulation.entries()[2]["numerical"])
     simulation.close()
     squares = np.array(states) ** 2 @ [k, m] / 2
-    memory = scheme.part * np.diff(states, axis=0) ** 2 @ [k, m] / 2
+    memory = scheme.lost_fraction * np.diff(states, axis=0) ** 2 @ [k, m] / 2
     stored = squares + np.concatenate([[0.0], memory])
     assert np.diff(stored).max() <= 1e-12 * stored[0]
     assert stored[-1] < 0.5 * stored[0]

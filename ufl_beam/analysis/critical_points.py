@@ -122,10 +122,10 @@ class Stiffness:
     ) -> None:
         numbering = subdomain.numbering
         triplets = subdomain.dofs[A.rows()], subdomain.dofs[A.indices], A.data
-        parts = subdomain.comm.allgather(
+        gathered = subdomain.comm.allgather(
             (*triplets, subdomain.dofs, rate, subdomain.dofs[constrained])
         )
-        rows, columns, data, dofs, rates, fixed = map(np.concatenate, zip(*parts, strict=True))
+        rows, columns, data, dofs, rates, fixed = map(np.concatenate, zip(*gathered, strict=True))
         free = np.setdiff1d(np.arange(numbering.size), fixed)
         shape = (numbering.size, numbering.size)
         self._K = csr_array(coo_array((data, (rows, columns)), shape=shape))[free][:, free]

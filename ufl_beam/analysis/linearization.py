@@ -44,7 +44,7 @@ def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array
 
     Yielding and opening stay frozen afterwards, so no step may follow.
     """
-    simulation.controllers.ask(simulation)
+    simulation.controllers.evaluate(simulation)
     for cells in simulation.inelastic:
         cells.points.freeze()
     for group in simulation.connector_terms:
@@ -300,14 +300,14 @@ class SmallMotions:
         """Return the n eigenvalues nearest to zero, and motions with the largest displacement 1."""
         order = np.argsort(np.abs(values), kind="stable")[:n]
         shapes = self._Z @ x[:, order]
-        turns = self._simulation.subdomain.rotations
+        rotations = self._simulation.subdomain.rotations
         sizes = np.abs(shapes)
         sizes[self.numbering.multipliers] = 0.0
-        turning = sizes[turns].max(axis=0, initial=0.0)
-        sizes[turns] = 0.0
+        turning = sizes[rotations].max(axis=0, initial=0.0)
+        sizes[rotations] = 0.0
         # If only rotations move, the largest rotation is 1.
         only = sizes.max(axis=0, initial=0.0) <= 1e-9 * self.scene.size * turning
-        sizes[np.ix_(turns, only)] = np.abs(shapes[np.ix_(turns, only)])
+        sizes[np.ix_(rotations, only)] = np.abs(shapes[np.ix_(rotations, only)])
         largest = shapes[sizes.argmax(axis=0), np.arange(shapes.shape[1])]
         shapes = shapes / largest
         real = np.abs(shapes.imag).max(initial=0.0) <= 1e-8

@@ -25,7 +25,7 @@ from ufl_beam.display import Rich
 from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number, warn
 from ufl_beam.mechanics.classical import Static
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_prestress
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
@@ -80,7 +80,7 @@ class Shapes(Rich, ABC):
     def __len__(self) -> int:
         return int(self.shapes.shape[1])
 
-    def shape(self, k: int, place: Anchor) -> Array | Complex:
+    def shape(self, k: int, place: AttachmentPoint) -> Array | Complex:
         """Return the motion (u, v, ψ) of a place in the k-th mode; (3,).
 
         Raises:

@@ -189,7 +189,7 @@ class PathCorrector:
             for term in self._loading:
                 term.add_residual(q, forces)
             r += weight * forces
-        simulation.supports.enter(r)
+        simulation.supports.into_axes(r)
         self._rates = np.asarray((self._moved(t + ε) - self._moved(t - ε)) / (2 * ε), dtype=float)
         self._A = simulation.equation.tangent_at(x, self._rates, r)
 
@@ -253,7 +253,7 @@ class PathCorrector:
         self.sought = predicted = predicted if self.crossing is None else self.crossing.predicted
         self.t = simulation.t + predicted[-1]
         step, guess = self.step_at(self.t), simulation.q + predicted[:-1]
-        simulation.supports.enter(guess)
+        simulation.supports.into_axes(guess)
         simulation.together(simulation.supports.move, guess, guess, step)
         trial = simulation.attempt_along(step, guess, self, hold=hold)
         return trial._replace(step=self.step_at(self.t))
@@ -271,7 +271,7 @@ class PathCorrector:
             self.simulation.together(self.tangent, supports.in_axes(q), rate)
         stiffness = Stiffness(self.subdomain, self._A, supports.dofs, rate, self._all_weights)
         motion = stiffness.flow[self.subdomain.dofs] + self._rates
-        supports.leave(motion)
+        supports.into_plane(motion)
         direction = np.append(motion, 1.0)
         size = self.length(direction)
         if not math.isfinite(size) or not self.size(motion) > 0:

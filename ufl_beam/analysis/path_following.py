@@ -215,13 +215,13 @@ def _require_load_factor(scene: Scene, t0: float) -> None:
         if isinstance(connector.law, ConnectorLaw):
             require_limit(connector.law, str(connector))
     for work in scene.works:
-        if "v" in work.asked:
+        if "v" in work.used_arguments:
             raise ArgumentError(
                 f"{work}: it depends on the velocity v, and a path has no time; leave v out, or "
                 "use simulate(scene, Static(), ...)"
             )
     times = (t0 + 1e-3, t0 + 1.0, t0 - 1e-3, t0 - 1.0)
-    changes = any("t" in work.asked for work in scene.works)
+    changes = any("t" in work.used_arguments for work in scene.works)
     if not changes and not any(f(t) != f(t0) for _, f in scene.time_functions() for t in times):
         raise ArgumentError(
             "follow: no load and no motion depends on time, which is the load factor here; give "
@@ -355,8 +355,8 @@ class PathStepper:
         step = np.append(trial.q1, trial.step.t1) - corrector.start
         size, sought = (corrector.length(x) for x in (step, corrector.sought))
         aligned = corrector.along(corrector.weights * step, corrector.sought)
-        turns = aligned < LEAST_COSINE * size * sought or size > LARGEST_LENGTH_RATIO * sought
-        if fraction > UNCHECKED_FRACTION and turns:
+        reverses = aligned < LEAST_COSINE * size * sought or size > LARGEST_LENGTH_RATIO * sought
+        if fraction > UNCHECKED_FRACTION and reverses:
             raise StepFailed("the path turns too sharply, or the step leaps to another branch")
         if self._control.sense(corrector, direction, step) < 0:
             direction = -direction
@@ -436,7 +436,7 @@ class PathStepper:
         Raises:
             StepFailed: The point is no bifurcation point, or was not found.
         """
-        corrector, to_plane = self.corrector, self._simulation.supports.leave
+        corrector, to_plane = self.corrector, self._simulation.supports.into_plane
         (first, last), (before, after) = pair, ends
         whole, stiffness = last.end - first.end, last.stiffness
         if not whole[-1] * first.direction[-1] * last.direction[-1]:
@@ -486,7 +486,7 @@ class PathStepper:
             mode = candidate.mode
         else:
             mode = np.array(candidate.stiffness.softest[1][corrector.subdomain.dofs])
-            simulation.supports.leave(mode)
+            simulation.supports.into_plane(mode)
             # A singular stiffness gives no accurate component of the path along the mode.
             along = corrector.along(corrector.weights[:-1] * mode, (direction - before)[:-1])
             corrector.direction = direction - along * np.append(mode, 0.0)

@@ -575,8 +575,8 @@ class _Search:
     def _confirm(self, candidate: _Candidate) -> None:
         """Run with cells and steps a level finer than a choice and the base, for the limit."""
         i, j = self._base
-        parts = 2 * max(round(2**candidate.level), 2**j)
-        finer = self._at(2 * max(candidate.refine, Fraction(2**i)), math.log2(parts))
+        intervals = 2 * max(round(2**candidate.level), 2**j)
+        finer = self._at(2 * max(candidate.refine, Fraction(2**i)), math.log2(intervals))
         if self._runs.allowed([finer]):
             self._runs.run([finer])
         if finer in self._runs.runs:

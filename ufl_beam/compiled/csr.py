@@ -12,8 +12,8 @@ from petsc4py import PETSc
 import numpy as np
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.caches import cached_by_structure
 from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, loop, struct
-from ufl_beam.memory import of_structure
 
 
 class Csr:
@@ -36,7 +36,7 @@ class Csr:
         assert self._again is not None
         return self._again()
 
-    def release(self) -> None:
+    def free(self) -> None:
         """Free the memory of :attr:`indices` until they are needed again."""
         if self._again is not None:
             vars(self).pop("indices", None)
@@ -104,15 +104,15 @@ class Csr:
         return matrix
 
 
-def coupling(size: int, *coupled: Index) -> Csr:
+def zero_matrix(size: int, *coupled: Index) -> Csr:
     """Return a zero matrix whose pattern has the diagonal and all pairs of coupled dofs."""
     indices, indptr = _pattern(size, *coupled)
     return Csr(np.zeros(len(indices)), indices, indptr, lambda: _pattern(size, *coupled)[0])
 
 
-@of_structure
+@cached_by_structure
 def _pattern(size: int, *coupled: Index) -> tuple[Index, Index]:
-    """Return ``indices`` and ``indptr`` of :func:`coupling`."""
+    """Return ``indices`` and ``indptr`` of :func:`zero_matrix`."""
     none = np.empty(0, dtype=np.int32)
     lengths = np.concatenate([none, *(np.full(len(x), x.shape[1], np.int32) for x in coupled)])
     dofs = np.concatenate([none, *(rows.ravel() for rows in coupled)]).astype(np.int32, copy=False)

@@ -145,7 +145,7 @@ def require_agreement(module: ModuleType, kernel: int, sizes: tuple[int, int, in
 
 
 @cache
-def in_lanes(
+def interleaved(
     source: Path, kernel: int, sizes: tuple[int, int, int], unknowns: tuple[int, int]
 ) -> int | None:
     """Return the address of the SIMD loop of a compiled form, or None if there is none.

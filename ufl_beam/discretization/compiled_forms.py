@@ -23,12 +23,12 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.caches import cached_forms as cached_forms
 from ufl_beam.compiled.c_library import doubles, ffi, fill, kernel, lib, view_pointer
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.compiled.jit import compiled_form
-from ufl_beam.compiled.simd_kernels import LANES, in_batches, in_lanes
+from ufl_beam.compiled.simd_kernels import LANES, in_batches, interleaved
 from ufl_beam.dolfinx_compat import VERSIONS, fem, line_mesh, pack
-from ufl_beam.memory import stated as stated
 
 
 def tabulator(compiled: fem.Form) -> Any:
@@ -154,7 +154,7 @@ class Kernel:
         if several is not None:
             sizes = (self._entries, ready.packed.shape[1], len(ready.constants))
             tabulate = int(ffi.cast("intptr_t", ready.tabulate))
-            address = in_lanes(ready.source, tabulate, sizes, (self._at, self._unknowns))
+            address = interleaved(ready.source, tabulate, sizes, (self._at, self._unknowns))
         if several is None or address is None:
             self.lanes, self._in_lanes = 1, ffi.NULL
             self._coordinates = in_batches(coordinates, 1)

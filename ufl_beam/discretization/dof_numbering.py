@@ -21,10 +21,10 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.display import counted
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.bodies import Anchor, Body, Member, Node, Place, node
+from ufl_beam.model.bodies import AttachmentPoint, Body, Member, Node, Place, node
 from ufl_beam.model.checks import require_kind
 from ufl_beam.model.connectors import Connector, place_of
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import points_along
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.softening_laws import SofteningLaw
@@ -86,7 +86,7 @@ class DofNumbering:
             raise ModelError(f"{name}: zero length of a cell at ({x:g}, {y:g})")
         self._add_hinges([place_of(hinge) for hinge in scene.hinges])
         self._number()
-        scene.release()
+        scene.free_caches()
 
     def __str__(self) -> str:
         scene = self.scene
@@ -209,28 +209,28 @@ class DofNumbering:
         return [self.scene.beams[i].section for i in firsts], beam_sections
 
     @cached_property
-    def inelastic(self) -> list[tuple[Layout, Index]]:
+    def inelastic(self) -> list[tuple[SectionPoints, Index]]:
         """Layouts of material points, and the cells that have them.
 
         Raises:
             ModelError: Such cells have a degree above one.
         """
-        groups = dict[Layout, list[int]]()
+        groups = dict[SectionPoints, list[int]]()
         sections, beam_sections = self.sections
         for number, section in enumerate(sections):
-            layout = section.layout(section.hinge)
-            if layout is not None and not layout.elastic:
+            section_points = section.section_points(section.hinge)
+            if section_points is not None and not section_points.elastic:
                 if self.mesh.degree > 1:
                     beam = self.scene.beams[int(np.argmax(beam_sections == number))]
                     raise ModelError(
                         f"Mesh: degree = {self.mesh.degree} is for elastic beams, and {beam.name} "
                         "may yield or break; use degree=1 with more cells, or an elastic section"
                     )
-                groups.setdefault(layout, []).append(number)
+                groups.setdefault(section_points, []).append(number)
         cell_sections = beam_sections[self.beam_of_cell]
         return [
-            (layout, np.flatnonzero(np.isin(cell_sections, group)))
-            for layout, group in groups.items()
+            (section_points, np.flatnonzero(np.isin(cell_sections, group)))
+            for section_points, group in groups.items()
         ]
 
     @cached_property
@@ -260,7 +260,7 @@ class DofNumbering:
 
     # -- places ----------------------------------------------------------------------------------
 
-    def cell_and_part(self, place: Place) -> tuple[int, float]:
+    def cell_and_fraction(self, place: Place) -> tuple[int, float]:
         """Return the cell at a place, and the fraction of it that lies before the place."""
         require_kind(place, Place, "place")
         if place.beam not in self._beam_indices:
@@ -273,7 +273,7 @@ class DofNumbering:
 
     def cell(self, place: Place) -> int:
         """Return the cell at a place; at a vertex the cell before it, at the start the first."""
-        return self.cell_and_part(place)[0]
+        return self.cell_and_fraction(place)[0]
 
     def vertex(self, place: Place) -> int:
         """Return the vertex of an attachment place."""
@@ -284,12 +284,12 @@ class DofNumbering:
             return int(self.first_vertices[i])
         if place.s == 1.0:
             return int(self.first_vertices[i + 1]) - 1
-        cell, fraction = self.cell_and_part(place)
+        cell, fraction = self.cell_and_fraction(place)
         return cell + i + round(fraction)
 
     def weights(self, place: Place) -> tuple[Index, Array]:
         """Return nodes of the cell at a place, vertices first, and their weights; (degree + 1,)."""
-        cell, fraction = self.cell_and_part(place)
+        cell, fraction = self.cell_and_fraction(place)
         first, *between, last = self.mesh.weights(fraction)
         nodes = self.nodes_of_cells[cell].copy()
         if fraction in (0.0, 1.0):  # the attached side of a hinge, not the cell's
@@ -332,13 +332,13 @@ class DofNumbering:
         """Return the nodes of a beam, including both sides of its hinges."""
         return np.union1d(self.nodes_of_cells[self.cells_of(beam)], self.vertices_of(beam))
 
-    def node(self, anchor: Anchor) -> Index:
+    def node(self, point: AttachmentPoint) -> Index:
         """Return degrees of freedom of the vertex or body that an anchor belongs to; (3,)."""
-        carrier = node(anchor)
+        carrier = node(point)
         if not isinstance(carrier, Body):
             return np.asarray(self.dofs[self.vertex(carrier)])
         if carrier not in self.scene.rigid_bodies:
-            raise ModelError(f"{anchor}: {carrier.name} is not in the scene")
+            raise ModelError(f"{point}: {carrier.name} is not in the scene")
         return np.asarray(self.dofs_of_bodies[self.scene.rigid_bodies.index(carrier)])
 
     @cached_property

@@ -15,10 +15,10 @@ import ufl
 from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.compiled.csr import Csr, coupling
+from ufl_beam.compiled.csr import Csr, zero_matrix
 from ufl_beam.compiled.jit import compiled_form
 from ufl_beam.compiled.simd_kernels import LANES, in_batches
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.dolfinx_compat import cell_coordinates, fem, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
@@ -26,7 +26,7 @@ from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.functional import kinetic_energy, resultants
 from ufl_beam.mechanics.kinematics import Axis, strain
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.scene import Scene
 
 
@@ -110,18 +110,18 @@ def element_of(mesh: Mesh) -> Element:
     return _element(mesh.degree, mesh.lumped)
 
 
-@stated
+@cached_forms
 def _element(degree: int, lumped: bool) -> Element:
     return Element(Mesh(degree=degree, lumped=lumped))
 
 
-@stated
+@cached_forms
 def derivative(work: ufl.Form, q1: fem.Function) -> ufl.Form:
     """Return the derivative of a virtual work."""
     return ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
 
 
-@stated
+@cached_forms
 def applied(form: ufl.Form, q1: fem.Function) -> ufl.Form:
     """Return a bilinear form times a vector, the unknown q1."""
     return ufl.action(form, q1)
@@ -165,7 +165,7 @@ class Fields:
         kernel = Kernel(form, unknown, dofs, self._coordinates(), lanes)
         for function in (self.element.stiffness, self.element.inertia):
             if kernel.uses(function):
-                kernel.put(function, self.of_sections(function))
+                kernel.put(function, self.section_values(function))
         return kernel
 
     def force_and_tangent(self, work: ufl.Form, q1: fem.Function, A: Csr) -> tuple[Kernel, Kernel]:
@@ -203,7 +203,7 @@ class Fields:
             for offset in range(1, component.max(initial=0) + 1):  # forces of one bushing
                 later, force = np.flatnonzero(component >= offset), subdomain.connector_dofs[:, 6]
                 couples.append(np.column_stack([force[later], force[later - offset]]))
-            self._matrix = coupling(subdomain.size, *couples)
+            self._matrix = zero_matrix(subdomain.size, *couples)
             return self._matrix
         return self._matrix.zeros_like()
 
@@ -215,7 +215,7 @@ class Fields:
         kernel.add(np.zeros(self.subdomain.size), matrix.data)
         return matrix
 
-    def of_sections(self, function: fem.Function) -> Array:
+    def section_values(self, function: fem.Function) -> Array:
         """Return properties of the cells' sections, for a coefficient of the element."""
         numbering = self.subdomain.numbering
         names = ("rhoA", "rhoI") if function is self.element.inertia else ("EA", "GA", "EI")
@@ -225,7 +225,7 @@ class Fields:
         return np.asarray(np.array(properties).reshape(-1, len(names))[beam_sections[beams]])
 
 
-@stated
+@cached_forms
 def mass_form(element: Element) -> ufl.Form:
     """Return the mass of the beams as a bilinear form; kg, kg m²."""
     v = element.configuration()
@@ -241,7 +241,7 @@ def mass_kernel(fields: Fields) -> Kernel:
     return fields.kernel(applied(mass_form(fields.element), q1), q1)
 
 
-def lumps(scene: Scene) -> list[tuple[Anchor, float, float]]:
+def lumps(scene: Scene) -> list[tuple[AttachmentPoint, float, float]]:
     """List places, masses and rotary inertias of the point masses and the bodies; kg, kg m²."""
     masses = [(mass.place, mass.mass, mass.inertia) for mass in scene.masses]
     return masses + [(body.middle, body.mass, body.inertia) for body in scene.bodies]
@@ -258,7 +258,7 @@ def mass_matrix(fields: Fields) -> Csr:
     return M
 
 
-@stated
+@cached_forms
 def _weighted_strains(element: Element) -> ufl.Form:
     return element.sampled(strain(element.q1, element.axis))
 
@@ -290,7 +290,7 @@ class Strains:
         return strains
 
 
-@stated
+@cached_forms
 def _section_forces(element: Element) -> ufl.Form:
     r = resultants(strain(element.q1, element.axis), element.stiffness)
     return (
@@ -362,4 +362,4 @@ class DolfinxFields(Fields):
         self.element = element = Element(numbering.mesh, self.mesh)
         for function in (element.stiffness, element.inertia):
             dofs = dofs_of_cells(function.function_space)
-            function.x.array[dofs] = self.of_sections(function)
+            function.x.array[dofs] = self.section_values(function)

@@ -13,11 +13,11 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.caches import cached_by_structure
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.errors import warn
-from ufl_beam.memory import of_structure
 from ufl_beam.model.bodies import GROUND, Place, Spot, carries
-from ufl_beam.model.connector_laws import HELD, PrescribedMotion
+from ufl_beam.model.connector_laws import RIGID, PrescribedMotion
 from ufl_beam.model.connectors import place_of
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.scene import Scene
@@ -55,7 +55,7 @@ def warn_of_masses(scene: Scene) -> None:
 def warn_of_rates(scene: Scene) -> None:
     """Warn of works with velocities in a static run, such as drag left in a preload."""
     for work in scene.works:
-        if "v" in work.asked:
+        if "v" in work.used_arguments:
             warn(
                 f"{work} takes v, which is (q1 - q0)/dt in a static run, too: it carries a part of "
                 "the loads, as a damper does. Leave it out of the scene of a preload; if slow "
@@ -138,7 +138,7 @@ def _groups(numbering: DofNumbering) -> Index:
     return np.asarray(group[numbering.dofs[:, 0]])
 
 
-@of_structure
+@cached_by_structure
 def _connected(size: int, pairs: Index) -> tuple[Index]:
     """Return the group number of each of ``size`` degrees of freedom, given connected pairs."""
     rows, columns = pairs.T
@@ -232,10 +232,10 @@ def warn_of_jumps(numbering: DofNumbering, t: float, q: Array, motions: Array) -
             f"{connector}: its motion",
             value,
             value_at(connector.law.motion, t, connector),
-            connector.turns,
+            connector.is_rotation,
         )
         for connector, value in zip(numbering.scene.all_connectors, motions, strict=True)
-        if isinstance(connector.law, PrescribedMotion) and connector.law is not HELD
+        if isinstance(connector.law, PrescribedMotion) and connector.law is not RIGID
     ]
     for name, value, target, is_rotation in starts:
         if abs(target - value) > JUMP * (1.0 if is_rotation else numbering.scene.size):

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
-from ufl_beam.model.bodies import Anchor, Spot
+from ufl_beam.model.bodies import AttachmentPoint, Spot
 
 
 def bisected(points: Array, number: int) -> Index:
@@ -114,14 +114,14 @@ class Subdomain:
         """Scratch space for each degree of freedom; loops in C keep nothing in it between calls."""
         return np.empty(self.size)
 
-    def computes(self, anchor: Anchor) -> bool:
+    def computes(self, point: AttachmentPoint) -> bool:
         """Return whether this process has the (first) cell at a place, or owns a body.
 
         It then has all degrees of freedom of the place, even if other processes own some of them.
         """
-        if isinstance(anchor, Spot):
-            return bool(self.owns(self.numbering.node(anchor)).all())
-        place = np.searchsorted(self.cells, cell := self.numbering.cell(anchor))
+        if isinstance(point, Spot):
+            return bool(self.owns(self.numbering.node(point)).all())
+        place = np.searchsorted(self.cells, cell := self.numbering.cell(point))
         return bool(np.any(self.cells[place : place + 1] == cell))
 
     def translations(self) -> tuple[Index, Index]:

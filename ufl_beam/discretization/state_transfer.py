@@ -46,7 +46,7 @@ class Transfer:
         for i, connector in enumerate(new.scene.all_connectors):
             if candidates := known.get(_geometry(connector)):
                 connectors[i] = candidates.pop(0)
-        self._link_map = {a: b for b, a in connectors.items()}
+        self._connector_map = {a: b for b, a in connectors.items()}
         self._to = np.concatenate([news, new.multipliers[list(connectors)]])
         self._from = np.concatenate([olds, old.multipliers[list(connectors.values())]])
 
@@ -89,7 +89,7 @@ class Transfer:
         mapped = np.zeros(self._new.size)
         mapped[self._to] = x[self._from]
         mismatch = np.abs(mapped[self._to] - x[self._from])
-        moving = len(self._to) - len(self._link_map)
+        moving = len(self._to) - len(self._connector_map)
         for c in range(3):
             component = mismatch[c:moving:3]
             if component.size and component.max() > allowed(c):
@@ -114,8 +114,8 @@ class Transfer:
             elif name.rpartition(",")[0] in CELL_TABLES:
                 mapped[name] = values
             else:
-                common = [row for row in values if int(row[0]) in self._link_map]
-                rows = [[self._link_map[int(row[0])], *row[1:]] for row in common]
+                common = [row for row in values if int(row[0]) in self._connector_map]
+                rows = [[self._connector_map[int(row[0])], *row[1:]] for row in common]
                 if rows:
                     mapped[name] = np.array(sorted(rows, key=lambda row: row[0]))
         return mapped

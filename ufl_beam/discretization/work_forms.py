@@ -12,7 +12,7 @@ from ufl.algorithms.check_arities import ArityMismatch, check_form_arity
 from ufl.core.expr import Expr
 from ufl.domain import extract_domains
 
-from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.function_spaces import Element
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ModelError, shorten
@@ -29,7 +29,7 @@ class Statement(NamedTuple):
 
     residual: ufl.Form  # minus the virtual work
     tangent: ufl.Form  # its derivative; empty if independent of the configuration
-    numbers: Mapping[str, fem.Function]  # functions that hold the parameters, by name
+    parameters: Mapping[str, fem.Function]  # functions that hold the parameters, by name
     energy: ufl.Form | None = None  # energy of a potential at the end of the step
     lost: ufl.Form | None = None  # energy that the scheme dissipates in the step
 
@@ -37,7 +37,7 @@ class Statement(NamedTuple):
         """Return whether the energy of a work may change in time without motion."""
         known = () if self.energy is None else self.energy.coefficients()
         varying = ["t", *(name for name, number in work.numbers.items() if callable(number))]
-        return any(self.numbers[name] in known for name in varying)
+        return any(self.parameters[name] in known for name in varying)
 
 
 class _Same:
@@ -65,7 +65,7 @@ def statement(work: Work, element: Element, scheme: Scheme) -> Statement:
     )
 
 
-@stated
+@cached_forms
 def _statement(
     kind: type[Work], name: str, density: _Same, names: Sequence[str], degree: int,
     element: Element, scheme: Scheme,
@@ -134,7 +134,7 @@ def _potential_forms(
 def _returned(work: Work, known: Mapping[str, Any], element: Element) -> Expr:
     """Evaluate the function of a work, or raise :class:`ModelError` naming it."""
     try:
-        value = work.density(**{name: known[name] for name in work.asked})
+        value = work.density(**{name: known[name] for name in work.used_arguments})
     except ModelError:
         raise
     except Exception as error:

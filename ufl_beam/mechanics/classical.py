@@ -25,7 +25,7 @@ class PlainStep:
 
     half_tangents = False
 
-    def virtual_rotation(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+    def virtual_rotation(self, rotation_a: Expr, rotation_b: Expr, w: Expr) -> Expr:
         """Return the virtual rotation itself."""
         return w
 

@@ -79,10 +79,10 @@ class EnergyMomentumBase(_OverStep):
         """Return the variation that maps the nodal step to the increment of the strains."""
         return kinematics.virtual_strain_over_step(q0, q1, w, axis)
 
-    def virtual_rotation(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+    def virtual_rotation(self, rotation_a: Expr, rotation_b: Expr, w: Expr) -> Expr:
         """Return the increment of the rotation, if ``w`` is 2 tan(turn_b/2) - 2 tan(turn_a/2)."""
-        tan_a, tan_b = (ufl.sin(x / 2) / ufl.cos(x / 2) for x in (turn_a, turn_b))
-        return kinematics.over_tan((turn_b - turn_a) / 2) / (1 + tan_a * tan_b) * w
+        tan_a, tan_b = (ufl.sin(x / 2) / ufl.cos(x / 2) for x in (rotation_a, rotation_b))
+        return kinematics.over_tan((rotation_b - rotation_a) / 2) / (1 + tan_a * tan_b) * w
 
 
 @dataclass(frozen=True)
@@ -263,14 +263,14 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
         require_number(self.rho_inf, "EnergyMomentumDecaying: rho_inf", at_least=1 / 3, at_most=1.0)
 
     @property
-    def part(self) -> float:
+    def lost_fraction(self) -> float:
         """Fraction c of the energy of second differences of strains and velocities that is lost."""
         # At infinity (λ + 1)/2 + c (λ - 1)²/λ = 0; λ = -rho_inf is the larger root.
         return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)
 
     def coefficients(self, dt: float, last_dt: float, known: int) -> Coefficients:
         """Return the numbers of the step, with c times second differences of velocities."""
-        c, keep = self.part, 0.5 + self.part
+        c, keep = self.lost_fraction, 0.5 + self.lost_fraction
         r = c * min(1.0, dt / last_dt)
         return Coefficients(
             inertia=(1 / (dt**2 * keep), (r - 1) / (dt * keep), -r / (dt * keep)),
@@ -281,7 +281,7 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
 
     def error_weights(self) -> tuple[float, float]:
         """Return the error of the trapezoidal rule plus the delay by the second differences."""
-        return 0.0, 1 / 12 + self.part
+        return 0.0, 1 / 12 + self.lost_fraction
 
 
 @dataclass(frozen=True)

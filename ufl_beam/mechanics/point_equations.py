@@ -18,7 +18,7 @@ from ufl.corealg.traversal import unique_pre_traversal
 
 from ufl_beam.compiled.c_library import names
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.model.fibres import Kind, Layout
+from ufl_beam.model.fibres import Kind, SectionPoints
 from ufl_beam.model.law_functions import Values, absolute, positive
 from ufl_beam.model.material_law import MaterialLaw, State
 from ufl_beam.model.softening_laws import SofteningLaw
@@ -37,10 +37,12 @@ def prefixed(prefix: str, names: Mapping[str, object] | tuple[str, ...]) -> tupl
     return tuple(f"{prefix} {name}" for name in names)
 
 
-def inputs(layout: Layout) -> tuple[str, ...]:
+def inputs(section_points: SectionPoints) -> tuple[str, ...]:
     """Return the input names of the law of a point as stored; loops.h explains their order."""
-    law, parameters = layout.kind
-    softening = layout.softening.parameters() if layout.softening is not None else {}
+    law, parameters = section_points.kind
+    softening = (
+        section_points.softening.parameters() if section_points.softening is not None else {}
+    )
     return (
         *names("point_input"),
         *rows(law, "strain"), *rows(law, "before"), *rows(law, "stiffness"),

@@ -18,11 +18,11 @@ import basix.ufl
 import ufl
 from ufl.core.expr import Expr
 
+from ufl_beam.caches import cached_forms
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.kinematics import frame, perpendicular, split
 from ufl_beam.mechanics.time_schemes import Scheme
-from ufl_beam.memory import stated
 
 
 class Geometry(NamedTuple):
@@ -131,7 +131,7 @@ class ConnectorForms(NamedTuple):
     u: fem.Function
 
 
-@stated
+@cached_forms
 def connector_forms(motions: Sequence[str], scheme: Scheme, cell: meshes.Mesh) -> ConnectorForms:
     """Return forms on cells of unit length between both nodes of a connector."""
     n = len(motions)

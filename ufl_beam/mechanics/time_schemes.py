@@ -104,7 +104,7 @@ class Scheme(Protocol):
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
         """Return the value in the step of a function of the configuration."""
 
-    def virtual_rotation(self, turn_a: Expr, turn_b: Expr, w: Expr) -> Expr:
+    def virtual_rotation(self, rotation_a: Expr, rotation_b: Expr, w: Expr) -> Expr:
         """Return the variation of a relative rotation whose virtual motion is ``w``."""
 
 

@@ -67,12 +67,12 @@ class Member(ABC):
         regular = [i / self.cells for i in range(self.cells + 1)]
         if not {*self.corners, *attached} - {0.0, 1.0}:
             return regular
-        kept = [0.0]
+        coordinates = [0.0]
         for s in sorted({*regular, *self.corners, *attached})[1:]:
-            if (s - kept[-1]) * self.cells > TOGETHER:
-                kept.append(s)
-        kept[-1] = 1.0
-        return kept
+            if (s - coordinates[-1]) * self.cells > TOGETHER:
+                coordinates.append(s)
+        coordinates[-1] = 1.0
+        return coordinates
 
 
 Beams = Annotated[Sequence[Member] | None, partial(require_all, kind=Member)]
@@ -220,7 +220,7 @@ def ground(x: float, y: float) -> Spot:
     return Spot(GROUND, (x, y))
 
 
-Anchor = Place | Spot
+AttachmentPoint = Place | Spot
 """Attachment point of a joint, support, load, mass or connector."""
 
 Node = Place | Body
@@ -261,12 +261,12 @@ def merged(groups: Iterable[Sequence[NodeDof]]) -> Representatives:
     return Representatives((dofs[k], dofs[root(above)]) for k, above in parent.items())
 
 
-def node(place: Anchor) -> Node:
+def node(place: AttachmentPoint) -> Node:
     """Return the cross-section of a beam, or the body, to which a place is fixed."""
     return place.body if isinstance(place, Spot) else place
 
 
-def arm(place: Anchor, point: Point | None = None) -> Point:
+def arm(place: AttachmentPoint, point: Point | None = None) -> Point:
     """Return the vector from the node of a place to a point, by default the place; m.
 
     It is zero for points of the ground, which do not move.
@@ -278,7 +278,7 @@ def arm(place: Anchor, point: Point | None = None) -> Point:
     return x - nx, y - ny
 
 
-def carries(place: Anchor) -> bool:
+def carries(place: AttachmentPoint) -> bool:
     """Return whether a place and its node have the same displacement."""
     return isinstance(place, Place) or math.hypot(*arm(place)) == 0.0
 
@@ -325,7 +325,7 @@ class PointMass(Record):
         True
     """
 
-    place: Anchor
+    place: AttachmentPoint
     mass: NotNegative
     inertia: NotNegative = 0.0
 

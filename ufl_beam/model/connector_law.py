@@ -220,7 +220,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
                 result = getattr(law, name)(*arguments)
         except Exception as error:
             raise ModelError(
-                f"{what}.{name} fails at no motion: {error}{stated_at(law)}"
+                f"{what}.{name} fails at no motion: {error}{source_location(law)}"
             ) from error
         if name == "increments":
             require_names(result, law, f"{what}.{name}")
@@ -228,7 +228,7 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
             if not isinstance(result, tuple | list) or len(result) != law.components:
                 raise ModelError(
                     f"{what}.resistance returns {shorten(result)}; it must return a tuple of "
-                    f"{law.components} forces{stated_at(law)}"
+                    f"{law.components} forces{source_location(law)}"
                 )
             values = [("", force) for force in result]
         else:
@@ -238,12 +238,12 @@ def require_connector_law(law: ConnectorLaw, what: str) -> None:
             if not number or not np.all(np.isfinite(value)):
                 raise ModelError(
                     f"{what}.{name} returns {f'{variable} = ' * bool(variable)}{shorten(value)} "
-                    f"at no motion; it must return a number there{stated_at(law)}"
+                    f"at no motion; it must return a number there{source_location(law)}"
                 )
             if name in ("limit", "sliding") and np.any(np.asarray(value) < 0):
                 raise ModelError(
                     f"{what}.{name} returns {shorten(value)} at no motion; it must return the size "
-                    f"of a force without a sign{stated_at(law)}"
+                    f"of a force without a sign{source_location(law)}"
                 )
 
 
@@ -261,11 +261,12 @@ def require_limit(law: ConnectorLaw, what: str) -> None:
             raise ModelError(
                 f"{what}: {type(law).__name__}.increments returns {name} = {shorten(change)} for "
                 "dt = inf, and steps of a path are infinitely slow; state it so that it has a "
-                f"limit, as a / (b / dt + c), or use simulate(scene, Static(), ...){stated_at(law)}"
+                "limit, as a / (b / dt + c), or use simulate(scene, Static(), ...)"
+                f"{source_location(law)}"
             )
 
 
-def stated_at(law: object) -> str:
+def source_location(law: object) -> str:
     """Return file and line of the class of a law in brackets, if they are known."""
     try:
         file, (_, line) = inspect.getsourcefile(type(law)), inspect.getsourcelines(type(law))
@@ -346,15 +347,15 @@ class ForceLaw(Record):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        if self.state and "state" not in self.asked:
+        if self.state and "state" not in self.arguments:
             raise ModelError(
                 "ForceLaw: the function has no parameter for the state; give it a parameter state, "
                 "and return the force and the state after the step"
             )
-        _ = self.asked, self.stored_arguments  # raises for unknown names
+        _ = self.arguments, self.stored_arguments  # raises for unknown names
 
     @property
-    def asked(self) -> tuple[str, ...]:
+    def arguments(self) -> tuple[str, ...]:
         """Names of the parameters of the function after motion and rate."""
         return self._names(self.force, "force", "t", "dt", after=2)
 

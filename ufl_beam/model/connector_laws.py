@@ -116,7 +116,7 @@ class Controller(Record):
     force: Annotated[Callable[[Any], float], partial(require_function, arguments="the simulation")]
     sample: Annotated[float | None, partial(require_number, positive=True)] = None
 
-    def ask(self, simulation: Running, connector: object) -> float:
+    def evaluate(self, simulation: Running, connector: object) -> float:
         """Evaluate the force of a connector for the next steps; all processes call it together."""
         at = f"t = {simulation.t:.9g} s"
         return require_returned(
@@ -380,7 +380,7 @@ class Coulomb(Record):
         if (self.coefficient > 0) != (self.joint is not None):
             raise ModelError("Coulomb: give coefficient and joint together")
 
-    def ask(self, simulation: Running, connector: object) -> float:
+    def evaluate(self, simulation: Running, connector: object) -> float:
         """Return the limit of the next step; all processes call it together."""
         if self.joint is None:
             return self.force
@@ -477,5 +477,5 @@ def rubs(law: object) -> bool:
     return isinstance(law, Coulomb) or (isinstance(law, ConnectorLaw) and law.holds)
 
 
-HELD = PrescribedMotion(Constant(0.0))
+RIGID = PrescribedMotion(Constant(0.0))
 """Law of the connectors of a joint."""

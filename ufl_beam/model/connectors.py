@@ -12,7 +12,16 @@ from functools import cached_property
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
-from ufl_beam.model.bodies import Anchor, Node, NodeDof, Place, arm, merged, node, require_anchors
+from ufl_beam.model.bodies import (
+    AttachmentPoint,
+    Node,
+    NodeDof,
+    Place,
+    arm,
+    merged,
+    node,
+    require_anchors,
+)
 from ufl_beam.model.checks import require_kind, require_vector
 from ufl_beam.model.connector_law import ConnectorLaw, require_connector_law
 from ufl_beam.model.connector_laws import HingeLaw, Law, RigidPlastic
@@ -50,8 +59,8 @@ class Connector(ABC):
     """
 
     motion: str
-    a: Anchor
-    b: Anchor
+    a: AttachmentPoint
+    b: AttachmentPoint
     law: Law
     axis: Point = (1.0, 0.0)
     corner: Point | None = None
@@ -92,7 +101,7 @@ class Connector(ABC):
         return bx - ax, by - ay
 
     @property
-    def turns(self) -> bool:
+    def is_rotation(self) -> bool:
         """True if the motion is a rotation: rad and N m instead of m and N."""
         return self.motion == "turning"
 
@@ -108,7 +117,7 @@ class Connector(ABC):
 
     def rigidly(self) -> tuple[Factors, Factors]:
         """Return the derivatives of the motion by (u, v, ψ) of nodes a and b, undeformed."""
-        if self.turns:
+        if self.is_rotation:
             return (0.0, 0.0, -1.0), (0.0, 0.0, 1.0)
         (dx, dy), length = self.apart, math.hypot(*self.apart)
         x, y = (dx / length, dy / length) if self.stretches else self.axis
@@ -129,8 +138,8 @@ class Turn(Connector):
         True
     """
 
-    a: Anchor
-    b: Anchor
+    a: AttachmentPoint
+    b: AttachmentPoint
     law: Law
     motion = "turning"
 
@@ -147,8 +156,8 @@ class Stretch(Connector):
         >>> stayed = ub.Scene([beam], supports=scene.supports, connectors=[rod])
     """
 
-    a: Anchor
-    b: Anchor
+    a: AttachmentPoint
+    b: AttachmentPoint
     law: Law
     motion = "stretching"
 
@@ -175,8 +184,8 @@ class Slide(Connector):
         >>> propped = ub.Scene([beam], supports=scene.supports, connectors=[spring])
     """
 
-    a: Anchor
-    b: Anchor
+    a: AttachmentPoint
+    b: AttachmentPoint
     law: Law
     _: KW_ONLY
     axis: Point = None  # type: ignore[assignment]  # a unit vector follows
@@ -213,8 +222,8 @@ class Bushing(Connector):
         0.001
     """
 
-    a: Anchor
-    b: Anchor
+    a: AttachmentPoint
+    b: AttachmentPoint
     law: ConnectorLaw
     _: KW_ONLY
     axis: Point = (1.0, 0.0)
@@ -248,8 +257,8 @@ class Component(Connector):
 
     owner: str
     motion: str
-    a: Anchor
-    b: Anchor
+    a: AttachmentPoint
+    b: AttachmentPoint
     law: Law
     axis: Point = (1.0, 0.0)
     corner: Point | None = None
@@ -265,7 +274,7 @@ UNIT = 4 * sys.float_info.epsilon
 """Round-off of the length of a unit vector."""
 
 
-def unit_axis(a: Anchor, b: Anchor, axis: Point | None, kind: str) -> Point:
+def unit_axis(a: AttachmentPoint, b: AttachmentPoint, axis: Point | None, kind: str) -> Point:
     """Return the unit vector along an axis, by default from ``a`` to ``b``."""
     require_anchors(kind, a, b)
     (ax, ay), (bx, by) = a.point, b.point
@@ -296,8 +305,8 @@ def require_apart(connector: Connector) -> None:
 def plastic_hinges(
     may_have: Mapping[Place, HingeLaw],  # laws of the hinges that the beams may have
     rigid: Iterable[Sequence[NodeDof]],  # groups of rotations that joints make equal
-    bearing: Iterable[Anchor],  # where supports, connectors or masses bear a moment
-    loaded: Iterable[Anchor],  # where loads are moments
+    bearing: Iterable[AttachmentPoint],  # where supports, connectors or masses bear a moment
+    loaded: Iterable[AttachmentPoint],  # where loads are moments
 ) -> tuple[Connector, ...]:
     """Return plastic hinges of zero length as connectors; their motions are jumps of rotation.
 

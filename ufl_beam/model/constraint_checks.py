@@ -14,7 +14,7 @@ from scipy.sparse.linalg import eigsh
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError
-from ufl_beam.model.bodies import GROUND, Anchor, Body, Member, Node, NodeDof, node
+from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body, Member, Node, NodeDof, node
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
     HOLDING,
@@ -90,9 +90,9 @@ def require_inertia(scene: Scene) -> None:
         return
     mode = np.zeros(rows.shape[1])
     mode[loose] = free[:, 0]
-    parts = "; ".join(_moving(scene, mode)[:4])
+    moving = "; ".join(_moving(scene, mode)[:4])
     raise ModelError(
-        f"dynamics needs mass or something that holds: {parts}, without mass (rhoA or mass = "
+        f"dynamics needs mass or something that holds: {moving}, without mass (rhoA or mass = "
         "0), and nothing determines this motion. Give it mass (a section rho or rhoA), or hold or "
         "join it"
     )
@@ -188,7 +188,7 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
         for dof in moved[-1]:
             users[dof].add(number)
     left = set(range(len(rows)))
-    alone = [dof for dof, numbers in users.items() if len(numbers) == 1]
+    alone = [dof for dof, indices in users.items() if len(indices) == 1]
     while alone:
         for number in users[alone.pop()] & left:
             left.discard(number)
@@ -198,15 +198,15 @@ def _dependences(scene: Scene, friction: bool = False) -> tuple[list[tuple[objec
                     alone.append(dof)
     if not left:
         return [], np.zeros((0, 0))
-    numbers = sorted(left)
+    indices = sorted(left)
     columns: dict[NodeDof, int] = {}
     terms = [
         (columns.setdefault(dof, len(columns)), column, factor)
-        for column, number in enumerate(numbers)
+        for column, number in enumerate(indices)
         for dof, factor in moved[number].items()
     ]
-    gradients = _sparse(terms, (max(len(columns), 1), len(numbers)))
-    return [rows[number] for number in numbers], _null_space(gradients)
+    gradients = _sparse(terms, (max(len(columns), 1), len(indices)))
+    return [rows[number] for number in indices], _null_space(gradients)
 
 
 def require_no_mechanism(scene: Scene) -> str:
@@ -246,7 +246,7 @@ def _rows(
 ) -> Iterator[tuple[object, Row]]:
     """Iterate over the constraints of supports and of connectors that ``acts`` selects."""
     for connector in filter(acts, scene.all_connectors):
-        unit = np.array([1.0, 1.0, 1.0 if connector.turns else 1 / scene.size])
+        unit = np.array([1.0, 1.0, 1.0 if connector.is_rotation else 1 / scene.size])
         ends = zip((connector.a, connector.b), connector.rigidly(), strict=True)
         yield connector, [(node(end), np.multiply(factors, unit)) for end, factors in ends]
     for support in supports:
@@ -258,7 +258,7 @@ def _rows(
 def _constraints(
     scene: Scene,
     acts: Callable[[Connector], bool] = lambda connector: resists(connector.law),
-    also: Iterable[tuple[Anchor, int]] = (),
+    also: Iterable[tuple[AttachmentPoint, int]] = (),
 ) -> csr_array:
     """Assemble constraints on the rigid motions (u, v, size ψ) of all parts; (n, 3 parts).
 
@@ -276,7 +276,9 @@ def _constraints(
     worked = (beam.start for work in scene.works for beam in work.on(scene.beams))
     also = (*also, *((place, component) for place in worked for component in range(3)))
     rows += ([(node(place), unit[component])] for place, component in also)
-    parts: dict[object, int] = {member: i for i, member in enumerate((*scene.beams, *scene.bodies))}
+    moving: dict[object, int] = {
+        member: i for i, member in enumerate((*scene.beams, *scene.bodies))
+    }
     terms: list[tuple[int, int, float]] = []
     for i, row in enumerate(rows):
         for moved, factors in row:
@@ -287,8 +289,8 @@ def _constraints(
                 cx, cy = _center(member)
                 x, y = (px - cx) / scene.size, (py - cy) / scene.size
                 gradient = factors @ np.array([[1.0, 0.0, -y], [0.0, 1.0, x], [0.0, 0.0, 1.0]])
-                terms += ((i, 3 * parts[member] + k, gradient[k]) for k in range(3))
-    return _sparse(terms, (max(len(rows), 1), 3 * len(parts)))
+                terms += ((i, 3 * moving[member] + k, gradient[k]) for k in range(3))
+    return _sparse(terms, (max(len(rows), 1), 3 * len(moving)))
 
 
 def _sparse(terms: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
@@ -311,11 +313,11 @@ def _null_space(constraints: csr_array) -> Array:
 
 def _moving(scene: Scene, mode: Array) -> list[str]:
     """Describe the motions of beams and bodies in a mode."""
-    parts: list[tuple[str, Member | Body]] = [(f"beam {i}", b) for i, b in enumerate(scene.beams)]
-    parts += [(f"body {i}", body) for i, body in enumerate(scene.bodies)]
+    moving: list[tuple[str, Member | Body]] = [(f"beam {i}", b) for i, b in enumerate(scene.beams)]
+    moving += [(f"body {i}", body) for i, body in enumerate(scene.bodies)]
     texts = []
     motions = (mode / np.abs(mode).max()).reshape(-1, 3)
-    for (kind, member), (u, v, ψ) in zip(parts, motions, strict=True):
+    for (kind, member), (u, v, ψ) in zip(moving, motions, strict=True):
         if abs(ψ) >= 1e-6:
             cx, cy = _center(member)
             center = (cx - v / ψ * scene.size, cy + u / ψ * scene.size)
@@ -337,26 +339,29 @@ def require_no_prestress(scene: Scene, what: str, instead: str) -> None:
             connector,
             spring.law,
             np.array([spring.stiffness]),
-            np.array([1.0 if connector.turns else size]),
+            np.array([1.0 if connector.is_rotation else size]),
         )
         for connector in scene.connectors
         if isinstance(spring := connector.law, Spring) and spring.law is not None
     ]
     for beam in scene.beams:
-        if (layout := beam.section.layout(None)) is not None:
-            first = np.cumsum([0, *(n for _, n in layout.laws)])
+        if (section_points := beam.section.section_points(None)) is not None:
+            first = np.cumsum([0, *(n for _, n in section_points.laws)])
             stiffness, points = (
-                np.reshape(x, (len(layout.weights), -1))
-                for x in (layout.stiffness, np.abs(layout.strains) @ [1.0, 1.0, 1.0 / size])
+                np.reshape(x, (len(section_points.weights), -1))
+                for x in (
+                    section_points.stiffness,
+                    np.abs(section_points.strains) @ [1.0, 1.0, 1.0 / size],
+                )
             )
             laws += [
                 (beam.name, law, stiffness[k], points[k])
-                for (law, _), k in zip(layout.laws, first[:-1], strict=True)
+                for (law, _), k in zip(section_points.laws, first[:-1], strict=True)
             ]
     for connector in scene.all_connectors:
         if isinstance(connector.law, ConnectorLaw):
             rest, i = [np.zeros(1)] * connector.law.components, connector.component
-            moved = LAST_DIGITS * (1.0 if connector.turns else size)
+            moved = LAST_DIGITS * (1.0 if connector.is_rotation else size)
             ends = (rest, [*rest[:i], rest[i] + moved, *rest[i + 1 :]])
             state = initial_state(connector.law)
             at_rest, strained = (connector.law.elastic_forces(e, state)[i][0] for e in ends)

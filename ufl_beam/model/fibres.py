@@ -35,7 +35,7 @@ class Kind(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
+class SectionPoints:
     """Material points of a cross-section, with their strains, weights and laws.
 
     The resultants of the section are the sums of weight times stress times ``strains``.
@@ -165,10 +165,10 @@ class PlacedFibres:
         """Bending stiffness; N m²."""
         return float(self.E * self.A @ self.y**2)
 
-    def layout(self, GA: float) -> Layout:
+    def section_points(self, GA: float) -> SectionPoints:
         """Return the layout with one material point for each fibre; shear stays elastic."""
         n, softening = len(self.y), self.fibres.softening
-        return Layout(
+        return SectionPoints(
             strains=np.column_stack([np.ones(n), np.zeros(n), -self.y]),
             weights=self.A,
             stiffness=np.full(n, self.E),

@@ -261,9 +261,9 @@ class Table:
 
     def __post_init__(self) -> None:
         for name in ("times", "values"):
-            numbers = require_sequence(getattr(self, name), f"Table: {name}")
-            object.__setattr__(self, name, numbers)
-            for i, number in enumerate(numbers):
+            checked = require_sequence(getattr(self, name), f"Table: {name}")
+            object.__setattr__(self, name, checked)
+            for i, number in enumerate(checked):
                 require_number(number, f"Table: {name}[{i}]")
         if len(self.times) != len(self.values) or len(self.times) < 1:
             raise ModelError(

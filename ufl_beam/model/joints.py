@@ -11,7 +11,7 @@ from functools import cached_property
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
 from ufl_beam.model.bodies import (
-    Anchor,
+    AttachmentPoint,
     NodeDof,
     Place,
     Spot,
@@ -21,7 +21,7 @@ from ufl_beam.model.bodies import (
     require_anchors,
 )
 from ufl_beam.model.checks import require_kind, require_switch, require_text
-from ufl_beam.model.connector_laws import HELD, Bearing, Guide
+from ufl_beam.model.connector_laws import RIGID, Bearing, Guide
 from ufl_beam.model.connectors import Component, Connector, require_apart, unit_axis
 from ufl_beam.model.functions import Curve, Point, curve_point
 
@@ -48,7 +48,7 @@ class Joint(Bearing, ABC):
         4621.0
     """
 
-    places: tuple[Anchor, ...]
+    places: tuple[AttachmentPoint, ...]
     shared: tuple[int, ...] = ()
     holders: tuple[Connector, ...] = ()
     meets: bool = False
@@ -67,7 +67,7 @@ class Joint(Bearing, ABC):
     def _hold(self, motion: str, axis: Point, corner: Point | None = None) -> Connector:
         """Return a connector that holds a relative motion of the first two places."""
         a, b = self.places[:2]
-        return Component(type(self).__name__, motion, a, b, HELD, axis, corner)
+        return Component(type(self).__name__, motion, a, b, RIGID, axis, corner)
 
 
 class _AtPoint(Joint):
@@ -82,7 +82,7 @@ class _AtPoint(Joint):
 
     multipliers: bool
 
-    def __init__(self, *places: Anchor, multipliers: bool = False) -> None:
+    def __init__(self, *places: AttachmentPoint, multipliers: bool = False) -> None:
         kind = type(self).__name__
         if len(places) < 2:
             raise ModelError(f"{kind}: a joint needs at least two places")
@@ -112,7 +112,7 @@ def _constraints_at_point(
         motions.append(("turning", (1.0, 0.0)))
     kind = type(joint).__name__
     return tuple(
-        Component(kind, motion, base, second, HELD, axis)
+        Component(kind, motion, base, second, RIGID, axis)
         for second in others
         for motion, axis in motions
     )
@@ -134,7 +134,7 @@ class Rigid(_AtPoint):
         ... )
     """
 
-    places: tuple[Anchor, ...]
+    places: tuple[AttachmentPoint, ...]
     multipliers: bool
     joined = (0, 1, 2)
 
@@ -152,7 +152,7 @@ class Revolute(_AtPoint):
         ... )
     """
 
-    places: tuple[Anchor, ...]
+    places: tuple[AttachmentPoint, ...]
     multipliers: bool
 
 
@@ -176,8 +176,8 @@ class Prismatic(Joint):
         Prismatic(beam.end (2, 0), slider (2, 0))
     """
 
-    rail: Anchor
-    slider: Anchor
+    rail: AttachmentPoint
+    slider: AttachmentPoint
     _: KW_ONLY
     axis: Point | None = None
     turning: bool = False
@@ -188,7 +188,7 @@ class Prismatic(Joint):
         object.__setattr__(self, "axis", axis)
 
     @property
-    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
         """The rail, then the slider."""
         return self.rail, self.slider
 
@@ -219,8 +219,8 @@ class RigidLink(Joint):
         ... )
     """
 
-    a: Anchor
-    b: Anchor
+    a: AttachmentPoint
+    b: AttachmentPoint
     shared = (2,)
 
     def __post_init__(self) -> None:
@@ -229,7 +229,7 @@ class RigidLink(Joint):
             raise ModelError(f"{self}: zero length; join them with Rigid")
 
     @property
-    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
         """Both ends of it."""
         return self.a, self.b
 
@@ -259,15 +259,15 @@ class Link(Joint):
         1540.0
     """
 
-    a: Anchor
-    b: Anchor
+    a: AttachmentPoint
+    b: AttachmentPoint
 
     def __post_init__(self) -> None:
         require_anchors("Link", self.a, self.b)
         require_apart(self.holders[0])
 
     @property
-    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
         """Both ends of it."""
         return self.a, self.b
 
@@ -297,7 +297,7 @@ class Guided(Joint):
         ... )
     """
 
-    place: Anchor
+    place: AttachmentPoint
     curve: Curve
     meets = True
     advice = "curve(0) must be at the place"
@@ -309,7 +309,7 @@ class Guided(Joint):
         _ = self.holders  # checks the curve
 
     @cached_property
-    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
         """The start of the curve, and the place."""
         return self._start, self.place
 
@@ -355,7 +355,7 @@ class Release(Joint):
     """
 
     a: Place
-    b: Anchor
+    b: AttachmentPoint
     _: KW_ONLY
     free: str
     multipliers: bool = False
@@ -370,7 +370,7 @@ class Release(Joint):
             raise ModelError(f"{self}: free = {self.free!r} must be letters of 'NVM'")
 
     @property
-    def places(self) -> tuple[Anchor, ...]:  # type: ignore[override]
+    def places(self) -> tuple[AttachmentPoint, ...]:  # type: ignore[override]
         """Both places of the joint."""
         return self.a, self.b
 

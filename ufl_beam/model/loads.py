@@ -7,7 +7,7 @@ from abc import ABC
 from dataclasses import KW_ONLY, dataclass
 
 from ufl_beam.errors import ModelError, closed
-from ufl_beam.model.bodies import Anchor, Beams, Member, carries, require_anchors
+from ufl_beam.model.bodies import AttachmentPoint, Beams, Member, carries, require_anchors
 from ufl_beam.model.checks import require_kind
 from ufl_beam.model.functions import Timed, TimeFunction, steady
 from ufl_beam.model.records import NotNegative, Number, Positive, Record, Vector
@@ -17,7 +17,7 @@ from ufl_beam.model.records import NotNegative, Number, Positive, Record, Vector
 class LoadAtPlace(Record, ABC):
     """Base of the loads that act at one place."""
 
-    place: Anchor
+    place: AttachmentPoint
     force: Vector = (0.0, 0.0)
     moment: Number = 0.0
     amplitude: Timed = steady

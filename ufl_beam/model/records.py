@@ -65,12 +65,12 @@ class Record:
             if value is not default:
                 owner = type(self).__name__ if name == "name" else self._label()
                 try:
-                    kept = check(value, what=f"{owner}: {word}")
+                    checked = check(value, what=f"{owner}: {word}")
                 except ArgumentError as error:
                     if isinstance(error, self._refused):
                         raise
                     raise self._refused(str(error)) from None
-                object.__setattr__(self, name, value if kept is None else kept)
+                object.__setattr__(self, name, value if checked is None else checked)
 
     def _label(self) -> str:
         """Return the name of the record in messages."""

@@ -11,13 +11,13 @@ from typing import Annotated, Any
 
 import numpy as np
 
+from ufl_beam.caches import no_garbage_collection
 from ufl_beam.display import Rich, counted
 from ufl_beam.errors import ModelError, clip
-from ufl_beam.memory import no_garbage_collection
 from ufl_beam.model.beams import Beam
 from ufl_beam.model.bodies import (
     GROUND,
-    Anchor,
+    AttachmentPoint,
     Body,
     Member,
     NodeDof,
@@ -225,7 +225,7 @@ class Scene(Record, Rich):
         for work in self.works:
             yield from ((work, number) for number in work.numbers.values() if callable(number))
 
-    def attachments(self) -> Iterator[tuple[object, Anchor]]:
+    def attachments(self) -> Iterator[tuple[object, AttachmentPoint]]:
         """Iterate over pairs of a record (or a word for it) and a place that it refers to."""
         yield from ((joint, place) for joint in self.joints for place in joint.places)
         yield from (
@@ -302,7 +302,7 @@ class Scene(Record, Rich):
             why = "is not in the scene; add it to joints or supports"
         elif isinstance(pressing, Support) and not pressing.held.keys() & {0, 1}:
             why = "holds no displacement and bears no force; name another support or joint"
-        elif isinstance(pressing, Joint) and all(holder.turns for holder in pressing.holders):
+        elif isinstance(pressing, Joint) and all(holder.is_rotation for holder in pressing.holders):
             why = "shares unknowns, so that its force is not known; make it with multipliers=True"
         else:
             return
@@ -313,7 +313,7 @@ class Scene(Record, Rich):
         """Groups of degrees of freedom that joints make equal."""
         return [joint.equal(component) for joint in self.joints for component in joint.shared]
 
-    def release(self) -> None:
+    def free_caches(self) -> None:
         """Free the memory of properties that only numbering uses; they are computed again."""
         for name in ("attached", "representatives"):
             vars(self).pop(name, None)

@@ -16,7 +16,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError
 from ufl_beam.model.checks import require_array, require_kind, require_number
-from ufl_beam.model.fibres import Fibres, Layout, PlacedFibres
+from ufl_beam.model.fibres import Fibres, PlacedFibres, SectionPoints
 from ufl_beam.model.material_law import MaterialLaw, require_bulk_law, require_interaction
 from ufl_beam.model.material_laws import ElastoPlastic
 from ufl_beam.model.records import Instance, NotNegative, Positive, Record
@@ -92,18 +92,18 @@ class Section(Record):
             raise ModelError(
                 f"Section: {law} beside interaction, the law of N and M; give one of both"
             )
-        self.layout(self.hinge)  # refuses laws that do not go together
+        self.section_points(self.hinge)  # refuses laws that do not go together
 
-    def layout(self, hinge: SofteningLaw | None) -> Layout | None:
+    def section_points(self, hinge: SofteningLaw | None) -> SectionPoints | None:
         """Return the material points of a cell with this hinge law; None if it is elastic."""
         if self.fibres is not None:
-            return self.fibres.layout(self.GA)
+            return self.fibres.section_points(self.GA)
         stiffness = np.array([self.EA, self.GA, self.EI])
         if self.interaction is not None:
             together = np.array([name in self.interaction.resultants for name in "NVM"])
             if hinge is not None and hinge.opens:
                 raise ModelError("Section: a hinge in a cell whose N and M interact; leave one out")
-            return Layout(
+            return SectionPoints(
                 strains=np.eye(3)[together],
                 weights=np.ones(1),
                 stiffness=stiffness[together],
@@ -120,7 +120,7 @@ class Section(Record):
         inelastic = np.array([law is not None for law in laws])
         if not inelastic.any():
             return None
-        return Layout(
+        return SectionPoints(
             strains=np.eye(3)[inelastic],
             weights=np.ones(inelastic.sum()),
             stiffness=stiffness[inelastic],
@@ -288,6 +288,6 @@ def _below_in_circle(y: Array, d: float) -> Array:
     return np.array([area, -2 / 3 * half_chord**3])
 
 
-def _require_positive(owner: str, **numbers: float) -> None:
-    for name, value in numbers.items():
+def _require_positive(owner: str, **sizes: float) -> None:
+    for name, value in sizes.items():
         require_number(value, f"{owner}: {name}", positive=True)

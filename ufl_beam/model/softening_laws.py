@@ -173,7 +173,7 @@ class Softening(_LimitAndEnergy):
 
     Example:
         >>> law = ub.Softening(limit=5e4, fracture_energy=1e3)  # N m, J
-        >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after openings in rad; N m
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])).round())  # after jumps in rad; N m
         [50000. 18394.  6767.]
     """
 
@@ -195,7 +195,7 @@ class LinearSoftening(_LimitAndEnergy):
 
     Example:
         >>> law = ub.LinearSoftening(limit=5e4, fracture_energy=1e3)  # N m, J
-        >>> print(law.traction(np.array([0.0, 0.02, 0.04])))  # after openings in rad; N m
+        >>> print(law.traction(np.array([0.0, 0.02, 0.04])))  # after jumps in rad; N m
         [50000. 25000.     0.]
     """
 
@@ -296,35 +296,35 @@ def course(law: SofteningLaw) -> Course:
     return Course(limit, energy, float(tractions.max()), steepest)
 
 
-def _require_no_drive(kind: str, openings: Array, t: Array) -> None:
+def _require_no_drive(kind: str, jumps: Array, t: Array) -> None:
     """Raise :class:`ModelError` where a traction is negative."""
     if (negative := t < 0).any():
         raise ModelError(
             f"{kind}: its traction is {t[negative][0]:.6g} at the opening "
-            f"{openings[negative][0]:.6g}, and a hinge would drive its opening; let it end at "
+            f"{jumps[negative][0]:.6g}, and a hinge would drive its opening; let it end at "
             "zero, such as by ub.law_functions.positive"
         )
 
 
-def _called(law: SofteningLaw, method: str, openings: Array) -> Array:
+def _called(law: SofteningLaw, method: str, jumps: Array) -> Array:
     """Call a method of a law with openings; raise :class:`ModelError` unless it returns numbers."""
     what = f"{type(law).__name__}.{method}"
     try:
         with np.errstate(all="ignore"):
-            values = getattr(law, method)(openings) + 0 * openings
+            values = getattr(law, method)(jumps) + 0 * jumps
     except Exception as error:
         raise ModelError(
             f"{what} fails: {error}{raised_at(error)}. It is called with arrays of openings, real "
             "or complex, and written with + - * / ** and the functions of ub.law_functions"
         ) from error
-    if np.shape(values) != openings.shape:
+    if np.shape(values) != jumps.shape:
         raise ModelError(
-            f"{what} returns for {len(openings)} openings an array of shape {np.shape(values)}; it "
+            f"{what} returns for {len(jumps)} openings an array of shape {np.shape(values)}; it "
             "must return one number for each"
         )
     if (bad := ~np.isfinite(values)).any():
         raise ModelError(
-            f"{what} is {values[bad][0]} at the opening {openings[bad][0]:.6g}; it must be a "
+            f"{what} is {values[bad][0]} at the opening {jumps[bad][0]:.6g}; it must be a "
             "number at all openings from zero on"
         )
     return np.asarray(values)

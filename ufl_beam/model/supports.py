@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from ufl_beam.display import bracketed
 from ufl_beam.errors import ModelError
-from ufl_beam.model.bodies import Anchor, require_node
+from ufl_beam.model.bodies import AttachmentPoint, require_node
 from ufl_beam.model.checks import require_number, require_vector
 from ufl_beam.model.connector_laws import Bearing
 from ufl_beam.model.functions import Constant, Point, TimeFunction, require_time_function
@@ -42,7 +42,7 @@ class Support(Bearing, ABC):
         100000.0
     """
 
-    place: Anchor
+    place: AttachmentPoint
     angle: float = 0.0
 
     __repr__ = bracketed
@@ -78,7 +78,7 @@ class Clamped(Support):
         [0, 1, 2]
     """
 
-    place: Anchor
+    place: AttachmentPoint
     held: ClassVar = {0: still, 1: still, 2: still}
 
 
@@ -92,7 +92,7 @@ class Pinned(Support):
         [0, 1]
     """
 
-    place: Anchor
+    place: AttachmentPoint
     held: ClassVar = {0: still, 1: still}
 
 
@@ -111,7 +111,7 @@ class Roller(Support):
         True
     """
 
-    place: Anchor
+    place: AttachmentPoint
     _: KW_ONLY
     along: Point = (1.0, 0.0)
 
@@ -149,7 +149,7 @@ class PrescribedDisplacement(Support):
         True
     """
 
-    place: Anchor
+    place: AttachmentPoint
     _: KW_ONLY
     u: Motion | None = None
     v: Motion | None = None

@@ -60,7 +60,7 @@ class Work(Record):
             else:
                 require_number(value, what)
         require_function(self.density, f"{self}: density", ", ".join(self.arguments))
-        asked = self.asked
+        asked = self.used_arguments
         for name in self.numbers:
             if name not in asked:
                 raise ModelError(f"{self}: numbers[{name!r}] is no parameter of the function")
@@ -71,7 +71,7 @@ class Work(Record):
     _label = __str__
 
     @property
-    def asked(self) -> tuple[str, ...]:
+    def used_arguments(self) -> tuple[str, ...]:
         """Names of the parameters of the function, all of them known."""
         known = (*self.arguments, *self.numbers)
         asked = parameters_by_name(
@@ -87,7 +87,7 @@ class Work(Record):
     @property
     def takes_rates(self) -> bool:
         """True if the function takes ``v`` or ``dt``, which only a time step defines."""
-        return not {"v", "dt"}.isdisjoint(self.asked)
+        return not {"v", "dt"}.isdisjoint(self.used_arguments)
 
     @property
     def in_time(self) -> str:

@@ -111,8 +111,8 @@ class DolfinxView:
             2.0
         """
         beams = self._view.subdomain.numbering.beam_of_cell[self.cells]
-        numbers = np.arange(len(beams), dtype=np.int32)
-        return meshes.meshtags(self.mesh, 1, numbers, beams.astype(np.int32))
+        tags = np.arange(len(beams), dtype=np.int32)
+        return meshes.meshtags(self.mesh, 1, tags, beams.astype(np.int32))
 
     @property
     def function_space(self) -> fem.FunctionSpace:
@@ -172,7 +172,9 @@ class DolfinxView:
             >>> bool(view.stiffness.x.array[2] == section.EI)
             True
         """
-        return self._function("stiffness", self._fields.of_sections(self._fields.element.stiffness))
+        return self._function(
+            "stiffness", self._fields.section_values(self._fields.element.stiffness)
+        )
 
     @property
     def configuration(self) -> fem.Function:
@@ -292,7 +294,7 @@ class DolfinxView:
         if self._view.inelastic:
             points = inelastic_forms(element, scheme)
             work, self._around = work + points.around, (points.b, points.D)
-            cells = np.concatenate([beams.kept()[0] for beams in self._view.inelastic])
+            cells = np.concatenate([beams.recorded()[0] for beams in self._view.inelastic])
             dofs = dofs_of_cells(element.stiffness.function_space)
             element.stiffness.x.array[dofs[np.isin(self.cells, cells)]] = 0.0
         q0, q1 = element.q0, element.q1

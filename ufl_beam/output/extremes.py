@@ -12,7 +12,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.compiled.c_library import doubles, lib, struct
 from ufl_beam.compiled.simd_kernels import in_batches
-from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Element, Fields
 from ufl_beam.display import in_one_line
@@ -38,7 +38,7 @@ class AlongCells(NamedTuple):
 
     Attributes:
         motions: The last degrees of freedom of a cell: all, or rotations.
-        numbers: Forces of the cells, the first components of ``cell_number`` of loops.h.
+        resultants: Forces of the cells, the first components of ``cell_number`` of loops.h.
         angles: :attr:`ForcesAlongCells.angles`.
         first: Number of components of ``numbers``.
         moves: Number of degrees of freedom in ``motions``.
@@ -46,20 +46,22 @@ class AlongCells(NamedTuple):
 
     form: ufl.Form
     motions: fem.Function
-    numbers: fem.Function
+    resultants: fem.Function
     angles: fem.Function
     first: int
     moves: int
 
 
-@stated
-def along_cells(element: Element, parts: tuple[float, ...], works: bool) -> AlongCells:
+@cached_forms
+def along_cells(element: Element, fractions: tuple[float, ...], works: bool) -> AlongCells:
     """State :func:`section_force` as a form; its entries are (N, V, M)."""
-    mesh, h, between = Mesh(degree=element.degree), element.axis.h, set(parts) > {0.0, 1.0}
+    mesh, h, between = Mesh(degree=element.degree), element.axis.h, set(fractions) > {0.0, 1.0}
     n = len(mesh.nodes)
     first, moves = (lib.CELL_NUMBERS, 3 * n) if between else (lib.COUPLE, n)
     # All are constant in cells: interpolation in a cell would take longer than the evaluation.
-    motions, numbers, angles, values = map(element.in_cells, (moves, first, 2, 3 * len(parts)))
+    motions, resultants, angles, values = map(
+        element.in_cells, (moves, first, 2, 3 * len(fractions))
+    )
     order = [0, *range(2, n), 1]  # of the nodes along a cell
     *displacements, rotations = ([motions[k + i] for i in order] for k in range(0, moves, n))
 
@@ -73,17 +75,17 @@ def along_cells(element: Element, parts: tuple[float, ...], works: bool) -> Alon
         u, v = (weighted(mesh.slopes(fraction), nodes) for nodes in displacements)
         return x + u, y + v
 
-    known = [numbers[k] for k in range(first)] + [0.0] * (lib.CELL_NUMBERS - first)
+    known = [resultants[k] for k in range(first)] + [0.0] * (lib.CELL_NUMBERS - first)
     at, at_end = section_force(known, tangent, works=works), known[lib.END_X : lib.END_M + 1]
     rows = list[Expr]()
-    for fraction in parts:
+    for fraction in fractions:
         rotation = weighted(mesh.weights(fraction), rotations)
         angle = (1 - fraction) * angles[0] + fraction * angles[1] + rotation
         plane = at(fraction) if fraction < 1 else tuple(at_end)
         rows += in_section(plane, ufl.cos(angle), ufl.sin(angle))
     test = ufl.TestFunction(values.function_space)
     form = ufl.dot(ufl.as_vector(rows), test) / h * element.dx(1)
-    return AlongCells(form, motions, numbers, angles, first, moves)
+    return AlongCells(form, motions, resultants, angles, first, moves)
 
 
 class ExtremesInC:
@@ -96,13 +98,13 @@ class ExtremesInC:
 
     def __init__(
         self, fields: Fields, cell_forces: CellForces, along: ForcesAlongCells, between: float,
-        parts: Array,
+        fractions: Array,
     ) -> None:  # fmt: skip
         size, works = fields.subdomain.size, bool(fields.subdomain.numbering.scene.works)
-        form = along_cells(fields.element, tuple(map(float, parts)), works)
+        form = along_cells(fields.element, tuple(map(float, fractions)), works)
         self._kernel = fields.kernel(form.form, form.motions, fields.cell_dofs[:, -form.moves :])
         _, self._batch, spare = self._kernel.keep_entries()
-        self._cells, self._points, self._forces = len(along.angles), len(parts), cell_forces
+        self._cells, self._points, self._forces = len(along.angles), len(fractions), cell_forces
         sizes = spare.size, size
         self._extents = [dict(zip(EXTENT, np.zeros((4, n)), strict=True)) for n in sizes]
         cell_forces.keep_latest()
@@ -110,7 +112,7 @@ class ExtremesInC:
             "watch", forces=cell_forces.c, along=self._kernel.cells, between=between,
             angles=in_batches(along.angles, self._batch), q=np.zeros(size), first=form.first,
             at_angles=self._kernel.position(form.angles),
-            at_numbers=self._kernel.position(form.numbers),
+            at_numbers=self._kernel.position(form.resultants),
             numbers=np.zeros(lib.CELL_NUMBERS * self._cells),
             some=np.zeros(lib.SOME * self._kernel.cells.width),
             in_order=cell_forces.in_order(self._batch),
@@ -121,23 +123,23 @@ class ExtremesInC:
             for name, values in extent.items():
                 setattr(c, name, doubles(values))
 
-    def add(self, parts: int, t: float, q: Array, before: Array) -> None:
-        """Include the state after ``parts`` steps, if C has not."""
-        if parts == self.seen:
+    def add(self, steps: int, t: float, q: Array, before: Array) -> None:
+        """Include the state after ``steps`` steps, if C has not."""
+        if steps == self.seen:
             return
-        numbers = self._forces(q, before)
-        previous, self._forces.c.given = self._forces.c.given, doubles(numbers)
+        resultants = self._forces(q, before)
+        previous, self._forces.c.given = self._forces.c.given, doubles(resultants)
         lib.watch_step(self.c, 0, t, doubles(before), doubles(q))
         self._forces.c.given = previous
-        self.seen = parts
+        self.seen = steps
 
-    def begin(self, parts: int, extents: Any) -> None:
-        """Begin with the extremes after ``parts`` steps, as :meth:`extents` returns them."""
+    def begin(self, steps: int, extents: Any) -> None:
+        """Begin with the extremes after ``steps`` steps, as :meth:`extents` returns them."""
         for to, extent in zip(self._extents, extents, strict=True):
             for name, values in zip(EXTENT, extent, strict=True):
                 batches = in_batches(values, self._batch) if values.ndim == 3 else values
                 to[name][:] = batches.ravel()
-        self.seen = parts
+        self.seen = steps
 
     def extents(self) -> list[list[Array]]:
         """Return extremes and times: of forces, (num_cells, points, 3), and motions, (size,)."""
@@ -291,7 +293,7 @@ class Extremes(Restartable):
         cells = self.numbering.cells_of(beam)
         return Extent(*(x.reshape(-1, 3) for x in self._extents[0].of(cells)))
 
-    def displacement(self, one: Member | Body) -> Extent:
+    def displacement(self, owner: Member | Body) -> Extent:
         """Return extremes of (u, v, ψ) at the nodes of a beam, or of a body; (n, 3); m, m, rad.
 
         Rows follow a beam from start to end: its vertices, between them the inner nodes of a mesh
@@ -300,6 +302,6 @@ class Extremes(Restartable):
         Raises:
             ArgumentError: The object is not in the scene, or nothing was run.
         """
-        if isinstance(one, Body):
-            return self._extents[1].of(self.numbering.node(one.middle).reshape(1, 3))
-        return self._extents[1].of(self.numbering.dofs[self.numbering.nodes_along(one)])
+        if isinstance(owner, Body):
+            return self._extents[1].of(self.numbering.node(owner.middle).reshape(1, 3))
+        return self._extents[1].of(self.numbering.dofs[self.numbering.nodes_along(owner)])

@@ -358,7 +358,7 @@ class Fatigue(Restartable):
 
     def begin(self, simulation: StateView, state: State | None = None) -> None:
         """Begin to count with the initial state, or continue from a :meth:`state`."""
-        at = [simulation.numbering.cell_and_part(spot.place) for spot in self.spots]
+        at = [simulation.numbering.cell_and_fraction(spot.place) for spot in self.spots]
         self._cells = np.array([cell for cell, _ in at], dtype=np.int64)
         self._fractions, self._column = np.unique([s for _, s in at], return_inverse=True)
         self._block: list[Array] = []

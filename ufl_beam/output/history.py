@@ -22,7 +22,7 @@ from ufl_beam.errors import (
     require_kind,
     require_sequence,
 )
-from ufl_beam.model.bodies import Anchor, Place, require_anchors
+from ufl_beam.model.bodies import AttachmentPoint, Place, require_anchors
 from ufl_beam.model.connector_laws import Coulomb, Stop
 from ufl_beam.model.connectors import Connector, law_of
 from ufl_beam.model.joints import Joint
@@ -69,7 +69,7 @@ class History(Restartable):
     def __init__(
         self,
         path: str | Path,
-        places: Sequence[Anchor] = (),
+        places: Sequence[AttachmentPoint] = (),
         connectors: Sequence[Connector | Joint] = (),
         *,
         every: int = 1,
@@ -99,8 +99,8 @@ class History(Restartable):
         }
         names = [f"{c} {place} [{unit}]" for place in self._places for c, unit in MOTION]
         for connector, name in self._followed.items():
-            turns = simulation.scene.all_connectors[connector].turns
-            units = ("rad", "N m", "J") if turns else ("m", "N", "J")
+            is_rotation = simulation.scene.all_connectors[connector].is_rotation
+            units = ("rad", "N m", "J") if is_rotation else ("m", "N", "J")
             names += [f"{c} {name} [{unit}]" for c, unit in zip(CONNECTOR, units, strict=True)]
         energies = [f"{name} [J]" for group in simulation.entries() for name in group]
         for twice in {*names} & {*energies}:
@@ -151,8 +151,8 @@ class History(Restartable):
         connectors = list(self._followed)
         connections = simulation.connections()[connectors, :3] if connectors else ()
         energies = [energy for group in simulation.entries() for energy in group.values()]
-        numbers = (simulation.t, *np.ravel(motion), *np.ravel(connections), *energies)
-        return _line([repr(float(x)) for x in numbers])
+        line = (simulation.t, *np.ravel(motion), *np.ravel(connections), *energies)
+        return _line([repr(float(x)) for x in line])
 
     def state(self) -> State:
         """Return the length of the file and its checksum, or its content if rows may be deleted."""
@@ -215,7 +215,7 @@ def _named_components(scene: Scene, followed: Connector | Joint) -> list[tuple[i
             for connector, name in zip(connectors, names, strict=False)
         ]
     holders = [scene.all_connectors[connector] for connector in connectors]
-    axes = ["psi" if c.turns else "xy"[abs(c.axis[1]) > abs(c.axis[0])] for c in holders]
+    axes = ["psi" if c.is_rotation else "xy"[abs(c.axis[1]) > abs(c.axis[0])] for c in holders]
     return [
         (connector, f"{holder}, {axis}" if len(connectors) > 1 else str(holder))
         for connector, holder, axis in zip(connectors, holders, axes, strict=True)
@@ -328,7 +328,9 @@ class Events(Restartable):
         forces = np.abs(simulation.connections()[self._followed, FORCE])
         # Forces above which they touch or slide; the limit of friction holds to some digits
         connectors = (simulation.scene.all_connectors[connector] for connector in self._followed)
-        limits = [(1 - 1e-9) * simulation.asked.get(connector, 0.0) for connector in connectors]
+        limits = [
+            (1 - 1e-9) * simulation.requested_forces.get(connector, 0.0) for connector in connectors
+        ]
         return in_cells, np.asarray(forces > limits)
 
     def write(self, simulation: StateView) -> None:

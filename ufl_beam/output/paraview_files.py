@@ -17,7 +17,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array, Index, State
 from ufl_beam.errors import ArgumentError, require_count
-from ufl_beam.model.bodies import Anchor, arm
+from ufl_beam.model.bodies import AttachmentPoint, arm
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Link, RigidLink
 from ufl_beam.model.scene import Scene, attachment_points
@@ -37,18 +37,18 @@ class Lines(NamedTuple):
 
     points: Array  # (n, 3); m
     cells: Index  # points at both ends of each line; (m, 2)
-    parts: Array  # kind of each line: 0 for beams, BODY or LINK; (m,)
+    kinds: Array  # kind of each line: 0 for beams, BODY or LINK; (m,)
 
 
-BODY, LINK = 1, 2
+BODY, RIGID_LINE = 1, 2
 """Numbers of lines of bodies and of links; lines of beams are 0."""
 
 
 class Rod(NamedTuple):
     """Straight line between two anchors, of a body or a connector."""
 
-    a: Anchor
-    b: Anchor
+    a: AttachmentPoint
+    b: AttachmentPoint
     group: int  # BODY or LINK
     along: Connector | None = None  # connector whose force acts along it
 
@@ -66,11 +66,11 @@ def scene_rods(scene: Scene) -> list[Rod]:
         if isinstance(joint, RigidLink | Link):
             a, b = joint.places
             pulls = next((c for c in joint.holders if c.stretches), None)
-            rods.append(Rod(a, b, LINK, pulls))
+            rods.append(Rod(a, b, RIGID_LINE, pulls))
     rods += [
-        Rod(c.a, c.b, LINK, c if c.stretches else None)
+        Rod(c.a, c.b, RIGID_LINE, c if c.stretches else None)
         for c in scene.connectors
-        if not c.turns and c.apart != (0.0, 0.0)
+        if not c.is_rotation and c.apart != (0.0, 0.0)
     ]
     return rods
 
@@ -165,7 +165,7 @@ class XdmfWriter:
     ) -> None:  # fmt: skip
         self._name, mesh = escape(beside(path, ".bin").name), bytearray()
         items = []
-        for values in (lines.cells.astype("<i8"), lines.points, lines.parts):
+        for values in (lines.cells.astype("<i8"), lines.points, lines.kinds):
             items.append(self._item(values, len(mesh)))
             mesh += values.tobytes()
         self._mesh = (  # text of each step; its numbers are written once
@@ -428,7 +428,7 @@ def _empty_file(lines: Lines, rows: dict[str, Array], fields: LineFields) -> byt
         root["Connectivity"] = lines.cells.ravel()
         root["Offsets"] = 2 * np.arange(len(lines.cells) + 1)
         root["Types"] = np.full(len(lines.cells), LINE, dtype=np.uint8)
-        root["CellData/part"] = lines.parts
+        root["CellData/part"] = lines.kinds
         steps = root.create_group("Steps")
         # HDF5 writes in the order of addresses: the number of steps comes before their times.
         steps.attrs["NSteps"] = np.int64(0)

@@ -20,7 +20,7 @@ from ufl_beam.compiled.c_library import lib
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.display import in_one_line
 from ufl_beam.errors import ArgumentError
-from ufl_beam.model.bodies import GROUND, Anchor, Spot, arm, node
+from ufl_beam.model.bodies import GROUND, AttachmentPoint, Spot, arm, node
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
@@ -75,7 +75,7 @@ def turned(x: tuple[float, float] | Array, angle: Array) -> Array:
     return np.column_stack([cos * a - sin * b, sin * a + cos * b])
 
 
-def values_at(numbering: DofNumbering, place: Anchor, states: Vectors) -> Array:
+def values_at(numbering: DofNumbering, place: AttachmentPoint, states: Vectors) -> Array:
     """Return values at the node that moves a place, or interpolated in its cell; (n, 3)."""
     if isinstance(place, Spot):
         if node(place) is GROUND:
@@ -88,7 +88,7 @@ def values_at(numbering: DofNumbering, place: Anchor, states: Vectors) -> Array:
 
 
 def velocity_at(
-    numbering: DofNumbering, place: Anchor, states: Vectors, velocities: Vectors
+    numbering: DofNumbering, place: AttachmentPoint, states: Vectors, velocities: Vectors
 ) -> Array:
     """Return the velocity of a place; (n, 3); m/s, m/s, rad/s."""
     motion = values_at(numbering, place, velocities)
@@ -152,19 +152,21 @@ Tangent = Callable[[Any], tuple[Any, Any]]
 
 
 def section_force(
-    numbers: Any, tangent: Tangent, *, works: bool
+    resultants: Any, tangent: Tangent, *, works: bool
 ) -> Callable[[Any], tuple[Any, Any, Any]]:
     """Return the force in the plane and the moment as a function of the fraction of a cell.
 
     The fraction is 0 at the start of the cell and 1 at its end.
 
     Args:
-        numbers: Forces of the cell, ``cell_number`` of loops.h: arrays, or expressions of UFL.
+        resultants: Forces of the cell, ``cell_number`` of loops.h: arrays, or expressions of UFL.
         tangent: Derivative of the position in the configuration of equilibrium.
         works: Whether forces across the cell may have any distribution, due to works of a user.
     """
-    start, end, skew = ((numbers[k], numbers[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X))
-    at_start, at_end, couple = (numbers[k] for k in (lib.START_M, lib.END_M, lib.COUPLE))
+    start, end, skew = (
+        (resultants[k], resultants[k + 1]) for k in (lib.START_X, lib.END_X, lib.SKEW_X)
+    )
+    at_start, at_end, couple = (resultants[k] for k in (lib.START_M, lib.END_M, lib.COUPLE))
 
     def force(s: Any) -> list[Any]:
         bend = -6 * s * (1 - s)
@@ -215,13 +217,15 @@ class ForcesAlongCells:
         angles = np.asarray(np.arctan2(y, x))
         self.angles = angles[:, None] + _axis_angles(numbering, angles)
 
-    def __call__(self, cells: Index | slice, parts: Array, numbers: Array, q: Array) -> Array:
+    def __call__(
+        self, cells: Index | slice, fractions: Array, resultants: Array, q: Array
+    ) -> Array:
         """Compute section forces at fractions of cells; N, N, N m.
 
         Args:
             cells: Numbers of the cells, or of one cell at many times.
-            parts: Fractions from 0 at the start to 1 at the end; (points,).
-            numbers: Forces of the cells, ``cell_number`` of loops.h; (9, num_cells).
+            fractions: Fractions from 0 at the start to 1 at the end; (points,).
+            resultants: Forces of the cells, ``cell_number`` of loops.h; (9, num_cells).
             q: Configurations (u, v, ψ) of the nodes at the time within the step at which its
                 forces are in equilibrium; (num_cells, 3, degree + 1).
 
@@ -236,9 +240,13 @@ class ForcesAlongCells:
             slopes = mesh.slopes(np.ravel(s)).T
             return x @ slopes, y @ slopes
 
-        angle = np.outer(start, 1 - parts) + np.outer(end, parts) + ψ @ mesh.weights(parts).T
-        at = section_force(numbers[:, :, None], tangent, works=self._works)
-        return np.stack(in_section(at(parts), np.cos(angle), np.sin(angle)), axis=2)
+        angle = (
+            np.outer(start, 1 - fractions)
+            + np.outer(end, fractions)
+            + ψ @ mesh.weights(fractions).T
+        )
+        at = section_force(resultants[:, :, None], tangent, works=self._works)
+        return np.stack(in_section(at(fractions), np.cos(angle), np.sin(angle)), axis=2)
 
 
 def _axis_angles(numbering: Any, angles: Array) -> Array:

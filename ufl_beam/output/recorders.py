@@ -19,7 +19,7 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Parameter
 from ufl_beam.errors import ArgumentError, require_sequence, shorten
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.records import unlike
@@ -52,8 +52,8 @@ class PresentState(ABC):
     def entries(self) -> tuple[dict[str, float], ...]:
         """Return the ledger over all processes: state, supplied, lost; J."""
         columns, row = self.now.row(0)
-        numbers: Any = row.tolist()
-        return tuple({name: numbers[at] for name, at in group.items()} for group in columns.ledger)
+        values: Any = row.tolist()
+        return tuple({name: values[at] for name, at in group.items()} for group in columns.ledger)
 
     def connections(self) -> Array:
         """Return columns of :class:`Connection` for all connectors of the scene; (num, columns)."""
@@ -67,11 +67,11 @@ class PresentState(ABC):
         """
         return connection(self.connections()[connector_indices(self.scene, connector)])
 
-    def displacement(self, place: Anchor) -> Array:
+    def displacement(self, place: AttachmentPoint) -> Array:
         """Return displacement and rotation (u, v, ψ) of a place now; (3,); m, m, rad."""
         return np.asarray(self.now.displacement(place)[0])
 
-    def velocity(self, place: Anchor) -> Array:
+    def velocity(self, place: AttachmentPoint) -> Array:
         """Return the velocity (du/dt, dv/dt, dψ/dt) of a place now; (3,); m/s, m/s, rad/s.
 
         Raises:
@@ -94,8 +94,8 @@ class PresentState(ABC):
             number = self.scene.supports.index(joint)
             return float(np.linalg.norm(self.now.column("reactions")[0, number, :2]))
         connectors = self.scene.all_connectors
-        numbers = [n for n in connector_indices(self.scene, joint) if not connectors[n].turns]
-        return float(np.linalg.norm(self.connections()[numbers, FORCE]))
+        values = [n for n in connector_indices(self.scene, joint) if not connectors[n].is_rotation]
+        return float(np.linalg.norm(self.connections()[values, FORCE]))
 
     def section_forces(self) -> Array:
         """Return (N, V, M) in the middle of all cells; (num_cells, 3); N, N, N m.
@@ -131,10 +131,10 @@ class StateView(PresentState):
         """Configuration at the beginning of the last step."""
 
     @property
-    def asked(self) -> dict[Connector, float]:
+    def requested_forces(self) -> dict[Connector, float]:
         """Forces of controllers, and limits of friction; N or N m."""
-        numbers: Any = self.controllers.values
-        return dict(zip(self.controllers.at, numbers.tolist(), strict=True))
+        values: Any = self.controllers.values
+        return dict(zip(self.controllers.at, values.tolist(), strict=True))
 
     @property
     def iterations(self) -> int:

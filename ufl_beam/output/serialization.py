@@ -25,7 +25,7 @@ from scipy.interpolate import KroghInterpolator
 
 from ufl_beam.errors import ArgumentError, ModelWarning
 from ufl_beam.model.bodies import GROUND
-from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.functions import Point, steady
 from ufl_beam.model.supports import still
 
@@ -137,7 +137,7 @@ RECORDS: dict[str, type] = {
 }
 RECORDS |= {kind.__name__: kind for kind in (SavedFunction, SavedCurve, LostFunction)}
 # Objects that all scenes share
-KNOWN: dict[str, Any] = {"GROUND": GROUND, "HELD": HELD, "steady": steady, "still": still}
+KNOWN: dict[str, Any] = {"GROUND": GROUND, "HELD": RIGID, "steady": steady, "still": still}
 
 
 def to_data(value: Any, sampling: Sampling | None = None) -> Data:
@@ -147,7 +147,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
     """
     records: list[Data] = []
     # By identity; references to the objects prevent that an identity is used again.
-    numbers: dict[int, tuple[int, Any]] = {}
+    indices: dict[int, tuple[int, Any]] = {}
 
     def describe(value: Any, owner: Any, field: str) -> Data:
         if isinstance(value, np.generic):
@@ -166,7 +166,7 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
         for name, known in KNOWN.items():
             if value is known:
                 return {"known": name}
-        if id(value) not in numbers:
+        if id(value) not in indices:
             record = value
             if RECORDS.get(type(value).__name__) is not type(value):
                 if callable(value):
@@ -182,12 +182,12 @@ def to_data(value: Any, sampling: Sampling | None = None) -> Data:
                 for f in dataclasses.fields(record)
                 if f.init
             }
-            numbers[id(value)] = len(records), value
+            indices[id(value)] = len(records), value
             kind = type(record)
             if RECORDS.get(kind.__name__) is not kind:
                 content["from"] = kind.__module__
             records.append({"is": kind.__qualname__, **content})
-        return {"record": numbers[id(value)][0]}
+        return {"record": indices[id(value)][0]}
 
     root = describe(value, None, "")
     return {"records": records, "root": root}

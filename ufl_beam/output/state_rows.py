@@ -32,7 +32,8 @@ LEDGER = ("state", "supplied", "lost")
 
 FORCES, RECORD, BEFORE = "cell forces", "record", "before"
 """Columns of some states only: ``cell_number`` of loops.h of all cells; the record from which
-:meth:`CellForces.of_record` computes these; q at the beginning of the step, if forces depend on it
+:meth:`CellForces.forces_from_record` computes these; q at the beginning of the step, if forces
+depend on it
 and it differs from q of the row before (in the first row, from q of the same row)."""
 
 
@@ -60,12 +61,12 @@ class Connection(NamedTuple):
     dissipated: Any
 
 
-def connection(numbers: Array) -> Connection:
+def connection(values: Array) -> Connection:
     """Make a history of columns of k components, whose works are added; (..., k, columns)."""
-    if numbers.shape[-2] == 1:
-        columns = np.moveaxis(numbers[..., 0, :], -1, 0)
+    if values.shape[-2] == 1:
+        columns = np.moveaxis(values[..., 0, :], -1, 0)
         return Connection(*(x if x.ndim else float(x) for x in columns))
-    motion, force, work, rate, dissipated = np.moveaxis(numbers, -1, 0)
+    motion, force, work, rate, dissipated = np.moveaxis(values, -1, 0)
     return Connection(motion, force, work.sum(-1), rate, dissipated.sum(-1))
 
 
@@ -93,9 +94,9 @@ class Columns:
         self.at = dict(zip(self.shapes, (slice(*pair) for pair in pairwise(ends)), strict=True))
         self.width = ends[-1]
         self.ledger = tuple(
-            {name[len(part) + 2 :]: at.start for name, at in self.at.items()
-             if name.startswith(f"{part}: ")}
-            for part in LEDGER
+            {name[len(account_name) + 2 :]: at.start for name, at in self.at.items()
+             if name.startswith(f"{account_name}: ")}
+            for account_name in LEDGER
         )  # fmt: skip
         self._others: dict[tuple[str, str], Columns] = {}
 
@@ -124,7 +125,7 @@ class Columns:
                else {RECORD: (record,)}),
         })  # fmt: skip
 
-    def of_rows(self, name: str, rows: Array) -> Array:
+    def column_of(self, name: str, rows: Array) -> Array:
         """Return a view of a column of one row or of several rows, in the shape of the column."""
         return rows[..., self.at[name]].reshape(rows.shape[:-1] + self.shapes[name])
 
@@ -171,8 +172,8 @@ class Column:
 
     def __getitem__(self, at: tuple[Any, ...]) -> Array:
         """Return a new array; the first index is ``:``."""
-        parts = [block.columns.of_rows(self._name, block.rows)[at] for block in self._blocks]
-        return np.concatenate(parts) if parts else np.empty(0)
+        pieces = [block.columns.column_of(self._name, block.rows)[at] for block in self._blocks]
+        return np.concatenate(pieces) if pieces else np.empty(0)
 
 
 # -- rows of a running simulation ------------------------------------------------------------------
@@ -224,40 +225,41 @@ class StateWriter:
         for place, number in others:
             self._copy(place, first, number)
             first += number
-        for part, account in zip(LEDGER, accounts, strict=True):
+        for account_name, account in zip(LEDGER, accounts, strict=True):
             if account:
-                first = at[f"{part}: {next(iter(account))}"].start
+                first = at[f"{account_name}: {next(iter(account))}"].start
                 self._copy(self._place(account.amounts), first, len(account))
-        held = [  # degrees of freedom of supports that this process owns, and indices in the row
+        # Degrees of freedom of supports that this process owns, and their indices in the row
+        constrained = [
             (dof, at["reactions"].start + 3 * k + c)
             for k, support in enumerate(numbering.scene.supports)
             for c, dof in ((c, subdomain.numbering.node(support.place)[c]) for c in support.held)
             if subdomain.owns(np.array([dof]))[0]
         ]  # fmt: skip
-        dofs, to = np.array(held, dtype=np.int64).reshape(-1, 2).T
+        dofs, to = np.array(constrained, dtype=np.int64).reshape(-1, 2).T
         mine = np.searchsorted(supports.dofs, subdomain.local(dofs))
         self._add(self._place(supports.reactions), mine, to)
-        for one in inelastic:
-            mine, k = one.kept()[0], np.flatnonzero(one.kept_factors)
+        for term in inelastic:
+            mine, k = term.recorded()[0], np.flatnonzero(term.recorded_factors)
             width = columns.shapes["material"][1]
             rows = at["material"].start + width * np.searchsorted(numbering.inelastic_cells, mine)
             first = width * np.arange(len(mine))
-            self._add(self._place(one.points.kept), first[:, None] + k, rows[:, None] + k)
+            self._add(self._place(term.points.recorded), first[:, None] + k, rows[:, None] + k)
         for connector in connector_terms:
             rows = at["connectors"].start + columns.shapes["connectors"][1] * connector.indices
             self._add(now, connector.forces_at, rows + FORCE)
-            for field, numbers in connector.kept:
-                apart = numbers.strides[0] // numbers.itemsize * np.arange(len(rows))
-                self._add(self._place(numbers), apart, rows + Connection._fields.index(field))
+            for field, values in connector.recorded:
+                apart = values.strides[0] // values.itemsize * np.arange(len(rows))
+                self._add(self._place(values), apart, rows + Connection._fields.index(field))
         kept = ffi.new("kept_numbers[]", self._kinds)
         fill(time_loop, kinds=len(kept), kept=kept, width=columns.width, sums=at["q"].start)
 
-    def _place(self, numbers: Any) -> Any:
+    def _place(self, values: Any) -> Any:
         """Return a pointer to the address of a number of C, of an array, or of a view."""
-        address = numbers
-        if isinstance(numbers, np.ndarray):
-            address = ffi.cast("double *", numbers.ctypes.data)
-        self._alive += [numbers, place := ffi.new("double *[1]", [address])]
+        address = values
+        if isinstance(values, np.ndarray):
+            address = ffi.cast("double *", values.ctypes.data)
+        self._alive += [values, place := ffi.new("double *[1]", [address])]
         return place
 
     def _copy(self, place: Any, first: int, number: int) -> None:

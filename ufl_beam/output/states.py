@@ -16,7 +16,7 @@ from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import Fields, Strains, mass_matrix
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ArgumentError, require_number
-from ufl_beam.model.bodies import Anchor, Member, Place, Spot, arm
+from ufl_beam.model.bodies import AttachmentPoint, Member, Place, Spot, arm
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import nearest, parameter_step, tangent
@@ -91,25 +91,29 @@ class States:
         between: Fraction of a step at whose configuration its forces are in equilibrium.
         begun: Whether forces depend on the configuration at the beginning of the step.
         cells: Section forces, strains and masses of its cells.
-        of_record: Function that computes the forces of cells from a record, q, and q at the
-            beginning of the step; ``cell_number`` of loops.h; (9, num_cells).
+        forces_from_record: Function that computes the forces of cells from a record, q, and q at
+            the beginning of the step; ``cell_number`` of loops.h; (9, num_cells).
     """
 
     def __init__(self, numbering: DofNumbering, like: States | None = None, *blocks: Block) -> None:
         self.scene: Scene = numbering.scene
         self.numbering = numbering
         self.between, self.begun = 1.0, False
-        self.of_record: Callable[[Array, Array, Array], Array] | None = None
+        self.forces_from_record: Callable[[Array, Array, Array], Array] | None = None
         self._blocks = [*blocks]
         self.cells = Cells(numbering)
         self._computed: tuple[tuple[int, bytes], Array] | None = None  # latest forces
         if like is not None:
-            self.between, self.begun, self.of_record = like.between, like.begun, like.of_record
+            self.between, self.begun, self.forces_from_record = (
+                like.between,
+                like.begun,
+                like.forces_from_record,
+            )
             self.cells = like.cells
 
     # -- rows ----------------------------------------------------------------------------------
 
-    def room(self, columns: Columns, number: int = 1) -> Array:
+    def free_rows(self, columns: Columns, number: int = 1) -> Array:
         """Return up to ``number`` free rows after the last state; :meth:`grow` makes them states.
 
         The process may keep freed memory, so rows are not copied to make room.
@@ -130,12 +134,12 @@ class States:
         """Append ``number`` states, which were written in :meth:`room`."""
         self._blocks[-1].number += number
 
-    def append(self, columns: Columns, *parts: Array) -> None:
+    def append(self, columns: Columns, *pieces: Array) -> None:
         """Append a state: a row with these columns, in one or several parts."""
-        np.concatenate(parts, out=self.room(columns)[0])
+        np.concatenate(pieces, out=self.free_rows(columns)[0])
         self.grow()
 
-    def part(self, first: int, last: int) -> States:
+    def subset(self, first: int, last: int) -> States:
         """Return views of the states from ``first`` to ``last``, excluding ``last``."""
         blocks, end = [], 0
         for block in self._blocks:
@@ -146,13 +150,13 @@ class States:
 
     def downsample(self) -> None:
         """Delete every other state; the first state stays."""
-        states, self._blocks, self._computed = self.part(0, len(self)), [], None
+        states, self._blocks, self._computed = self.subset(0, len(self)), [], None
         for n in range(0, len(states), 2):
-            columns, *parts = states.row(n)
+            columns, *pieces = states.row(n)
             if states.begun and BEFORE not in columns.at:
                 columns = columns.plus(BEFORE, (self.numbering.size,))
-                parts.append(states.before(n))
-            self.append(columns, *parts)
+                pieces.append(states.before(n))
+            self.append(columns, *pieces)
 
     def __len__(self) -> int:
         """Number of states."""
@@ -174,25 +178,25 @@ class States:
     def _row(self, name: str, n: int) -> Array:
         """Return a view of a column of the n-th state."""
         columns, row = self.row(n)
-        return columns.of_rows(name, row)
+        return columns.column_of(name, row)
 
     def before(self, n: int) -> Array:
         """Return q at the beginning of the step to the n-th state, if forces depend on it."""
         n = range(len(self))[n]
         columns, row = self.row(n)
         if BEFORE in columns.at:
-            return columns.of_rows(BEFORE, row)
+            return columns.column_of(BEFORE, row)
         return self._row("q", n - 1 if n and self.begun else n)
 
     def cell_resultants(self, n: int) -> Array:
         """Return ``cell_number`` of loops.h in the n-th state; (9, num_cells); N, N m."""
         columns, row = self.row(n)
         if FORCES in columns.at:
-            return columns.of_rows(FORCES, row)
-        if self.of_record is None:
+            return columns.column_of(FORCES, row)
+        if self.forces_from_record is None:
             raise ArgumentError("section forces: these states were stored without them")
-        record, q = (columns.of_rows(name, row) for name in (RECORD, "q"))
-        return self.of_record(record, q, self.before(n))
+        record, q = (columns.column_of(name, row) for name in (RECORD, "q"))
+        return self.forces_from_record(record, q, self.before(n))
 
     def history(self) -> State:
         """Return all states as arrays by name, with the forces of cells; (n+1, ...)."""
@@ -226,7 +230,7 @@ class States:
         for name, shape in columns.shapes.items():
             if name in history or name in ("q", FORCES):
                 require_arrays(history, {name: (n, *shape)})
-                columns.of_rows(name, rows)[:] = history[name]
+                columns.column_of(name, rows)[:] = history[name]
         self._blocks = [Block(columns, rows, n)]
 
     # -- motion --------------------------------------------------------------------------------
@@ -246,7 +250,7 @@ class States:
         """Velocities in the order of :attr:`q`; empty in statics."""
         return self.column("v")[:,]
 
-    def displacement(self, place: Anchor) -> Array:
+    def displacement(self, place: AttachmentPoint) -> Array:
         """Return displacement and rotation (u, v, ψ) of a place; (n+1, 3); m, m, rad.
 
         In cells they are interpolated with the degree of the mesh; for bodies they are exact.
@@ -259,7 +263,7 @@ class States:
             motion[:, :2] += turned(arm(place), motion[:, 2]) - arm(place)
         return motion
 
-    def velocity(self, place: Anchor) -> Array:
+    def velocity(self, place: AttachmentPoint) -> Array:
         """Return the velocity (du/dt, dv/dt, dψ/dt) of a place; (n+1, 3); m/s, m/s, rad/s.
 
         Raises:
@@ -269,7 +273,7 @@ class States:
             raise ArgumentError("velocity: the run was static; there is none")
         return velocity_at(self.numbering, place, self.column("q"), v)
 
-    def position(self, place: Anchor) -> Array:
+    def position(self, place: AttachmentPoint) -> Array:
         """Return the coordinates of a place; (n+1, 2); m."""
         if isinstance(place, Spot):
             return np.asarray(place.point + self.displacement(place)[:, :2])
@@ -299,29 +303,31 @@ class States:
         Raises:
             ArgumentError: The joint is not in the scene, or its places share unknowns.
         """
-        numbers, (a, b, *_) = connector_indices(self.scene, joint), joint.places
+        resultants, (a, b, *_) = connector_indices(self.scene, joint), joint.places
         if not any({holder.a, holder.b} == {a, b} for holder in joint.holders):
             raise ArgumentError(
                 f"{joint}: {a} and {b} share unknowns, so that the force between them is not "
                 "known; make it with multipliers=True"
             )
-        turns = [self.displacement(place)[:, 2] for place in (a, b)]
+        rotations = [self.displacement(place)[:, 2] for place in (a, b)]
         between = self.position(b) - self.position(a)
         apart = np.subtract(b.point, a.point)
-        motion = np.column_stack([turned(between, -turns[0]) - apart, turns[1] - turns[0]])
+        motion = np.column_stack(
+            [turned(between, -rotations[0]) - apart, rotations[1] - rotations[0]]
+        )
         force, moment = np.zeros((len(self), 2)), np.zeros(len(self))
         if 2 in joint.shared:
             moment[:] = np.nan
-        forces = self.column("connectors")[:, numbers, FORCE].T
+        forces = self.column("connectors")[:, resultants, FORCE].T
         for k, holder in enumerate(joint.holders):
             if {holder.a, holder.b} != {a, b}:
                 continue
             λ = forces[k] if holder.b == b else -forces[k]
-            if holder.turns:
+            if holder.is_rotation:
                 moment -= λ
             else:
-                force -= λ[:, None] * self._direction(holder, turns[0])
-        in_a, in_b = (turned(force, -angle) for angle in turns)
+                force -= λ[:, None] * self._direction(holder, rotations[0])
+        in_a, in_b = (turned(force, -angle) for angle in rotations)
         return JointHistory(motion, force, in_a, in_b, moment)
 
     def _direction(self, holder: Connector, angle: Array) -> Array:
@@ -361,7 +367,7 @@ class States:
 
     # -- forces of cells -----------------------------------------------------------------------
 
-    def cell_forces(self, n: int, parts: Array = MIDDLE) -> Array:
+    def cell_forces(self, n: int, pieces: Array = MIDDLE) -> Array:
         """Compute (N, V, M) of :meth:`diagram` at fractions of all cells in the n-th state.
 
         Fractions ``parts`` are from 0 to 1.
@@ -369,13 +375,13 @@ class States:
         Returns:
             Section forces; (num_cells, len(parts), 3); N, N, N m.
         """
-        key = range(len(self))[n], parts.tobytes()
+        key = range(len(self))[n], pieces.tobytes()
         if self._computed is None or self._computed[0] != key:
             q = self._row("q", n)
             if self.between < 1:
                 q = (1 - self.between) * self.before(n) + self.between * q
             along = self.cells.along
-            forces = along(slice(None), parts, self.cell_resultants(n), q[along.dofs])
+            forces = along(slice(None), pieces, self.cell_resultants(n), q[along.dofs])
             forces.flags.writeable = False
             self._computed = key, forces
         return self._computed[1]
@@ -392,14 +398,14 @@ class States:
         Raises:
             ArgumentError: The beam of the place is not in the scene.
         """
-        cell, part = self.numbering.cell_and_part(place)
+        cell, part = self.numbering.cell_and_fraction(place)
         n, dofs = range(len(self)), self.cells.along.dofs[cell]
         q = self.column("q")[:, dofs]
         if self.between < 1:
             before = np.array([self.before(k)[dofs] for k in n])
             q = (1 - self.between) * before + self.between * q
-        numbers = np.array([self.cell_resultants(k)[:, cell] for k in n]).T
-        forces = self.cells.along(np.full(len(n), cell), np.array([part]), numbers, q)
+        resultants = np.array([self.cell_resultants(k)[:, cell] for k in n]).T
+        forces = self.cells.along(np.full(len(n), cell), np.array([part]), resultants, q)
         return np.asarray(forces[:, 0])
 
     def diagram(self, beam: Member, n: int = -1, *, points: int = 9) -> Diagram:
@@ -417,13 +423,13 @@ class States:
             ArgumentError: The beam is not in the scene, or ``points`` is less than 2.
         """
         require_number(points, "diagram: points", at_least=2)
-        s, cells, parts = (
+        s, cells, pieces = (
             self.numbering.parameters(beam),
             self.numbering.cells_of(beam),
             int(points),
         )
-        at = s[:-1, None] + np.linspace(0.0, 1.0, parts) * np.diff(s)[:, None]
-        forces = self.cell_forces(n, np.arange(parts) / (parts - 1))[cells]
+        at = s[:-1, None] + np.linspace(0.0, 1.0, pieces) * np.diff(s)[:, None]
+        forces = self.cell_forces(n, np.arange(pieces) / (pieces - 1))[cells]
         return Diagram(at.ravel(), *forces.reshape(-1, 3).T)
 
     def strains(self, beam: Member, n: int = -1) -> Array:
@@ -502,17 +508,17 @@ class States:
 
     def ledger(self) -> list[dict[str, Array]]:
         """Return the parts of the ledger, with arrays by name; each (n+1,); J."""
-        parts = []
+        pieces = []
         for k in range(len(LEDGER)):
             columns = [(block.rows, block.columns.ledger[k]) for block in self._blocks]
             names = dict.fromkeys(name for _, at in columns for name in at)
-            parts.append({
+            pieces.append({
                 name: np.concatenate([
                     rows[:, at[name]] if name in at else np.zeros(len(rows)) for rows, at in columns
                 ])
                 for name in names
             })  # fmt: skip
-        return parts
+        return pieces
 
     @property
     def energy(self) -> Energy:

@@ -240,14 +240,14 @@ def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
     extremes = [k for sign, k in ends if sign * values[k] > 0.0]
     large: list[int] = [*map(int, np.flatnonzero(np.abs(values) > least * np.abs(values).max()))]
-    numbers = {k: style.number(values[k] / unit) for k in {*extremes, *large}}
+    labels = {k: style.number(values[k] / unit) for k in {*extremes, *large}}
     places = np.round(axis / (1e-3 * math.hypot(*np.ptp(axis, axis=0)) or 1.0))
     chosen: dict[tuple[object, ...], int] = {}
     for k in [*extremes, *large]:
-        chosen.setdefault((numbers[k].lstrip("−"), *places[k]), k)
+        chosen.setdefault((labels[k].lstrip("−"), *places[k]), k)
     return [
         Peak(
-            numbers[k], RED if values[k] > 0 else BLUE, axis[k] + up[k], unit_vectors(up[k]),
+            labels[k], RED if values[k] > 0 else BLUE, axis[k] + up[k], unit_vectors(up[k]),
             k in extremes,
         )
         for k in chosen.values()
@@ -432,9 +432,9 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
     labels = []
     for k in chosen:
         # First perpendicular to the axis, then more and more aside.
-        turns = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
+        tilts = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
         x, y = peaks[k].outward
-        at, ways = in_points(peaks[k].tip), positions.directions(math.atan2(y, x) + turns)
+        at, ways = in_points(peaks[k].tip), positions.directions(math.atan2(y, x) + tilts)
         spots = tuple(Candidate(at, direction) for direction in ways)
         labels.append(Label(peaks[k].text, peaks[k].color, k, spots))
     written = []

@@ -50,9 +50,9 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
             if law is not None and (jump != 0.0 or lost > 0.0):
                 hinges.append((beam, points[numbering.cells[cell]].mean(axis=0), law, float(lost)))
     for hinge, vertex in zip(solution.scene.hinges, numbering.vertices_at_hinges, strict=True):
-        kept = solution.connector(hinge)
-        if kept.motion[n] != 0.0 or kept.dissipated[n] > 0.0:
-            dissipated = float(kept.dissipated[n])
+        history = solution.connector(hinge)
+        if history.motion[n] != 0.0 or history.dissipated[n] > 0.0:
+            dissipated = float(history.dissipated[n])
             hinges.append((place_of(hinge).beam, points[vertex], law_of(hinge), dissipated))
     return [
         # A hinge without strength is a joint.
@@ -66,8 +66,8 @@ def dissipated_per_length(solution: Solution, n: int) -> Array:
     numbering = solution.numbering
     energy = np.zeros(len(numbering.cells))
     for beam in solution.scene.beams:
-        layout = beam.section.layout(None)
-        if layout is not None and not layout.elastic:
+        section_points = beam.section.section_points(None)
+        if section_points is not None and not section_points.elastic:
             state = solution.material(beam, n)
             cracks = state.hinge if beam.section.fibres is not None else 0.0
             energy[numbering.cells_of(beam)] = state.plastic + cracks
@@ -145,7 +145,7 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     Example:
         >>> ub.plot(broken, "hinge", weak.start).savefig("hinge.png")
     """
-    kept, numbering = solution.material_at(place), solution.numbering
+    history, numbering = solution.material_at(place), solution.numbering
     hinge = numbering.hinge_at(place)
     in_cell = numbering.hinges(place.beam)[
         numbering.cell(place) - int(numbering.cells_of(place.beam)[0])
@@ -153,12 +153,12 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     law = in_cell if hinge is None else law_of(hinge)
     if law is None or np.isinf(law.limit):
         raise ArgumentError(f"plot: neither {place} nor the cell there has a hinge")
-    M, jump, lost = kept.forces[:, 2], kept.jump, float(kept.hinge[-1])
+    M, jump, lost = history.forces[:, 2], history.jump, float(history.hinge[-1])
     with style.panel(ax, (8.0, 5.4)) as axes:
         # Sections in which the jump only grows or only falls; neighbours share a point.
         moves = np.flatnonzero(np.diff(jump))
-        turns = moves[1:][np.diff(np.sign(np.diff(jump)[moves])) != 0]
-        for first, last in pairwise([0, *turns, len(jump) - 1]):
+        reversals = moves[1:][np.diff(np.sign(np.diff(jump)[moves])) != 0]
+        for first, last in pairwise([0, *reversals, len(jump) - 1]):
             window = slice(first, last + 1)
             axes.fill_between(
                 jump[window], M[window], facecolor=(ORANGE, 0.3), linewidth=0.0, zorder=2

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 
 from ufl_beam.arrays import Array
-from ufl_beam.model.bodies import Anchor, Body, Member, Place, Velocity
+from ufl_beam.model.bodies import AttachmentPoint, Body, Member, Place, Velocity
 from ufl_beam.model.connectors import law_of, place_of
 from ufl_beam.model.functions import TimeFunction, steady
 from ufl_beam.model.loads import FollowerLoad, LineLoad, PointLoad
@@ -63,7 +63,7 @@ class Subject:
         ends = [(x[0], x[1], x[-1], x[-2]) for x in self.axes.values()]
         self._ends: Array = np.reshape(ends, (-1, 2, 2))
 
-    def directions_at(self, place: Anchor) -> Array:
+    def directions_at(self, place: AttachmentPoint) -> Array:
         """Return the directions in which beams leave a place; (n, 2)."""
         close = np.abs(self._ends[:, 0] - place.point).max(axis=1) < 1e-7 * self.scene.size
         pairs = [*self._ends[close]]
@@ -189,7 +189,7 @@ def _name_bodies_and_connectors(drawing: Drawing) -> None:
     for connector in scene.connectors:
         offset = canvas.offsets[connector]
         a, b = symbols.connector_ends(drawing.shape, connector)
-        if connector.turns:
+        if connector.is_rotation:
             spots = drawing.around(b, (1.6 + offset + 0.8) * unit)
         else:
             apart = math.dist(a, b) > 0.1 * unit
@@ -200,7 +200,7 @@ def _name_bodies_and_connectors(drawing: Drawing) -> None:
                 for fraction in (0.5, 0.3, 0.7)
                 for side in (outwards, -outwards)
             )
-        units = ("N m", "rad") if connector.turns else ("N", "m")
+        units = ("N m", "rad") if connector.is_rotation else ("N", "m")
         words = symbols.law_symbol(connector.law).words(connector.law, *units)
         drawing.write(words, TEXT, CAPTIONS, spots)
 
@@ -226,8 +226,8 @@ def _arrow(
 
 def _around(center: Array, radius: float, sense: float) -> Array:
     """Return the arc of an arrow around a point, counter-clockwise if ``sense`` > 0; (n, 2)."""
-    turns = math.copysign(1.0, sense) * np.linspace(-150.0, 120.0, 40)
-    return np.asarray(center + radius * directions(np.radians(90.0 + turns)))
+    angles = math.copysign(1.0, sense) * np.linspace(-150.0, 120.0, 40)
+    return np.asarray(center + radius * directions(np.radians(90.0 + angles)))
 
 
 def _beside(tail: Array, tip: Array) -> Candidates:
@@ -269,7 +269,7 @@ def _draw_point_load(drawing: Drawing, load: PointLoad | FollowerLoad) -> None:
         drawing.write("0 N", RED, LOADS, drawing.around(at, 0.0))
 
 
-def _stand(drawing: Drawing, place: Anchor, direction: Array, fraction: float) -> Array:
+def _stand(drawing: Drawing, place: AttachmentPoint, direction: Array, fraction: float) -> Array:
     """Return the line of the arrow of a force, which ends at its place; (2, 2); m.
 
     If it would lie on a beam, it begins at its place; if it still would, it is beside the beam.

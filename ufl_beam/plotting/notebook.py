@@ -30,15 +30,15 @@ def energy_page(energy: Energy) -> str:
 def study_page(results: Study) -> str:
     """Write a study: its first cases with their scalar results."""
     title, *failed = str(results).splitlines()
-    numbers = {name: x for name, x in results.results.items() if x.ndim == 1}
+    scalars = {name: x for name, x in results.results.items() if x.ndim == 1}
     arrays = [f"{name}: {x.shape}" for name, x in results.results.items() if x.ndim > 1]
     names = list(dict.fromkeys(name for case in results.cases for name in case))
     rows = [
-        (*(str(case.get(name, "")) for name in names), *(f"{x[i]:.6g}" for x in numbers.values()))
+        (*(str(case.get(name, "")) for name in names), *(f"{x[i]:.6g}" for x in scalars.values()))
         for i, case in enumerate(results.cases[:ROWS])
     ]
     more = f"and {len(results) - ROWS} more cases" if len(results) > ROWS else ""
-    return lines(title) + table((*names, *numbers), rows) + lines(more, *arrays, *failed)
+    return lines(title) + table((*names, *scalars), rows) + lines(more, *arrays, *failed)
 
 
 def lines(*texts: str) -> str:

@@ -15,7 +15,7 @@ from ufl_beam.analysis.parameter_study import Study
 from ufl_beam.analysis.tradeoff_result import Tradeoff
 from ufl_beam.display import html_page
 from ufl_beam.errors import ArgumentError, require_number
-from ufl_beam.model.bodies import Anchor
+from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import notebook, style, symbols
@@ -76,16 +76,16 @@ def draw_shapes(
             f"plot: times = {times!r} must be a sequence of times (s); for a number of shapes "
             f"give count={times!r}"
         )
-    kept = solution.times
-    nearest = [int(np.argmin(np.abs(kept - t))) for t in sorted(times)]
+    instants = solution.times
+    nearest = [int(np.argmin(np.abs(instants - t))) for t in sorted(times)]
     chosen = nearest or evenly(solution.progress, int(count))
     canvas, size = plane_canvas(solution, chosen, magnify, ax)
     shapes = [canvas.shape(n) for n in chosen]
     with style.panel(ax, size) as axes:
-        colors = style.scale("viridis", 0.0, 0.88, kept[chosen].min(), kept[chosen].max())
+        colors = style.scale("viridis", 0.0, 0.88, instants[chosen].min(), instants[chosen].max())
         style.plane_axes(axes, style.magnified(magnify, ""))
         draw_undeformed(axes, solution, canvas)
-        for shape, color in zip(shapes, map(to_hex, colors.to_rgba(kept[chosen])), strict=True):
+        for shape, color in zip(shapes, map(to_hex, colors.to_rgba(instants[chosen])), strict=True):
             moving = *symbols.bodies(shape), *symbols.rods(shape)
             draw_strokes(axes, {"moving": moving}, color)
             draw_beams(axes, solution, shape.nodes, color=color, linewidth=2.2, zorder=3)
@@ -117,7 +117,7 @@ def solution_page(solution: Solution) -> str:
 
 def draw_history(
     solution: Solution,
-    places: Anchor | Sequence[Anchor],
+    places: AttachmentPoint | Sequence[AttachmentPoint],
     *,
     component: str = "v",
     ax: Axes | None = None,
@@ -138,7 +138,7 @@ def draw_history(
         >>> ub.plot(solution, "history", beam.end, component="v").savefig("history.png")
     """
     style.require_option(component, COMPONENTS, "plot: component")
-    followed = (places,) if isinstance(places, Anchor) else tuple(places)
+    followed = (places,) if isinstance(places, AttachmentPoint) else tuple(places)
     number = list(COMPONENTS).index(component)
     motion = solution.displacement if number < 3 else solution.velocity
     quantity, unit = COMPONENTS[component]
@@ -369,7 +369,7 @@ def draw_study(study: Study) -> Figure:
     return figure
 
 
-def draw_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
+def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
     """Draw rainflow matrix, spectrum and damage of the stress cycles at a place.
 
     On the left is the rainflow matrix; in the middle the number of cycles above each range, with
@@ -377,25 +377,25 @@ def draw_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
 
     Args:
         fatigue: Recorder of a run.
-        spot: One of its hot spots.
+        place: One of its hot spots.
 
     Raises:
         ArgumentError: The recorder does not have the spot, nothing was run, or the stress has no
             cycle.
 
     Example:
-        >>> spot = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
-        >>> fatigue = ub.Fatigue(spot, ub.SNCurve.eurocode(71e6))
+        >>> place = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)
+        >>> fatigue = ub.Fatigue(place, ub.SNCurve.eurocode(71e6))
         >>> shake = ub.PointLoad(beam.end, force=(0, 5e4), amplitude=np.sin)
         >>> shaken = ub.Scene([beam], supports=scene.supports, loads=[shake])
         >>> run = ub.simulate(shaken, ub.Static(), t=(0, 20), dt=0.2, record=fatigue)
-        >>> ub.plot(fatigue, "cycles", spot).savefig("cycles.png")
+        >>> ub.plot(fatigue, "cycles", place).savefig("cycles.png")
     """
     from matplotlib.colors import LogNorm
 
-    cycles, curve = fatigue.cycles(spot), fatigue.curve
+    cycles, curve = fatigue.cycles(place), fatigue.curve
     if not len(cycles.range):
-        raise ArgumentError(f"plot: the stress at {spot} never turned")
+        raise ArgumentError(f"plot: the stress at {place} never turned")
     ranges, means = 1e-6 * cycles.range, 1e-6 * cycles.mean
     done = cycles.count / curve.endurance(cycles.range, cycles.mean)
     edges = np.linspace(0.0, ranges[-1] * (1 + 1e-9), CLASSES + 1)
@@ -419,8 +419,8 @@ def draw_cycles(fatigue: Fatigue, spot: HotSpot) -> Figure:
         spectrum.set(xscale="log", xlabel="number of cycles")
         spectrum.legend(loc="lower left")
         total = done.sum()
-        parts, _ = np.histogram(ranges, edges, weights=done / (total or 1.0))
-        damage.barh(edges[:-1], 100 * parts, np.diff(edges), align="edge", color=RED, alpha=0.6)
+        fractions, _ = np.histogram(ranges, edges, weights=done / (total or 1.0))
+        damage.barh(edges[:-1], 100 * fractions, np.diff(edges), align="edge", color=RED, alpha=0.6)
         damage.set(xlabel="part of the damage (%)")
         matrix.set_ylim(0.0, 1.1 * edges[-1])
         titles = "cycles", "spectrum and S-N curve", f"damage {total:.3g}"

@@ -14,7 +14,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, require_number
-from ufl_beam.model.bodies import GROUND, Anchor, Body
+from ufl_beam.model.bodies import GROUND, AttachmentPoint, Body
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import nearest, parameter_step, tangent
@@ -139,7 +139,7 @@ class Canvas:
             raise ArgumentError(
                 f"n = {n}: the solution kept {number} times; give {-number} to {number - 1}"
             )
-        state = self._solution.part(n % number, n % number + 1)
+        state = self._solution.subset(n % number, n % number + 1)
         nodes = numbering.points + self.magnify * state.q[0, numbering.dofs[:, :2]]
         return DeformedShape(self, lambda place: state.displacement(place)[0], nodes)
 
@@ -214,11 +214,13 @@ class Canvas:
         middles = {frozenset(joint.places) for joint in self.scene.joints if not joint.meets}
         groups: defaultdict[tuple[bool, frozenset[object]], list[Connector]] = defaultdict(list)
         for c in self.scene.connectors:
-            groups[c.turns, frozenset((c.b.point,) if c.turns else (c.a, c.b))].append(c)
+            groups[c.is_rotation, frozenset((c.b.point,) if c.is_rotation else (c.a, c.b))].append(
+                c
+            )
         offsets: dict[Connector, float] = {}
-        for (turns, ends), group in groups.items():
+        for (rotated, ends), group in groups.items():
             for k, connector in enumerate(group):
-                if turns:
+                if rotated:
                     offsets[connector] = 1.15 * k
                 elif ends in middles:
                     offsets[connector] = 1.6 * (k // 2 + 1) * (-1.0) ** (k + 1)
@@ -232,18 +234,20 @@ class DeformedShape:
     """Drawn positions of a scene at one time."""
 
     canvas: Canvas
-    motion: Callable[[Anchor], Array]  # (u, v, ψ) of a place, not magnified; (3,); m, m, rad
+    motion: Callable[
+        [AttachmentPoint], Array
+    ]  # (u, v, ψ) of a place, not magnified; (3,); m, m, rad
     nodes: Array  # of all beams of a solution; (num_nodes, 2); m
 
-    def at(self, place: Anchor) -> Array:
+    def at(self, place: AttachmentPoint) -> Array:
         """Return the coordinates of a place; (2,); m."""
         return np.asarray(place.point + self.canvas.magnify * self.motion(place)[:2])
 
-    def rotation(self, place: Anchor) -> float:
+    def rotation(self, place: AttachmentPoint) -> float:
         """Return the rotation of a place; rad."""
         return float(self.motion(place)[2])
 
-    def turned(self, x: tuple[float, float], place: Anchor) -> Array:
+    def turned(self, x: tuple[float, float], place: AttachmentPoint) -> Array:
         """Rotate a vector with a place; (2,)."""
         return in_frame(x, 0.0, directions(self.rotation(place)))
 

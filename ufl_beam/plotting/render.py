@@ -16,7 +16,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, require_kind, require_number, require_row, require_switch
-from ufl_beam.model.bodies import Anchor, Member, Place, Spot, require_anchors
+from ufl_beam.model.bodies import AttachmentPoint, Member, Place, Spot, require_anchors
 from ufl_beam.model.records import Record
 from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting import style, symbols
@@ -84,7 +84,7 @@ class Camera(Record):
     _refused = ArgumentError
 
     direction: Annotated[Direction, _require_direction] = (-0.20, -0.28, -1.0)
-    follow: Annotated[Anchor | None, _require_place] = None
+    follow: Annotated[AttachmentPoint | None, _require_place] = None
     width: Annotated[float | None, partial(require_number, positive=True)] = None
 
     def origin(self, shape: DeformedShape) -> Array:
@@ -327,7 +327,7 @@ class Solids:
         symbol = max(0.022 * scene.size, 0.7 * self.thickest(scene.beams)[0])
         return Canvas(self.solution, self.magnify, symbol, sorted(set(self.shown)))
 
-    def thickest(self, objects: Iterable[Member | Anchor]) -> tuple[float, float]:
+    def thickest(self, objects: Iterable[Member | AttachmentPoint]) -> tuple[float, float]:
         """Return the largest depth in the plane and width across it of beams, or at places; m.
 
         Slender beams and bodies have a minimum width.
@@ -390,8 +390,8 @@ class Solids:
         alike: defaultdict[tuple[float, float, str], list[Array]] = defaultdict(list)
         for pin, color in pins:
             depth, width = self.thickest(pin.places)
-            least = 0.4 * shape.canvas.unit if pin.turns or not depth else 0.0
-            height = width * (1.25 if pin.turns else 1.02)
+            least = 0.4 * shape.canvas.unit if pin.rotates or not depth else 0.0
+            height = width * (1.25 if pin.rotates else 1.02)
             alike[max(depth / 2, least), height, color].append(pin.at)
         solids: list[tuple[Any, str, list[Array]]] = []
         for (radius, height, color), places in alike.items():

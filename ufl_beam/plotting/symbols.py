@@ -17,7 +17,7 @@ import numpy as np
 
 from ufl_beam.arrays import Array
 from ufl_beam.model import connector_laws as laws
-from ufl_beam.model.bodies import GROUND, Anchor, Place, Spot, node
+from ufl_beam.model.bodies import GROUND, AttachmentPoint, Place, Spot, node
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Guided, Joint, Link, Prismatic, Release, RigidLink
@@ -109,7 +109,7 @@ class SupportSymbol(NamedTuple):
     angle: float  # rotation of the symbol; rad
     outlines: tuple[Outline, ...]
     color: str  # orange if the support moves
-    place: Anchor
+    place: AttachmentPoint
 
 
 def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
@@ -120,12 +120,12 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
         color = ORANGE if support.moving else GROUND_GREY
         number = 3 if len(support.held) == 3 else len({0, 1} & set(support.held))
         yield SupportSymbol(shape.at(support.place), angle, SUPPORTS[number], color, support.place)
-    grounded: list[tuple[Sequence[Anchor], bool]] = [
+    grounded: list[tuple[Sequence[AttachmentPoint], bool]] = [
         (j.places, _rotates(j)) for j in scene.joints if joint_symbol(j).grounded
     ]
-    grounded += [((c.a, c.b), False) for c in scene.connectors if not c.turns]
+    grounded += [((c.a, c.b), False) for c in scene.connectors if not c.is_rotation]
     grounds: dict[Spot, tuple[float, bool]] = {}  # direction from it; if free to turn
-    for places, turns in grounded:
+    for places, rotates in grounded:
         for point in places:
             if isinstance(point, Spot) and point.body is GROUND:
                 far = next(place for place in places if place != point)
@@ -135,11 +135,11 @@ def support_symbols(shape: DeformedShape) -> Iterator[SupportSymbol]:
                 away = (x, y) != (X, Y)
                 inward = math.atan2(Y - y, X - x) if away else _inward(far)
                 known, before = grounds.get(point, (inward, True))
-                grounds[point] = known, before and turns
-    for point, (inward, turns) in grounds.items():
-        angle = _upright(inward) if turns else inward - math.pi / 2
+                grounds[point] = known, before and rotates
+    for point, (inward, rotates) in grounds.items():
+        angle = _upright(inward) if rotates else inward - math.pi / 2
         yield SupportSymbol(
-            np.array(point.point), angle, SUPPORTS[2 if turns else 3], GROUND_GREY, point
+            np.array(point.point), angle, SUPPORTS[2 if rotates else 3], GROUND_GREY, point
         )
 
 
@@ -168,7 +168,7 @@ def _upright(inward: float, angle: float = 0.0) -> float:
     return angle + (math.pi if math.sin(inward - angle) < -0.5 else 0.0)
 
 
-def _inward(place: Anchor) -> float:
+def _inward(place: AttachmentPoint) -> float:
     """Return the direction in which a beam leaves its end, or upwards for other places; rad."""
     if not isinstance(place, Place) or 0.0 < place.s < 1.0:
         return math.pi / 2
@@ -279,7 +279,7 @@ def joint_symbol(joint: Joint) -> Look:
 
 
 def _rotates(joint: Joint) -> bool:
-    return 2 not in joint.shared and not any(holder.turns for holder in joint.holders)
+    return 2 not in joint.shared and not any(holder.is_rotation for holder in joint.holders)
 
 
 def rods(shape: DeformedShape) -> Iterator[Stroke]:
@@ -300,17 +300,17 @@ class Pin(NamedTuple):
     """Symbol of a joint of places at one point."""
 
     at: Array  # (2,); m
-    turns: bool  # freely
-    places: tuple[Anchor, ...]
+    rotates: bool  # freely
+    places: tuple[AttachmentPoint, ...]
 
 
 def pins(shape: DeformedShape) -> Iterator[Pin]:
     """Find the pins of joints; joints that only slide have none."""
     for joint in shape.canvas.scene.joints:
-        look, turns = joint_symbol(joint), _rotates(joint)
-        for k in look.pins if turns or look.rail is None else ():
+        look, rotates = joint_symbol(joint), _rotates(joint)
+        for k in look.pins if rotates or look.rail is None else ():
             places = joint.places[k : k + 1] if look.rod else joint.places[k:]
-            yield Pin(shape.at(joint.places[k]), turns, places)
+            yield Pin(shape.at(joint.places[k]), rotates, places)
 
 
 # -- connectors --------------------------------------------------------------------------------
@@ -424,7 +424,7 @@ def law_symbol(law: laws.Law) -> LawSymbol:
 def connectors(shape: DeformedShape) -> Iterator[Stroke]:
     """Draw springs, dampers, motors and other connectors."""
     for connector in shape.canvas.scene.connectors:
-        yield from (_around if connector.turns else _straight)(shape, connector)
+        yield from (_around if connector.is_rotation else _straight)(shape, connector)
 
 
 def connector_ends(shape: DeformedShape, connector: Connector) -> tuple[Array, Array]:
@@ -507,8 +507,8 @@ def in_plane(shape: DeformedShape) -> dict[str, list[Stroke]]:
         "supports": [*supports(shape)],
         "centres": [*centres(shape)] if few else [],
         "pins": [
-            disc(at, unit / 3, INK, WHITE) if turns else Stroke(at + square, INK, 1.0, INK, PINS)
-            for at, turns, _ in pins(shape)
+            disc(at, unit / 3, INK, WHITE) if rotates else Stroke(at + square, INK, 1.0, INK, PINS)
+            for at, rotates, _ in pins(shape)
         ],
         "masses": masses(shape),
     }

@@ -26,7 +26,7 @@ from ufl_beam.mechanics.time_schemes import (
     nodal_step,
     with_half_tangents,
 )
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.loads import KelvinVoigt, Rayleigh
 from ufl_beam.reference.cell_forms import (
     Archive,
@@ -62,7 +62,9 @@ class ElasticBeams(CellForce):
             element.at_points(3),
         )
         if isinstance(scheme, EnergyMomentumDecaying):  # c C (Δe - r Δe'), Δe' of the step before
-            damped = element.constant(scheme.part) * resultants(e1 - e0 - self._change_before, C)
+            damped = element.constant(scheme.lost_fraction) * resultants(
+                e1 - e0 - self._change_before, C
+            )
             r = r + damped
             losses.append(virtual_work(damped, e1 - e0))
         w_e = scheme.virtual_strain(element.q0, element.q1, element.w, element.axis)
@@ -75,10 +77,10 @@ class ElasticBeams(CellForce):
         self._last_change: Array = np.zeros((len(indices), points, 3))
         self._last_dt = math.inf
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return the work of the resultants, which may depend on the last change of strains."""
         put(self._change_before, min(1.0, step.dt / self._last_dt) * self._last_change)
-        return super().respond(step, q1)
+        return super().response(step, q1)
 
     def change(self, step: Step, q1: Array) -> float:
         """Return the energy stored in the step to ``q1``; J."""
@@ -112,9 +114,9 @@ class YieldingBeams(CellForce):
 
     inner = True
 
-    def __init__(self, indices: Index, layout: Layout, setting: Setting) -> None:
+    def __init__(self, indices: Index, section_points: SectionPoints, setting: Setting) -> None:
         cells, numbering = Cells(setting.numbering, indices), setting.numbering
-        element, self._hinges = cells.element, layout.hinges
+        element, self._hinges = cells.element, section_points.hinges
         self._r, self._b, self._D = (
             element.at_points(3),
             element.at_points(3),
@@ -126,17 +128,17 @@ class YieldingBeams(CellForce):
         super().__init__(cells, work, setting, around=around)
         self._names = [numbering.describe_cell(number) for number in cells.cell_indices]
         self.points = MaterialPoints(
-            layout, numbering.keys(cells.cell_indices), cells.lengths, setting
+            section_points, numbering.keys(cells.cell_indices), cells.lengths, setting
         )
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return the work of the resultants of the return map, with its consistent tangent."""
         points = self.points
-        points.respond(self.cells.strains(q1)[:, 0], step.dt)
+        points.return_map(self.cells.strains(q1)[:, 0], step.dt)
         put(self._r, points.r)
         put(self._b, points.r - np.einsum("kij,kj->ki", points.D, points.strains))
         put(self._D, points.D)
-        return super().respond(step, q1)
+        return super().response(step, q1)
 
     def change(self, step: Step, q1: Array) -> float:
         """Return the energy stored and dissipated in the step of the latest response; J."""
@@ -162,28 +164,29 @@ class YieldingBeams(CellForce):
 
     def material(self) -> Array:
         """Return the numbers of the cells, and their data for solutions; (num_cells, 7)."""
-        data = self.points.kept.copy()
+        data = self.points.recorded.copy()
         data[:, 3] *= self._hinges  # a crack of one fibre is no rotation
         return np.column_stack([self.cells.cell_indices, data])
 
 
-def inelastic_cells(numbering: DofNumbering) -> dict[Layout, Index]:
+def inelastic_cells(numbering: DofNumbering) -> dict[SectionPoints, Index]:
     """Return layouts of material points that can yield or break, and their cells."""
     sections, section_indices = numbering.sections
-    groups: dict[Layout, list[int]] = {}
+    groups: dict[SectionPoints, list[int]] = {}
     for number, section in enumerate(sections):
-        layout = section.layout(section.hinge)
-        if layout is not None and not layout.elastic:
+        section_points = section.section_points(section.hinge)
+        if section_points is not None and not section_points.elastic:
             if numbering.mesh.degree > 1:
                 beam = numbering.scene.beams[int(np.argmax(section_indices == number))]
                 raise ModelError(
                     f"Mesh: degree = {numbering.mesh.degree} is for elastic beams, and {beam.name} "
                     "may yield or break; use degree=1 with more cells, or an elastic section"
                 )
-            groups.setdefault(layout, []).append(number)
+            groups.setdefault(section_points, []).append(number)
     cell_sections = section_indices[numbering.beam_of_cell]
     return {
-        layout: np.flatnonzero(np.isin(cell_sections, group)) for layout, group in groups.items()
+        section_points: np.flatnonzero(np.isin(cell_sections, group))
+        for section_points, group in groups.items()
     }
 
 
@@ -227,7 +230,7 @@ class MatrixForce(Force):
         self.size, self.scheme, self.matrix = setting.numbering.size, scheme, matrix
         self.ledger, self._rotations = setting.ledger, setting.numbering.rotations.astype(np.int32)
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return forces; the scheme decides whether the step of a rotation is 2 tan(Δψ/2) or Δψ."""
         scheme, before, rotations = self.scheme, self.inertia, self._rotations
         self.coefficients = scheme.coefficients(step.dt, before.last_dt, len(before.more))
@@ -331,10 +334,10 @@ class KelvinVoigtForce(CellForce):
         lost = virtual_work(r, change) * element.dx(1), "damping"
         super().__init__(cells, virtual_work(r, w_e) * element.dx(1), setting, lost=lost)
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return the work of the resultants at the rates of the step."""
         self._rate.value = self._time / step.dt
-        return super().respond(step, q1)
+        return super().response(step, q1)
 
 
 def damping_forces(setting: Setting, inertia: Inertia | None) -> list[Force]:

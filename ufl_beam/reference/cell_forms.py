@@ -65,7 +65,7 @@ class Setting:
 
     numbering: DofNumbering
     scheme: Scheme
-    asked: Mapping[Connector, float]  # forces of controllers, limits of friction
+    requested_forces: Mapping[Connector, float]  # forces of controllers, limits of friction
     rates: Mapping[Connector, float]  # of motions with friction at the beginning of a step
     friction_repeats: bool  # True if sticking may repeat a constraint
     ledger: Ledger = field(default_factory=Ledger)
@@ -123,7 +123,7 @@ class Force:
     stored: Mapping[str, float] = {}
     on_nodes: Array | float = 0.0
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return virtual work and derivative if the step ends at ``q1``; (size,), (size, size)."""
         return np.zeros(self.size), csr_array((self.size, self.size))
 
@@ -313,7 +313,7 @@ class CellForce(Force):
         self._lost = {lost[1]: cells.form(lost[0])} if lost else {}
         setting.loses(*self._lost)
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return the virtual work if the step ends at ``q1``, and its derivative."""
         self.cells.set(self.element.q0, step.q0)
         self.cells.set(self.element.q1, q1)

@@ -88,7 +88,9 @@ class Connectors(Linked):
         by_cell = forms.motion.arguments()[0].ufl_function_space()
         self._cell_dofs = cell_dofs(by_cell).ravel()
         self._length = np.where(
-            [connector.turns for connector in self.connectors], 1.0, setting.numbering.scene.size
+            [connector.is_rotation for connector in self.connectors],
+            1.0,
+            setting.numbering.scene.size,
         )
         self._rows: Array = np.zeros((n, k + 2))
         self._e0: Array = np.zeros(n)
@@ -112,7 +114,7 @@ class Connectors(Linked):
         """Return values by connector: a number, or an array of numbers of its components."""
         return [*map(float, values)] if self._k == 1 else [*values.reshape(-1, self._k)]
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return forces on the nodes and residuals of the laws, and their derivative."""
         arguments = map(self._by_connector, (self.motion(q1), q1[self.forces_at]))
         rows = [law.row(e, λ) for law, e, λ in zip(self.laws, *arguments, strict=True)]
@@ -243,7 +245,7 @@ class GuideForce(Linked):
         x_m, y_m = along / math.hypot(*along)
         return np.array([t[0] * (x - on)[1] - t[1] * (x - on)[0], -y_m, x_m])
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return force across the curve, distance, and derivatives by central differences."""
         x, λ, r = self._point + q1[self._x], q1[self._λ], np.zeros(self.size)
         self._s = self._nearest(x)

@@ -23,7 +23,7 @@ from ufl_beam.model.bodies import Place
 from ufl_beam.model.checks import require_returned
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import (
-    HELD,
+    RIGID,
     Controller,
     Coulomb,
     Damper,
@@ -34,7 +34,7 @@ from ufl_beam.model.connector_laws import (
     Spring,
 )
 from ufl_beam.model.connectors import Connector, law_of
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.material_law import State
 from ufl_beam.model.material_laws import ElastoPlastic
@@ -84,7 +84,9 @@ class LawInStep:
     def __init__(self, connector: Connector, setting: Setting) -> None:
         self.connector, self.setting, self.e0, self.dt = connector, setting, 0.0, 1.0
         self.law: Any = connector.law
-        self.length = 1.0 if connector.turns else setting.numbering.scene.size  # scale of motions
+        self.length = (
+            1.0 if connector.is_rotation else setting.numbering.scene.size
+        )  # scale of motions
         self.z: dict[str, float] = {}
         self.stored: dict[str, float] = {}
         self.opens: Any = None
@@ -174,14 +176,14 @@ class _Known(LawInStep):
 
     def __init__(self, connector: Connector, setting: Setting) -> None:
         joint = "lost", "", 1.0, "_Held"  # a joint: no motion, no work
-        kind = joint if connector.law is HELD else self.KINDS[type(connector.law)]
+        kind = joint if connector.law is RIGID else self.KINDS[type(connector.law)]
         self.account, self.entry, self.sign, self.saved_as = kind
         super().__init__(connector, setting)
         self.z = {"reached": 0.0} if isinstance(self.law, PrescribedForce | Controller) else {}
 
     def begin(self, e0: float, step: Step) -> None:
         law, connector = self.law, self.connector
-        if law is HELD:
+        if law is RIGID:
             self._row = 1.0, 0.0, 0.0
         elif isinstance(law, PrescribedMotion):
             wanted = value_at(law.motion, step.motion_time, connector)
@@ -190,7 +192,7 @@ class _Known(LawInStep):
             factor = law.viscosity / step.dt
             self._row = -factor, 1.0, -factor * e0
         else:  # a controller is called at the beginning of the step
-            controlled, reached = self.setting.asked.get(connector), self.z["reached"]
+            controlled, reached = self.setting.requested_forces.get(connector), self.z["reached"]
             wanted = (
                 value_at(law.force, step.load_time, connector) if controlled is None else controlled
             )
@@ -288,17 +290,17 @@ class _SpringLaw(LawInStep):
     def __init__(self, connector: Connector, setting: Setting) -> None:
         super().__init__(connector, setting)
         law, softening = self.law.law or ElastoPlastic(yield_limit=np.inf), self.law.softening
-        layout = Layout(
+        section_points = SectionPoints(
             strains=np.eye(1, 3), weights=np.ones(1), stiffness=np.array([self.law.stiffness]),
             laws=((law, 1),), rest=np.zeros(3), breaking=slice(None),
             softening=softening if softening is not None and softening.opens else None,
         )  # fmt: skip
-        self._points = MaterialPoints(layout, [(0, 0)], np.ones(1), setting)
+        self._points = MaterialPoints(section_points, [(0, 0)], np.ones(1), setting)
         self.stored = self._points.stored
         self.opens = self._points if self._points.softens else None
 
     def row(self, e1: float, λ: float) -> Row:
-        self._points.respond(np.array([[e1, 0.0, 0.0]]), self.dt)
+        self._points.return_map(np.array([[e1, 0.0, 0.0]]), self.dt)
         f, D = float(self._points.r[0, 0]), float(self._points.D[0, 0, 0])
         return -D, 1.0, f - D * e1
 
@@ -313,8 +315,8 @@ class _SpringLaw(LawInStep):
     def start(self, e: float) -> float:
         self._points.start(np.array([[e, 0.0, 0.0]]))
         self.stored = self._points.stored
-        self.z["dissipated"] = float(self._points.kept[0, 4:].sum())
-        return float(self._points.kept[0, 0])
+        self.z["dissipated"] = float(self._points.recorded[0, 4:].sum())
+        return float(self._points.recorded[0, 0])
 
     def state(self, values: Array | None = None) -> Array:
         return np.asarray(self._points.state(None if values is None else values[None])[0])
@@ -350,7 +352,7 @@ class _Friction(LawInStep):
         if self.opens:
             self._limit = max(float(np.sum(self.law.limit(self.after(e0, 0.0)[2]))), 0.0)
         else:
-            self._limit = self.setting.asked[self.connector]
+            self._limit = self.setting.requested_forces[self.connector]
         softness = CREEP * self.length * self.setting.friction_repeats
         self._creep = softness / self._limit if self._limit > 0 else 0.0
         # With this motion the velocity at the end is zero; without motion it would return reversed.
@@ -504,7 +506,7 @@ def _slope(connector: Connector, size: float) -> float:
     if not 0.0 < law.limit < np.inf:
         return 1.0
     steepest, _ = law.steepest
-    early = law.limit / (REFERENCE_MOTION * (1.0 if connector.turns else size))
+    early = law.limit / (REFERENCE_MOTION * (1.0 if connector.is_rotation else size))
     least = (
         LEAST_SLOPE * connector.a.beam.section.EI / size if isinstance(connector.a, Place) else 0.0
     )
@@ -537,7 +539,7 @@ class _UserLaw(LawInStep):
         """Return force and internal variables after a step to the motion ``e1``."""
         w = self.setting.scheme.load_weight
         motion, rate = (1 - w) * self.e0 + w * e1, (e1 - self.e0) / self.dt
-        known = {name: self._known[name] for name in self.law.asked}
+        known = {name: self._known[name] for name in self.law.arguments}
         value, after = self.law.force(motion, rate, **known), self.state()
         at = f"motion = {motion:.6g}, rate = {rate:.6g}, t = {self._known['t']:.9g} s"
         if self.z:

@@ -62,7 +62,7 @@ class LoadForce(Force, ABC):
         """Return the configuration at which the load acts if the step ends at ``q1``."""
         return np.asarray(step.q0 + self.scheme.load_weight * (q1 - step.q0))
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return minus the load of the step, in proportion to the substep."""
         wanted = value_at(self.time, step.load_time, self.load)
         growth = step.fraction * (wanted - self._reached)
@@ -171,9 +171,9 @@ class FrameForce(LoadForce):
         """Return the centrifugal forces at the positions of the nodes."""
         return np.asarray(self._pull @ (self._places + q)), self._pull
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return minus the centrifugal forces and the Coriolis forces at the mean rate."""
-        r, K = super().respond(step, q1)
+        r, K = super().response(step, q1)
         coriolis = self._gyro @ (q1 - step.q0) / step.dt
         return np.asarray(r + coriolis), csr_array(K + self._gyro / step.dt)
 
@@ -219,10 +219,10 @@ class WorkForce(CellForce):
         parameters = self._work.numbers.items()
         values = {n: value_at(x, t, self._work) if callable(x) else x for n, x in parameters}
         for name, value in {"t": t, **clock, **values}.items():
-            self._forms.numbers[name].x.array[:] = value
+            self._forms.parameters[name].x.array[:] = value
         self._at = t
 
-    def respond(self, step: Step, q1: Array) -> Response:
+    def response(self, step: Step, q1: Array) -> Response:
         """Return minus the virtual work, or the derivative of the potential, and its derivative.
 
         Substeps take the same fraction as for loads.
@@ -231,7 +231,7 @@ class WorkForce(CellForce):
         self._end = self._t + fraction * (step.motion_time - self._t), self._grown + growth
         t = self._t + step.at * fraction * (step.load_time - self._t)
         self._put(t, **{"dt": min(step.dt, AT_REST), GROWTH: self._grown + step.at * growth})
-        r, K = super().respond(step, q1)
+        r, K = super().response(step, q1)
         self.force = -r
         return r, K
 

@@ -17,7 +17,7 @@ import numpy as np
 from ufl_beam.arrays import Array
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import At, PointEquations, curved, inputs, prefixed, rows
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.law_functions import Values
 from ufl_beam.reference.cell_forms import Setting
 
@@ -71,7 +71,7 @@ class MaterialPoints:
     """Points with the same layout in many cells.
 
     Args:
-        layout: The points of a cell, with their laws.
+        section_points: The points of a cell, with their laws.
         keys: Keys of the cells, for random numbers.
         length: Lengths of the cells; (cells,); m.
         setting: Setting; its scheme decides at which time of a step the laws hold.
@@ -89,45 +89,55 @@ class MaterialPoints:
     """
 
     def __init__(
-        self, layout: Layout, keys: list[tuple[int, int]], length: Array, setting: Setting
+        self,
+        section_points: SectionPoints,
+        keys: list[tuple[int, int]],
+        length: Array,
+        setting: Setting,
     ) -> None:
-        self._layout, self._scheme, self._ledger = layout, setting.scheme, setting.ledger
+        self._section_points, self._scheme, self._ledger = (
+            section_points,
+            setting.scheme,
+            setting.ledger,
+        )
         scheme, self._search = setting.scheme, setting.search
-        cells, n, self._law = len(keys), len(layout.weights), layout.kind.law
-        self.at = at = {name: np.zeros((cells, n)) for name in inputs(layout)}
+        cells, n, self._law = len(keys), len(section_points.weights), section_points.kind.law
+        self.at = at = {name: np.zeros((cells, n)) for name in inputs(section_points)}
         names = (rows(self._law, name) for name in ("strain", "before", "stiffness"))
         self._e, self._e0, self._C = names
         self._z, self._z1 = (prefixed(prefix, self._law.variables) for prefix in ("state", "new"))
         self._variables = *self._z, "jump", "opening", *self._e0, "traction", "flows"
-        for name, C in zip(self._C, np.reshape(layout.stiffness, (n, -1)).T, strict=True):
+        for name, C in zip(self._C, np.reshape(section_points.stiffness, (n, -1)).T, strict=True):
             at[name][:] = C
-        for name, value in layout.parameters(keys).items():
+        for name, value in section_points.parameters(keys).items():
             at[f"number {name}"][:] = value
         for name, initial in zip(self._z, self._law.variables.values(), strict=True):
             at[name][:] = initial
         at["length"][:], at["theta"][:], at["dt"][:] = length[:, None], scheme.theta, 1.0
         at["traction"][:] = np.inf
-        for name, value in (layout.softening.parameters() if layout.softening else {}).items():
+        for name, value in (
+            section_points.softening.parameters() if section_points.softening else {}
+        ).items():
             at[f"softening {name}"][:] = value
-        self._equations = PointEquations(layout.kind, layout.softening, scheme)
+        self._equations = PointEquations(section_points.kind, section_points.softening, scheme)
         # Strains of the points by component are B times the strains of the cell.
-        self._B = np.asarray(layout.strains).reshape(n, -1, 3)
-        self._volume = layout.weights * at["length"]
+        self._B = np.asarray(section_points.strains).reshape(n, -1, 3)
+        self._volume = section_points.weights * at["length"]
         self.r, self.strains, self.strains0 = np.zeros((3, cells, 3))
         self.D: Array = np.zeros((cells, 3, 3))
-        self.kept: Array = np.zeros((cells, 6))
+        self.recorded: Array = np.zeros((cells, 6))
         self.excess: Array = np.zeros((cells, n))
         self.released: Any = False
-        self.softens = layout.softening is not None
+        self.softens = section_points.softening is not None
         # Broken points have no stress where the law holds, but may have a stress at the ends of a
         # step.
         over_step = scheme.average(0.0, 1.0) != 1.0
-        releases = over_step and (self.softens or curved(layout.kind))
-        losses = {"plastic": layout.yields, "hinges": self.softens}
+        releases = over_step and (self.softens or curved(section_points.kind))
+        losses = {"plastic": section_points.yields, "hinges": self.softens}
         losses["numerical"] = bool(scheme.alpha) or releases
         self._lost = [name for name, occurs in losses.items() if occurs]
         setting.loses(*self._lost)
-        self.stored = {"stored": 0.0, **({"hardening": 0.0} if layout.yields else {})}
+        self.stored = {"stored": 0.0, **({"hardening": 0.0} if section_points.yields else {})}
 
     def _at_points(self, strains: Array) -> Array:
         """Return strains of the points, by component, from cell strains; (d, cells, n)."""
@@ -140,12 +150,12 @@ class MaterialPoints:
     # -- a step ----------------------------------------------------------------------------------
 
     @np.errstate(all="ignore")
-    def respond(self, strains: Array, dt: float) -> None:
+    def return_map(self, strains: Array, dt: float) -> None:
         """Compute :attr:`r` and :attr:`D` from the strains of an iterate, (cells, 3).
 
         The step has the length ``dt``; s.
         """
-        at, θ, w = self.at, self._scheme.theta, self._layout.weights
+        at, θ, w = self.at, self._scheme.theta, self._section_points.weights
         self.strains, at["dt"][:] = strains.copy(), dt
         for name, values in zip(self._e, self._at_points(strains), strict=True):
             at[name][:] = values
@@ -165,7 +175,7 @@ class MaterialPoints:
             stress_open, D = self._bulk(at)
             condensed = D * softens / (D / at["length"] + softens)  # P(76)
             stress, slope = np.where(opens, stress_open, stress), np.where(opens, condensed, slope)
-        rest = self._layout.rest  # stiffness without points
+        rest = self._section_points.rest  # stiffness without points
         self.r = rest * ((1 - θ) * self.strains0 + θ * strains)
         self.r = self.r + np.einsum("n,acn,nak->ck", w, stress, self._B)
         self.D = np.einsum("n,abcn,nak,nbl->ckl", w, slope, self._B, self._B) + θ * np.diag(rest)
@@ -287,12 +297,12 @@ class MaterialPoints:
         """
         end = self._equations.end(self.at)
         bulk = end.worked + end.elastic + end.hardening + end.missed + end.relaxed
-        change = np.sum(self._volume * bulk) + np.sum(self._layout.weights * end.broken)
+        change = np.sum(self._volume * bulk) + np.sum(self._section_points.weights * end.broken)
         return float(change + self._rest_energy(self.strains)) - sum(self.stored.values())
 
     def _rest_energy(self, strains: Array) -> float:
         """Return the elastic energy of the stiffness without points; J."""
-        return float(np.sum(strains**2 @ self._layout.rest / 2 * self.at["length"][:, 0]))
+        return float(np.sum(strains**2 @ self._section_points.rest / 2 * self.at["length"][:, 0]))
 
     @np.errstate(over="ignore")
     def accept(self) -> None:
@@ -300,8 +310,8 @@ class MaterialPoints:
         at, α = self.at, self._scheme.alpha
         end = self._equations.end(at)
         plastic = np.sum(self._volume * end.worked, axis=1)
-        broken = np.sum(self._layout.weights * (end.broken + 0 * at["length"]), axis=1)
-        self.kept[:, 4:] += np.column_stack([plastic, broken])
+        broken = np.sum(self._section_points.weights * (end.broken + 0 * at["length"]), axis=1)
+        self.recorded[:, 4:] += np.column_stack([plastic, broken])
         numerical = 2 * α * self._rest_energy(self.strains - self.strains0)
         numerical += np.sum(self._volume * (2 * α * end.lost + end.missed))
         for name, grown in zip(self._z, end.changes, strict=True):
@@ -324,23 +334,23 @@ class MaterialPoints:
 
     def start(self, strains: Array) -> None:
         """Begin at these strains of the cells, without a step; (cells, 3)."""
-        softening, breaking = self._layout.softening, self._layout.breaking
+        softening, breaking = self._section_points.softening, self._section_points.breaking
         if softening is not None:
             self.at["traction"][:, breaking] = softening.traction(self.at["opening"][:, breaking])
         self._hold(strains.copy())
 
     def _hold(self, strains: Array) -> None:
         """Compute forces and stored energies from the variables at these strains."""
-        at, w = self.at, self._layout.weights
+        at, w = self.at, self._section_points.weights
         self.strains0, point_strains = strains, self._at_points(strains)
         for name, values in zip(self._e0, point_strains, strict=True):
             at[name][:] = values
         law, z = self._equations.law(at), self._equations.state(at)
         e = law.as_argument(tuple(point_strains - at["jump"] / at["length"]))
         stress = self._array(law.as_tuple(law.stress(e, z))) * (at["traction"] != 0)
-        self.kept[:, :3] = self._layout.rest * strains
-        self.kept[:, :3] += np.einsum("n,acn,nak->ck", w, stress, self._B)
-        self.kept[:, 3] = at["jump"][:, -1]
+        self.recorded[:, :3] = self._section_points.rest * strains
+        self.recorded[:, :3] += np.einsum("n,acn,nak->ck", w, stress, self._B)
+        self.recorded[:, 3] = at["jump"][:, -1]
         energies = law.elastic_energy(e, z), law.hardening_energy(z)
         elastic, hardening = (float(np.sum(self._volume * x)) for x in energies)
         by_entry = {"stored": elastic + self._rest_energy(strains), "hardening": hardening}
@@ -355,12 +365,12 @@ class MaterialPoints:
             n = self.at["length"].shape[1]
             for i, name in enumerate(self._variables):
                 self.at[name][:] = values[:, i * n : (i + 1) * n]
-            self.kept = values[:, -11:-5].copy()
-        stored = np.zeros((len(self.kept), 2))
+            self.recorded = values[:, -11:-5].copy()
+        stored = np.zeros((len(self.recorded), 2))
         # The energy of all cells together; the owner does not matter.
         stored[:1] = self.stored["stored"], self.stored.get("hardening", 0.0)
         variables = [self.at[name] for name in self._variables]
-        return np.asarray(np.hstack([*variables, self.kept, self.strains0, stored]))
+        return np.asarray(np.hstack([*variables, self.recorded, self.strains0, stored]))
 
 
 def _largest_ratio(residuals: Array, sizes: Array) -> Array:

@@ -113,27 +113,29 @@ class Solver(PresentState):
         )
         self.t, self.q, self.q_before, self.last_dt = t, q, q, math.inf
         self.parts = self.iterations = 0
-        asked = [
+        controlled = [
             connector
             for connector in scene.all_connectors
             if isinstance(connector.law, Controller | Coulomb)
         ]
         frictional = [connector for connector in scene.all_connectors if rubs(connector.law)]
-        self.asked: dict[Connector, float] = dict.fromkeys(asked, 0.0)
-        self.rates: dict[Connector, float] = dict.fromkeys([*asked, *frictional], 0.0)
+        self.requested_forces: dict[Connector, float] = dict.fromkeys(controlled, 0.0)
+        self.rates: dict[Connector, float] = dict.fromkeys([*controlled, *frictional], 0.0)
         self.samples: dict[Connector, tuple[float, int]] = {}  # first time, last number
         laws = {
-            connector: connector.law for connector in asked if isinstance(connector.law, Controller)
+            connector: connector.law
+            for connector in controlled
+            if isinstance(connector.law, Controller)
         }
         self._sampled = {connector: law.sample for connector, law in laws.items() if law.sample}
 
         repeats = friction_repeats(scene)
-        setting = Setting(numbering, scheme, self.asked, self.rates, repeats)
+        setting = Setting(numbering, scheme, self.requested_forces, self.rates, repeats)
         self.ledger, self.search, self.supports = setting.ledger, setting.search, Supports(setting)
         rest = np.arange(len(numbering.cells))
         self.yielding: list[YieldingBeams] = []
-        for layout, cells in inelastic_cells(numbering).items():
-            self.yielding.append(YieldingBeams(cells, layout, setting))
+        for section_points, cells in inelastic_cells(numbering).items():
+            self.yielding.append(YieldingBeams(cells, section_points, setting))
             rest = np.setdiff1d(rest, cells)
         elastic = [ElasticBeams(rest, setting)] if len(rest) else []
         self.beams = [*self.yielding, *elastic]
@@ -187,14 +189,14 @@ class Solver(PresentState):
         # Forces of beams at rest, in a step too short for viscous flow.
         short = Step.of(scheme, 0.0, sys.float_info.min, sys.float_info.min, self.q)
         for beam in self.beams:
-            self._inner_before = self._inner_before + beam.respond(short, self.q)[0]
+            self._inner_before = self._inner_before + beam.response(short, self.q)[0]
         self.on_nodes = sum(beam.on_nodes for beam in self.beams)
         if self.inertia is None:
             step = Step.of(scheme, self.t, self.t + 1.0, self.t + 1.0, self.q)
             step = step._replace(load_time=self.t, motion_time=self.t)
             for group in self.connectors:
                 group.begin(step)
-                self._inner_before = self._inner_before + group.respond(step, self.q)[0]
+                self._inner_before = self._inner_before + group.response(step, self.q)[0]
             if not known:
                 self.supports.store_reactions(self.supports.axes @ (self._inner_before - loads))
                 self.supports.before = self.supports.reactions
@@ -206,11 +208,11 @@ class Solver(PresentState):
         supports.before = supports.reactions = archive.vector("reactions", supports.before)
         for force in self.forces:
             force.save_or_restore(archive)
-        for connector, value in self.asked.items():
+        for connector, value in self.requested_forces.items():
             sample = self.samples.get(connector, (math.nan, math.nan))
             at = np.array([self.scene.all_connectors.index(connector)])
             (row,) = archive.rows("asked", at, np.array([[value, *sample, self.t]]))
-            self.asked[connector] = float(row[0])
+            self.requested_forces[connector] = float(row[0])
             if math.isfinite(row[1]) and row[3] == self.t:
                 self.samples[connector] = float(row[1]), int(row[2])
         together = {name: np.concatenate(arrays) for name, arrays in archive.saved.items()}
@@ -281,7 +283,7 @@ class Solver(PresentState):
     def _solve(self, step: Step) -> tuple[Array, Array]:
         """Return the configuration at the end of a step, and the nodal step that forces work on."""
         q0, axes = self.q, self.supports.axes
-        self.ask()
+        self.evaluate()
         self.begin(step)
         guess = axes @ (q0 + step.dt / self.last_dt * (q0 - self.q_before))
         self.supports.move(guess, axes @ q0, step)
@@ -387,10 +389,10 @@ class Solver(PresentState):
         for group in self.connectors:
             group.begin(step)
 
-    def respond(self, x: Array) -> Response:
+    def response(self, x: Array) -> Response:
         """Return the residual at ``x`` and its derivative, in the axes of the supports."""
         axes, q1, step = self.supports.axes, self.supports.axes.T @ x, self._step
-        responses = [force.respond(step, q1) for force in self.forces]
+        responses = [force.response(step, q1) for force in self.forces]
         n, none = len(self.inner), np.zeros(len(x))
         self._inner = sum((r for r, _ in responses[:n]), none)
         r = np.asarray(axes @ sum((r for r, _ in responses[n:]), self._inner))
@@ -469,7 +471,7 @@ class Solver(PresentState):
     def _function(self, snes: PETSc.SNES, vector: PETSc.Vec, f: PETSc.Vec) -> None:
         """Compute the residual of the free degrees of freedom; NaN after an error stops SNES."""
         try:
-            self._r, self._K = self.respond(self._all(vector))
+            self._r, self._K = self.response(self._all(vector))
         except Exception as error:  # of a function of the user
             self._error = error
         if self._error is not None:
@@ -537,12 +539,12 @@ class Solver(PresentState):
 
     # -- controllers and friction ----------------------------------------------------------------
 
-    def ask(self) -> None:
+    def evaluate(self) -> None:
         """Evaluate controllers and limits of friction; store the rates of friction."""
-        for connector in self.asked:
+        for connector in self.requested_forces:
             due = self._due(connector) if connector in self._sampled else None
             if due is None or due != self.samples.get(connector):
-                self.asked[connector] = connector.law.ask(self, connector)  # type: ignore[union-attr]
+                self.requested_forces[connector] = connector.law.evaluate(self, connector)  # type: ignore[union-attr]
             if due is not None:
                 self.samples[connector] = due
         if self.inertia is not None:

@@ -142,7 +142,7 @@ class Keeper:
         if not os.access(folder, os.W_OK):
             raise ArgumentError(f"checkpoint {self.path}: the directory cannot be written to")
         try:
-            owner = self.lock.take()
+            owner = self.lock.acquire()
             exists = self.path.exists()
         except OSError as error:
             raise ArgumentError(

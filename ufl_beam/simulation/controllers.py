@@ -62,12 +62,12 @@ class Controllers:
         """Return the address of the force or limit of a connector."""
         return doubles(self.values) + self.at[connector]
 
-    def ask(self, now: Running) -> None:
+    def evaluate(self, now: Running) -> None:
         """Evaluate forces and limits that are due at ``now.t``; all processes call it together."""
         for i, connector in self._changing:
             sample = self._due(i, now.t)
             if sample[1] != self._samples[i, 1]:  # always for NaN, without a sample time
-                self.values[i] = connector.law.ask(now, connector)  # type: ignore[union-attr]
+                self.values[i] = connector.law.evaluate(now, connector)  # type: ignore[union-attr]
                 self.fresh[i] = 1
                 self._samples[i] = sample
 
@@ -167,7 +167,7 @@ class ForceWatch:
             dof=np.array([group.forces_at[k] for _, group, k in watched], dtype=np.int32),
             value=ffi.new("double *[]", values), fresh=ffi.new("int32_t *[]", fresh),
             rate=ffi.new("double *[]", [doubles(group.rate) + k for _, group, k in watched]),
-            length=np.array([1.0 if connector.turns else size for connector in self._connectors]),
+            length=np.array([1.0 if c.is_rotation else size for c in self._connectors]),
             force=none[0], change=none[1], largest=none[2], told=self._told,
             count=np.zeros(n, dtype=np.int32),
         )  # fmt: skip

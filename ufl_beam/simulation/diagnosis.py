@@ -200,7 +200,9 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
             continue  # no motion beyond the end of a guide; the failure of the step reports it
         connectors[group.indices] = np.abs(change)
         left[group.indices] = group.response.remaining()
-    connectors /= np.where([connector.turns for connector in scene.all_connectors], 1.0, scene.size)
+    connectors /= np.where(
+        [connector.is_rotation for connector in scene.all_connectors], 1.0, scene.size
+    )
     # Strains of a small motion, times lengths of cells; (num_cells, 3); m, m, rad
     first, last = numbering.cells[:, 0], numbering.cells[:, 1]
     position, motion = (
@@ -217,7 +219,7 @@ def _deformations(equation: StepEquation, q: Array, x: Array) -> list[Deformed]:
     strains = np.column_stack([along, shear, change[:, 2]])
     left_in_cells = np.ones(len(numbering.cells))
     for beams in equation.inelastic:
-        cells, _ = beams.kept()
+        cells, _ = beams.recorded()
         left_in_cells[cells] = beams.points.remaining(strains[cells])
     if subdomain.comm.size > 1:
         subdomain.comm.Allreduce(MPI.IN_PLACE, connectors)
@@ -238,26 +240,32 @@ def _describe(
 ) -> str:
     """Describe a motion without resistance; ``motions`` are the magnitudes of its components."""
     alike = np.round(motions, 6)  # round-off must not determine the order of equal motions
-    parts = []
+    phrases = []
     for words in numbering.worst(np.where(alike >= 1 / 2, alike, 0.0)):
         component, _, place = words.partition(" of ")
         what = "rotation" if component == "psi" else f"displacement {component}"
-        parts.append(f"the {what} of {place}")
+        phrases.append(f"the {what} of {place}")
     if cells.stiff:
         return (
-            f"the forces no longer resist a motion that is largest in {_list(parts)}, as at a "
+            f"the forces no longer resist a motion that is largest in {_list(phrases)}, as at a "
             "limit load or a bifurcation"
         )
-    said = f"{_list(parts)} {'is' if len(parts) == 1 else 'are'} held by nothing"
+    said = f"{_list(phrases)} {'is' if len(phrases) == 1 else 'are'} held by nothing"
     ways = [str(numbering.scene.all_connectors[i]) for i in connectors.soft]
     ways += [numbering.describe_cell(i) for i in cells.soft]
     if ways:
         verb = "gives way" if len(ways) == 1 else "give way together"
         said += f"; {_list(ways)} {verb} at no further force"
     layouts = (
-        numbering.scene.beams[numbering.beam_of_cell[i]].section.layout(None) for i in cells.soft
+        numbering.scene.beams[numbering.beam_of_cell[i]].section.section_points(None)
+        for i in cells.soft
     )
-    laws = (law for layout in layouts if layout is not None for law, _ in layout.laws)
+    laws = (
+        law
+        for section_points in layouts
+        if section_points is not None
+        for law, _ in section_points.laws
+    )
     perfect = any(isinstance(law, ElastoPlastic) and law.bounded and law.opens for law in laws)
     if len(cells.soft) > 1 and perfect:
         said += (
@@ -312,9 +320,9 @@ class LedgerWatch:
         self._numbering, self._claimed = numbering, claimed
         connectors, laws = numbering.scene.all_connectors, list[MaterialLaw]()  # of material points
         for beam in numbering.scene.beams:
-            layout = beam.section.layout(beam.section.hinge)
-            if layout is not None and not layout.elastic:
-                laws += [law for law, _ in layout.laws]
+            section_points = beam.section.section_points(beam.section.hinge)
+            if section_points is not None and not section_points.elastic:
+                laws += [law for law, _ in section_points.laws]
         springs = [
             connector.law.law for connector in connectors if isinstance(connector.law, Spring)
         ]
@@ -350,7 +358,7 @@ class LedgerWatch:
         number -= 0 if last else number % STATES
         if number <= 0:
             return
-        states = states.part(self.judged, self.judged + number + 1)
+        states = states.subset(self.judged, self.judged + number + 1)
         self.judged += number
         times, (state, supplied, lost) = states.times, states.ledger()
         works = sum(float(np.abs(np.diff(work)).sum()) for work in supplied.values())

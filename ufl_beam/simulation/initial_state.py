@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ufl_beam.arrays import Array
+from ufl_beam.caches import no_garbage_collection
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import element_of
 from ufl_beam.discretization.model_warnings import (
@@ -23,9 +24,8 @@ from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.discretization.work_forms import statement
 from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
 from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
-from ufl_beam.memory import no_garbage_collection
 from ufl_beam.model.beams import Mesh
-from ufl_beam.model.connector_laws import HELD
+from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.constraint_checks import (
     require_independent,
     require_inertia,
@@ -41,7 +41,7 @@ from ufl_beam.simulation.solution import Solution
 
 
 @no_garbage_collection()
-def checked_grid(
+def checked_numbering(
     scene: Scene, scheme: Scheme, mesh: Mesh, *, fresh: bool
 ) -> tuple[DofNumbering, str]:
     """Check that the scheme can compute a scene, and number its degrees of freedom.
@@ -152,8 +152,8 @@ def _require_agreement(numbering: DofNumbering, v: Array) -> None:
         a, b = v[dofs[0:6:2]], v[dofs[1:6:2]]
         by_a, by_b = connector.rigidly()
         rate = float(np.dot(by_a, a) + np.dot(by_b, b))
-        if connector.law is HELD and abs(rate) > 1e-9 * fastest / (
-            size if connector.turns else 1.0
+        if connector.law is RIGID and abs(rate) > 1e-9 * fastest / (
+            size if connector.is_rotation else 1.0
         ):
             raise ArgumentError(
                 f"Velocity: the parts that {connector} joins would move apart at {rate:.3g} m/s "

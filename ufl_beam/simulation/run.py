@@ -35,7 +35,7 @@ from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, checksum_at
 from ufl_beam.simulation.diagnosis import LEDGER_TOLERANCE, LedgerWatch
-from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
+from ufl_beam.simulation.initial_state import checked_numbering, initial_state, mesh_of
 from ufl_beam.simulation.simulation import Simulation
 from ufl_beam.simulation.solution import Opened, Solution
 from ufl_beam.simulation.step_control import Adaptive, AdaptiveSteps, EqualSteps, step_count
@@ -117,8 +117,8 @@ def simulate(
         require_kind(start, Solution, "start")
     if checkpoint is not None:
         require_kind(checkpoint, Checkpoint, "simulate: checkpoint")
-    kept = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
-    recorders, outputs = checked_recorders(record, comm, "simulate", *kept)
+    files = [] if checkpoint is None else [("checkpoint", checkpoint.files)]
+    recorders, outputs = checked_recorders(record, comm, "simulate", *files)
     begin = time.perf_counter()
     if isinstance(newton, Newton) and newton.reference:
         if isinstance(dt, Adaptive):
@@ -275,7 +275,7 @@ def running(
             yield
             check_ledger(simulation)
         except BaseException as error:
-            simulation.copies.leave()
+            simulation.copies.finish()
             if simulation.subdomain.comm.size == 1 or error is simulation.together.raised:
                 simulation.end()  # else some processes may not get here
             stopped: Any = error
@@ -313,7 +313,7 @@ def simulate_by_reference(
         require_plain(newton, f"mpirun, here with {comm.size} processes")
     newton = checked_newton(newton, comm)
     begin, (t0, t1) = time.perf_counter(), times
-    numbering, _ = checked_grid(scene, scheme, mesh_of(start, mesh), fresh=start is None)
+    numbering, _ = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=start is None)
     q, v, internal = initial_state(numbering, start)
     options: dict[str, Any] = {"max_iterations": newton.max_iterations, "petsc": newton.petsc}
     solver = Solver(numbering, scheme, t0, q, v, rtol=newton.rtol, **options)
@@ -331,7 +331,7 @@ def simulate_by_reference(
     def keep() -> None:
         columns, row = solver.now.row(0)
         if solver.parts == 0 and has_inertia(scheme):
-            columns.of_rows("reactions", row).fill(math.nan)  # unknown before the first step
+            columns.column_of("reactions", row).fill(math.nan)  # unknown before the first step
         solution.append(columns, row)
         solution.count(solver.parts, solver.iterations)
 

@@ -29,7 +29,7 @@ from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWrite
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
 from ufl_beam.simulation.diagnosis import no_equilibrium
-from ufl_beam.simulation.initial_state import checked_grid, initial_state, mesh_of
+from ufl_beam.simulation.initial_state import checked_numbering, initial_state, mesh_of
 from ufl_beam.simulation.solution import Solution
 from ufl_beam.simulation.step_equation import StaticPath, StepEquation, forces_of_scene
 from ufl_beam.simulation.stepper import Stepper
@@ -105,7 +105,7 @@ class Simulation(Stepper):
         if start is not None:
             require_kind(start, Solution, "start")
         fresh = start is None
-        numbering, loose = checked_grid(scene, scheme, mesh_of(start, mesh), fresh=fresh)
+        numbering, loose = checked_numbering(scene, scheme, mesh_of(start, mesh), fresh=fresh)
         subdomain = Subdomain(numbering, sharing(comm, len(numbering.cells)))
         together, q, v, internal = Agreement(subdomain.comm), *initial_state(numbering, start)
         equation = StepEquation(subdomain, scheme, t0, v[subdomain.dofs], together)
@@ -141,8 +141,10 @@ class Simulation(Stepper):
         super().__init__(comm, equation, newton, t0, q_local, path, solution, together, loose)
         self._begun_at = before
         solution.begun = solution.between < 1 or self.cell_forces.asks_for_before
-        of_scene = forces_of_scene(numbering, scheme, t0)
-        solution.of_record = self.cell_forces.of_record if subdomain.alone else of_scene
+        whole_scene = forces_of_scene(numbering, scheme, t0)
+        solution.forces_from_record = (
+            self.cell_forces.forces_from_record if subdomain.alone else whole_scene
+        )
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())
         # If forces act before the end of a step, loads that act from the start are applied first.
@@ -204,7 +206,9 @@ class Simulation(Stepper):
                     not solution.begun or solution.parts_of_last == self.parts
                 ):
                     columns = self._writer.columns
-                    space = solution.room(columns, min(number, 1 + MOST_VALUES // columns.width))
+                    space = solution.free_rows(
+                        columns, min(number, 1 + MOST_VALUES // columns.width)
+                    )
                     row_limit, rows = len(space), doubles(space)
                 number = max(row_limit, 1)
             with self._in_c():
@@ -239,7 +243,7 @@ class Simulation(Stepper):
         Raises:
             ConvergenceError: With the solution so far.
         """
-        self.copies.leave()
+        self.copies.finish()
         self.supports.go_back()
         self.end()
         raise no_equilibrium(
@@ -272,7 +276,7 @@ class Simulation(Stepper):
                 columns = columns.plus(BEFORE, (self.numbering.size,))
             self._now = States(self.numbering, self.solution, Block(columns, row[None], 1))
             if not self.subdomain.alone or self._lacks_record:
-                self._now.of_record = partial(self._gathered_forces, self.parts)
+                self._now.forces_from_record = partial(self._gathered_forces, self.parts)
         return self._now
 
     @cached_property
@@ -303,7 +307,7 @@ class Simulation(Stepper):
         columns = self._writer.columns
         follows = not solution.begun or solution.parts_of_last == self.parts - 1
         if self.parts and follows and not self._lacks_record:
-            (row,) = solution.room(columns)
+            (row,) = solution.free_rows(columns)
             self._writer.write(row)
             solution.grow()
         else:
@@ -320,7 +324,7 @@ class Simulation(Stepper):
             solution.append(columns, *parts)
             if self.parts == 0 and has_inertia(self.scheme):  # reactions are not known
                 columns, row = solution.row(-1)
-                columns.of_rows("reactions", row).fill(math.nan)
+                columns.column_of("reactions", row).fill(math.nan)
         solution.count(self.parts, self.iterations)
 
     # -- end and restart -----------------------------------------------------------------------

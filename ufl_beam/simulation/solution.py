@@ -19,7 +19,7 @@ from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import Curve, nearest, parameter_step
 from ufl_beam.model.joints import START_INTERVAL
 from ufl_beam.model.scene import Scene
@@ -337,7 +337,7 @@ class Opened:
         numbering, times = self._numbering, self._times
         for beam in numbering.scene.beams:
             cells, laws = numbering.cells_of(beam), numbering.hinges(beam)
-            fall = {law: _fall(beam.section.layout(law), scheme) for law in set(laws)}
+            fall = {law: _fall(beam.section.section_points(law), scheme) for law in set(laws)}
             falls, energies = np.array([fall[law] for law in laws]).T
             opened = (self.first[cells] > 0) & (self.dissipated[cells] >= energies)
             lengths = numbering.lengths(cells)
@@ -375,20 +375,26 @@ def _percent(fraction: float) -> str:
     return f"{100 * fraction:.2g} %" if fraction <= 1 else "more than 100 %"
 
 
-def _fall(layout: Layout | None, scheme: Scheme) -> tuple[float, float]:
+def _fall(section_points: SectionPoints | None, scheme: Scheme) -> tuple[float, float]:
     """Return the softening slope over θ times the stiffness of the points (1/m), and an energy.
 
     The slope is taken at the opening where the traction falls most steeply.  The energy is the
     least that a cell dissipates before that opening; J.
     """
-    law = None if layout is None else layout.softening
-    if layout is None or law is None or law.limit == 0:
+    law = None if section_points is None else section_points.softening
+    if section_points is None or law is None or law.limit == 0:
         return 0.0, 0.0
     growth, begins = INCREMENT * law.fracture_energy / law.limit, np.array([law.steepest[1]])
     after = scheme.resistance(law, begins, np.array([growth]))
     (fall,) = (law.traction(begins) - after) / growth
-    before = law.mean_traction(0 * begins, begins) * begins * layout.weights[layout.breaking].min()
-    return float(fall / (scheme.theta * layout.stiffness[layout.breaking].min())), float(before[0])
+    before = (
+        law.mean_traction(0 * begins, begins)
+        * begins
+        * section_points.weights[section_points.breaking].min()
+    )
+    return float(
+        fall / (scheme.theta * section_points.stiffness[section_points.breaking].min())
+    ), float(before[0])
 
 
 # -- text in the file ------------------------------------------------------------------------------

@@ -202,11 +202,11 @@ class AdaptiveSteps:
         c2, c3 = inertia.scheme.error_weights()
         error = c2 * dt**2 * a + c3 * dt**3 * jerk
         error[self._rotations] += (trial.q1 - simulation.q - trial.s)[self._rotations]
-        supports.enter(error)
+        supports.into_axes(error)
         error[supports.dofs] = 0.0
         # Rotations without inertia follow the other motions, and jump with a load.
         error[self._massless] = 0.0
-        supports.leave(error)
+        supports.into_plane(error)
         moves = np.hypot(error[self._x], error[self._y]).max(initial=0.0)
         rotations = np.abs(error[self._rotations]).max(initial=0.0)
         load_error = simulation.together(self._load_error, dt)

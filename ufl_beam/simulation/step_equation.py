@@ -86,13 +86,13 @@ class StepEquation:
         # Each kind makes its entries of the ledger, in the order of the columns of tables.  The
         # order follows from the scene alone, even if a process lacks cells or connectors of a kind.
         self.inelastic, elastic = list[InelasticBeams](), np.ones(len(subdomain.cells), dtype=bool)
-        for layout, cells in subdomain.numbering.inelastic:
-            expect_entries(layout, scheme, ledger)
+        for section_points, cells in subdomain.numbering.inelastic:
+            expect_entries(section_points, scheme, ledger)
             indices = np.flatnonzero(np.isin(subdomain.cells, cells))
             if len(indices):
                 elastic[indices] = False
                 subset = Fields(subdomain, indices)
-                self.inelastic.append(InelasticBeams(subset, layout, *setting, search))
+                self.inelastic.append(InelasticBeams(subset, section_points, *setting, search))
         self.beams: list[Cells] = [*self.inelastic]
         loses = scheme.alpha or isinstance(scheme, EnergyMomentumDecaying)
         if loses and sum(len(cells) for _, cells in subdomain.numbering.inelastic) < len(
@@ -130,8 +130,8 @@ class StepEquation:
         self.supports = Supports(subdomain, scheme, ledger, A)
         if inertia is not None:
             self.supports.stop(v)
-            inertia.take(v, v, math.inf)
-            if inertia.slips:
+            inertia.commit(v, v, math.inf)
+            if inertia.loses_energy:
                 ledger.lost["numerical"] += 0.0
             others.append(inertia)
         for damping in scene.damping:
@@ -163,8 +163,8 @@ class StepEquation:
             return match[1]
 
         product, cells = pop("add_step_tangent"), pop("add_cells")
-        demands = [term.demand for term in self.inner if term.demand is not None]
-        demanding = subdomain.largest(float(bool(demands)))
+        law_residuals = [term.law_residual for term in self.inner if term.law_residual is not None]
+        demanding = subdomain.largest(float(bool(law_residuals)))
         predicted = [term.predicted for term in self.beams if term.predicted is not None]
         zero, pivot = (x.astype(np.int32) for x in supports.entries)
         fill(
@@ -178,11 +178,12 @@ class StepEquation:
             reactions=supports.reactions, pivots=supports.pivots,
             turned=supports.turned, axes=supports.axes,
             plane=np.zeros(subdomain.size if supports.turned else 0),
-            demands=len(demands), demand=ffi.new("demand[]", demands), demanding=int(demanding),
+            law_residuals=len(law_residuals), law_residual=ffi.new("law_residual[]", law_residuals),
+            demanding=int(demanding),
             predictions=len(predicted), predicted=ffi.new("predicted_strains *[]", predicted),
             search=search, switched=switched,
         )  # fmt: skip
-        self._alive = loops, demands, predicted
+        self._alive = loops, law_residuals, predicted
         # In statics the work of the internal forces is compared with energies.
         self.force = np.zeros(0 if self.inertia is not None else subdomain.size)
         if self.inertia is None:
@@ -290,7 +291,7 @@ class StepEquation:
         lib.fill_tangent(self.c, doubles(self.supports.in_plane(x)))
         if len(self.supports.moving):
             forces = Product(self.A)(self.supports.in_plane(v))
-            self.supports.enter(forces)
+            self.supports.into_axes(forces)
             r += forces
         lib.hold_tangent(self.c)
         return self.A
@@ -389,7 +390,7 @@ class StepEquation:
 
 
 def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Callable[..., Array]:
-    """Return :meth:`CellForces.of_record` of all cells, for a record of several processes.
+    """Return :meth:`CellForces.forces_from_record` of all cells, for a record of several processes.
 
     The equation of the whole scene is made at the first call, without communication.
     """
@@ -401,7 +402,7 @@ def forces_of_scene(numbering: DofNumbering, scheme: Scheme, t0: float) -> Calla
             subdomain, scheme, t0, np.zeros(numbering.size), Agreement(subdomain.comm)
         )
 
-    return lambda *state: equation().cell_forces.of_record(*state)
+    return lambda *state: equation().cell_forces.forces_from_record(*state)
 
 
 # -- checks of static steps ------------------------------------------------------------------------
@@ -439,18 +440,18 @@ class StaticPath:
         equation.cell_forces.accept()
         if not goes_on:
             r = np.asarray(self.force - sum(loads))
-            supports.enter(r)
+            supports.into_axes(r)
             supports.hold(subdomain.added(r))
-            supports.take()
+            supports.commit()
         changes = [phases.change for phases in equation.phases if phases.change is not None]
-        parts = ledger.state, ledger.supplied, ledger.lost
+        accounts = ledger.state, ledger.supplied, ledger.lost
         self.c = struct(
             "static_path", slack=scheme.slack, far=LARGEST_MOTION, kink=KINK_IMBALANCE,
             per_far=subdomain.numbering.scales[subdomain.dofs],
             force=self.force, terms=len(changes), weight_of_before=scheme.weight_of_before,
-            change=ffi.new("change_call[]", changes), accounts=len(parts),
-            account=ffi.new("double *[]", [doubles(entries.amounts) for entries in parts]),
-            entries=np.array([len(entries) for entries in parts], dtype=np.int32),
+            change=ffi.new("change_call[]", changes), accounts=len(accounts),
+            account=ffi.new("double *[]", [doubles(entries.amounts) for entries in accounts]),
+            entries=np.array([len(entries) for entries in accounts], dtype=np.int32),
         )  # fmt: skip
 
     def save_or_restore(self, archive: Archive) -> None:

@@ -236,7 +236,7 @@ class Stepper(StateView):
         if controllers.asks:
             loops["begin"].insert(0, callbacks.phase(self._evaluate_controllers))
         if self.copies.several:
-            record = self.copies.note
+            record = self.copies.compare
             took = callbacks.phase(lambda step, q1, s: record(step.t1, self._copy(q1)))
             loops["add_state"].append(took)
         for name, calls in loops.items():
@@ -249,17 +249,17 @@ class Stepper(StateView):
     def _evaluate_controllers(self, *_: Any) -> None:
         """Evaluate controllers and limits of friction in the state of C."""
         self._moved(self.time_loop.t)
-        self.together(self.controllers.ask, self)
+        self.together(self.controllers.evaluate, self)
 
     def _prepare(self) -> None:
         """Store the quantities of a trial step that the scheme keeps besides the velocities."""
         c = self.time_loop
         _, *more = self.inertia.after(self._copy(c.s), c.step.dt)
         self.inertia.keep(*more)
-        self.supports.take()
+        self.supports.commit()
         q1 = self._copy(c.x)
         for group in self.connector_terms:
-            group.take(q1)
+            group.commit(q1)
 
     def _require_stiffness(self, step: Any, q1: Any, s: Any) -> None:
         """Raise if a motion that only loads can hold is free in the equilibrium.
@@ -270,7 +270,7 @@ class Stepper(StateView):
         equation, newton, numbering, loose = self.equation, self.solver, self.numbering, self._loose
         if not loose:
             return
-        newton.forget_idle()
+        newton.forget_zero_modes()
         if equation.evaluate(self._copy(q1)):
             K, free = free_matrix(self.subdomain, equation.A, self.supports.dofs)
             x, scales = null_vectors(K)[1][:, -1], numbering.scales[free]

@@ -10,9 +10,9 @@ import numpy.typing as npt
 from scipy.sparse import csr_array
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.caches import cached_by_structure
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, struct
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.memory import of_structure
 
 ONE_FRONT = int(lib.ONE_FRONT)
 """Largest number of unknowns of a system that is one dense front."""
@@ -87,7 +87,7 @@ STRUCTURE = (
 """Arrays of ``fronts`` of loops.h that follow from the structure of a matrix."""
 
 
-@of_structure
+@cached_by_structure
 def _structure(
     indptr: Index, indices: Index, stays: npt.NDArray[np.bool_]
 ) -> tuple[npt.NDArray[np.integer], ...]:

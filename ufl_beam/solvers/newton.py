@@ -101,7 +101,8 @@ class Solver:
             unknowns=self.unknowns, residual=self._r, change=self.change,
             x=opaque(self._x), f=opaque(self._f), y=opaque(self._y),
             find_conjugates=lib.find_conjugates_in_python,
-            find_idle=lib.find_idle_in_python, forget_idle=lib.forget_idle_in_python,
+            find_zero_modes=lib.find_zero_modes_in_python,
+            forget_zero_modes=lib.forget_zero_modes_in_python,
             aside=np.zeros(subdomain.size if c.search != ffi.NULL else 0),
         )  # fmt: skip
         c.handle = equation.callbacks.handle(self)  # `fill` would keep this object alive
@@ -143,7 +144,7 @@ class Solver:
             self._matrix = self._equation.A.petsc()
         else:
             # Only the preconditioner needs the matrix, and it has its own.
-            self._equation.A.release()
+            self._equation.A.free()
             give_back_memory(self._subdomain.size)
             sizes = (self._subdomain.num_owned, self._subdomain.numbering.size)
             self._matrix = PETSc.Mat().createPython(
@@ -193,7 +194,7 @@ class Solver:
         conjugate = self._equation.working(q, self.change)
         fill(self.c, conjugate=conjugate, start=np.empty(len(q)))
 
-    def find_idle(self) -> bool:
+    def find_zero_modes(self) -> bool:
         """Find new zero-energy modes and hold them by springs; return whether there are any."""
         if self._stiffness is None:
             self._stiffness = np.zeros(self._subdomain.size)
@@ -203,7 +204,7 @@ class Solver:
         self._set_stiffness(self._stiffness)
         return new
 
-    def forget_idle(self) -> bool:
+    def forget_zero_modes(self) -> bool:
         """Release all zero-energy modes; return whether any were held, on any process."""
         if self._subdomain.largest(float(self.c.idle)) == 0.0:
             return False
@@ -340,7 +341,7 @@ def _call(method: str, error: int | None, handle: Any, *data: Any) -> int | None
 
 
 for _method, _error in {
-    "solve": 1, "find_conjugates": None, "find_idle": 0, "forget_idle": 0, "arrive": None,
-    "change_along": 1, "met": 0,
+    "solve": 1, "find_conjugates": None, "find_zero_modes": 0, "forget_zero_modes": 0,
+    "arrive": None, "change_along": 1, "met": 0,
 }.items():  # fmt: skip
     from_c(_error, f"{_method}_in_python")(partial(_call, _method, _error))

@@ -39,8 +39,8 @@ def free_matrix(subdomain: Subdomain, A: Csr, constrained: Index) -> tuple[csc_a
         A.data,
         subdomain.dofs[constrained],
     )
-    parts = subdomain.comm.allgather(local) if not subdomain.alone else [local]
-    rows, columns, data, fixed = (np.concatenate(x) for x in zip(*parts, strict=True))
+    gathered = subdomain.comm.allgather(local) if not subdomain.alone else [local]
+    rows, columns, data, fixed = (np.concatenate(x) for x in zip(*gathered, strict=True))
     n = subdomain.numbering.size
     free = np.setdiff1d(np.arange(n), fixed)
     K = coo_array((data, (rows, columns)), shape=(n, n)).tocsc()
@@ -123,13 +123,13 @@ def stiffen_zero_modes(
     forced = chosen & (forces > FORCED * scale)
     if not subdomain.total(float(new.any())) or subdomain.total(float(forced.any())):
         return False
-    turns, owned = (
+    rotations, owned = (
         np.isin(subdomain.dofs, numbering.rotations),
         np.arange(subdomain.size) < subdomain.num_owned,
     )
     owned[subdomain.multipliers] = False
     sizes = np.abs(A.data[diagonal])
-    for alike in (turns & owned, ~turns & owned):
+    for alike in (rotations & owned, ~rotations & owned):
         stiffest = subdomain.largest(float(sizes[alike].max(initial=0.0)))
         stiffness[new & alike] = STIFFNESS * stiffest
     return True

@@ -16,10 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ufl_beam.arrays import Array, Index
+from ufl_beam.caches import cached_by_structure
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Subdomain
-from ufl_beam.memory import of_structure
 from ufl_beam.solvers.multifrontal import ONE_FRONT, Multifrontal
 from ufl_beam.solvers.substructuring import BAD_PIVOT, GOOD, Klu, Summed, succeeds
 
@@ -111,7 +111,7 @@ INDICES = (
 """Arrays of ``chains`` of loops.h that follow from the structure of a matrix."""
 
 
-@of_structure
+@cached_by_structure
 def _plan(
     cell_dofs: Index, indptr: Index, indices: Index, alone: Index, dofs: Index, num_owned: int
 ) -> tuple[Index, ...]:

@@ -18,14 +18,14 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.function_spaces import Element, Fields, Strains
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, beginning, entering
@@ -64,7 +64,7 @@ class FormForces(Term):
 # -- static steps ----------------------------------------------------------------------------------
 
 
-@stated
+@cached_forms
 def _linear_strains(element: Element) -> tuple[ufl.Form, fem.Function]:
     """Return strains at the points, linearised about a configuration, and this configuration."""
     about = element.configuration()
@@ -99,7 +99,7 @@ def predicted_strains(fields: Fields) -> Any:
 # -- works of tangents -----------------------------------------------------------------------------
 
 
-@stated
+@cached_forms
 def _works(work: ufl.Form, q1: fem.Function) -> dict[str, Any]:
     """Return works of the tangent and its change along u for x on y; the change; x, y, u."""
     x, y, u = (fem.Function(q1.function_space) for _ in range(3))
@@ -168,7 +168,7 @@ class ElasticForms(NamedTuple):
     losses: list[ufl.Form]
 
 
-@stated
+@cached_forms
 def elastic_forms(element: Element, scheme: Scheme) -> ElasticForms:
     """Return the forms of a step of a time scheme."""
     q0, q1, w, C, dx = element.q0, element.q1, element.w, element.stiffness, element.dx(1)
@@ -180,7 +180,7 @@ def elastic_forms(element: Element, scheme: Scheme) -> ElasticForms:
     return ElasticForms(virtual_work(r, w_e) * dx, stored, [lost] if scheme.alpha else [])
 
 
-@stated
+@cached_forms
 def _static_tangent(element: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function]:
     """Return the tangent of elastic cells with given strains in its forces; these strains."""
     q0, q1, C = element.q0, element.q1, element.stiffness
@@ -232,7 +232,7 @@ class ElasticBeams(FormForces, Cells):
 # -- beams with material points --------------------------------------------------------------------
 
 WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
-"""Factors of :attr:`Points.kept` if its jump is a crack of a fibre instead of a hinge."""
+"""Factors of :attr:`Points.recorded` if its jump is a crack of a fibre instead of a hinge."""
 
 
 class InelasticForms(NamedTuple):
@@ -246,7 +246,7 @@ class InelasticForms(NamedTuple):
     D: fem.Function
 
 
-@stated
+@cached_forms
 def inelastic_forms(element: Element, scheme: Scheme) -> InelasticForms:
     """Return the forms of a step of a time scheme."""
     r, b, D = element.at_points(3), element.at_points(3), element.at_points(3, 3)
@@ -264,23 +264,23 @@ class InelasticBeams(Cells):
     geometric tangent from them.  One loop in C evaluates points and forms.
 
     Attributes:
-        kept_factors: Factors of :attr:`Points.kept` in :meth:`kept`; (6,).
+        recorded_factors: Factors of :attr:`Points.recorded` in :meth:`kept`; (6,).
     """
 
     kind = "beams"
 
     def __init__(
-        self, fields: Fields, layout: Layout, scheme: Scheme, A: Csr, ledger: Ledger,
+        self, fields: Fields, section_points: SectionPoints, scheme: Scheme, A: Csr, ledger: Ledger,
         search: Index,
     ) -> None:  # fmt: skip
         self._A, self._ledger = A, ledger
-        self.kept_factors = np.ones(6) if layout.hinges else WITHOUT_JUMP
+        self.recorded_factors = np.ones(6) if section_points.hinges else WITHOUT_JUMP
         self.predicted = None if has_inertia(scheme) else predicted_strains(fields)
         self._cells = fields.subdomain.cells[fields.order]
         self._strains = Strains(fields)
         subdomain, lengths = fields.subdomain, fields.subdomain.numbering.lengths(self._cells)
         keys = subdomain.numbering.keys(self._cells)
-        self.points = Points(layout, keys, lengths, scheme, search, predicts=True)
+        self.points = Points(section_points, keys, lengths, scheme, search, predicts=True)
 
         forms = inelastic_forms(fields.element, scheme)
         self._q0, self._q1 = fields.element.q0, fields.element.q1
@@ -289,7 +289,7 @@ class InelasticBeams(Cells):
             fields.kernel(form, self._q1) for form in (forms.work, forms.tangent)
         )
         self._tangent.place(A)
-        self.must_dissipate = layout.kind.law.must_dissipate
+        self.must_dissipate = section_points.kind.law.must_dissipate
 
         self._latest: Array = np.full(subdomain.size, np.nan)
         self._in_c = struct(
@@ -307,7 +307,7 @@ class InelasticBeams(Cells):
         self.loops = loop(names[0], self._in_c), loop(names[1], self._in_c)
         self.in_cells = [InCells(lambda: force, lib.STRESS, fields.order)]
         if self.points.c.line:
-            self.demand = loop("missed_by_points", self._in_c)
+            self.law_residual = loop("missed_by_points", self._in_c)
 
     # -- in C ----------------------------------------------------------------------------------
 
@@ -345,7 +345,7 @@ class InelasticBeams(Cells):
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
         """Return b and D around ``q1``; the points keep this response as their latest."""
         strains = self._strains(q1)
-        r, D = self.points.respond(strains)
+        r, D = self.points.return_map(strains)
         self._latest.fill(np.nan)  # the points have another response now
         around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         return {self._b: around, self._D: D}
@@ -357,7 +357,7 @@ class InelasticBeams(Cells):
         """
         strains, D = self.points.tangent()
         elastic = np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
-        return self._cells, self.points.kept[:, :3] - elastic, D
+        return self._cells, self.points.recorded[:, :3] - elastic, D
 
     # -- the state -----------------------------------------------------------------------------
 
@@ -365,6 +365,6 @@ class InelasticBeams(Cells):
         """Save or restore the internal variables."""
         self.points.restore(archive.rows("cells", self._cells, self.points.state()))
 
-    def kept(self) -> tuple[Index, Array]:
-        """Return cells (numbers of the scene), and their :attr:`Points.kept`; (num_cells, 6)."""
-        return self._cells, self.points.kept * self.kept_factors
+    def recorded(self) -> tuple[Index, Array]:
+        """Return cells (numbers of the scene), and their recorded values; (num_cells, 6)."""
+        return self._cells, self.points.recorded * self.recorded_factors

@@ -68,24 +68,24 @@ class Supports:
         self.reactions: Array = np.zeros(len(self.dofs))
         self._before: Array = self.reactions.copy()
 
-    def enter(self, x: Array) -> None:
+    def into_axes(self, x: Array) -> None:
         """Transform from the axes of the plane to those of the supports, in place."""
         lib.turn_axes(self.turned, self.axes, doubles(x), 1)
 
-    def leave(self, x: Array) -> None:
+    def into_plane(self, x: Array) -> None:
         """Transform from the axes of the supports to those of the plane, in place."""
         lib.turn_axes(self.turned, self.axes, doubles(x), -1)
 
     def in_axes(self, q: Array) -> Array:
         """Return ``q`` in the axes of the supports; a copy only if an axis is turned."""
         if self.turned:
-            self.enter(q := q.copy())
+            self.into_axes(q := q.copy())
         return q
 
     def in_plane(self, x: Array) -> Array:
         """Return ``x`` in the axes of the plane; a copy only if an axis is turned."""
         if self.turned:
-            self.leave(x := x.copy())
+            self.into_plane(x := x.copy())
         return x
 
     def move(self, x: Array, x0: Array, step: Step) -> None:
@@ -113,13 +113,13 @@ class Supports:
 
     def stop(self, v: Array) -> None:
         """Set velocities at fixed supports to zero, in place; else they would oscillate."""
-        self.enter(v)
+        self.into_axes(v)
         moving = v[self.moving]
         v[self.dofs] = 0.0
         v[self.moving] = moving
-        self.leave(v)
+        self.into_plane(v)
 
-    def take(self) -> None:
+    def commit(self) -> None:
         """Accept the latest reactions."""
         self._before[:] = self.reactions
 
@@ -132,7 +132,7 @@ class Supports:
         reactions: Array = np.zeros(len(q))
         reactions[self.dofs] = self._before
         self.reactions[:] = archive.at_dofs("reactions", reactions)[self.dofs]
-        self.take()
+        self.commit()
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore the reactions and the pivots."""

@@ -133,7 +133,7 @@ class CellForces:
 
     # -- data of solutions ----------------------------------------------------------------------
 
-    def of_record(self, record: Array, q: Array, before: Array) -> Array:
+    def forces_from_record(self, record: Array, q: Array, before: Array) -> Array:
         """Return the numbers of a call from saved vectors, entries and factors, in this order."""
         arrays = [*((x, self._subdomain.size) for x in self.vectors), *self.entries, *self.factors]
         values, addresses, at = self.c.given, [place[0] for place, _ in arrays], 0

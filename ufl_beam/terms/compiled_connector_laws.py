@@ -20,12 +20,12 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struct
-from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms
 from ufl_beam.errors import ModelError, NoNumber, shorten
 from ufl_beam.mechanics.connector_equations import law_step
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.checks import require_returned
-from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, stated_at
+from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, source_location
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.material_law import State
 from ufl_beam.terms.connector_rows import Response, Setting
@@ -70,7 +70,8 @@ class LawForms:
         except Exception as error:
             raise ModelError(
                 f"{type(law).__name__}: it cannot be called with symbols of UFL: {error}. Laws are "
-                f"written with + - * / ** and the functions of ub.law_functions{stated_at(law)}"
+                "written with + - * / ** and the functions of ub.law_functions"
+                f"{source_location(law)}"
             ) from error
 
     @cached_property
@@ -91,7 +92,7 @@ class LawForms:
         return ffi.NULL if zero else self._pointwise.compile(*outputs)
 
 
-_law_forms = stated(LawForms)
+_law_forms = cached_forms(LawForms)
 
 
 class CompiledLaws(Response):
@@ -210,7 +211,7 @@ class UserLaw:
     def __init__(
         self, connector: Connector, law: ForceLaw, size: float, load_weight: float, state: Array
     ) -> None:
-        self._connector, self._law, self._arguments = connector, law.force, law.asked
+        self._connector, self._law, self._arguments = connector, law.force, law.arguments
         self._small, self._weight = 1e-3 * size, load_weight
         self.energy, self._stored_arguments = law.stored, law.stored_arguments
         self._e0, self._dt, self._known = 0.0, 1.0, dict[str, Any]()

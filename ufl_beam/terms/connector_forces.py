@@ -17,7 +17,7 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib, loop, names, struct
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import line_mesh
@@ -25,7 +25,7 @@ from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import NoNumber
 from ufl_beam.mechanics.relative_motions import MOTIONS, connector_forms
 from ufl_beam.model.connector_law import ConnectorLaw
-from ufl_beam.model.connector_laws import HELD, ForceLaw, Guide, Law, RigidPlastic, Spring
+from ufl_beam.model.connector_laws import RIGID, ForceLaw, Guide, Law, RigidPlastic, Spring
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.functions import REACH, parameter_step
 from ufl_beam.terms.compiled_connector_laws import CompiledLaws, UserLaws
@@ -39,7 +39,7 @@ from ufl_beam.terms.connector_rows import (
 from ufl_beam.terms.term import Callbacks, Phases, Term, beginning
 
 
-def respond(law: Any, connectors: Sequence[Connector], setting: Setting) -> Response:
+def response_of(law: Any, connectors: Sequence[Connector], setting: Setting) -> Response:
     """Make the response of connectors whose laws are of the kind of ``law``."""
     if isinstance(law, ConnectorLaw):
         return CompiledLaws(law, connectors, setting)
@@ -71,16 +71,16 @@ class ConnectorTerm(Term):
         self.forces_at: Index = self._dofs[:, 6]
         self._A = A
         self._callbacks: Callbacks  # set when the phases are made
-        self.response = response = respond(self.connectors[0].law, self.connectors, setting)
+        self.response = response = response_of(self.connectors[0].law, self.connectors, setting)
         self.must_dissipate = response.must_dissipate
         # Motions and forces of the accepted state, and `connector_number` of loops.h
         self._e, self._before = np.zeros((2, len(self.connectors)))
-        self._numbers_kept: Array = np.zeros((lib.CONNECTOR_NUMBERS, len(self.connectors)))
-        self.rate: Array = self._numbers_kept[lib.CONNECTOR_RATE]
+        self._recorded: Array = np.zeros((lib.CONNECTOR_NUMBERS, len(self.connectors)))
+        self.rate: Array = self._recorded[lib.CONNECTOR_RATE]
         motion = self._e if response.motion is None else response.motion
         fields = names("connector_number", "connector_")
-        self.kept = [("motion", motion), *zip(fields, self._numbers_kept, strict=True)]
-        self.kept += [("dissipated", energy) for energy in response.dissipated]
+        self.recorded = [("motion", motion), *zip(fields, self._recorded, strict=True)]
+        self.recorded += [("dissipated", energy) for energy in response.dissipated]
 
     @abstractmethod
     def motion(self, q: Array) -> Array:
@@ -99,7 +99,7 @@ class ConnectorTerm(Term):
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
         """Set the motions in ``works`` that force laws work on in the step ``v`` from ``q``."""
 
-    def take(self, q: Array) -> None:
+    def commit(self, q: Array) -> None:
         """Set the forces before the next step to those in ``q``."""
         self._before[:] = q[self.forces_at]
 
@@ -132,10 +132,10 @@ def _kind(law: Law) -> object:
         return ForceLaw, len(law.state)
     if isinstance(law, ConnectorLaw):
         return type(law), law.elastic
-    return type(law), law is HELD, isinstance(law, RigidPlastic) and type(law.law)
+    return type(law), law is RIGID, isinstance(law, RigidPlastic) and type(law.law)
 
 
-@stated
+@cached_forms
 def _unit_cell() -> meshes.Mesh:
     return line_mesh(np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([[0, 1]]))
 
@@ -175,15 +175,15 @@ class ConnectorForces(ConnectorTerm):
             "connectors", number=self._cells, components=k,
             connector=np.arange(self._cells, dtype=np.int32), dofs=self._dofs,
             force=self.forces_at.copy(), size=setting.size,
-            length=np.where([c.turns for c in connectors], 1.0, setting.size),
+            length=np.where([c.is_rotation for c in connectors], 1.0, setting.size),
             work=work.cells, tangent=tangent.cells, motion=value.cells,
             row=work.position(forms.row), row_of_tangent=tangent.position(forms.row),
             by_cell=np.zeros(n), e0=self._e, e1=self._now, before=self._before,
-            kept=[doubles(numbers) for numbers in self._numbers_kept],
+            kept=[doubles(saved) for saved in self._recorded],
             weight_of_before=scheme.weight_of_before, **self.response.in_c,
         )  # fmt: skip
         self.loops = loop("add_connectors_force", self._in_c), loop("add_cells", tangent.cells)
-        self.demand = loop("missed_by_connectors", self._in_c)
+        self.law_residual = loop("missed_by_connectors", self._in_c)
         self.response.know(self)
 
     def _form(self, form: ufl.Form) -> Kernel:
@@ -288,11 +288,11 @@ class ConnectorForces(ConnectorTerm):
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore motions, forces, works, and internal variables of laws."""
         response = self.response
-        mine = *self._numbers_kept, self._before, self._e
+        mine = *self._recorded, self._before, self._e
         rows = np.column_stack([*mine, response.state()])
         rows = archive.rows(response.name, self.indices, rows)
-        for numbers, column in zip(mine, rows.T, strict=False):
-            numbers[:] = column
+        for saved, column in zip(mine, rows.T, strict=False):
+            saved[:] = column
         response.restore(rows[:, len(mine) :])
 
 
@@ -330,7 +330,7 @@ class Guides(ConnectorTerm):
         )  # fmt: skip
         lib.begin_guides_again(self._c)
         self.loops = loop("add_guides_force", self._c), loop("add_guides_tangent", self._c)
-        self.demand = loop("missed_by_guides", self._c)
+        self.law_residual = loop("missed_by_guides", self._c)
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops that begin at the points of the last step and save its end points."""
@@ -393,7 +393,7 @@ def connector_terms(subdomain: Subdomain, setting: Setting, A: Csr) -> list[Conn
         if connector.motion in MOTIONS and key in groups:
             made.append(ConnectorForces(subdomain, np.array(groups[key]), setting, A))
         elif connector.motion in MOTIONS:
-            respond(connector.law, (), setting)
+            response_of(connector.law, (), setting)
     guides = [
         i
         for i, number in enumerate(subdomain.connectors)

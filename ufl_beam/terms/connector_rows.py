@@ -21,12 +21,12 @@ import ufl
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, names, struct
-from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms
 from ufl_beam.mechanics.connector_equations import parameters, rigid_plastic_step
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import (
-    HELD,
+    RIGID,
     Controller,
     Coulomb,
     Damper,
@@ -37,7 +37,7 @@ from ufl_beam.model.connector_laws import (
     Spring,
 )
 from ufl_beam.model.connectors import Connector, law_of
-from ufl_beam.model.fibres import Layout
+from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.model.functions import TimeFunction
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.material_laws import ElastoPlastic
@@ -57,7 +57,9 @@ force.
 class Setting(NamedTuple):
     """Arguments that all responses are made with."""
 
-    asked: Callable[[Connector], Any]  # pointers to forces of controllers, limits of friction
+    requested_forces: Callable[
+        [Connector], Any
+    ]  # pointers to forces of controllers, limits of friction
     rates: Any  # ``rates`` of loops.h, with the velocities; None in statics
     size: float  # of the scene; m
     scheme: Scheme
@@ -96,7 +98,9 @@ class Response:
         self._connectors, self._setting, self.name = connectors, setting, name
         self._laws: list[Any] = [connector.law for connector in connectors]
         # Scale of motions: the size of the scene, or a radian
-        self._lengths = np.where([connector.turns for connector in connectors], 1.0, setting.size)
+        self._lengths = np.where(
+            [connector.is_rotation for connector in connectors], 1.0, setting.size
+        )
         self.way: Index = np.zeros(len(connectors), dtype=np.int32)
         self.in_c: dict[str, Any] = {}
         self._in_steps: dict[str, Any] = {}
@@ -207,7 +211,7 @@ class PrescribedLaws(Response):
     """
 
     def __init__(self, law: Any, connectors: Sequence[Connector], setting: Setting) -> None:
-        constrained = law is HELD or isinstance(law, Guide)
+        constrained = law is RIGID or isinstance(law, Guide)
         name, account, entry, sign = (
             ("_Held", "", "", 0.0) if constrained else PRESCRIBED[type(law)]
         )
@@ -223,7 +227,7 @@ class PrescribedLaws(Response):
         elif isinstance(law, Damper):
             self._in_steps["viscosity"] = np.array([damper.viscosity for damper in self._laws])
         elif isinstance(law, Coulomb):
-            self._rub([setting.asked(connector) for connector in connectors])
+            self._rub([setting.requested_forces(connector) for connector in connectors])
         elif isinstance(law, PrescribedForce | Controller):
             # The forces at the ends of this step and of the last step
             end, reached = np.zeros((2, len(connectors)))
@@ -240,7 +244,7 @@ class PrescribedLaws(Response):
                     place.points, place.t, place.y = (
                         1,
                         doubles(self._always),
-                        setting.asked(connector),
+                        setting.requested_forces(connector),
                     )
                 self._in_steps["wanted_force"] = wanted
 
@@ -254,7 +258,7 @@ class Springs(Response):
     def __init__(self, law: Spring, connectors: Sequence[Connector], setting: Setting) -> None:
         super().__init__(connectors, setting, "_Sprung")
         softening, number = law.softening, len(connectors)
-        layout = Layout(
+        section_points = SectionPoints(
             strains=np.array([[1.0, 0.0, 0.0]]),
             weights=np.ones(1),
             stiffness=np.array([law.stiffness]),
@@ -264,12 +268,12 @@ class Springs(Response):
             breaking=slice(0, None),
         )
         keys = [(0, i) for i in range(number)]
-        self.points = Points(layout, keys, np.ones(number), setting.scheme, setting.search)
-        expect_entries(layout, setting.scheme, setting.ledger)
+        self.points = Points(section_points, keys, np.ones(number), setting.scheme, setting.search)
+        expect_entries(section_points, setting.scheme, setting.ledger)
         self._strains = np.zeros((number, 3))
-        self.must_dissipate = layout.kind.law.must_dissipate
+        self.must_dissipate = section_points.kind.law.must_dissipate
         self.in_c, self.opens = {"points": self.points.c}, self.points.softens
-        self.dissipated = self.points.kept[:, 4], self.points.kept[:, 5]
+        self.dissipated = self.points.recorded[:, 4], self.points.recorded[:, 5]
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
         """Return fields of ``inelastic_term`` of loops.h, with entries of the ledger."""
@@ -281,12 +285,12 @@ class Springs(Response):
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Return the energy dissipated by springs in a step to the motions ``e1``; J."""
-        self.points.respond(self._at(e1))
+        self.points.return_map(self._at(e1))
         return self.points.dissipation()
 
     def require_dissipation(self, e1: Array) -> None:
         """Raise :class:`StepFailed` if a law generates energy in a step to motions ``e1``."""
-        self.points.respond(self._at(e1))
+        self.points.return_map(self._at(e1))
         self.points.require_dissipation(lambda number: str(self._connectors[number]))
 
     def remaining(self) -> Array:
@@ -308,7 +312,7 @@ class Springs(Response):
 
     def borne(self) -> Array | None:
         """Return the forces of the springs."""
-        return self.points.kept[:, 0]
+        return self.points.recorded[:, 0]
 
     def freeze(self) -> None:
         """Keep springs elastic from now on."""
@@ -345,7 +349,7 @@ class RigidPlasticForms:
         return self._pointwise.compile(*(FREED_STIFFNESS * x for x in self._response))
 
 
-_rigid_plastic_forms = stated(RigidPlasticForms)
+_rigid_plastic_forms = cached_forms(RigidPlasticForms)
 
 
 REFERENCE_MOTION = 0.01
@@ -368,7 +372,7 @@ def _slope(connector: Connector, size: float) -> float:
     if not 0.0 < law.limit < np.inf:
         return 1.0
     steepest, _ = law.steepest
-    early = law.limit / (REFERENCE_MOTION * (1.0 if connector.turns else size))
+    early = law.limit / (REFERENCE_MOTION * (1.0 if connector.is_rotation else size))
     least = (
         LEAST_SLOPE * connector.a.beam.section.EI / size if isinstance(connector.a, Place) else 0.0
     )

@@ -183,8 +183,8 @@ class Energy(Mapping[str, Array], Rich):
     @property
     def worst(self) -> float:
         """Largest imbalance over the energy that went through."""
-        largest, throughput = float(np.max(np.abs(self.imbalance))), self.energy_transferred
-        return largest / throughput if throughput > 0 else largest
+        largest, transferred = float(np.max(np.abs(self.imbalance))), self.energy_transferred
+        return largest / transferred if transferred > 0 else largest
 
     def opened(self, claimed: float, round_off: float) -> str:
         """Describe the imbalance of the ledger; empty if it is as small as claimed.

@@ -17,7 +17,7 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, StepProduct
-from ufl_beam.discretization.compiled_forms import Kernel, stated
+from ufl_beam.discretization.compiled_forms import Kernel, cached_forms
 from ufl_beam.discretization.function_spaces import (
     Element,
     Fields,
@@ -122,13 +122,13 @@ class Inertia(Term):
         self.in_cells = [InCells(partial(mass_kernel, fields), lib.DENSITY, *at)]
         self._ledger, self._A, self.scheme = ledger, A, scheme
         size, number = len(v), FURTHER + len(scheme.kept)
-        self.slips = checked_coefficients(scheme).slip is not None
+        self.loses_energy = checked_coefficients(scheme).slip is not None
         # Changes are stored elsewhere.  Velocities before the last step are not computed anew; if
         # nothing needs them, new velocities use their memory.
-        asks = self.slips or scheme.uses_last_step
+        asks = self.loses_energy or scheme.uses_last_step
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
-        self._slip = np.zeros(size if self.slips else 0)
+        self._slip = np.zeros(size if self.loses_energy else 0)
         handle = ffi.new_handle((scheme, number))
         find = lib.numbers_in_python
         self.c = struct("rates", size=size, number=number, find=find, handle=handle)
@@ -138,7 +138,7 @@ class Inertia(Term):
             zip(self._now, (first, self._slip, *more), strict=True), start=V
         ):
             self.c.rate[k], self.c.new_rate[k] = doubles(rate), doubles(new)
-        self.take(v, v, math.inf)
+        self.commit(v, v, math.inf)
         self.keep()
 
     @property
@@ -148,7 +148,7 @@ class Inertia(Term):
 
     def phases(self, callbacks: Callbacks) -> Phases:
         """Return loops over the matrix and the velocities."""
-        lost = self._ledger.lost.pointer("numerical") if self.slips else ffi.NULL
+        lost = self._ledger.lost.pointer("numerical") if self.loses_energy else ffi.NULL
         kinetic = self._ledger.state.pointer("kinetic")
         c = self.times(self._times, kept=kinetic, lost=lost)
         begin, accept = loop("begin_inertia", c), loop("accept_inertia", c)
@@ -181,7 +181,7 @@ class Inertia(Term):
             self._rate(FURTHER + k)[:] = rate
         self.c.more, self.c.ready = len(more), bool(more) or not self.scheme.kept
 
-    def take(self, v: Array, v_before: Array, last_dt: float) -> None:
+    def commit(self, v: Array, v_before: Array, last_dt: float) -> None:
         """Set velocities, velocities before the last step, and its length."""
         self._rate(V)[:], self._rate(V_BEFORE)[:], self.c.last_dt = v, v_before, last_dt
 
@@ -208,13 +208,13 @@ class Inertia(Term):
         """Save or restore velocities before the last step and its length, by degree of freedom."""
         v_before = archive.at_dofs(BEFORE, self.v_before)
         lengths = archive.at_dofs("last step", np.full(self.c.size, self.c.last_dt))
-        self.take(self.v, v_before, float(lengths[0]) if len(lengths) else self.c.last_dt)
+        self.commit(self.v, v_before, float(lengths[0]) if len(lengths) else self.c.last_dt)
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore velocities and the last step."""
         v = archive.at_dofs("velocity", self.v)
         v_before = archive.at_dofs(BEFORE, self.v_before)
-        self.take(v, v_before, archive.number("step of velocity", self.c.last_dt))
+        self.commit(v, v_before, archive.number("step of velocity", self.c.last_dt))
         self.carry_on(archive, int(archive.number("further rates", len(self.more))))
 
 
@@ -231,7 +231,7 @@ def _work_and_loss(
     return virtual_work(r, w_e) * element.dx(1), virtual_work(r, change) * element.dx(1)
 
 
-@stated
+@cached_forms
 def _viscous_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
     """Return forms of virtual work and lost energy, and the retardation time over the step."""
     rate = element.at_points()
@@ -260,7 +260,7 @@ class KelvinVoigtForces(FormForces):
         return Phases([*begin, loop("begin_viscous_forms", c)], accept)
 
 
-@stated
+@cached_forms
 def _reference_stiffness(element: Element) -> ufl.Form:
     rest = element.configuration()
     motions = ufl.TrialFunction(element.space), element.w
@@ -326,13 +326,13 @@ def damping_forces(
 # -- numerical damping -----------------------------------------------------------------------------
 
 
-@stated
+@cached_forms
 def _change_forms(
     element: Element, scheme: EnergyMomentumDecaying
 ) -> tuple[ufl.Form, ufl.Form, fem.Function]:
     """Return forms of virtual work and lost energy, and changes of strains in the last step."""
     before = element.at_points(3)
-    return *_work_and_loss(element, scheme, element.constant(scheme.part), before), before
+    return *_work_and_loss(element, scheme, element.constant(scheme.lost_fraction), before), before
 
 
 class SecondDifferences(FormForces):

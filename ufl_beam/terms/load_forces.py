@@ -15,7 +15,7 @@ import ufl
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, loop, struct
 from ufl_beam.compiled.csr import Csr, Product
-from ufl_beam.discretization.compiled_forms import stated
+from ufl_beam.discretization.compiled_forms import cached_forms
 from ufl_beam.discretization.function_spaces import (
     Element,
     Fields,
@@ -243,7 +243,7 @@ class FollowerLoads(_AtDofs):
         self._sizes[:] = archive.rows("follower loads", self._indices, self._sizes[2])
 
 
-@stated
+@cached_forms
 def _turned_mass(element: Element) -> ufl.Form:
     (u, _), (w_u, _) = split(ufl.TrialFunction(element.space)), split(element.w)
     return element.inertia[0] * ufl.dot(perpendicular(u), w_u) * element.dx_of_mass()

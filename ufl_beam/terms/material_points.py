@@ -28,7 +28,7 @@ from ufl.core.expr import Expr
 
 from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import ffi, fill, in_order, lib, struct
-from ufl_beam.discretization.compiled_forms import Pointwise, stated
+from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms
 from ufl_beam.errors import StepFailed
 from ufl_beam.mechanics.point_equations import (
     End,
@@ -40,7 +40,7 @@ from ufl_beam.mechanics.point_equations import (
 )
 from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
 from ufl_beam.model import law_functions
-from ufl_beam.model.fibres import Kind, Layout
+from ufl_beam.model.fibres import Kind, SectionPoints
 from ufl_beam.model.material_law import traced
 from ufl_beam.model.softening_laws import SofteningLaw
 from ufl_beam.terms.energy_ledger import Ledger
@@ -63,24 +63,26 @@ FREED_STIFFNESS = 1e-30
 """Factor of the stiffness of such a joint."""
 
 
-def expect_entries(layout: Layout, scheme: Scheme, ledger: Ledger) -> None:
+def expect_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger) -> None:
     """Make the entries of the ledger that points of a layout write, on every process."""
-    if layout.yields:
+    if section_points.yields:
         ledger.state["hardening"] += 0.0
         ledger.lost["plastic"] += 0.0
-    if layout.softening is not None:
+    if section_points.softening is not None:
         ledger.lost["hinges"] += 0.0
-    if scheme.alpha or releases(layout, scheme):
+    if scheme.alpha or releases(section_points, scheme):
         ledger.lost["numerical"] += 0.0
 
 
-def releases(layout: Layout, scheme: Scheme) -> bool:
+def releases(section_points: SectionPoints, scheme: Scheme) -> bool:
     """Return whether points have numerical losses besides those by ``alpha`` of a scheme.
 
     Broken points bear no stress, except perhaps at the ends of a step.  In nonlinear elasticity the
     stress of a step is not its mean over the step.
     """
-    return scheme.average(0.0, 1.0) != 1.0 and (layout.softening is not None or curved(layout.kind))
+    return scheme.average(0.0, 1.0) != 1.0 and (
+        section_points.softening is not None or curved(section_points.kind)
+    )
 
 
 class PointForms:
@@ -148,15 +150,15 @@ class PointForms:
         return [ufl.diff(f, self._at[name]) for f in functions for name in by]
 
 
-_point_forms = stated(PointForms)
+_point_forms = cached_forms(PointForms)
 
 
 class Points:
     """Points with the same layout in many cells.
 
     Args:
-        layout: The points of a cell.
-        keys: See :meth:`Layout.parameters`.
+        section_points: The points of a cell.
+        keys: See :meth:`SectionPoints.parameters`.
         length: Lengths of the cells; (cells,); m.
         scheme: The time scheme.
         search: Flags of the present search for an equilibrium, see loops.h, shared by all points
@@ -181,7 +183,7 @@ class Points:
 
     def __init__(
         self,
-        layout: Layout,
+        section_points: SectionPoints,
         keys: list[tuple[int, int]],
         length: Array,
         scheme: Scheme,
@@ -190,23 +192,23 @@ class Points:
         predicts: bool = False,
     ) -> None:
         self._search: Index = np.zeros(lib.SEARCH_FLAGS, np.int32) if search is None else search
-        self._layout, self._alpha = layout, scheme.alpha
-        self._yields, self.softens = layout.yields, layout.softening is not None
-        self._releases = releases(layout, scheme)
-        self.names, law = inputs(layout), layout.kind.law
-        cells, per_cell, width = len(length), len(layout.weights), len(self.names)
+        self._section_points, self._alpha = section_points, scheme.alpha
+        self._yields, self.softens = section_points.yields, section_points.softening is not None
+        self._releases = releases(section_points, scheme)
+        self.names, law = inputs(section_points), section_points.kind.law
+        cells, per_cell, width = len(length), len(section_points.weights), len(self.names)
         self._storage = storage = np.zeros((cells, per_cell, width))
         self._at = {name: storage[:, :, i] for i, name in enumerate(self.names)}
         # Internal variables, and further data of an accepted state for the next step
         others = ("jump", "opening", *rows(law, "before"), "traction", "flows")
         self._state_names = (*prefixed("state", law.variables), *others)
         self._components = len(law.resultants or "x")
-        softening = layout.softening and layout.softening.kind()
-        self._equations = PointEquations(layout.kind, softening, scheme)
-        stiffness = np.reshape(layout.stiffness, (len(layout.weights), -1)).T
+        softening = section_points.softening and section_points.softening.kind()
+        self._equations = PointEquations(section_points.kind, softening, scheme)
+        stiffness = np.reshape(section_points.stiffness, (len(section_points.weights), -1)).T
         for name, value in zip(rows(law, "stiffness"), stiffness, strict=True):
             self._at[name][:] = value
-        for name, value in layout.parameters(keys).items():
+        for name, value in section_points.parameters(keys).items():
             self._at[f"number {name}"][:] = value
         for name, initial in law.variables.items():
             self._at[f"state {name}"][:] = initial
@@ -215,20 +217,24 @@ class Points:
         self.dt: Array = np.ones(1)
         self._at["dt"][:] = self.dt
         self._at["traction"][:] = np.inf
-        if layout.softening is not None:
-            for name, value in layout.softening.parameters().items():
+        if section_points.softening is not None:
+            for name, value in section_points.softening.parameters().items():
                 self._at[f"softening {name}"][:] = value
             self._resist()
 
-        self.kept = np.zeros((cells, int(lib.POINT_KEPT)))
+        self.recorded = np.zeros((cells, int(lib.POINT_KEPT)))
         self.sums = np.zeros(int(lib.POINT_SUMS))
         self.r, self.D = np.zeros((cells, 3)), np.zeros((cells, 9))
         self._e0, self.strains = np.zeros((cells, 3)), np.zeros((cells, 3))
         self.over = np.zeros(1)
 
-        self._forms = forms = _point_forms(self.names, layout.kind, softening, scheme)
+        self._forms = forms = _point_forms(self.names, section_points.kind, softening, scheme)
         self._dynamic = has_inertia(scheme)
-        arrays = {"B": layout.strains, "weight": layout.weights, "rest": layout.rest}
+        arrays = {
+            "B": section_points.strains,
+            "weight": section_points.weights,
+            "rest": section_points.rest,
+        }
         arrays = {k: np.ascontiguousarray(x, np.float64) for k, x in arrays.items()}
         self.c = struct(
             "points", cells=cells, of_cell=per_cell, width=width, w=storage,
@@ -236,7 +242,7 @@ class Points:
             law=forms.law, resistance=forms.resistance, end=forms.end, solves=law.solves,
             components=self._components, variables=len(law.variables),
             strain=self.names.index(rows(law, "strain")[0]),
-            e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.kept, sum=self.sums,
+            e0=self._e0, e1=self.strains, r=self.r, D=self.D, kept=self.recorded, sum=self.sums,
             own=forms.own, over=self.over, unlike=np.zeros(3), search=self._search,
         )  # fmt: skip
         if predicts and self._components == 1 and self._yields:
@@ -249,16 +255,16 @@ class Points:
 
     def _rows(self, name: str) -> tuple[str, ...]:
         """Return the names of the components of a strain or stiffness."""
-        return rows(self._layout.kind.law, name)
+        return rows(self._section_points.kind.law, name)
 
     def _at_points(self, strains: Array) -> tuple[Array, ...]:
         """Return strains of the points by component, (cells, n) each, from strains of the cells."""
         d = self._components
-        return tuple(strains @ self._layout.strains[k::d].T for k in range(d))
+        return tuple(strains @ self._section_points.strains[k::d].T for k in range(d))
 
     def _resist(self) -> None:
         """Update the resistance after the openings so far."""
-        softening, breaking = self._layout.softening, self._layout.breaking
+        softening, breaking = self._section_points.softening, self._section_points.breaking
         if softening is not None:
             self["traction"][:, breaking] = softening.traction(self["opening"][:, breaking])
 
@@ -277,7 +283,7 @@ class Points:
             self["dt"][:] = self.dt[0] = dt
         self.c.tried = 0  # of a law that solves for its variables
 
-    def respond(self, strains: Array) -> tuple[Array, Array]:
+    def return_map(self, strains: Array) -> tuple[Array, Array]:
         """Return (N, V, M) in a step to these strains, and derivatives; (cells, 3), (cells, 9).
 
         They are NaN if an opening was not found.  The arrays are reused.  Predictions of the last
@@ -296,17 +302,17 @@ class Points:
         arrays = self._storage, self.strains, self.r, self.D, self._search
         before = [array.copy() for array in arrays]
         try:
-            return self._e0.copy(), self.respond(self._e0)[1].copy()
+            return self._e0.copy(), self.return_map(self._e0)[1].copy()
         finally:
             for array, values in zip(arrays, before, strict=True):
                 array[:] = values
 
     def remaining(self, change: Array) -> Array:
         """Return the remaining fraction of elastic stiffness for small ``change``; (cells,)."""
-        layout, theta = self._layout, self["theta"][0, 0]
-        elastic = theta * change**2 @ layout.rest
+        section_points, theta = self._section_points, self["theta"][0, 0]
+        elastic = theta * change**2 @ section_points.rest
         for name, by_point in zip(self._rows("stiffness"), self._at_points(change), strict=True):
-            elastic += (theta * self[name] * by_point**2) @ layout.weights
+            elastic += (theta * self[name] * by_point**2) @ section_points.weights
         now = np.einsum("ci,cij,cj->c", change, self.D.reshape(-1, 3, 3), change)
         return np.asarray(np.divide(now, elastic, out=np.ones(len(now)), where=elastic > 0))
 
@@ -317,7 +323,7 @@ class Points:
         solver found a solution that no material reaches.
         """
         if (worst := lib.gives_energy(self.c)) >= 0:
-            law = type(self._layout.kind.law).__name__
+            law = type(self._section_points.kind.law).__name__
             raise StepFailed(
                 f"{law} of {describe(worst // self._storage.shape[1])} has a negative dissipation "
                 "in the step: its equations have several solutions, or it stores energy that it "
@@ -337,7 +343,7 @@ class Points:
         copy = self._copy()
         lib.commit(copy)
         plastic, broken = copy.sum[0], copy.sum[1]
-        size, volume = 0.0, self._layout.weights * self["length"]
+        size, volume = 0.0, self._section_points.weights * self["length"]
         for C, *ends in zip(*map(self._rows, ("stiffness", "strain", "before")), strict=True):
             size += sum(float(np.sum(volume * self[C] * self[e] ** 2)) for e in ends)
         return float(broken + (plastic if abs(plastic) > DIGITS * size else 0.0))
@@ -346,7 +352,7 @@ class Points:
         """Return points with the same response and a copy of the state, which loops may change."""
         copy = ffi.new("points *", self.c[0])
         return fill(
-            copy, e0=self._e0.copy(), w=self._storage.copy(), kept=self.kept.copy(),
+            copy, e0=self._e0.copy(), w=self._storage.copy(), kept=self.recorded.copy(),
             sum=self.sums.copy(),
         )  # fmt: skip
 
@@ -355,7 +361,7 @@ class Points:
 
         So points respond to any small vibration of a yielded state by elastic unloading.
         """
-        breaking, softening = self._layout.breaking, self._layout.softening
+        breaking, softening = self._section_points.breaking, self._section_points.softening
         if softening is not None:
             borne, limit = self["traction"][:, breaking], softening.limit
             spent = np.isfinite(limit) & (borne <= EXHAUSTED * limit)
@@ -386,9 +392,11 @@ class Points:
 
     def state(self) -> Array:
         """Return the internal variables of the accepted state; (cells, k); a copy."""
-        stored = np.zeros((len(self.kept), 2))
+        stored = np.zeros((len(self.recorded), 2))
         stored[:1] = self.sums[3:5]  # of all cells together; the owner does not matter
-        return np.hstack([*(self[name] for name in self._state_names), self.kept, self._e0, stored])
+        return np.hstack(
+            [*(self[name] for name in self._state_names), self.recorded, self._e0, stored]
+        )
 
     def restore(self, rows: Array) -> None:
         """Restore the variables of :meth:`state`.
@@ -399,19 +407,25 @@ class Points:
         *variables, kept, e0, stored = np.split(rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
         for name, values in zip(self._state_names, variables, strict=True):
             self[name][:] = values
-        self.kept[:], self._e0[:] = kept, e0
+        self.recorded[:], self._e0[:] = kept, e0
         self.sums[3:5] = stored.sum(axis=0)
 
     def refresh(self, strains: Array) -> None:
         """Compute forces and stored energies of a state without a step."""
-        layout, length, law = self._layout, self["length"][:, :1], self._equations.law(self._at)
-        state, volume = self._equations.state(self._at), layout.weights * length
+        section_points, length, law = (
+            self._section_points,
+            self["length"][:, :1],
+            self._equations.law(self._at),
+        )
+        state, volume = self._equations.state(self._at), section_points.weights * length
         relieved = self["jump"] / self["length"]
         e = law.as_argument(tuple(x - relieved for x in self._at_points(strains)))
-        self.kept[:, :3] = layout.rest * strains
+        self.recorded[:, :3] = section_points.rest * strains
         for k, stress in enumerate(law.as_tuple(law.stress(e, state))):
-            forces = (layout.weights * stress) @ layout.strains[k :: self._components]
-            self.kept[:, :3] += forces
-        rest_energy = strains**2 @ layout.rest / 2 * length[:, 0]
+            forces = (section_points.weights * stress) @ section_points.strains[
+                k :: self._components
+            ]
+            self.recorded[:, :3] += forces
+        rest_energy = strains**2 @ section_points.rest / 2 * length[:, 0]
         self.sums[3] = np.sum(volume * law.elastic_energy(e, state)) + np.sum(rest_energy)
         self.sums[4] = np.sum(volume * law.hardening_energy(state))

@@ -77,7 +77,7 @@ class Term(ABC):
         kind: Kind of its forces, one of :data:`KINDS`.
         loops: C functions of residual and tangent, with their data.
         in_cells: Forces on the nodes of cells; none if all act between nodes that joints may share.
-        demand: C function of the residual of a law, with its data; None if it is always zero.
+        law_residual: C function of the residual of a law, with its data; None if it is always zero.
         must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
             accepted.
     """
@@ -85,7 +85,7 @@ class Term(ABC):
     kind: str
     loops: tuple[Loop, Loop | None]
     in_cells: Sequence[InCells] = ()
-    demand: Loop | None = None
+    law_residual: Loop | None = None
     must_dissipate = False
 
     _A: Csr

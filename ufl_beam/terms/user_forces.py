@@ -56,13 +56,13 @@ class Acting:
         self.tangent, self._energy, self._lost = made[1:]
         if self.tangent is not None:
             self.tangent.place(A)
-        self._values: Array = np.full(len(work_forms.numbers), math.nan)
+        self._values: Array = np.full(len(work_forms.parameters), math.nan)
         # Forces of a virtual work in the equation of the last step
         self._before = np.zeros(0 if self._energy else fields.subdomain.size)
 
     def in_c(self, ledger: Ledger, callbacks: Callbacks) -> Any:
         """Return ``user_work`` of loops.h, with entries of the ledger."""
-        work, q0, functions = self._work, self._fields.element.q0, self._forms.numbers.values()
+        work, q0, functions = self._work, self._fields.element.q0, self._forms.parameters.values()
         kernels = [self.residual, self.tangent, self._energy, self._lost]
         forms = [kernel for kernel in kernels if kernel is not None]
         at = [_position(form, function) for form in forms for function in functions]
@@ -103,7 +103,7 @@ class Acting:
         """Add the derivative of the tangent at ``q1`` along ``u``."""
         change, direction = self._change
         if change is not None:
-            for function, value in zip(self._forms.numbers.values(), self._values, strict=True):
+            for function, value in zip(self._forms.parameters.values(), self._values, strict=True):
                 if change.uses(function):
                     change.put(function, np.array([value]))
             change.set(direction, u)

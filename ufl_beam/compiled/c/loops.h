@@ -501,7 +501,7 @@ enum { OF_LIBRARY = 76 }; /* PETSC_ERR_LIB: KLU reports a singular matrix by thi
 /* Relative violation of a law at an iterate q with the residual r. scale is the size of the forces;
  * moved is the largest motion, see largest_motion. */
 typedef double (miss)(void *self, const double *q, const double *r, double scale, double moved);
-typedef struct { miss *missed; void *self; } demand;
+typedef struct { miss *missed; void *self; } law_residual;
 miss missed_by_connectors, missed_by_points, missed_by_guides;
 
 /* A point whose displacement is in the axes of a support at an angle; c and s are its cosine and
@@ -574,8 +574,8 @@ typedef struct {
   const double *lengths; /* see Solver */
   const uint8_t *moves;
   double scene, moved; /* size of the scene; largest motion of the latest iterate, at most that size */
-  int demands, demanding; /* demanding: whether any process has demands */
-  const demand *demand; /* of connectors and points */
+  int law_residuals, demanding; /* demanding: whether any process has law_residuals */
+  const law_residual *law_residual; /* of connectors and points */
   int32_t *switched;    /* set if a row of a connector has changed between motion and force since the
                          * tangent */
   double last, best;                  /* residual of the previous iterate; least residual so far */
@@ -597,8 +597,8 @@ typedef struct {
   void (*agree)(void *handle, int number, const int *how, double *values); /* none on one process */
   int (*solve)(void *handle, int anew);                /* on several processes: computes the change */
   void (*find_conjugates)(void *handle, const double *q);
-  int (*find_idle)(void *handle);
-  int (*forget_idle)(void *handle);
+  int (*find_zero_modes)(void *handle);
+  int (*forget_zero_modes)(void *handle);
 } equation;
 
 /* Values of SNESConvergedReason. */

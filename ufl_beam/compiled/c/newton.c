@@ -174,13 +174,13 @@ static const double SURE = 1e-4;
 static const double CLOSE = 8;
 
 /* Whether x and its residual satisfy the laws of connectors and points on all processes. */
-static int demands_met(const equation *e, const double *x, double scale)
+static int laws_met(const equation *e, const double *x, double scale)
 {
   if (!e->demanding) return 1;
   const double *q = in_plane(e, x);
   double most = 0;
-  for (int k = 0; k < e->demands; ++k) {
-    const double missed = e->demand[k].missed(e->demand[k].self, q, e->residual, scale, e->moved);
+  for (int k = 0; k < e->law_residuals; ++k) {
+    const double missed = e->law_residual[k].missed(e->law_residual[k].self, q, e->residual, scale, e->moved);
     if (!(missed <= most)) most = isnan(missed) ? INFINITY : missed;
   }
   return over_processes(e, LARGEST, most) <= e->rtol;
@@ -198,7 +198,7 @@ static int judge(equation *e, const double *q, int iteration, double residual, d
    * ones, such as imperfections that make columns buckle. The residual of an iterate is about the
    * square of the previous one. */
   const double enough = iteration < e->least ? SURE * wanted : wanted;
-  const int met = residual > wanted || demands_met(e, q, scale);
+  const int met = residual > wanted || laws_met(e, q, scale);
   if (residual <= enough && met) return CONVERGED;
   const int kept = e->near;
   e->near = 0;
@@ -209,7 +209,7 @@ static int judge(equation *e, const double *q, int iteration, double residual, d
      * tolerance. */
     const int close = residual <= CLOSE * wanted && !e->demanding;
     const int stays = e->last / 2 < residual && residual <= floor && (!kept || close);
-    if ((stays || residual <= floor / 80) && demands_met(e, q, scale)) return AT_ROUND_OFF;
+    if ((stays || residual <= floor / 80) && laws_met(e, q, scale)) return AT_ROUND_OFF;
     /* With a kept tangent, the residual falls by twice the last factor. It must fall far enough
      * that works are the same as with a new tangent. */
     e->near = !kept && 2000 * residual * (residual / e->last) <= wanted && (close || residual > floor);
@@ -538,8 +538,8 @@ static int iterate_from(equation *e, const double *guess, int patience, enum tan
     go_to(e, guess, kind);
     const int reason = iterate(e, patience, 0);
     if (motions == FREE || reason > 0 || e->error || raised_anywhere(e) == OTHER) return reason;
-    if (reason == SINGULAR && e->find_idle(e->handle)) motions = HELD;
-    else if ((reason == SINGULAR || motions == HELD) && e->forget_idle(e->handle)) motions = FREE;
+    if (reason == SINGULAR && e->find_zero_modes(e->handle)) motions = HELD;
+    else if ((reason == SINGULAR || motions == HELD) && e->forget_zero_modes(e->handle)) motions = FREE;
     else return reason;
   }
 }

@@ -31,12 +31,12 @@ That are some 500 cells, of which a hundred steps take longer than all of the bu
 """
 
 
-def stated(function: Callable[P, Cached]) -> Callable[P, Cached]:
+def cached_forms(function: Callable[P, Cached]) -> Callable[P, Cached]:
     """Call a function that states forms once in a process with the same arguments."""
     return cast("Callable[P, Cached]", lru_cache(maxsize=128)(function))
 
 
-def of_structure(function: Callable[..., T]) -> Callable[..., T]:
+def cached_by_structure(function: Callable[..., T]) -> Callable[..., T]:
     """Call a function of index arrays and whole numbers once with the same arguments.
 
     It sees nothing but the numbers in its arguments, and returns a tuple; nobody can write to the
@@ -49,7 +49,7 @@ def of_structure(function: Callable[..., T]) -> Callable[..., T]:
         return result
 
     @lru_cache(maxsize=MOST_CACHED)
-    def kept(*keys: Any) -> T:
+    def cached(*keys: Any) -> T:
         # Of an array the type, the shape and the bytes, which have a hash
         arguments = (
             np.frombuffer(key[2], key[0]).reshape(key[1]) if isinstance(key, tuple) else key
@@ -66,7 +66,7 @@ def of_structure(function: Callable[..., T]) -> Callable[..., T]:
             (x.dtype.str, x.shape, x.tobytes()) if isinstance(x, np.ndarray) else x
             for x in arguments
         )
-        return kept(*keys)
+        return cached(*keys)
 
     return call
 
