@@ -186,11 +186,11 @@ assert limit.factor < push_of_mechanism(0.0)
 assert np.allclose(lost, G_f, rtol=1e-9)
 assert all(abs(state.forces[-1, 2]) < 1e-9 * M_u for state in states)
 free = P[-1] / push_of_mechanism(sway[-1])
-ub.print_once(f"push of the free frame over that of the mechanism: {free:.4f}")
+ub.print_once(f"push of the frame over the push of the mechanism: {free:.4f}")
 assert abs(free - 1) < 5e-3
 
 # %% [markdown]
 # ## Try this
 #
 # * 30 kN/m on the girders, `W = 180e3`: by how much does the weight reduce the largest push?
-# * `ub.Softening` in the place of `ub.LinearSoftening`: the moment falls exponentially.
+# * `ub.Softening` instead of `ub.LinearSoftening`: the moment falls exponentially.

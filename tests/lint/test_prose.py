@@ -84,6 +84,15 @@ def test_public_names_belong_to_the_package():
         assert module.startswith("ufl_beam."), name
 
 
+def test_the_readme_is_read_in_a_minute():
+    """Up to the features: at most 300 words beside code and addresses of links."""
+    text, features, _ = (ROOT / "README.md").read_text("utf-8").partition("\n## Features\n")
+    assert features
+    text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
+    text = re.sub(r"\]\([^)]*\)", "", text)
+    assert len(text.split()) <= 300
+
+
 SOURCES = [
     path
     for folder in ("ufl_beam", "tests", "demos", "benchmarks")

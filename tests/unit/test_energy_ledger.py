@@ -69,7 +69,7 @@ def test_the_ledger_can_be_read():
     assert lines[1].split() == ["in", "scene", "stored", "4.000000e+00", "J"]
     assert lines[3].split() == ["supplied", "loads", "1.000000e+00", "J"]
     assert lines[4].split() == ["lost", "numerical", "3.000000e+00", "J"]
-    assert "imbalance at most 0.0e+00 of 1.200000e+01 J throughput" in lines[5]
+    assert "imbalance at most 0.0e+00 of 1.200000e+01 J transferred" in lines[5]
 
 
 # -- known energies ------------------------------------------------------------------------------

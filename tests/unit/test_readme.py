@@ -87,37 +87,3 @@ def test_limit_loads_of_the_lee_frame(degree, cells, errors):
     )
     limits = np.array([point.factor for point in path.critical])
     assert (np.abs(limits / (18.5466, -9.3961) - 1) < errors).all()
-
-
-PAGES = ("README.md", "docs/start.md", "docs/installation.md")
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_commands_of_the_pages_exist(page):
-    """Targets of make, and the packages that ./env asks for in one line."""
-    text = (ROOT / page).read_text("utf-8")
-    makefile = (ROOT / "Makefile").read_text("utf-8")
-    targets = set(re.findall(r"^([a-z-]+):", makefile, re.MULTILINE))
-    commands = re.findall(r"(?:^|`|: )make ([a-z-]+)", text, re.MULTILINE)
-    assert commands
-    assert set(commands) <= targets
-    (tools,) = re.findall('^tools="(.*)"', (ROOT / "env").read_text("utf-8"), re.MULTILINE)
-    assert f"sudo apt-get install git make {tools}\n" in text
-    assert "<this repository>" not in text
-
-
-def test_the_readme_is_read_in_a_minute():
-    """Up to the features: at most 300 words beside code and addresses of links."""
-    text, features, _ = README.read_text("utf-8").partition("\n## Features\n")
-    assert features
-    text = re.sub(r"^```.*?^```", "", text, flags=re.MULTILINE | re.DOTALL)
-    text = re.sub(r"\]\([^)]*\)", "", text)
-    assert len(text.split()) <= 300
-
-
-def test_links_of_the_readme_lead_somewhere():
-    targets = re.findall(r"\]\(([^)#]+)\)", README.read_text("utf-8"))
-    for target in targets:
-        if not target.startswith("http"):
-            assert (ROOT / target).exists(), target
-    assert targets

@@ -100,8 +100,8 @@ class Keeper:
     """The checkpoint of one run; its file is locked until the :attr:`lock` is released.
 
     The ``call`` holds the arguments of the run by name.  A run with equal steps of length ``step``
-    (s) may continue to another end ``t1`` (s).  ``content`` is that of the file until
-    :meth:`resume`.
+    (s) may continue to another end ``t1`` (s).  ``content`` is the content of the
+    file until :meth:`resume`.
     """
 
     def __init__(

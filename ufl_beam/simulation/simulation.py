@@ -141,9 +141,10 @@ class Simulation(Stepper):
         super().__init__(comm, equation, newton, t0, q_local, path, solution, together, loose)
         self._begun_at = before
         solution.begun = solution.between < 1 or self.cell_forces.asks_for_before
-        whole_scene = forces_of_scene(numbering, scheme, t0)
         solution.forces_from_record = (
-            self.cell_forces.forces_from_record if subdomain.alone else whole_scene
+            self.cell_forces.forces_from_record
+            if subdomain.alone
+            else forces_of_scene(numbering, scheme, t0)
         )
         acts = any(isinstance(load, RotatingFrame) for load in scene.loads) or bool(scene.works)
         acts = acts or any(f(t0) != 0 for _, f in scene.time_functions())

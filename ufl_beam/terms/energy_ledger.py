@@ -225,7 +225,7 @@ class Energy(Mapping[str, Array], Rich):
 
     def balance(self) -> str:
         """Return the largest imbalance and the throughput in words."""
-        return f"imbalance at most {self.worst:.1e} of {self.energy_transferred:.6e} J throughput"
+        return f"imbalance at most {self.worst:.1e} of {self.energy_transferred:.6e} J transferred"
 
     def __str__(self) -> str:
         entries = [f"{kind:9s} {name:12s} {value: .6e} J" for kind, name, value in self.entries()]
