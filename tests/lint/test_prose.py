@@ -51,6 +51,22 @@ def test_docstrings_begin_with_a_noun_or_a_verb():
     assert sum(len(begin.findall(path.read_text(encoding="utf-8"))) for path in files) <= 10
 
 
+def test_docstrings_refer_to_names_of_the_package():
+    """Targets of roles such as ``:meth:`` are identifiers; a renamed one leaves no old reference."""
+    texts = [path.read_text("utf-8") for path in sorted((ROOT / "ufl_beam").rglob("*.py"))]
+    identifiers = {
+        getattr(node, field)
+        for text in texts
+        for node in ast.walk(ast.parse(text))
+        for field in ("name", "id", "arg", "attr")
+        if isinstance(getattr(node, field, None), str)
+    }
+    roles = re.compile(r":(?:attr|meth|func|class):`~?([\w.]+)`")
+    targets = {target.rpartition(".")[2] for text in texts for target in roles.findall(text)}
+    assert len(targets) > 200
+    assert targets - identifiers == set()
+
+
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
 def test_targets_of_links_exist(page):
     text = page.read_text(encoding="utf-8")

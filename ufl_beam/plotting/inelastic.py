@@ -216,7 +216,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
             rf"${digits}\times10^{{{int(power)}}}$",
             with_unit(energy.energy_transferred, "J"),
         )
-        axes.set_title(f"worst imbalance {worst} of {through} throughput", loc="left")
+        axes.set_title(f"worst imbalance {worst} of {through} transferred", loc="left")
         style.draw_legend(axes, ax, loc="outside upper left", ncols=3)
     return style.parent_figure(axes)
 

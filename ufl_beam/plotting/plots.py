@@ -157,7 +157,7 @@ def draw_energy(solution: Solution) -> Figure:
     """Draw the energy ledger over time or along a path, and below it its imbalance.
 
     Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance divided
-    by the throughput, with the machine precision for comparison.
+    by the transferred energy, with the machine precision for comparison.
 
     Example:
         >>> ub.plot(solution, "energy").savefig("energy.png")
@@ -187,7 +187,7 @@ def draw_energy(solution: Solution) -> Figure:
             xycoords=check.get_yaxis_transform(), textcoords="offset points", color=style.FRAME,
         )  # fmt: skip
         check.set_ylim(1e-2 * precision, 10 * max(float(fraction.max()), 10 * precision))
-        check.set_ylabel("imbalance\nper throughput")
+        check.set_ylabel("imbalance per\ntransferred energy")
         check.set_xlabel(solution.parameter.progress)
     return figure
 

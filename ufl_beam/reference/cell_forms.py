@@ -81,7 +81,7 @@ class Setting:
 class Archive:
     """Internal variables, by the names of :attr:`Solution.internal`.
 
-    Each force has a method ``remember`` that both saves and restores its variables.
+    Each force has a method ``save_or_restore`` that both saves and restores its variables.
 
     Attributes:
         restored: Variables to restore; other variables do not change.

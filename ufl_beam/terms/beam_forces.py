@@ -264,7 +264,7 @@ class InelasticBeams(Cells):
     geometric tangent from them.  One loop in C evaluates points and forms.
 
     Attributes:
-        recorded_factors: Factors of :attr:`Points.recorded` in :meth:`kept`; (6,).
+        recorded_factors: Factors of :attr:`Points.recorded` in :meth:`recorded`; (6,).
     """
 
     kind = "beams"

@@ -25,8 +25,8 @@ class Supports:
     """Supports of a scene: constrained and prescribed degrees of freedom, reactions.
 
     Unknowns and residuals of the solver are in the turned axes of the supports.  Unknowns and
-    residuals of the terms are in the axes of the plane.  :meth:`enter` and :meth:`leave` transform
-    them.
+    residuals of the terms are in the axes of the plane.  :meth:`into_axes` and :meth:`into_plane`
+    transform them.
 
     Attributes:
         reactions: Forces of the supports on the scene in the latest residual, at the constrained

@@ -6,7 +6,8 @@ Constrained motions have a row about e.  All other laws have a row about λ, lin
 latest iterate.
 
 This module has laws that prescribe a motion or a force, dry friction, springs, and rigid-plastic
-laws, such as plastic hinges of zero length.  Laws in force_laws.py are stated by functions.
+laws, such as plastic hinges of zero length.  Laws that call functions of a user are in
+compiled_connector_laws.py.
 """
 
 from __future__ import annotations

@@ -224,7 +224,7 @@ class Energy(Mapping[str, Array], Rich):
         ]
 
     def balance(self) -> str:
-        """Return the largest imbalance and the throughput in words."""
+        """Return the largest imbalance and the transferred energy in words."""
         return f"imbalance at most {self.worst:.1e} of {self.energy_transferred:.6e} J transferred"
 
     def __str__(self) -> str:

@@ -105,7 +105,7 @@ class Inertia(Term):
     Attributes:
         scheme: The time scheme.
         c: ``rates`` of loops.h; also has the length of the last step, infinite before the first.
-        slips: True if the scheme loses energy by the rates.
+        loses_energy: True if the scheme loses energy by the rates.
 
     Raises:
         ModelError: The scheme has coefficients that do not match :class:`Coefficients`.
