@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
 """State of a simulation in numbers of the scene, the same on any number of processes.
 
-Each object with state between steps lists it in one method, ``save_or_restore``.  The same calls save and
-restore it.
+Each object with state between steps lists it in one method, ``save_or_restore``.  The same calls
+save and restore it.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.errors import ModelError
 
 NOWHERE: Array = np.empty(0)
-"""Argument of ``save_or_restore`` instead of a configuration while a state is restored: saved strains and
-stored energies do not belong to the configuration of the scene."""
+"""Argument of ``save_or_restore`` instead of a configuration while a state is restored: saved
+strains and stored energies do not belong to the configuration of the scene."""
 
 
 class Archive:

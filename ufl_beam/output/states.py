@@ -131,7 +131,7 @@ class States:
         return block.space[block.number : block.number + number]
 
     def grow(self, number: int = 1) -> None:
-        """Append ``number`` states, which were written in :meth:`room`."""
+        """Append ``number`` states, which were written into :meth:`free_rows`."""
         self._blocks[-1].number += number
 
     def append(self, columns: Columns, *pieces: Array) -> None:

@@ -202,7 +202,7 @@ def test_dissipation_stacks_the_losses_of_the_ledger(damaged):
     np.testing.assert_array_equal(drawn["in the scene"], energy.total)
     assert axes.get_ylabel() == "energy (J)"
     title = axes.get_title(loc="left")
-    assert title.endswith(f"of {with_unit(energy.energy_transferred, 'J')} throughput")
+    assert title.endswith(f"of {with_unit(energy.energy_transferred, 'J')} transferred")
     assert f"{energy.worst:.1e}".split("e")[0] in title
     assert set(legend(figure)) == {*drawn, *(f"lost: {name}" for name in energy.lost)}
 
