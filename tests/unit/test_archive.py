@@ -316,7 +316,7 @@ def test_laws_of_a_user_need_the_scene_of_the_script(shared_path):
         ub.ArgumentError,
         match=r"a\.h5: the scene has the class Odd of your own \(module test_archive\), and files "
         r"have no code; load it with the scene of the script, "
-        r"ub\.Solution\.load\(path, scene=scene\)",
+        r"ub\.Solution\.load\(path, scene=scene\)$",
     ):
         ub.Solution.load(path)
     scene = of_ones_own()
@@ -344,7 +344,8 @@ def test_laws_of_a_user_need_the_scene_of_the_script(shared_path):
 )
 def test_another_scene_is_refused(other, message, shared_path):
     swing(of_ones_own()).save(shared_path / "a.h5")
-    with pytest.raises(ub.ArgumentError, match=message):
+    remedy = r"give the scene of that run, or load the file without scene=$"
+    with pytest.raises(ub.ArgumentError, match=f"{message}.*; {remedy}"):
         ub.Solution.load(shared_path / "a.h5", scene=other())
 
 

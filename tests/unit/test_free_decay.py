@@ -306,19 +306,19 @@ def test_it_can_be_read():
 @pytest.mark.parametrize(
     ("t", "x", "says"),
     [
-        ([0, 1, 2], [0, 1], ("peaks: 3 t and 2 x; give the same number of each",)),
+        ([0, 1, 2], [0, 1], ("3 t and 2 x; give the same number of each",)),
         ([0, 2, 1], [0, 1, 0], ("t must increase", "t[1] = 2 is followed by 1")),
         ([0, 1, 1], [0, 1, 0], ("t must increase", "t[1] = 1 is followed by 1")),
         ([0, 1, 2], [0, np.nan, 0], ("x[1] = nan is not finite",)),
         ([0, 1, np.inf], [0, 1, 0], ("t[2] = inf is not finite",)),
         ([0, 1, 2], [[0, 1, 0]], ("x has shape (1, 3)",)),
-        ([0, 1, 2], ["a", 1, 0], ("peaks: x = ['a', 1, 0] must be numbers",)),
-        ([0, 1, 2], None, ("peaks: x = None must be numbers",)),
+        ([0, 1, 2], ["a", 1, 0], ("x = ['a', 1, 0] must be numbers",)),
+        ([0, 1, 2], None, ("x = None must be numbers",)),
     ],
 )
 def test_bad_histories_are_refused(t, x, says):
     for call in (peaks, damping):
-        with raises(*says):
+        with raises(f"{call.__name__}: ", *says):
             call(t, x)
 
 

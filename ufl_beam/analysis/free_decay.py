@@ -141,7 +141,7 @@ def damping(
         >>> print(f"{decay.decrement:.3f} {decay.ratio:.4f}")
         0.100 0.0159
     """
-    times, amplitudes = peaks(t, x, about, prominence=prominence)
+    times, amplitudes = _maxima("damping", t, x, about, prominence)
     if len(times) < 3:
         raise ArgumentError(
             f"damping: peaks found: {len(times)}, needed: 3; give a longer history, "
@@ -177,9 +177,16 @@ def peaks(
         >>> print(times.round(3), amplitudes.round(3))
         [1. 2.] [1. 1.]
     """
-    t, x = _series("peaks", t, x, "x")
-    require_number(about, "peaks: about")
-    require_number(prominence, "peaks: prominence", at_least=0.0)
+    return _maxima("peaks", t, x, about, prominence)
+
+
+def _maxima(
+    call: str, t: npt.ArrayLike, x: npt.ArrayLike, about: float, prominence: float
+) -> tuple[Array, Array]:
+    """Return times and amplitudes of :func:`peaks`; ``call`` names the caller in errors."""
+    t, x = _series(call, t, x, "x")
+    require_number(about, f"{call}: about")
+    require_number(prominence, f"{call}: prominence", at_least=0.0)
     i = scipy.signal.find_peaks(x, prominence=prominence * np.ptp(x))[0] if len(x) else np.arange(0)
     before, after = t[i] - t[i - 1], t[i + 1] - t[i]
     rise, fall = (x[i] - x[i - 1]) / before, (x[i + 1] - x[i]) / after

@@ -137,7 +137,7 @@ def tradeoff(
     require_number(max_seconds, "tradeoff: max_seconds", positive=True)
     require_switch(progress, "tradeoff: progress")
     comm = communicator(comm, "tradeoff: comm")
-    t = require_times(t)
+    t = require_times(t, "tradeoff")
     meshes = _several(MESHES if mesh is None else mesh, Mesh, "mesh")
     newtons = _several(NEWTONS if newton is None else newton, Newton, "newton")
     schemes: tuple[Scheme, ...] = _several(scheme, object, "scheme")

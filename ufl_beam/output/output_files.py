@@ -252,6 +252,11 @@ ADVICE = {
 }
 """Remedies for a file that cannot be used."""
 
+
+class WrongReader(ArgumentError):
+    """Error of a file that is in order, but not for this call; its message says what to do."""
+
+
 NPY: Any = np.lib.format
 """NumPy's reader and writer of arrays, which has no type annotations."""
 
@@ -341,6 +346,8 @@ def decoding(path: Path, format: str) -> Iterator[None]:
     what = format.partition(" ")[0]
     try:
         yield
+    except WrongReader as error:
+        raise ArgumentError(f"{what} {path}: {error}") from None
     except ArgumentError as error:
         raise ArgumentError(f"{what} {path}: {error}. {ADVICE[what]}") from None
     except Exception as error:  # of any library, as a file may have any content

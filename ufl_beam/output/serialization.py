@@ -28,6 +28,7 @@ from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.functions import Point, steady
 from ufl_beam.model.supports import still
+from ufl_beam.output.output_files import WrongReader
 
 T = TypeVar("T")
 Data = Any  # data of JSON
@@ -198,7 +199,7 @@ def require_no_code(data: Data) -> None:
     for record in data["records"]:
         if "from" in record:
             kind = f"the class {record['is']} of your own (module {record['from']})"
-            raise ArgumentError(
+            raise WrongReader(
                 f"the scene has {kind}, and files have no code; load it with the scene of the "
                 "script, ub.Solution.load(path, scene=scene)"
             )

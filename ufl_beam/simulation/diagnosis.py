@@ -54,7 +54,8 @@ FREE_MOTION = (
 LIMIT_STIFFNESS = 0.1
 """Least stiffness near a limit load, as a fraction of the least stiffness in the first state.
 
-It is the root of 1/4096 if the limit load is as far away as the smallest substep."""
+The stiffness falls with the root of the distance to the limit load: to 1/64 at the distance of the
+smallest substep, 1/4096 of a step.  A tenth allows for steps that begin farther away."""
 
 LEDGER_TOLERANCE = 10.0
 """Largest ratio of the imbalance of an exact ledger to the tolerance of the solver."""

@@ -287,16 +287,16 @@ def running(
         Opened(simulation.solution).warn(simulation.scheme)
 
 
-def require_times(t: tuple[float, float]) -> tuple[float, float]:
-    """Return the beginning and the end of a run, checked."""
+def require_times(t: tuple[float, float], call: str = "simulate") -> tuple[float, float]:
+    """Return the beginning and the end of a run, checked; ``call`` names the caller in errors."""
     try:
         t0, t1 = t
     except (TypeError, ValueError):
-        raise ArgumentError(f"simulate: t = {t!r} must be a pair (beginning, end)") from None
-    require_number(t0, "simulate: t[0]")
-    require_number(t1, "simulate: t[1]")
+        raise ArgumentError(f"{call}: t = {t!r} must be a pair (beginning, end)") from None
+    require_number(t0, f"{call}: t[0]")
+    require_number(t1, f"{call}: t[1]")
     if t1 <= t0:
-        raise ArgumentError(f"simulate: the end t[1] = {t1:g} must come after the beginning {t0:g}")
+        raise ArgumentError(f"{call}: the end t[1] = {t1:g} must come after the beginning {t0:g}")
     return float(t0), float(t1)
 
 

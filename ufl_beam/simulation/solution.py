@@ -25,6 +25,7 @@ from ufl_beam.model.joints import START_INTERVAL
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import (
     Content,
+    WrongReader,
     above,
     below,
     decoding,
@@ -152,9 +153,9 @@ class Solution(States, Rich):
             >>> bool((loaded.q == solution.q).all())
             True
         """
-        file = require_path(path, "load")
+        file = require_path(path, "Solution.load")
         if scene is not None:
-            require_kind(scene, Scene, "load: scene")
+            require_kind(scene, Scene, "Solution.load: scene")
         with decoding(file, FORMAT):
             return restored(read(file, FORMAT), scene)
 
@@ -241,10 +242,11 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
     numbering = DofNumbering(described, from_data(content["mesh"]))
     if numbering.checksum() != content["numbering"]:
         if scene is not None:
-            raise ArgumentError(
-                "it is a solution of another scene: its beams, cells, bodies or joints differ"
+            raise WrongReader(
+                "it is a solution of another scene: its beams, cells, bodies or joints differ; give "
+                "the scene of that run, or load the file without scene="
             )
-        raise ArgumentError(
+        raise WrongReader(
             f"it was written by version {content['version']} of ufl_beam, which numbers degrees of "
             f"freedom differently from this version, {version()}; load it with the former version"
         )
@@ -255,7 +257,10 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
         scenes = solution._content()["scene"], content["scene"]
         now, then = (Description({"scene": json.loads(json.dumps(d))}).texts for d in scenes)
         if differs := difference(now, then):
-            raise ArgumentError(f"it is a solution of another scene: {differs}")
+            raise WrongReader(
+                f"it is a solution of another scene: {differs}; give the scene of that run, or "
+                "load the file without scene="
+            )
     return solution
 
 

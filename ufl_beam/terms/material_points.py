@@ -57,10 +57,13 @@ DIGITS = 16 * float(np.finfo(float).eps)
 
 
 EXHAUSTED = 1e-6
-"""Fraction of its limit below which an open hinge is a joint."""
+"""Fraction of its limit below which an open hinge is a joint.
+
+For an exponential law this is also the fraction of its fracture energy that is left.
+"""
 
 FREED_STIFFNESS = 1e-30
-"""Factor of the stiffness of such a joint."""
+"""Factor of the stiffness of such a joint: frequencies, its square root, are zero to round-off."""
 
 
 def expect_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger) -> None:
