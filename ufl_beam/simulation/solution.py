@@ -14,7 +14,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import State
 from ufl_beam.display import TIME, Rich
-from ufl_beam.errors import ArgumentError, require_kind, warn
+from ufl_beam.errors import require_kind, warn
 from ufl_beam.mechanics.time_schemes import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_law import ForceLaw
@@ -243,8 +243,8 @@ def restored(content: Content, scene: Scene | None = None) -> Solution:
     if numbering.checksum() != content["numbering"]:
         if scene is not None:
             raise WrongReader(
-                "it is a solution of another scene: its beams, cells, bodies or joints differ; give "
-                "the scene of that run, or load the file without scene="
+                "it is a solution of another scene: its beams, cells, bodies or joints differ; "
+                "give the scene of that run, or load the file without scene="
             )
         raise WrongReader(
             f"it was written by version {content['version']} of ufl_beam, which numbers degrees of "
