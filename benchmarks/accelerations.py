@@ -41,7 +41,7 @@ ACCELERATIONS = {
             "compiled/c/newton.c:factor_tangent", "compiled/c/newton.c:solve_tangent",
             "compiled/c/newton.c:find_change", "compiled/c/newton.c:newton",
             "compiled/c/newton.c:snes_newton", "solvers/multifrontal.py:Multifrontal.drive",
-            "solvers/static_condensation.py:CondensedSolver.drive",
+            "solvers/beam_elimination.py:CondensedSolver.drive",
             "solvers/substructuring.py:Klu.drive",
         ),
     ),
@@ -50,7 +50,7 @@ ACCELERATIONS = {
         "four or eight cells at once. Without it, FFCx's own kernels compute one cell at a time.",
         by.SHIPPED, by.SCALAR,
         (
-            "compiled/simd_kernels.py", "compiled/c/lanes.c", "compiled/c/lanes.h",
+            "compiled/simd_kernels.py", "compiled/c/assembly_simd.c", "compiled/c/assembly_simd.h",
             "discretization/compiled_forms.py~several|LANES|lanes",
             "discretization/function_spaces.py:Fields._coordinates_in_lanes",
         ),
@@ -62,10 +62,10 @@ ACCELERATIONS = {
         "of subdomains are not divided among the processes.",
         by.SHIPPED, by.WHOLE,
         (
-            "compiled/c/elimination.c", "solvers/static_condensation.py:_interior_vertices",
-            "solvers/static_condensation.py:_runs", "solvers/static_condensation.py:_plan",
-            "solvers/static_condensation.py:_what_is_left",
-            "solvers/static_condensation.py:Elimination",
+            "compiled/c/beam_elimination.c", "solvers/beam_elimination.py:_interior_vertices",
+            "solvers/beam_elimination.py:_runs", "solvers/beam_elimination.py:_plan",
+            "solvers/beam_elimination.py:_what_is_left",
+            "solvers/beam_elimination.py:Elimination",
         ),
     ),
     "dense fronts": Acceleration(

@@ -18,10 +18,10 @@ from ufl_beam.compiled.jit import compiled
 from ufl_beam.discretization import compiled_forms
 from ufl_beam.simulation import stepper
 from ufl_beam.simulation.stepper import Prediction
-from ufl_beam.solvers import newton, static_condensation
+from ufl_beam.solvers import beam_elimination, newton
 from ufl_beam.solvers.substructuring import Klu
 
-plan = static_condensation._plan
+plan = beam_elimination._plan
 
 
 def nothing(*_):
@@ -99,8 +99,8 @@ class Variant(NamedTuple):
 
 
 CELL_BY_CELL = (compiled_forms, "in_lanes", nothing)
-NO_CHAINS = (static_condensation, "_plan", without_chains)
-NO_FRONTS = (static_condensation, "Multifrontal", klu)
+NO_CHAINS = (beam_elimination, "_plan", without_chains)
+NO_FRONTS = (beam_elimination, "Multifrontal", klu)
 ALL_TANGENTS = (newton, "loop", loop_without_kept_tangents)
 AT_VELOCITY = (stepper, "Prediction", AtVelocity)
 

@@ -63,8 +63,8 @@ from ufl_beam.errors import (
     ModelWarning,
     TradeoffError,
 )
-from ufl_beam.mechanics.classical import GeneralizedAlpha, Newmark, Static
-from ufl_beam.mechanics.energy_momentum import (
+from ufl_beam.mechanics.classical_schemes import GeneralizedAlpha, Newmark, Static
+from ufl_beam.mechanics.energy_momentum_schemes import (
     EnergyMomentum,
     EnergyMomentumBase,
     EnergyMomentumDecaying,
@@ -72,7 +72,7 @@ from ufl_beam.mechanics.energy_momentum import (
     EnergyMomentumStatic,
     MidpointLoads,
 )
-from ufl_beam.mechanics.time_schemes import Coefficients, DynamicScheme, Scheme, Step
+from ufl_beam.mechanics.time_scheme import Coefficients, DynamicScheme, Scheme, Step
 from ufl_beam.model import law_functions
 from ufl_beam.model.beams import Beam, Mesh
 from ufl_beam.model.bodies import Body, PointMass, Velocity, ground
@@ -145,8 +145,8 @@ from ufl_beam.output.history import Event as Event
 from ufl_beam.output.history import Events, History
 from ufl_beam.output.output_files import version
 from ufl_beam.output.paraview_files import VTKHDF, XDMF
-from ufl_beam.output.postprocessing import Diagram as Diagram
-from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.recorder import Recorder
+from ufl_beam.output.section_forces import Diagram as Diagram
 from ufl_beam.parallel import print_once
 from ufl_beam.plotting.films import Film as Film
 from ufl_beam.plotting.plot import plot

@@ -11,7 +11,7 @@ from cases import Case
 
 import ufl_beam as ub
 
-SCHEMES: dict[str, ub.mechanics.time_schemes.Scheme] = {
+SCHEMES: dict[str, ub.mechanics.time_scheme.Scheme] = {
     "EnergyMomentum": ub.EnergyMomentum(),
     "EnergyMomentum(0.05, 0.05)": ub.EnergyMomentum(alpha=0.05, beta=0.05),
     "EnergyMomentumDecaying": ub.EnergyMomentumDecaying(),
@@ -19,7 +19,7 @@ SCHEMES: dict[str, ub.mechanics.time_schemes.Scheme] = {
     "Newmark": ub.Newmark(),
     "GeneralizedAlpha": ub.GeneralizedAlpha(),
 }
-STATIC: dict[str, ub.mechanics.time_schemes.Scheme] = {
+STATIC: dict[str, ub.mechanics.time_scheme.Scheme] = {
     "Static": ub.Static(),
     "EnergyMomentumStatic": ub.EnergyMomentumStatic(),
 }

@@ -19,7 +19,7 @@ import pytest
 import ufl_beam as ub
 from ufl_beam.display import compact_repr, counted, html_page
 from ufl_beam.model.supports import still
-from ufl_beam.plotting import plots
+from ufl_beam.plotting import history_pictures
 
 SECTION = ub.Section.rectangle(b=0.1, h=0.2, E=210e9, nu=0.3, rho=7850.0)
 BEAM = ub.Beam((0, 0), (2, 0), SECTION, cells=4)
@@ -113,13 +113,13 @@ def test_a_solution_has_its_text_its_ledger_and_shapes(solution):
 
 def test_small_displacements_are_magnified(solution, monkeypatch):
     """[closed] The deflection of 0.019 m, 1 % of the length, ten times; of 1 m as it is."""
-    factors, draw = [], plots.draw_shapes
+    factors, draw = [], history_pictures.draw_shapes
 
     def shapes(solution, count, magnify):
         factors.append(magnify)
         return draw(solution, count=count, magnify=magnify)
 
-    monkeypatch.setattr(plots, "draw_shapes", shapes)
+    monkeypatch.setattr(history_pictures, "draw_shapes", shapes)
     solution._repr_html_()
     sink = ub.PrescribedDisplacement(BEAM.start, v=lambda t: -t, u=0, psi=0)
     ub.simulate(ub.Scene([BEAM], supports=[sink]), ub.Static(), t=(0, 1), dt=1)._repr_html_()
@@ -182,7 +182,7 @@ def test_errors_of_pictures_leave_the_text(solution, monkeypatch):
     def fail(*args, **options):
         raise RuntimeError("<no> ink")
 
-    monkeypatch.setattr(plots, "draw_shapes", fail)
+    monkeypatch.setattr(history_pictures, "draw_shapes", fail)
     page = solution._repr_html_()
     assert "no picture: RuntimeError: &lt;no&gt; ink" in page
     assert solution.summary()[0] in page

@@ -46,12 +46,12 @@ def gcc(*arguments, **options):
 
 
 def lanes_source():
-    """The loop of lanes.c with a kernel that asks for every function of lanes.h."""
+    """The loop of assembly_simd.c with a kernel that asks for every function of assembly_simd.h."""
     names = "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "UNKNOWNS"
     defined = ["#define LANES 4", "#define AT 0", *(f"#define {name} 1" for name in names)]
-    head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("lanes.h")]
+    head = [jit.HEADERS, jit.DECLARATIONS, *defined, jit.text("assembly_simd.h")]
     # The functions that Python calls are declared in no header: cffi reads them as text.
-    return "\n".join([*head, KERNEL, simd_kernels.INTERFACE, jit.text("lanes.c")])
+    return "\n".join([*head, KERNEL, simd_kernels.INTERFACE, jit.text("assembly_simd.c")])
 
 
 @pytest.mark.parametrize(

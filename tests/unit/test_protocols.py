@@ -8,7 +8,7 @@ import pytest
 from scenes import clamped
 
 import ufl_beam as ub
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.records import members
 from ufl_beam.simulation import step_equation
 

@@ -72,7 +72,7 @@ def test_quotients_are_right_to_the_last_digit(flag):
         "{ for (int i = 0; i < n; i += LANES) *(lanes *)(c + i) = "
         "quotient(*(lanes *)(a + i), *(lanes *)(b + i), 1 / *(lanes *)(b + i)); }"
     )
-    head = f"#define LANES {simd_kernels.LANES}\n{jit.text('lanes.h')}"
+    head = f"#define LANES {simd_kernels.LANES}\n{jit.text('assembly_simd.h')}"
     source = "\n".join([jit.HEADERS, head, divide, loop])
     flags = [*simd_kernels.FLAGS, flag]
     module = jit.compiled(
@@ -218,7 +218,7 @@ def test_the_check_is_made_once(fresh, monkeypatch):
 def test_what_is_slower_is_said(fresh, caplog, monkeypatch):
     caplog.set_level("INFO", logger="ufl_beam")
     pointwise(ufl.atan, np.ones(2), several=True)
-    assert "computed cell by cell, which is slower: lanes.h has no atan" in caplog.text
+    assert "computed cell by cell, which is slower: assembly_simd.h has no atan" in caplog.text
     pointwise(ufl.sin, np.ones(2))
     monkeypatch.setenv("CC", "no-such-compiler")
     kernel, _ = pointwise(ufl.sin, np.ones(2), several=True)

@@ -13,7 +13,7 @@ from scipy.sparse import csr_array
 import ufl_beam as ub
 from ufl_beam.compiled.c_library import ffi
 from ufl_beam.compiled.csr import Csr
-from ufl_beam.solvers.static_condensation import Elimination
+from ufl_beam.solvers.beam_elimination import Elimination
 
 SECTION = ub.Section(EA=60.0, GA=40.0, EI=30.0, rhoA=2.0, rhoI=1.0)
 

@@ -23,7 +23,7 @@ from ufl_beam.discretization.model_warnings import warn_of_masses
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Rich
 from ufl_beam.errors import ArgumentError, require_count, require_kind, require_number, warn
-from ufl_beam.mechanics.classical import Static
+from ufl_beam.mechanics.classical_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.constraint_checks import require_no_mechanism, require_no_prestress
@@ -31,7 +31,7 @@ from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.works import VirtualWork
 from ufl_beam.output.paraview_files import VTKHDF, XDMF, TimeSeries
-from ufl_beam.output.postprocessing import velocity_at
+from ufl_beam.output.section_forces import velocity_at
 from ufl_beam.output.state_rows import FORCES, Connection
 from ufl_beam.parallel import active_comm, on_first
 from ufl_beam.simulation.initial_state import mesh_of

@@ -18,7 +18,7 @@ import numpy as np
 from ufl_beam.analysis.critical_points import Stiffness
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number
-from ufl_beam.mechanics.time_schemes import Step
+from ufl_beam.mechanics.time_scheme import Step
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS

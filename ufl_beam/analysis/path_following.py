@@ -26,13 +26,13 @@ from ufl_beam.errors import (
     require_kind,
     require_switch,
 )
-from ufl_beam.mechanics.classical import Static
+from ufl_beam.mechanics.classical_schemes import Static
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_law import ConnectorLaw, require_limit
 from ufl_beam.model.connector_laws import Controller, rubs
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Content, above, below, require_arrays
-from ufl_beam.output.recorders import Recorder, checked_recorders
+from ufl_beam.output.recorder import Recorder, checked_recorders
 from ufl_beam.parallel import communicator, progress_bar
 from ufl_beam.simulation.run import running, take_steps
 from ufl_beam.simulation.simulation import Simulation

@@ -29,7 +29,7 @@ from ufl_beam.errors import (
     require_text,
     shorten,
 )
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.parallel import alone, communicator, progress_bar

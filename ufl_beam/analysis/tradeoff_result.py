@@ -14,7 +14,7 @@ import numpy as np
 from ufl_beam.analysis.richardson import SelfConvergence, pareto, size
 from ufl_beam.arrays import Array
 from ufl_beam.display import Rich, bracketed, compact_repr
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.beams import Mesh
 from ufl_beam.solvers.newton_options import Newton
 

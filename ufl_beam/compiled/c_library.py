@@ -24,8 +24,9 @@ from ufl_beam.dolfinx_compat import VERSIONS
 T = TypeVar("T")
 
 SOURCES = (
-    "loops", "material_points", "rigid_plastic", "connectors", "guide_curves", "elimination",
-    "fronts", "newton", "cell_forces", "time_loop",
+    "assembly", "loops", "material_laws", "embedded_hinges", "material_points", "rigid_plastic",
+    "connectors", "guide_curves", "beam_elimination", "fronts", "newton", "cell_forces",
+    "term_phases", "energy_ledger", "time_loop",
 )  # fmt: skip
 """C files beside this one; they form one translation unit."""
 

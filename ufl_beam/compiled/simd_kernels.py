@@ -43,14 +43,14 @@ FLAGS = ["-O2", NATIVE, "-fno-math-errno", *(["-mprefer-vector-width=512"] if _W
 """Compiler flags; without the last one, square roots are computed in halves of a vector."""
 
 FUNCTIONS = {"sin", "cos", "sqrt", "fabs", "pow"}
-"""Functions that lanes.h provides for vectors; pow with integer exponents only."""
+"""Functions that assembly_simd.h provides for vectors; pow with integer exponents only."""
 
 INTERFACE = """
 void *address(void);
 void compute_both(void *of_ffcx, const double *w, const double *constants, const double *x,
                   double *one, double *several);
 """
-"""Functions of lanes.c that Python calls."""
+"""Functions of assembly_simd.c that Python calls."""
 
 _NUMBER = r"[-+]?\d+\.?\d*(?:e[-+]?\d+)?"
 
@@ -62,7 +62,7 @@ def in_vectors(kernel: str) -> str:
     Conditions become masks with all bits of a lane zero or one, logical operators bitwise ones.
 
     Raises:
-        Refused: The kernel needs a function or a condition that lanes.h does not provide.
+        Refused: The kernel needs a function or a condition that assembly_simd.h does not provide.
     """
     body = kernel[kernel.index("{") :]
     called = re.findall(r"\b(?!for\b)([a-z_]\w*)\(", body)
@@ -71,7 +71,7 @@ def in_vectors(kernel: str) -> str:
     if len(whole) < called.count("pow"):
         missing.append("pow with a fractional exponent")
     if missing:
-        raise Refused(f"lanes.h has no {', '.join(missing)}")
+        raise Refused(f"assembly_simd.h has no {', '.join(missing)}")
     divisors = Counter(re.findall(r"/ (sp_\w+);", body))
     repeated = "|".join(name for name, number in divisors.items() if number > 1) or "(?!)"
     lines = []
@@ -156,7 +156,10 @@ def interleaved(
     names = ("LANES", "SIDE", "ENTRIES", "WIDTH", "CONSTANTS", "AT", "UNKNOWNS")
     values = LANES, math.isqrt(sizes[0]), *sizes, *unknowns
     defined = [f"#define {x} {n}" for x, n in zip(names, values, strict=True)]
-    head, loop = "\n".join([HEADERS, DECLARATIONS, *defined, text("lanes.h")]), text("lanes.c")
+    head, loop = (
+        "\n".join([HEADERS, DECLARATIONS, *defined, text("assembly_simd.h")]),
+        text("assembly_simd.c"),
+    )
     try:
         module = compiled(
             "ufl_beam_lanes",

@@ -17,7 +17,7 @@ from ufl_beam.discretization.function_spaces import Element
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ModelError, shorten
 from ufl_beam.mechanics.kinematics import split
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.works import VirtualWork, Work
 
 GROWTH = "growth of works"

@@ -17,7 +17,7 @@ import numpy as np
 import ufl
 from ufl.core.expr import Expr
 
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.material_law import State

@@ -11,7 +11,7 @@ The fields on a mesh of straight cells are
 Energies are densities along the undeformed axis, J/m; a function W maps the strains (Σ, Γ, K) of
 the bulk to its free energy at given internal variables, P(35).  Weak forms are derivatives of these
 functionals.  A time scheme replaces strains and variations by its own, one line each, see
-:mod:`ufl_beam.mechanics.time_schemes`.
+:mod:`ufl_beam.mechanics.time_scheme`.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from ufl.core.expr import Expr
 from ufl.corealg.traversal import unique_pre_traversal
 
 from ufl_beam.compiled.c_library import names
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.fibres import Kind, SectionPoints
 from ufl_beam.model.law_functions import Values, absolute, positive
 from ufl_beam.model.material_law import MaterialLaw, State

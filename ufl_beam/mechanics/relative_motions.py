@@ -22,7 +22,7 @@ from ufl_beam.caches import cached_forms
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.kinematics import frame, perpendicular, split
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 
 
 class Geometry(NamedTuple):

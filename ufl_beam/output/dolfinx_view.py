@@ -21,7 +21,7 @@ from ufl_beam.discretization.function_spaces import (
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.errors import ArgumentError
-from ufl_beam.mechanics.time_schemes import has_inertia
+from ufl_beam.mechanics.time_scheme import has_inertia
 from ufl_beam.terms.beam_forces import elastic_forms, inelastic_forms
 
 

@@ -21,8 +21,8 @@ from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.bodies import Body, Member
 from ufl_beam.output.output_files import require_arrays
-from ufl_beam.output.postprocessing import ForcesAlongCells, in_section, section_force
-from ufl_beam.output.recorders import Restartable, StateView
+from ufl_beam.output.recorder import Restartable, StateView
+from ufl_beam.output.section_forces import ForcesAlongCells, in_section, section_force
 from ufl_beam.terms.cell_forces import CellForces
 
 # -- extremes that C updates after each step -------------------------------------------------------

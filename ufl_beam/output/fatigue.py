@@ -26,7 +26,7 @@ from ufl_beam.errors import (
 )
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.records import Instance, Positive, Record
-from ufl_beam.output.recorders import Restartable, StateView
+from ufl_beam.output.recorder import Restartable, StateView
 
 BLOCK = 1000  # steps that are collected before cycles are counted
 

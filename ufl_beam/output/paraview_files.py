@@ -22,8 +22,8 @@ from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Link, RigidLink
 from ufl_beam.model.scene import Scene, attachment_points
 from ufl_beam.output.output_files import OutputFile, beside, changed, require_path
-from ufl_beam.output.postprocessing import turned
-from ufl_beam.output.recorders import Restartable, StateView
+from ufl_beam.output.recorder import Restartable, StateView
+from ufl_beam.output.section_forces import turned
 from ufl_beam.parallel import on_first
 
 # -- a scene as lines ------------------------------------------------------------------------------

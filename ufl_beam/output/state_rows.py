@@ -22,7 +22,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, fill, integers, lib
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import in_one_line
-from ufl_beam.mechanics.time_schemes import V
+from ufl_beam.mechanics.time_scheme import V
 from ufl_beam.terms.boundary_conditions import Supports
 from ufl_beam.terms.cell_forces import CellForces
 from ufl_beam.terms.energy_ledger import Ledger

@@ -24,7 +24,7 @@ from ufl_beam.model.joints import Joint
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import require_arrays
-from ufl_beam.output.postprocessing import (
+from ufl_beam.output.section_forces import (
     MIDDLE,
     Diagram,
     ForcesAlongCells,

@@ -15,7 +15,19 @@ from ufl_beam.errors import ArgumentError
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue
-from ufl_beam.plotting import diagrams, inelastic, model, plots
+from ufl_beam.plotting.frame_pictures import draw_damage_state, draw_shape
+from ufl_beam.plotting.history_pictures import (
+    draw_cycles,
+    draw_energy,
+    draw_extremes,
+    draw_history,
+    draw_modes,
+    draw_shapes,
+    draw_study,
+    draw_tradeoff,
+)
+from ufl_beam.plotting.inelastic_pictures import draw_dissipation, draw_hinge, draw_moment_curvature
+from ufl_beam.plotting.model import draw_model
 from ufl_beam.plotting.style import RESULTANTS
 from ufl_beam.simulation.solution import Solution
 
@@ -23,23 +35,23 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 PICTURES: dict[type, dict[str, Callable[..., Figure]]] = {
-    Scene: {"model": model.draw_model},
+    Scene: {"model": draw_model},
     Solution: {
-        "shape": diagrams.draw_shape,
-        **{name: partial(diagrams.draw_shape, quantity=name) for name in RESULTANTS},
-        "damage": diagrams.draw_damage_state,
-        "shapes": plots.draw_shapes,
-        "history": plots.draw_history,
-        "energy": plots.draw_energy,
-        "dissipation": inelastic.draw_dissipation,
-        "hinge": inelastic.draw_hinge,
-        "moment-curvature": inelastic.draw_moment_curvature,
+        "shape": draw_shape,
+        **{name: partial(draw_shape, quantity=name) for name in RESULTANTS},
+        "damage": draw_damage_state,
+        "shapes": draw_shapes,
+        "history": draw_history,
+        "energy": draw_energy,
+        "dissipation": draw_dissipation,
+        "hinge": draw_hinge,
+        "moment-curvature": draw_moment_curvature,
     },
-    Shapes: {"modes": plots.draw_modes},
-    Extremes: {name: partial(plots.draw_extremes, quantity=name) for name in ("M", "N", "V")},
-    Fatigue: {"cycles": plots.draw_cycles},
-    Study: {"results": plots.draw_study},
-    Tradeoff: {"errors": plots.draw_tradeoff},
+    Shapes: {"modes": draw_modes},
+    Extremes: {name: partial(draw_extremes, quantity=name) for name in ("M", "N", "V")},
+    Fatigue: {"cycles": draw_cycles},
+    Study: {"results": draw_study},
+    Tradeoff: {"errors": draw_tradeoff},
 }
 """Pictures by class and quantity; the first one of a class is drawn by default."""
 

@@ -21,7 +21,7 @@ from ufl_beam.model.records import Record
 from ufl_beam.parallel import active_comm, progress_bar
 from ufl_beam.plotting import style, symbols
 from ufl_beam.plotting.films import WRITERS, Film, screen
-from ufl_beam.plotting.inelastic import open_hinges
+from ufl_beam.plotting.inelastic_pictures import open_hinges
 from ufl_beam.plotting.positions import (
     Canvas,
     DeformedShape,

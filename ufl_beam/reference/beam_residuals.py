@@ -16,10 +16,10 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import mass_form
 from ufl_beam.errors import ModelError
-from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
+from ufl_beam.mechanics.energy_momentum_schemes import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
-from ufl_beam.mechanics.time_schemes import (
+from ufl_beam.mechanics.time_scheme import (
     DynamicScheme,
     Step,
     combined,

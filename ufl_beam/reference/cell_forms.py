@@ -25,7 +25,7 @@ from ufl_beam.discretization.function_spaces import Element
 from ufl_beam.dolfinx_compat import compile_form, fem, jit_directory, line_mesh
 from ufl_beam.dolfinx_compat import mesh as meshes
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_scheme import Scheme, Step
 from ufl_beam.model.connectors import Connector
 
 T = TypeVar("T", bound=Array | None)

@@ -13,7 +13,7 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.errors import NoNumber
 from ufl_beam.mechanics.relative_motions import MOTIONS, connector_forms
-from ufl_beam.mechanics.time_schemes import Step, acting
+from ufl_beam.mechanics.time_scheme import Step, acting
 from ufl_beam.model.connector_law import ConnectorLaw
 from ufl_beam.model.connector_laws import Guide
 from ufl_beam.model.connectors import Connector

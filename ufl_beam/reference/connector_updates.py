@@ -18,7 +18,7 @@ import scipy  # its parts are loaded when they are used
 from ufl_beam.arrays import Array
 from ufl_beam.errors import ModelError, NoNumber
 from ufl_beam.mechanics.connector_equations import RigidPlasticStep, parameters, rigid_plastic_step
-from ufl_beam.mechanics.time_schemes import Step, increment_to_rest
+from ufl_beam.mechanics.time_scheme import Step, increment_to_rest
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.checks import require_returned
 from ufl_beam.model.connector_law import ConnectorLaw

@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array
 from ufl_beam.discretization.work_forms import GROWTH, statement
 from ufl_beam.mechanics.kinematics import perpendicular, split
-from ufl_beam.mechanics.time_schemes import Step, acting, has_inertia
+from ufl_beam.mechanics.time_scheme import Step, acting, has_inertia
 from ufl_beam.model.bodies import GROUND, carries
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame

@@ -31,7 +31,7 @@ from ufl_beam.output.output_files import (
     require_writable,
     write,
 )
-from ufl_beam.output.recorders import Recorder
+from ufl_beam.output.recorder import Recorder
 from ufl_beam.output.serialization import CODE, Description, difference, has_state
 from ufl_beam.parallel import on_first
 from ufl_beam.simulation.simulation import Simulation

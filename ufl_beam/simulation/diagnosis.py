@@ -14,7 +14,7 @@ from scipy.sparse import csr_array
 from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.errors import ArgumentError, ConvergenceError, ModelError, NoNumber, StepFailed
-from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.connector_law import CONTRIBUTIONS, ConnectorLaw, judges_loss
 from ufl_beam.model.connector_laws import (
     Coulomb,

@@ -23,7 +23,7 @@ from ufl_beam.discretization.state_io import State
 from ufl_beam.discretization.state_transfer import Transfer, same_unknowns
 from ufl_beam.discretization.work_forms import statement
 from ufl_beam.errors import ArgumentError, require_kind, shorten, warn
-from ufl_beam.mechanics.time_schemes import DynamicScheme, Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import DynamicScheme, Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.connector_laws import RIGID
 from ufl_beam.model.constraint_checks import (

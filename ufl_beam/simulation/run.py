@@ -26,11 +26,11 @@ from ufl_beam.errors import (
     require_switch,
     warn,
 )
-from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.output_files import Output, reserved
-from ufl_beam.output.recorders import Recorder, checked_recorders
+from ufl_beam.output.recorder import Recorder, checked_recorders
 from ufl_beam.parallel import communicator, print_once, progress_bar
 from ufl_beam.reference.solver import Solver
 from ufl_beam.simulation.checkpoint import Checkpoint, Keeper, checksum_at

@@ -18,13 +18,13 @@ from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.discretization.state_transfer import same_unknowns
 from ufl_beam.errors import ArgumentError, StepFailed, require_kind, require_number, shorten
-from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.beams import Mesh
 from ufl_beam.model.loads import RotatingFrame
 from ufl_beam.model.scene import Scene
 from ufl_beam.output.dolfinx_view import DolfinxView
 from ufl_beam.output.extremes import ExtremesInC
-from ufl_beam.output.postprocessing import ForcesAlongCells
+from ufl_beam.output.section_forces import ForcesAlongCells
 from ufl_beam.output.state_rows import BEFORE, FORCES, RECORD, Block, StateWriter, new_rows
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, communicator, sharing
@@ -197,7 +197,7 @@ class Simulation(Stepper):
                 first = self.t + APPLYING * (float(ends[0]) - self.t)
                 fill(c, applies=1, begin_of_run=self.t, applied_by=first)
                 with self._in_c():
-                    reached = lib.go_to_time(c, first)
+                    reached = lib.step_or_subdivide(c, first)
                 c.applies = 0
                 if not reached:
                     self._fail()

@@ -15,7 +15,7 @@ from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.state_io import State
 from ufl_beam.display import TIME, Rich
 from ufl_beam.errors import require_kind, warn
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import Member, Place
 from ufl_beam.model.connector_law import ForceLaw
 from ufl_beam.model.connector_laws import Controller, Guide

@@ -21,8 +21,8 @@ from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import NOWHERE, Archive, State
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
-from ufl_beam.mechanics.time_schemes import Scheme, Step, has_inertia
+from ufl_beam.mechanics.energy_momentum_schemes import EnergyMomentumDecaying
+from ufl_beam.mechanics.time_scheme import Scheme, Step, has_inertia
 from ufl_beam.model.connector_laws import rubs
 from ufl_beam.model.constraint_checks import friction_repeats
 from ufl_beam.model.loads import FollowerLoad, RotatingFrame

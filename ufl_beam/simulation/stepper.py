@@ -22,9 +22,9 @@ from ufl_beam.compiled.c_library import doubles, ffi, fill, lib, struct
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import ArgumentError, StepFailed, warn
-from ufl_beam.mechanics.time_schemes import Step, with_half_tangents
+from ufl_beam.mechanics.time_scheme import Step, with_half_tangents
 from ufl_beam.model.constraint_checks import INSTEAD
-from ufl_beam.output.recorders import StateView
+from ufl_beam.output.recorder import StateView
 from ufl_beam.output.states import States
 from ufl_beam.parallel import Agreement, Copies
 from ufl_beam.simulation.controllers import ForceWatch

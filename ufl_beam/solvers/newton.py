@@ -30,9 +30,9 @@ from ufl_beam.compiled.c_library import (
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.errors import StepFailed
+from ufl_beam.solvers.beam_elimination import CondensedSolver
 from ufl_beam.solvers.newton_options import PREFIX, Newton, apply_options, database
 from ufl_beam.solvers.null_vectors import stiffen_zero_modes
-from ufl_beam.solvers.static_condensation import CondensedSolver
 from ufl_beam.terms.term import from_c
 
 FULL_STEPS = {"snes_linesearch_type": "basic"}

@@ -24,7 +24,7 @@ from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.mechanics.functional import elastic_energy, virtual_work
 from ufl_beam.mechanics.kinematics import strain
-from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.fibres import SectionPoints
 from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.material_points import Points

@@ -13,7 +13,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, integers, lib, struct
 from ufl_beam.compiled.csr import Csr
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
-from ufl_beam.mechanics.time_schemes import Scheme, Step
+from ufl_beam.mechanics.time_scheme import Scheme, Step
 from ufl_beam.model.bodies import GROUND
 from ufl_beam.model.functions import TimeFunction, value_at
 from ufl_beam.model.supports import Support

@@ -23,7 +23,7 @@ from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, struc
 from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms
 from ufl_beam.errors import ModelError, NoNumber, shorten
 from ufl_beam.mechanics.connector_equations import law_step
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.checks import require_returned
 from ufl_beam.model.connector_law import ConnectorLaw, ForceLaw, source_location
 from ufl_beam.model.connectors import Connector

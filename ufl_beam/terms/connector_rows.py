@@ -24,7 +24,7 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.compiled.c_library import doubles, ffi, fill, in_order, lib, names, struct
 from ufl_beam.discretization.compiled_forms import Pointwise, cached_forms
 from ufl_beam.mechanics.connector_equations import parameters, rigid_plastic_step
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.bodies import Place
 from ufl_beam.model.connector_laws import (
     RIGID,

@@ -29,10 +29,10 @@ from ufl_beam.discretization.function_spaces import (
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ModelError
-from ufl_beam.mechanics.energy_momentum import EnergyMomentumDecaying
+from ufl_beam.mechanics.energy_momentum_schemes import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
-from ufl_beam.mechanics.time_schemes import (
+from ufl_beam.mechanics.time_scheme import (
     FURTHER,
     V_BEFORE,
     Coefficients,

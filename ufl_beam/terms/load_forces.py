@@ -26,7 +26,7 @@ from ufl_beam.discretization.function_spaces import (
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.mechanics.kinematics import perpendicular, split
-from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.bodies import carries
 from ufl_beam.model.functions import value_at
 from ufl_beam.model.loads import FollowerLoad, Gravity, LineLoad, Load, PointLoad, RotatingFrame

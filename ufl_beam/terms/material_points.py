@@ -38,7 +38,7 @@ from ufl_beam.mechanics.point_equations import (
     prefixed,
     rows,
 )
-from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model import law_functions
 from ufl_beam.model.fibres import Kind, SectionPoints
 from ufl_beam.model.material_law import traced

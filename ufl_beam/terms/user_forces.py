@@ -20,7 +20,7 @@ from ufl_beam.discretization.state_io import Archive
 from ufl_beam.discretization.work_forms import Statement, statement
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ModelError, shorten
-from ufl_beam.mechanics.time_schemes import Scheme
+from ufl_beam.mechanics.time_scheme import Scheme
 from ufl_beam.model.functions import Constant
 from ufl_beam.model.works import Potential, Work
 from ufl_beam.terms.energy_ledger import Ledger

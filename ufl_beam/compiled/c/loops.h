@@ -396,7 +396,7 @@ typedef struct {
   const int32_t *first;     /* first vertex of each chain, and their number */
   const int32_t *spike;     /* whether a chain has a left end */
   const int32_t *dof, *begin; /* of each vertex: first degree of freedom; where its rows begin */
-  const uint8_t *at;        /* vertices x 3: where the blocks begin in a row, see elimination.c */
+  const uint8_t *at;        /* vertices x 3: where the blocks begin in a row, see beam_elimination.c */
   const int32_t *with_ends; /* chains x 4 x 9: entries of the blocks that couple with the ends, see
                              * end_block */
   const double *data;
@@ -646,7 +646,7 @@ void compare_differences(prediction *p);
 
 /* -- steps one after the other, see time_loop.c ----------------------------------------------------- */
 
-/* A step, see Step in time_schemes.py. */
+/* A step, see Step in time_scheme.py. */
 typedef struct {
   double t0, t1, dt, load_time, motion_time, fraction, at, ratio;
   const double *q0, *q_before;
@@ -764,7 +764,7 @@ typedef struct {
   double *force, *space; /* force: of all works in the equation of the last step */
 } user_works;
 
-/* Coefficients of a step, see Coefficients of time_schemes.py. Their rows multiply the rates: the
+/* Coefficients of a step, see Coefficients of time_scheme.py. Their rows multiply the rates: the
  * step or a change of velocities, the velocities, the previous velocities, and further rates of the
  * scheme. */
 enum { MOST_RATES = 6, MOST_KNOWN = 16 };
@@ -982,5 +982,5 @@ void keep_state(const time_loop *m, double *row);
 int solve_begun_step(time_loop *m, int hold);
 int attempt_step(time_loop *m, double t1, double end);
 int accept_step(time_loop *m);
-int go_to_time(time_loop *m, double end);
+int step_or_subdivide(time_loop *m, double end);
 int take_steps(time_loop *m, int steps, const double *ends, double seconds, int keeps, double *rows);

@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* Block elimination (3 x 3) of the interior vertices of chains; see static_condensation.py.
+/* Block elimination (3 x 3) of the interior vertices of chains; see beam_elimination.py.
  *
  * A chain is left end - vertices - right end. Its vertices are eliminated from left to right, so
  * that each vertex couples to the left end and to the next vertex when it is eliminated. A chain

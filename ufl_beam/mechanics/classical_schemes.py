@@ -15,7 +15,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.errors import ArgumentError, require_number
 from ufl_beam.mechanics import functional, kinematics
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import Coefficients, Constant
+from ufl_beam.mechanics.time_scheme import Coefficients, Constant
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
 

@@ -4,7 +4,7 @@
 A scheme says, in UFL, which strains vary and which resultants act during a step, how velocities
 follow from displacements, and at which time loads act.  Neither material laws nor the solver know
 which scheme runs.  This module has the protocols.  Schemes whose forces act over the step are in
-energy_momentum.py, schemes whose forces act at its end in classical.py.
+energy_momentum_schemes.py, schemes whose forces act at its end in classical_schemes.py.
 """
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.display import Parameter
 from ufl_beam.errors import ArgumentError, require_sequence, shorten
-from ufl_beam.mechanics.time_schemes import Scheme, has_inertia
+from ufl_beam.mechanics.time_scheme import Scheme, has_inertia
 from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.model.connectors import Connector
 from ufl_beam.model.joints import Joint
@@ -26,7 +26,7 @@ from ufl_beam.model.records import unlike
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import Support
 from ufl_beam.output.output_files import Output, require_apart, require_writable
-from ufl_beam.output.postprocessing import connector_indices
+from ufl_beam.output.section_forces import connector_indices
 from ufl_beam.output.state_rows import FORCE, Connection, connection
 from ufl_beam.output.states import States
 from ufl_beam.parallel import on_first

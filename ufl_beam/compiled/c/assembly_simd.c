@@ -1,5 +1,5 @@
 /* SPDX-License-Identifier: MIT */
-/* The loop of add_cells in loops.c for LANES cells at a time; the last batch may have fewer. */
+/* The loop of add_cells in assembly.c for LANES cells at a time; the last batch may have fewer. */
 
 enum { NUMBERS = CONSTANTS + (CONSTANTS == 0), COEFFICIENTS = WIDTH + (WIDTH == 0) };
 
@@ -7,10 +7,10 @@ enum { NUMBERS = CONSTANTS + (CONSTANTS == 0), COEFFICIENTS = WIDTH + (WIDTH == 
 typedef double two __attribute__((vector_size(16), aligned(8), may_alias));
 typedef double four __attribute__((vector_size(32), aligned(8), may_alias));
 
-/* Do the work of add_batch for cells with two vertices if the six entries of a row are adjacent,
+/* Do the work of insert_batch for cells with two vertices if the six entries of a row are adjacent,
  * vertex by vertex; a cell has them in the order u u v v ψ ψ. Additions are fewer and wider than
  * for single entries. */
-static inline void add_rows_of_six(const cells *c, const lanes *e, const int32_t *dofs,
+static inline void insert_rows_of_six(const cells *c, const lanes *e, const int32_t *dofs,
                                    const uint8_t *pattern, double *b)
 {
   /* Rows of the second vertices come last: adjacent cells add to the same rows, and would wait for
@@ -49,14 +49,14 @@ static inline void add_rows_of_six(const cells *c, const lanes *e, const int32_t
 /* Add a batch of `some` cells; if the entries are a matrix, it has SIDE rows. All lanes add one
  * entry, then the next one: adjacent cells add to the same indices, and would wait for each
  * other. */
-static inline void add_batch(const cells *c, const lanes *e, int first, int some, double *b)
+static inline void insert_batch(const cells *c, const lanes *e, int first, int some, double *b)
 {
   const int32_t *dofs = c->dofs + (size_t)first * c->of_cell;
   if (c->pattern) {
     const int has = c->has[first / LANES];
     const uint8_t *pattern = c->pattern + (size_t)has * ENTRIES * LANES;
     if (SIDE == 6 && some == LANES && has < c->in_rows) {
-      add_rows_of_six(c, e, dofs, pattern, b);
+      insert_rows_of_six(c, e, dofs, pattern, b);
       return;
     }
     for (int i = 0; i < SIDE; ++i) {
@@ -108,8 +108,8 @@ static void add_in_lanes(const cells *c, const double *q, double *b)
     tabulate(e, w, constants, x);
     if (c->each) memcpy(c->each + (size_t)first * ENTRIES, e, sizeof e);
     if (!b) continue;
-    if (some == LANES) add_batch(c, e, first, LANES, b);
-    else add_batch(c, e, first, some, b);
+    if (some == LANES) insert_batch(c, e, first, LANES, b);
+    else insert_batch(c, e, first, some, b);
   }
 }
 

@@ -13,7 +13,12 @@ import numpy as np
 from ufl_beam.arrays import Array, Index
 from ufl_beam.model.bodies import Member
 from ufl_beam.plotting import positions, style, symbols
-from ufl_beam.plotting.inelastic import circle, dissipated_per_length, draw_damage, open_hinges
+from ufl_beam.plotting.inelastic_pictures import (
+    circle,
+    dissipated_per_length,
+    draw_damage,
+    open_hinges,
+)
 from ufl_beam.plotting.positions import (
     Candidate,
     Canvas,

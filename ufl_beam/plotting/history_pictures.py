@@ -19,7 +19,13 @@ from ufl_beam.model.bodies import AttachmentPoint
 from ufl_beam.output.extremes import Extremes
 from ufl_beam.output.fatigue import Fatigue, HotSpot
 from ufl_beam.plotting import notebook, style, symbols
-from ufl_beam.plotting.diagrams import MOST, draw_beams, draw_frame, draw_undeformed, plane_canvas
+from ufl_beam.plotting.frame_pictures import (
+    MOST,
+    draw_beams,
+    draw_frame,
+    draw_undeformed,
+    plane_canvas,
+)
 from ufl_beam.plotting.positions import evenly
 from ufl_beam.plotting.style import BLUE, GREEN, GREY, INK, ORANGE, PINK, RED, SKY, picture, shade
 from ufl_beam.plotting.symbols import draw_strokes

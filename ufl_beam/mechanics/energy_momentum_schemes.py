@@ -14,9 +14,9 @@ from ufl.core.expr import Expr
 from ufl_beam.arrays import Array
 from ufl_beam.errors import require_number
 from ufl_beam.mechanics import functional, kinematics
-from ufl_beam.mechanics.classical import STATIC_ADVICE, PlainStep
+from ufl_beam.mechanics.classical_schemes import STATIC_ADVICE, PlainStep
 from ufl_beam.mechanics.kinematics import Axis
-from ufl_beam.mechanics.time_schemes import Coefficients, Constant
+from ufl_beam.mechanics.time_scheme import Coefficients, Constant
 from ufl_beam.model.law_functions import Values
 from ufl_beam.model.softening_laws import SofteningLaw
 

@@ -1,0 +1,298 @@
+/* SPDX-License-Identifier: MIT */
+/* Energy ledger: each term accepts a step and enters its works and losses, and adds its energies; see
+ * energy_ledger.py. */
+
+static double dot(int size, const double *x, const double *y)
+{
+  double sum = 0;
+#pragma omp simd reduction(+ : sum)
+  for (int i = 0; i < size; ++i) sum += x[i] * y[i];
+  return sum;
+}
+
+/* Work in a step s of the weighted mean of the forces in the previous equation (weight a) and in
+ * the equation of this step. The forces are at the degrees of freedom `dof`, or at all if that is
+ * null. */
+static double work_in_step(int size, const int32_t *dof, double a, const double *before, const double *force,
+                           const double *s)
+{
+  double work = 0;
+  for (int i = 0; i < size; ++i) work += (a * before[i] + (1 - a) * force[i]) * s[dof ? dof[i] : i];
+  return work;
+}
+
+void add_values(void *self, const time_step *step, const double *q1, const double *s)
+{
+  form_value *f = self;
+  *f->entry += f->held = value_of_cells(f->form, q1);
+}
+
+void change_of_form(void *self, const double *q1, energy_change *sum)
+{
+  const form_value *f = self;
+  sum->in_beams += value_of_cells(f->form, q1) - f->held;
+}
+
+void accept_second_differences(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const second_differences *d = self;
+  const int n = d->of_cell, all = d->strains->number * n;
+  memset(d->space, 0, all * sizeof *d->space);
+  add_cells((void *)d->strains, q1, d->space);
+  for (int i = 0; i < all; ++i) {
+    const double now = d->space[i] / d->weight[i % n];
+    d->change[i] = now - d->e[i];
+    d->e[i] = now;
+  }
+  *d->last_dt = step->dt;
+}
+
+void accept_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  dead_loads *l = self;
+  memcpy(l->parts[2], l->parts[1], l->vectors * sizeof *l->parts[2]);
+  if (!l->acts) return;
+  *l->work += work_in_step(l->size, l->dof, l->weight_of_before, l->before, l->force, s);
+  memcpy(l->before, l->end, l->size * sizeof *l->end);
+}
+
+void accept_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const follower_loads *f = self;
+  *f->work += work_in_step(f->size, f->dof, f->weight_of_before, f->force_before, f->force, s);
+  memcpy(f->force_before, f->force, f->size * sizeof *f->force);
+  memcpy(f->before, f->end, 3 * (size_t)f->number * sizeof *f->end);
+}
+
+void accept_frame(void *self, const time_step *step, const double *q1, const double *s)
+{
+  rotating_frame *f = self;
+  const double out = -f->growth * (f->rate * f->rate), across = f->coriolis / f->dt;
+  double *to = *f->accelerations;
+  *f->work += work_in_step(f->size, 0, f->weight_of_before, f->before, f->force, s);
+  memcpy(f->before, f->force, f->size * sizeof *f->force);
+  f->grown = f->grown_at_end;
+  for (int k = 0; k < f->places; ++k) {
+    const int x = f->x[k], y = f->y[k];
+    to[x] = out * f->place[x] - across * f->change[y];
+    to[y] = out * f->place[y] + across * f->change[x];
+  }
+}
+
+/* Enter the loss of a potential by the scheme, and the energy that its change in time supplied. */
+static void account_for(const user_work *w, const user_works *all, const double *q0, const double *q1)
+{
+  const double a = all->weight_of_before;
+  if (w->lost) add_values(w->lost, 0, q1, 0);
+  if (!w->supplied) return;
+  put_time(w, a * all->t + (1 - a) * w->number[WORK_TIME]);
+  const cells *energy = w->energy->form;
+  const double moved = value_of_cells(energy, q1) - value_of_cells(energy, q0);
+  put_time(w, all->t_at_end);
+  *w->supplied += value_of_cells(energy, q1) - w->energy->held - moved;
+}
+
+void accept_works(void *self, const time_step *step, const double *q1, const double *s)
+{
+  user_works *all = self;
+  const double a = all->weight_of_before;
+  double *r = all->space;
+  memset(all->force, 0, all->size * sizeof *r);
+  for (int k = 0; k < all->works; ++k) {
+    const user_work *w = all->work[k];
+    memset(r, 0, all->size * sizeof *r);
+    add_cells((void *)w->residual, q1, r);
+    for (int i = 0; i < all->size; ++i) all->force[i] -= r[i];
+    if (w->energy) account_for(w, all, step->q0, q1);
+    else {
+      double work = 0;
+      for (int i = 0; i < all->size; ++i) work += (a * w->before[i] - (1 - a) * r[i]) * s[i];
+      *w->supplied += work;
+      for (int i = 0; i < all->size; ++i) w->before[i] = -r[i];
+    }
+  }
+  all->t = all->t_at_end, all->grown = all->grown_at_end;
+}
+
+void add_energy_of_works(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const user_works *all = self;
+  for (int k = 0; k < all->works; ++k) {
+    const user_work *w = all->work[k];
+    if (!w->energy) continue;
+    put_time(w, all->t);
+    add_values(w->energy, step, q1, s);
+  }
+}
+
+void accept_inertia(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  rates *r = m->rates;
+  const step_product *p = m->product;
+  r->rate[0] = (double *)s;
+  combine_rates(r, r->now->rates[0], 0, r->new_rate[1]);
+  for (int j = 3; j < r->number; ++j) combine_rates(r, r->now->rates[j - 2], 0, r->new_rate[j]);
+  if (m->lost) {
+    double *change = m->v;
+    for (int i = 0; i < r->size; ++i) change[i] = r->new_rate[1][i] - r->rate[1][i];
+    memset(m->momentum, 0, r->size * sizeof *m->momentum);
+    add_product(p->A, change, m->momentum);
+    r->rate[0] = change;
+    combine_rates(r, r->now->slip, 0, r->new_rate[2]);
+    *m->lost += dot(r->size, r->new_rate[2], m->momentum);
+  }
+  double *last = r->rate[2] == r->new_rate[1] ? r->rate[1] : r->rate[2]; /* v becomes the previous velocity */
+  r->rate[2] = r->rate[1], r->rate[1] = r->new_rate[1], r->new_rate[1] = last;
+  for (int j = 3; j < r->number; ++j) {
+    last = r->rate[j];
+    r->rate[j] = r->new_rate[j], r->new_rate[j] = last;
+  }
+  r->last_dt = step->dt, r->more = r->now->gives;
+}
+
+void add_kinetic_energy(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  const step_product *p = m->product;
+  *m->kept += quadratic_form(p->A, m->rates->rate[1]) / 2;
+}
+
+void accept_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  const step_product *p = m->product;
+  *m->lost += quadratic_form(p->A, s) / step->dt;
+}
+
+/* Add the dissipation of points in the step to the ledger. */
+static void enter_losses(const inelastic_term *t, const double *sum)
+{
+  if (t->plastic) *t->plastic += sum[0];
+  if (t->hinges) *t->hinges += sum[1];
+  if (t->numerical) *t->numerical += 2 * t->alpha * sum[2];
+  if (t->released) *t->released += sum[5];
+}
+
+static void enter_stored(const inelastic_term *t, const double *sum)
+{
+  *t->stored += sum[3];
+  if (t->hardening) *t->hardening += sum[4];
+}
+
+void accept_inelastic(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const inelastic_term *t = self;
+  respond_at(t->cells, q1);
+  commit(t->cells->points);
+  enter_losses(t, t->cells->points->sum);
+}
+
+void add_energy_of_points(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const inelastic_term *t = self;
+  enter_stored(t, t->cells->points->sum);
+}
+
+void accept_connectors(void *self, const time_step *step, const double *q1, const double *s)
+{
+  connector_term *t = self;
+  const connectors *c = t->connectors;
+  const double taken = commit_connectors(c, q1, step->dt);
+  if (t->entry) *t->entry += t->sign * taken;
+  if (t->reached) memcpy(t->reached, t->end, c->number * sizeof *t->end);
+  if (c->friction) memcpy(c->friction->accepted, c->friction->slip, c->number * sizeof(double));
+  if (t->lost) *t->lost += c->laws->sum[0];
+  if (c->laws && t->points->numerical) *t->points->numerical += c->laws->sum[1];
+  if (c->points) {
+    respond_springs(c);
+    commit(c->points);
+    enter_losses(t->points, c->points->sum);
+  }
+  if (c->rigid_plastic) {
+    double sums[3];
+    const rigid_plastic *p = c->rigid_plastic;
+    commit_rigid_plastic(p, c->e1, sums);
+    for (int i = 0; i < p->number; ++i) t->way_before[i] = p->way[i] * p->slipped[i];
+    *t->points->hinges += sums[0];
+    if (t->points->numerical) *t->points->numerical += t->loss * sums[1];
+    *t->hardened = sums[2];
+  }
+}
+
+void add_energy_of_connectors(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const connector_term *t = self;
+  const connector_laws *l = t->connectors->laws;
+  if (t->connectors->points) enter_stored(t->points, t->connectors->points->sum);
+  if (t->connectors->asked) *t->points->stored += *t->connectors->asked->held;
+  for (int i = 0; l && i < l->number; ++i) *t->points->stored += l->stored[i];
+  if (t->connectors->rigid_plastic && t->points->hardening) *t->points->hardening += *t->hardened;
+}
+
+/* Energy stored and dissipated by points in the latest response, less the present one; see
+ * Points.change. */
+static double change_by_response(const points *p, points *copy)
+{
+  memcpy(copy->w, p->w, (size_t)p->cells * p->of_cell * p->width * sizeof *p->w);
+  memcpy(copy->e0, p->e0, 3 * (size_t)p->cells * sizeof *p->e0);
+  memcpy(copy->kept, p->kept, POINT_KEPT * (size_t)p->cells * sizeof *p->kept);
+  commit(copy);
+  const double *after = copy->sum, *before = p->sum;
+  return after[0] + after[1] + (after[3] - before[3]) + (after[4] - before[4]) + after[5] + after[6];
+}
+
+void change_of_points(void *self, const double *q1, energy_change *sum)
+{
+  const inelastic_term *t = self;
+  respond_at(t->cells, q1);
+  sum->in_beams += change_by_response(t->cells->points, t->copy);
+}
+
+void change_of_connectors(void *self, const double *q1, energy_change *sum)
+{
+  const connector_term *t = self;
+  const connectors *c = t->connectors;
+  double taken = 0;
+  find_motions(c, q1);
+  const int loses = !c->laws || c->laws->loses, n = c->components;
+  for (int j = 0; j < n * c->number; ++j) {
+    const double work = taken_by(c, j, q1);
+    taken += loses ? work : 0;
+    sum->effort += fabs(work);
+  }
+  for (int i = 0; !loses && i < c->number; ++i)
+    taken += end_of_law(c->laws, i, c->e1 + n * i)[LAW_STORED] - c->laws->stored[i];
+  if (c->points) {
+    respond_springs(c);
+    taken = change_by_response(c->points, t->points->copy);
+  }
+  sum->in_connectors += taken;
+}
+
+int points_dissipate(void *self, const double *q1)
+{
+  const inelastic_term *t = self;
+  respond_at(t->cells, q1);
+  return gives_energy(t->cells->points) < 0;
+}
+
+int springs_dissipate(void *self, const double *q1)
+{
+  const connector_term *t = self;
+  find_motions(t->connectors, q1);
+  respond_springs(t->connectors);
+  return gives_energy(t->connectors->points) < 0;
+}
+
+static void accept_supports(time_loop *m)
+{
+  const moving_supports *p = m->supports;
+  const double a = p->weight_of_before;
+  turn_axes(m->equation->turned, m->equation->axes, m->s, 1);
+  if (p->moving)
+    for (int k = 0; k < p->held; ++k)
+      if (p->hold[k] < m->equation->owned)
+        *p->work += (a * p->before[k] + (1 - a) * p->reactions[k]) * m->s[p->hold[k]];
+  memcpy(p->before, p->reactions, p->held * sizeof *p->before);
+}

@@ -1,0 +1,333 @@
+/* SPDX-License-Identifier: MIT */
+/* Beginning of a step: each term computes its loads, rows and coefficients of the step; see term.py. */
+
+/* Interpolate as numpy.interp does. */
+double value_at(const time_function *f, double t)
+{
+  const int last = f->points - 1;
+  if (last < 0) return f->ask(f->handle, t);
+  if (t <= f->t[0] || last == 0) return f->y[0];
+  if (t >= f->t[last]) return f->y[last];
+  int low = 0, high = last;
+  while (high - low > 1) {
+    const int middle = (low + high) / 2;
+    if (f->t[middle] <= t) low = middle;
+    else high = middle;
+  }
+  if (t == f->t[low]) return f->y[low];
+  return (f->y[high] - f->y[low]) / (f->t[high] - f->t[low]) * (t - f->t[low]) + f->y[low];
+}
+
+static void run(const phases *p, const time_step *step, const double *q1, const double *s)
+{
+  for (int k = 0; k < p->number; ++k) p->call[k].run(p->call[k].self, step, q1, s);
+}
+
+void begin_forms(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const form_of_step *f = self;
+  set_cells(f->form, step->q0, f->at);
+}
+
+void begin_viscous_forms(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const viscous_forms *v = self;
+  const double rate = v->time / step->dt;
+  if (step->dt == *v->dt) return;
+  *v->dt = step->dt;
+  for (int k = 0; k < v->forms; ++k)
+    for (int c = 0; c < v->form[k].form->number; ++c)
+      for (int i = 0; i < v->of_cell; ++i) put_in_cell(v->form[k].form, c, v->form[k].at + i, 1, &rate);
+}
+
+void begin_second_differences(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const second_differences *d = self;
+  const double ratio = fmin(1, step->dt / *d->last_dt);
+  const int n = d->of_cell;
+  for (int i = 0; i < d->strains->number * n; ++i) d->space[i] = ratio * d->change[i];
+  for (int k = 0; k < d->forms; ++k)
+    for (int c = 0; c < d->strains->number; ++c)
+      put_in_cell(d->form[k].form, c, d->form[k].at, n, d->space + (size_t)c * n);
+}
+
+void begin_predicted_strains(void *self, const time_step *step, const double *q1, const double *s)
+{
+  predicted_strains *p = self;
+  p->q0 = step->q0, p->q_before = step->q_before, p->ratio = step->ratio;
+  p->begins = 1, p->exact = 0;
+}
+
+/* Elastic cells have no branches: forces before the step suffice for the first tangent, and cost
+ * less. */
+void begin_static_tangent(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const static_tangent *t = self;
+  begin_predicted_strains(t->predicted, step, q1, s);
+  t->predicted->ratio = 0;
+}
+
+void begin_dead_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  dead_loads *l = self;
+  const int whole = step->fraction == 1 && step->at == 1;
+  int same = whole && l->whole;
+  l->whole = whole;
+  for (int k = 0; k < l->vectors; ++k) {
+    const double factor = value_at(l->factor + k, step->load_time);
+    if (factor != l->factors[k]) l->factors[k] = factor, same = 0;
+  }
+  if (same) return;
+  for (int k = 0; k < l->vectors; ++k) {
+    const double before = l->parts[2][k], change = step->fraction * (l->factors[k] - before);
+    l->parts[1][k] = whole ? l->factors[k] : before + change;
+    l->parts[0][k] = step->at == 1 ? l->parts[1][k] : before + step->at * change;
+  }
+  l->acts = 0;
+  for (int i = 0; i < l->size; ++i) l->end[i] = l->factors[0] * l->vector[0][i];
+  for (int k = 1; k < l->vectors; ++k)
+    for (int i = 0; i < l->size; ++i) l->end[i] += l->factors[k] * l->vector[k][i];
+  for (int i = 0; i < l->size; ++i) {
+    if (!whole) {
+      const double change = step->fraction * (l->end[i] - l->before[i]);
+      l->end[i] = l->before[i] + change;
+      l->force[i] = step->at == 1 ? l->end[i] : l->before[i] + step->at * change;
+    } else
+      l->force[i] = l->end[i];
+    l->acts |= l->force[i] != 0 || l->end[i] != 0 || l->before[i] != 0;
+  }
+}
+
+void begin_follower_loads(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const follower_loads *f = self;
+  for (int k = 0; k < f->number; ++k) {
+    const double factor = value_at(f->factor + k, step->load_time);
+    for (int i = 3 * k; i < 3 * k + 3; ++i) {
+      f->end[i] = f->before[i] + step->fraction * (f->given[i] * factor - f->before[i]);
+      f->now[i] = f->before[i] + step->at * (f->end[i] - f->before[i]);
+    }
+    f->turn0[k] = step->q0[f->turning[k]];
+  }
+}
+
+void begin_frame(void *self, const time_step *step, const double *q1, const double *s)
+{
+  rotating_frame *f = self;
+  const double growth = step->fraction * (1 - f->grown);
+  f->growth = f->grown + step->at * growth, f->grown_at_end = f->grown + growth;
+  f->q0 = step->q0, f->dt = step->dt;
+  memcpy(f->force, f->before, f->size * sizeof *f->force); /* iterates of a failed step may be far away */
+}
+
+/* Write a parameter into the forms of a work that depend on it, if it has changed. */
+static void put_number(const user_work *w, int k, double value)
+{
+  if (value == w->number[k]) return;
+  w->number[k] = value;
+  for (int j = 0; j < w->forms; ++j) {
+    const cells *form = w->form[j].form;
+    const int at = w->at[j * w->numbers + k];
+    if (at < 0) continue;
+    for (int c = 0; c < form->number; c += form->lanes)
+      for (int l = 0; l < form->lanes; ++l) in_cell(form, c, at)[l] = value;
+  }
+}
+
+static void put_time(const user_work *w, double t)
+{
+  put_number(w, WORK_TIME, t);
+  for (int k = WORK_NUMBERS; k < w->numbers; ++k) put_number(w, k, value_at(w->of_time + k - WORK_NUMBERS, t));
+}
+
+/* Longest time step that works get; all rates vanish with it. */
+static const double AT_REST = 1e300;
+
+void begin_works(void *self, const time_step *step, const double *q1, const double *s)
+{
+  user_works *all = self;
+  const double growth = step->fraction * (1 - all->grown), t = all->t;
+  all->t_at_end = t + step->fraction * (step->motion_time - t), all->grown_at_end = all->grown + growth;
+  for (int k = 0; k < all->works; ++k) {
+    const user_work *w = all->work[k];
+    for (int j = 0; j < w->forms; ++j)
+      if (w->form[j].at >= 0) set_cells(w->form[j].form, step->q0, w->form[j].at);
+    put_time(w, t + step->at * step->fraction * (step->load_time - t));
+    put_number(w, WORK_STEP, fmin(step->dt, AT_REST));
+    put_number(w, WORK_PART, all->grown + step->at * growth);
+  }
+}
+
+/* out = sum of coefficients times rates, from the index `first` on */
+static void combine_rates(const rates *r, const double *numbers, int first, double *out)
+{
+  int begun = 0;
+  for (int j = first; j < r->number; ++j) {
+    const double c = numbers[j], *x = r->rate[j];
+    if (c == 0) continue;
+    if (begun)
+      for (int i = 0; i < r->size; ++i) out[i] += c * x[i];
+    else
+      for (int i = 0; i < r->size; ++i) out[i] = c * x[i];
+    begun = 1;
+  }
+  if (!begun) memset(out, 0, r->size * sizeof *out);
+}
+
+int find_numbers(rates *r, double dt)
+{
+  for (int k = 0; k < r->known; ++k) {
+    r->now = r->numbers + k;
+    if (r->now->dt == dt && (r->after_any || r->now->last_dt == r->last_dt) && r->now->more == r->more)
+      return 1;
+  }
+  scheme_numbers *n = r->numbers + r->oldest;
+  n->dt = dt, n->last_dt = r->last_dt, n->more = r->more;
+  if (!r->find(r->handle, n)) {
+    n->dt = NAN;
+    return 0;
+  }
+  r->now = n;
+  r->oldest = (r->oldest + 1) % MOST_KNOWN;
+  if (r->known < MOST_KNOWN) ++r->known;
+  return 1;
+}
+
+/* Write a row of coefficients as factor s - back v. v is a rate, or a sum if several coefficients
+ * are nonzero. */
+static void begin_product(const matrix_of_rates *m, const time_step *step, const double *row)
+{
+  step_product *p = m->product;
+  p->q0 = step->q0;
+  const rates *r = m->rates;
+  int last = 0, some = 0;
+  for (int j = 1; j < r->number; ++j)
+    if (row[j] != 0) last = j, ++some;
+  p->factor = row[0];
+  p->back = some == 1 ? -row[last] : -1;
+  p->v = some == 1 ? r->rate[last] : m->v;
+  if (some != 1) combine_rates(r, row, 1, m->v);
+}
+
+void begin_inertia(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  begin_product(m, step, m->rates->now->inertia);
+}
+
+void begin_rayleigh(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const matrix_of_rates *m = self;
+  begin_product(m, step, m->rates->now->velocity);
+}
+
+static void begin_points(points *p, double *dt, double new_dt)
+{
+  if (new_dt != *dt) {
+    *dt = new_dt;
+    for (int k = 0; k < p->cells * p->of_cell; ++k) p->w[k * p->width + DT] = new_dt;
+  }
+  p->tried = p->predicts = 0;
+}
+
+void begin_inelastic(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const inelastic_term *t = self;
+  begin_points(t->cells->points, t->dt, step->dt);
+  t->cells->latest[0] = NAN; /* compute the next response in any case */
+}
+
+/* Rows of dampers, motors and actuators, which are constant during a step. */
+static void put_rows_of_step(const connector_term *t, const time_step *step)
+{
+  const connectors *c = t->connectors;
+  for (int k = 0; k < c->number; ++k) {
+    const int i = c->connector[k];
+    double a = 0, b = 1, y;
+    if (t->viscosity) {
+      a = -t->viscosity[i] / step->dt;
+      y = a * c->e0[i];
+    } else if (t->wanted_motion) {
+      const double wanted = value_at(t->wanted_motion + i, step->motion_time);
+      a = 1, b = 0;
+      y = c->e0[i] + step->fraction * (wanted - c->e0[i]);
+    } else {
+      const double wanted = -value_at(t->wanted_force + i, step->load_time);
+      t->end[i] = t->reached[i] + step->fraction * (wanted - t->reached[i]);
+      y = t->reached[i] + step->at * (t->end[i] - t->reached[i]);
+    }
+    const double row[3] = {a, b, y};
+    put_row(c, k, row);
+  }
+}
+
+static void begin_friction_again(friction *f)
+{
+  memcpy(f->slip, f->accepted, f->number * sizeof *f->slip);
+  memset(f->against, 0, f->number * sizeof *f->against);
+  f->guessed = 1;
+}
+
+/* A sticking connector moves by `way` in the step, so that its velocity is zero at the end. Without
+ * this motion, the previous velocity would come back. */
+static void begin_friction(const connectors *c, const time_step *step)
+{
+  friction *f = c->friction;
+  double way_to_rest = 0;
+  memset(c->by_cell, 0, c->number * sizeof *c->by_cell);
+  if (f->rates) {
+    const double *of = f->rates->now->rates[0]; /* v1 as a function of the step and v, with v instead of
+                                                 * v_before */
+    way_to_rest = -(of[1] + of[2]) / of[0];
+    set_cells(f->rate, f->rates->rate[1], f->at_v);
+    add_cells((void *)f->rate, step->q0, c->by_cell);
+  }
+  for (int k = 0; k < c->number; ++k) {
+    const int i = c->connector[k];
+    if (f->laws) {
+      ask_law(f->limit_of_law, f->laws->w + i * f->laws->width, 1, f->limit[i]);
+      *f->limit[i] = fmax(*f->limit[i], 0);
+    }
+    const double limit = *f->limit[i];
+    f->way[i] = way_to_rest * c->by_cell[k];
+    f->creep[i] = limit > 0 ? f->softness[i] / limit : 0;
+  }
+  begin_friction_again(f);
+}
+
+void begin_connectors(void *self, const time_step *step, const double *q1, const double *s)
+{
+  const connector_term *t = self;
+  const connectors *c = t->connectors;
+  const rigid_plastic *p = c->rigid_plastic;
+  const connector_laws *l = c->laws;
+  if (t->entry && !c->friction && !c->asked) put_rows_of_step(t, step);
+  for (int i = 0; l && i < l->number; ++i) {
+    double *w = l->w + i * l->width;
+    memcpy(w + c->components, c->e0 + i * c->components, c->components * sizeof *w);
+    w[2 * c->components] = step->dt;
+  }
+  if (c->friction) begin_friction(c, step);
+  if (c->asked) {
+    /* Substeps go in proportion to the loads of the step. A path has no beginning, as its fractions
+     * are 1. */
+    const double way = step->fraction * step->at;
+    const double t1 = way == 1 ? step->load_time : step->t0 + way * (step->load_time - step->t0);
+    c->asked->begin(c->asked->begin_self, t1, step->dt);
+  }
+  if (c->points) begin_points(c->points, t->points->dt, step->dt);
+  for (int i = 0; p && i < p->number; ++i) {
+    p->w[i * p->width + t->dt_of_law] = step->dt;
+    p->way[i] = t->way_before[i];
+  }
+}
+
+void begin_connectors_again(void *self)
+{
+  const connector_term *t = self;
+  const connectors *c = t->connectors;
+  if (c->rigid_plastic)
+    memcpy(c->rigid_plastic->way, t->way_before, c->rigid_plastic->number * sizeof *t->way_before);
+  if (c->friction) begin_friction_again(c->friction);
+  if (c->asked) c->asked->again(c->asked->again_self);
+}
