@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from abc import ABC
+from abc import ABC, abstractmethod
 from dataclasses import KW_ONLY, dataclass
 
 from ufl_beam.errors import ModelError, closed
@@ -13,8 +13,17 @@ from ufl_beam.model.functions import Timed, TimeFunction, steady
 from ufl_beam.model.records import NotNegative, Number, Positive, Record, Vector
 
 
+class Load(Record, ABC):
+    """Base of the loads; their forces are in terms/load_forces.py."""
+
+    @property
+    @abstractmethod
+    def amplitude(self) -> Timed:
+        """Factor at time t."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class LoadAtPlace(Record, ABC):
+class LoadAtPlace(Load):
     """Base of the loads that act at one place."""
 
     place: AttachmentPoint
@@ -84,7 +93,7 @@ class FollowerLoad(LoadAtPlace):
 
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
-class LineLoad(Record):
+class LineLoad(Load):
     """Distributed dead force and moment along a beam, per undeformed length.
 
     Args:
@@ -118,7 +127,7 @@ class LineLoad(Record):
 
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False, repr=False)
-class Gravity(Record):
+class Gravity(Load):
     """Weight of all beams, bodies and point masses.
 
     Args:
@@ -141,7 +150,7 @@ class Gravity(Record):
 
 @closed(OWN_LOAD)
 @dataclass(frozen=True, eq=False)
-class RotatingFrame(Record):
+class RotatingFrame(Load):
     """Centrifugal and Coriolis forces on all masses, in a frame that turns steadily.
 
     Motions, velocities and all other loads refer to the rotating frame.  A static run gives the
@@ -165,9 +174,6 @@ class RotatingFrame(Record):
     def amplitude(self) -> TimeFunction:
         """Constant 1: a rate that changes would cause other forces."""
         return steady
-
-
-Load = PointLoad | FollowerLoad | LineLoad | Gravity | RotatingFrame
 
 
 # -- viscous damping of the elastic motion ------------------------------------------------------

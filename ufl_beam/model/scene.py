@@ -38,7 +38,6 @@ from ufl_beam.model.functions import TimeFunction, enclosing_diameter, points_al
 from ufl_beam.model.joints import Joint
 from ufl_beam.model.loads import (
     Damping,
-    FollowerLoad,
     KelvinVoigt,
     Load,
     LoadAtPlace,
@@ -87,7 +86,7 @@ class Scene(Record, Rich):
     _: KW_ONLY
     joints: Annotated[Sequence[Joint], _all(Joint)] = ()
     supports: Annotated[Sequence[Support], _all(Support)] = ()
-    loads: Annotated[Sequence[Load], _all(*Load.__args__)] = ()
+    loads: Annotated[Sequence[Load], _all(Load)] = ()
     masses: Annotated[Sequence[PointMass], _all(PointMass)] = ()
     initial: Annotated[Sequence[Velocity], _all(Velocity)] = ()
     damping: Annotated[Sequence[Damping], _all(*Damping.__args__)] = ()
@@ -348,7 +347,7 @@ def attachment_points(scene: Scene) -> dict[Body, list[Spot]]:
     """Find the attachment points of bodies and of the ground, each once."""
     anchors = [place for joint in scene.joints for place in joint.places]
     anchors += [place for connector in scene.connectors for place in (connector.a, connector.b)]
-    anchors += [x.place for x in scene.loads if isinstance(x, PointLoad | FollowerLoad)]
+    anchors += [x.place for x in scene.loads if isinstance(x, LoadAtPlace)]
     points: dict[Body, dict[Spot, None]] = {body: {} for body in (*scene.bodies, GROUND)}
     for attached in anchors:
         if isinstance(attached, Spot):

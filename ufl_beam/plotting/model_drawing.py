@@ -13,7 +13,7 @@ from ufl_beam.arrays import Array
 from ufl_beam.model.bodies import AttachmentPoint, Body, Member, Place, Velocity
 from ufl_beam.model.connectors import law_of, place_of
 from ufl_beam.model.functions import TimeFunction, steady
-from ufl_beam.model.loads import FollowerLoad, LineLoad, PointLoad
+from ufl_beam.model.loads import FollowerLoad, LineLoad, LoadAtPlace
 from ufl_beam.model.scene import Scene
 from ufl_beam.model.supports import COMPONENTS, Support
 from ufl_beam.plotting import positions, symbols
@@ -48,7 +48,7 @@ class Subject:
             known = Counter(member.name for member in objects)
             for k, member in enumerate(objects):
                 self.names[member] = f"{member.name} {k}" if known[member.name] > 1 else member.name
-        forces = [x.force for x in scene.loads if isinstance(x, PointLoad | FollowerLoad)]
+        forces = [x.force for x in scene.loads if isinstance(x, LoadAtPlace)]
         lines = [x.force for x in scene.loads if isinstance(x, LineLoad)]
         speeds = [
             velocity.at(*at)[:2]
@@ -138,7 +138,7 @@ def draw(subject: Subject, scale: float) -> Drawing:
     for load in sorted(scene.loads, key=lambda load: not isinstance(load, LineLoad)):
         if isinstance(load, LineLoad):
             _draw_line_load(drawing, load)
-        elif isinstance(load, PointLoad | FollowerLoad):
+        elif isinstance(load, LoadAtPlace):
             _draw_point_load(drawing, load)
     for velocity in scene.initial:
         _draw_velocity(drawing, velocity)
@@ -247,7 +247,7 @@ def in_time(text: str, time: TimeFunction) -> str:
 # -- loads -------------------------------------------------------------------------------------
 
 
-def _draw_point_load(drawing: Drawing, load: PointLoad | FollowerLoad) -> None:
+def _draw_point_load(drawing: Drawing, load: LoadAtPlace) -> None:
     """Draw arrows of force and moment; follower loads have hollow heads."""
     at, unit, size = np.array(load.place.point), drawing.outside, math.hypot(*load.force)
     hollow = isinstance(load, FollowerLoad)

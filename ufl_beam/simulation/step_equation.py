@@ -25,7 +25,6 @@ from ufl_beam.mechanics.energy_momentum_schemes import EnergyMomentumDecaying
 from ufl_beam.mechanics.time_scheme import Scheme, Step, has_inertia
 from ufl_beam.model.connector_laws import rubs
 from ufl_beam.model.constraint_checks import friction_repeats
-from ufl_beam.model.loads import FollowerLoad, RotatingFrame
 from ufl_beam.parallel import Agreement
 from ufl_beam.simulation.controllers import Controllers
 from ufl_beam.terms.beam_forces import Cells, ElasticBeams, InelasticBeams
@@ -40,7 +39,7 @@ from ufl_beam.terms.inertia_and_damping import (
     SecondDifferences,
     damping_forces,
 )
-from ufl_beam.terms.load_forces import DeadLoads, FollowerLoads, FrameForces, LoadTerm
+from ufl_beam.terms.load_forces import DeadLoads, LoadTerm, load_terms
 from ufl_beam.terms.material_points import expect_entries
 from ufl_beam.terms.term import Callbacks, Term
 from ufl_beam.terms.user_forces import Works
@@ -115,16 +114,7 @@ class StepEquation:
         )  # fmt: skip
         self.connector_terms = together(connector_terms, subdomain, connectors, A)
 
-        if scene.loads:
-            ledger.supplied["loads"] += 0.0
-        followers = [load for load in scene.loads if isinstance(load, FollowerLoad)]
-        frames = [load for load in scene.loads if isinstance(load, RotatingFrame)]
-        dead = [load for load in scene.loads if load not in (*followers, *frames)]
-        self.loads: list[LoadTerm] = [FrameForces(x, fields, scheme, ledger, A) for x in frames]
-        if dead:
-            self.loads.append(DeadLoads(dead, subdomain, scheme, ledger))
-        if followers:
-            self.loads.append(FollowerLoads(followers, subdomain, scheme, ledger, A))
+        self.loads: list[LoadTerm] = load_terms(fields, scheme, ledger, A)
         if scene.works:
             self.loads.append(together(Works, fields, scheme, ledger, A, t0))
         self.supports = Supports(subdomain, scheme, ledger, A)

@@ -195,7 +195,7 @@ class Response:
 
 # -- laws that give a motion or a force ------------------------------------------------------------
 
-PRESCRIBED = {
+LEDGER_ENTRIES = {
     PrescribedMotion: ("_Driven", "supplied", "motors", -1.0),
     PrescribedForce: ("_Pushed", "supplied", "loads", -1.0),
     Controller: ("_Controlled", "supplied", "controllers", -1.0),
@@ -214,7 +214,7 @@ class PrescribedLaws(Response):
     def __init__(self, law: Any, connectors: Sequence[Connector], setting: Setting) -> None:
         constrained = law is RIGID or isinstance(law, Guide)
         name, account, entry, sign = (
-            ("_Held", "", "", 0.0) if constrained else PRESCRIBED[type(law)]
+            ("_Held", "", "", 0.0) if constrained else LEDGER_ENTRIES[type(law)]
         )
         super().__init__(connectors, setting, name)
         if not constrained:

@@ -34,6 +34,22 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term
 
 
+def load_terms(fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr) -> list[LoadTerm]:
+    """Create the terms of the loads of a scene, one for all loads with the same kind of force."""
+    subdomain, loads = fields.subdomain, fields.subdomain.numbering.scene.loads
+    if loads:
+        ledger.supplied["loads"] += 0.0
+    followers = [load for load in loads if isinstance(load, FollowerLoad)]
+    frames = [load for load in loads if isinstance(load, RotatingFrame)]
+    dead = [load for load in loads if load not in (*followers, *frames)]
+    terms: list[LoadTerm] = [FrameForces(x, fields, scheme, ledger, A) for x in frames]
+    if dead:
+        terms.append(DeadLoads(dead, subdomain, scheme, ledger))
+    if followers:
+        terms.append(FollowerLoads(followers, subdomain, scheme, ledger, A))
+    return terms
+
+
 class LoadTerm(Term):
     """Forces that depend on time or on the configuration.
 
