@@ -2,6 +2,7 @@
 """Where a run begins: at rest, in the state of another solution, in motion."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import pytest
@@ -65,6 +66,50 @@ def test_a_run_in_two_parts_is_the_run():
     assert np.abs(second.q - whole.q[10:]).max() < 1e-9
     assert np.abs(second.v - whole.v[10:]).max() < 1e-7
     assert second.times == pytest.approx(whole.times[10:])
+
+
+@dataclass(frozen=True)
+class DampedVelocities(ub.EnergyMomentumBase, ub.MidpointLoads):
+    """Δu/dt = (v0 + v1)/2 + c (Δv - r Δv'), with the change Δv' of velocities in the last step."""
+
+    c: float = 0.05
+
+    alpha = 0.0
+    uses_last_step = True
+
+    def coefficients(self, dt, last_dt, known):
+        c, r, after = self.c, self.c * min(1.0, dt / last_dt), 0.5 + self.c
+        return ub.Coefficients(
+            inertia=(1 / (dt**2 * after), (r - 1) / (dt * after), -r / (dt * after)),
+            velocity=(1 / dt, 0.0, 0.0),
+            rates=((1 / (dt * after), (c + r - 0.5) / after, -r / after),),
+            slip=(c, -r, r),
+        )
+
+    def error_weights(self):
+        return 0.0, 1 / 12 + self.c
+
+
+@pytest.mark.parametrize("scheme", [DampedVelocities(), ub.EnergyMomentumDecaying()])
+def test_a_scheme_that_uses_the_last_step_carries_on(scheme):
+    """The second part knows the change of velocities in the last step of the first part."""
+    scene = pushed_beam()
+    whole = ub.simulate(scene, scheme, t=(0, 0.2), dt=0.01)
+    first = ub.simulate(scene, scheme, t=(0, 0.1), dt=0.01)
+    second = ub.simulate(scene, scheme, t=(0.1, 0.2), dt=0.01, start=first)
+    size = np.abs(whole.q).max()
+    assert size > 0.01
+    np.testing.assert_allclose(second.q[-1], whole.q[-1], atol=1e-12 * size)
+    reference = ub.simulate(
+        scene, scheme, t=(0.1, 0.2), dt=0.01, start=first, newton=ub.Newton(reference=True)
+    )
+    np.testing.assert_allclose(reference.q[-1], whole.q[-1], atol=1e-9 * size)
+
+
+def pushed_beam():
+    beam = ub.Beam((0, 0), (1, 0), SECTION, cells=4)
+    push = ub.PointLoad(beam.end, force=(0, -3.0), amplitude=ub.Table([0, 0.05, 0.06], [1, 1, 0]))
+    return clamped(beam, loads=[push])
 
 
 @pytest.mark.parametrize("scheme", [ub.Static(), ub.GeneralizedAlpha(0.6)], ids=str)

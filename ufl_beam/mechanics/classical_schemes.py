@@ -50,7 +50,7 @@ class _AtEnd(PlainStep):
     weight_of_before = 0.5  # the trapezoidal rule, exact where forces grow in proportion
     limits_rotation = False  # rotations of nodes in a step have no limit
     theta = 1.0
-    alpha = 0.0
+    alpha = lost_fraction = 0.0
 
     def mean(self, f: Callable[[Expr], Expr], q0: Expr, q1: Expr) -> Expr:
         """Return the value at the end of the step."""

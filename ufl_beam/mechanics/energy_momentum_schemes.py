@@ -33,6 +33,7 @@ class _OverStep:
     weight_of_before = 0.0  # the forces in the equation of the step do its work
     limits_rotation = True
     alpha: float
+    lost_fraction = 0.0
 
     @property
     def theta(self) -> float:
@@ -263,7 +264,7 @@ class EnergyMomentumDecaying(EnergyMomentumBase, MidpointLoads):
         require_number(self.rho_inf, "EnergyMomentumDecaying: rho_inf", at_least=1 / 3, at_most=1.0)
 
     @property
-    def lost_fraction(self) -> float:
+    def lost_fraction(self) -> float:  # type: ignore[override]
         """Fraction c of the energy of second differences of strains and velocities that is lost."""
         # At infinity (λ + 1)/2 + c (λ - 1)²/λ = 0; λ = -rho_inf is the larger root.
         return self.rho_inf * (1 - self.rho_inf) / (2 * (1 + self.rho_inf) ** 2)

@@ -88,6 +88,7 @@ class Scheme(Protocol):
     theta: float  # fraction of the step at which laws of inelastic material hold
     slack: float  # fraction of stored and dissipated energy that the forces may miss; else a cut
     alpha: float  # numerical loss over twice the energy of a change of strain
+    lost_fraction: float  # numerical loss over the energy of a second difference of strain
 
     def resistance(self, softening: SofteningLaw, opening: Array, growth: Values) -> Values:
         """Return the traction of a discontinuity whose opening grows in the step."""

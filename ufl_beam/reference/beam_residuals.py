@@ -16,7 +16,6 @@ from ufl_beam.arrays import Array, Index
 from ufl_beam.discretization.dof_numbering import DofNumbering
 from ufl_beam.discretization.function_spaces import mass_form
 from ufl_beam.errors import ModelError
-from ufl_beam.mechanics.energy_momentum_schemes import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import elastic_energy, resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_scheme import (
@@ -58,10 +57,10 @@ class ElasticBeams(CellForce):
         if scheme.alpha:
             losses.append(2 * element.constant(scheme.alpha) * elastic_energy(e1 - e0, C))
         self._decays, self._change_before = (
-            isinstance(scheme, EnergyMomentumDecaying),
+            bool(scheme.lost_fraction),
             element.at_points(3),
         )
-        if isinstance(scheme, EnergyMomentumDecaying):  # c C (Δe - r Δe'), Δe' of the step before
+        if scheme.lost_fraction:  # c C (Δe - r Δe'), Δe' of the step before
             damped = element.constant(scheme.lost_fraction) * resultants(
                 e1 - e0 - self._change_before, C
             )
@@ -288,7 +287,7 @@ class Inertia(MatrixForce):
         pairs = zip_longest(self.scheme.kept, self.more)
         more = [archive.vector(name, known) for name, known in pairs]
         self.more = tuple(known for known in more if known is not None)
-        if isinstance(self.scheme, EnergyMomentumDecaying):
+        if self.scheme.uses_last_step:
             self.v_before = archive.vector("velocity before", self.v_before)
             last = archive.vector("last step", np.full(self.size, self.last_dt))
             self.last_dt = float(last[0])

@@ -21,7 +21,6 @@ from ufl_beam.discretization.function_spaces import Fields
 from ufl_beam.discretization.partition import Subdomain
 from ufl_beam.discretization.state_io import NOWHERE, Archive, State
 from ufl_beam.errors import StepFailed
-from ufl_beam.mechanics.energy_momentum_schemes import EnergyMomentumDecaying
 from ufl_beam.mechanics.time_scheme import Scheme, Step, has_inertia
 from ufl_beam.model.connector_laws import rubs
 from ufl_beam.model.constraint_checks import friction_repeats
@@ -93,16 +92,15 @@ class StepEquation:
                 subset = Fields(subdomain, indices)
                 self.inelastic.append(InelasticBeams(subset, section_points, *setting, search))
         self.beams: list[Cells] = [*self.inelastic]
-        loses = scheme.alpha or isinstance(scheme, EnergyMomentumDecaying)
-        if loses and sum(len(cells) for _, cells in subdomain.numbering.inelastic) < len(
-            subdomain.numbering.cells
-        ):
+        if (scheme.alpha or scheme.lost_fraction) and sum(
+            len(cells) for _, cells in subdomain.numbering.inelastic
+        ) < len(subdomain.numbering.cells):
             ledger.lost["numerical"] += 0.0
         others: list[Term] = []
         if elastic.any():
             subset = fields if elastic.all() else Fields(subdomain, np.flatnonzero(elastic))
             self.beams.append(ElasticBeams(subset, *setting))
-            if isinstance(scheme, EnergyMomentumDecaying):
+            if scheme.lost_fraction:
                 others.append(SecondDifferences(scheme, subset, A, ledger))
 
         self.controllers = Controllers(subdomain)
@@ -220,7 +218,7 @@ class StepEquation:
 
     def _pass_on_step(self, archive: Archive, q: Array) -> None:
         """Save or restore the increments of the last step, if the next step depends on them."""
-        if self.inertia is not None and isinstance(self.scheme, EnergyMomentumDecaying):
+        if self.inertia is not None and self.inertia.scheme.uses_last_step:
             self.inertia.pass_on_step(archive)
             for term in self.terms:
                 if isinstance(term, SecondDifferences):

@@ -29,7 +29,6 @@ from ufl_beam.discretization.function_spaces import (
 from ufl_beam.discretization.state_io import Archive
 from ufl_beam.dolfinx_compat import fem
 from ufl_beam.errors import ModelError
-from ufl_beam.mechanics.energy_momentum_schemes import EnergyMomentumDecaying
 from ufl_beam.mechanics.functional import resultants, virtual_work
 from ufl_beam.mechanics.kinematics import strain, virtual_strain
 from ufl_beam.mechanics.time_scheme import (
@@ -222,7 +221,7 @@ class Inertia(Term):
 
 
 def _work_and_loss(
-    element: Element, scheme: Scheme | EnergyMomentumDecaying, factor: Expr, before: Expr
+    element: Element, scheme: Scheme, factor: Expr, before: Expr
 ) -> tuple[ufl.Form, ufl.Form]:
     """Return forms of resultants ``factor C (Δe - before)`` with the change Δe of the strains."""
     change = strain(element.q1, element.axis) - strain(element.q0, element.axis)
@@ -327,9 +326,7 @@ def damping_forces(
 
 
 @cached_forms
-def _change_forms(
-    element: Element, scheme: EnergyMomentumDecaying
-) -> tuple[ufl.Form, ufl.Form, fem.Function]:
+def _change_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
     """Return forms of virtual work and lost energy, and changes of strains in the last step."""
     before = element.at_points(3)
     return *_work_and_loss(element, scheme, element.constant(scheme.lost_fraction), before), before
@@ -340,9 +337,7 @@ class SecondDifferences(FormForces):
 
     kind, _entry = "beams", "numerical"
 
-    def __init__(
-        self, scheme: EnergyMomentumDecaying, fields: Fields, A: Csr, ledger: Ledger
-    ) -> None:
+    def __init__(self, scheme: Scheme, fields: Fields, A: Csr, ledger: Ledger) -> None:
         work, lost, self._before = _change_forms(fields.element, scheme)
         super().__init__(work, [lost], fields, A, ledger)
         self._strains = Strains(fields)
