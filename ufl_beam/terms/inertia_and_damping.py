@@ -236,7 +236,7 @@ def _work_and_loss(
 
 @cached_forms
 def _viscous_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy; function of the retardation time over dt."""
+    """Return forms of virtual work and lost energy; function with values retardation time / dt."""
     rate = element.at_points()
     return *_work_and_loss(element, scheme, rate, ufl.zero(3)), rate
 
