@@ -75,13 +75,13 @@ def _linear_strains(element: Element) -> tuple[ufl.Form, fem.Function]:
 def predicted_strains(fields: Fields) -> Any:
     """Return ``predicted_strains`` of loops.h, the strains predicted by a static iteration.
 
-    An iteration changes the displacements linearly.  Beams are longer after such a change than
-    linearised strains predict.  In slender beams the axial forces of this error spoil the next
-    iteration.  So the tangent uses the forces of the linearised strains, and the residual uses the
-    forces of the displacements.  This is Newton's method for displacements and forces as
-    independent unknowns of the functional, with the forces eliminated; it converges in few
-    iterations at any slenderness.  The initial guess of a step has the same error, so cells that
-    yield extrapolate the strains of the last states instead.
+    In an iteration nodes move along straight lines, so rotating beams become longer than linearised
+    strains predict.  In slender beams the axial forces of this error spoil the next iteration.  So
+    the tangent uses the forces of the linearised strains, and the residual uses the forces of the
+    displacements.  This is Newton's method for displacements and forces as independent unknowns of
+    the functional, with the forces eliminated; it converges in few iterations at any slenderness.
+    The initial guess of a step has the same error, so cells that yield extrapolate the strains of
+    the last states instead.
 
     Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
     """
@@ -103,7 +103,7 @@ def predicted_strains(fields: Fields) -> Any:
 def _works(work: ufl.Form, q1: fem.Function) -> dict[str, Any]:
     """Return forms, and their functions x, y and u, by name.
 
-    The forms are the work y·(K x) of the tangent K, its derivative along u, and that of K.
+    The forms are the work y·(K x) of the tangent K, and the derivatives along u of this work and K.
     """
     x, y, u = (fem.Function(q1.function_space) for _ in range(3))
     tangent = ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
@@ -236,7 +236,7 @@ class ElasticBeams(FormForces, Cells):
 # -- beams with material points --------------------------------------------------------------------
 
 WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
-"""Factors of :attr:`Points.recorded` without the jump, which is not of a hinge but of a fibre."""
+"""Factors of :attr:`Points.recorded` that remove the jump: without a hinge, it is of a fibre."""
 
 
 class InelasticForms(NamedTuple):

@@ -107,7 +107,7 @@ class Supports:
         )  # fmt: skip
 
     def hold(self, r: Array) -> None:
-        """Store the reactions in ``r``, the residual of all processes, and set them to zero."""
+        """Take the reactions out of ``r``, the residual of all processes, and store them."""
         if len(self.dofs):
             self.reactions[:] = r[self.dofs]
             r[self.dofs] = 0.0
@@ -146,7 +146,7 @@ class Supports:
 def _turned_axes(dofs: Index, angle: float, A: Csr) -> tuple[Any, ...]:
     """Return fields of ``turned_axes`` of loops.h for the displacement of a place."""
     rows = [np.arange(A.indptr[d], A.indptr[d + 1], dtype=np.int32) for d in dofs]
-    # Both dofs belong to the same cells, so their rows and columns have the same sparsity.
+    # Both dofs belong to the same cells, so their rows and columns have the same pattern.
     columns = [np.flatnonzero(A.indices == d).astype(np.int32) for d in dofs]
     sizes, indices = (len(rows[0]), len(columns[0])), map(integers, (*rows, *columns))
     return *map(int, dofs), *sizes, math.cos(angle), math.sin(angle), *indices

@@ -43,7 +43,7 @@ class CellForces:
         self.vectors, self.entries = list[Any](), list[tuple[Any, int]]()
         self.factors = list[tuple[Any, int]]()
         self._forces = ffi.new("force_in_cells[]", len(forces))
-        vectors: dict[Any, Any] = {}  # latest vectors: accepted vectors, as pointers
+        vectors: dict[Any, Any] = {}  # pointer to each latest vector: to the accepted one
         for c, force in zip(self._forces, forces, strict=True):
             c.kind, c.factor, c.number = force.kind, force.factor, len(force.order)
             if not np.array_equal(force.order, np.arange(len(subdomain.cells))):

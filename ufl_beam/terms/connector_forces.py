@@ -71,7 +71,7 @@ class ConnectorTerm(Term):
         self._dofs = subdomain.connector_dofs[positions].astype(np.int32)
         self.forces_at: Index = self._dofs[:, 6]
         self._A = A
-        self._callbacks: Callbacks  # set when the phases are made
+        self._callbacks: Callbacks  # set when the phases are created
         self.response = response = response_of(self.connectors[0].law, self.connectors, setting)
         self.must_dissipate = response.must_dissipate
         # Motions and forces of the accepted state, and its `connector_number` of loops.h
@@ -287,7 +287,7 @@ class ConnectorForces(ConnectorTerm):
         self.response.start(self._e)
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore motions, forces, works, and internal variables of laws."""
+        """Save or restore works, rates, forces, motions, and internal variables of laws."""
         response = self.response
         mine = *self._recorded, self._before, self._e
         rows = np.column_stack([*mine, response.state()])

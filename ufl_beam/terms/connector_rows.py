@@ -122,7 +122,7 @@ class Response:
     def _rub(self, limits: list[Any], **law_fields: Any) -> None:
         """Let connectors stick or slip; ``limits`` are the addresses of their limit forces."""
         n, setting = len(self._connectors), self._setting
-        # Direction of slip, or 0, in the step and in the accepted state
+        # Direction of slip, or 0, in the step and in the accepted state; ``friction`` of loops.h
         self._direction, self._accepted, distance, creep = np.zeros((4, n))
         self.sticks, against = np.zeros((2, n), dtype=np.int32)
         softness = CREEP if setting.friction_repeats else 0.0
@@ -191,7 +191,7 @@ class Response:
         """Set the accepted motions to ``e``, without a step."""
 
     def borne(self) -> Array | None:
-        """Return the elastic forces after :meth:`start`, (num_connectors,); None without any."""
+        """Return the elastic forces after :meth:`start`, (num_connectors,), or None."""
         return None
 
     def freeze(self) -> None:

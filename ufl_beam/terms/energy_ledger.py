@@ -178,7 +178,7 @@ class Energy(Mapping[str, Array], Rich):
 
     @property
     def _in_scene(self) -> Array:
-        """Energy in the scene, with potentials of a user as changes, as their zero is arbitrary."""
+        """Energy in the scene; a user's potentials count as changes, as their zero is arbitrary."""
         sizes = {n: e if n in CONTRIBUTIONS else np.abs(e - e[0]) for n, e in self.state.items()}
         return _sum(sizes)
 

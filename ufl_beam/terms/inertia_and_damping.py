@@ -124,7 +124,7 @@ class Inertia(Term):
         size, number = len(v), FURTHER + len(scheme.kept)
         self.loses_energy = checked_coefficients(scheme).slip is not None
         # Rate 0, the nodal step, is stored elsewhere.  Velocities before the last step are not
-        # computed: they are old velocities.  If nothing needs them, new ones overwrite them.
+        # computed: they are the old velocities.  New velocities overwrite old ones nothing needs.
         asks = self.loses_energy or scheme.uses_last_step
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
@@ -205,7 +205,7 @@ class Inertia(Term):
         self.keep(*map(archive.at_dofs, self.scheme.kept[:known], more))
 
     def pass_on_step(self, archive: Archive) -> None:
-        """Save or restore velocities before the last step, and its length, one for each unknown."""
+        """Save or restore velocities before the last step, and its length at each unknown."""
         v_before = archive.at_dofs(BEFORE, self.v_before)
         lengths = archive.at_dofs("last step", np.full(self.c.size, self.c.last_dt))
         self.commit(self.v, v_before, float(lengths[0]) if len(lengths) else self.c.last_dt)
@@ -333,7 +333,7 @@ def damping_forces(
 def _change_forms(
     element: Element, scheme: EnergyMomentumDecaying
 ) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy; function of the strain changes before."""
+    """Return forms of virtual work and lost energy; function of last strain changes."""
     before = element.at_points(3)
     return *_work_and_loss(element, scheme, element.constant(scheme.lost_fraction), before), before
 

@@ -2,9 +2,9 @@
 """Material points: return map, internal variables, stored and dissipated energies.
 
 The laws are traced with UFL symbols, UFL derives their derivatives, and FFCx compiles both.  The
-return map is in material_points.c, a loop over the points that calls the compiled laws.  It derives
-the tangents of opening discontinuities, and of laws that solve for their variables, by the implicit
-function theorem.
+return map is in material_points.c, a loop over the points that calls the compiled laws.  There the
+tangents of opening discontinuities, and of laws that solve for their variables, follow from the
+implicit function theorem.
 
 With strong softening a step has two solutions: a hinge stays closed or opens.  A rule chooses
 between them.  A hinge, a crack of a fibre or a softening spring that did not open further in the
@@ -84,9 +84,9 @@ def expect_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger
 def releases(section_points: SectionPoints, scheme: Scheme) -> bool:
     """Return whether points have numerical losses besides those by ``alpha`` of a scheme.
 
-    Schemes with forces over the step have two.  A point that breaks loses the energy of its stress
-    at the end of the step.  In nonlinear elasticity the work of the stress at t_n+θ differs from
-    the change of the energy.
+    Schemes with forces over the step have two such losses.  A point that breaks loses the energy of
+    its stress at the end of the step.  In nonlinear elasticity the work of the stress at t_n+θ
+    differs from the change of the energy.
     """
     return scheme.average(0.0, 1.0) != 1.0 and (
         section_points.softening is not None or curved(section_points.kind)
@@ -125,15 +125,14 @@ class PointForms:
             self.resistance = pointwise.compile(resistance, slope)
         with traced(law):
             stress = tuple(map(ufl.as_ufl, equations.stress(at)))
-            answer = [*stress, *self._derivatives(stress, self._strains)]
+            outputs = [*stress, *self._derivatives(stress, self._strains)]
             if law.solves:
                 r = tuple(map(ufl.as_ufl, equations.residuals(at)))
-                by_both = [self._derivatives(r, names) for names in (unknown, self._strains)]
-                answer = [
+                outputs = [
                     *r,
-                    *by_both[0],
-                    *by_both[1],
-                    *answer,
+                    *self._derivatives(r, unknown),
+                    *self._derivatives(r, self._strains),
+                    *outputs,
                     *self._derivatives(stress, unknown),
                 ]
             *energies, stress, changes = equations.end(at)
@@ -142,7 +141,7 @@ class PointForms:
                 stored = ufl.as_ufl(equations.stored(at))
                 slopes = tuple(self._derivatives((stored,), unknown))
                 self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
-        self.law = pointwise.compile(*answer)
+        self.law = pointwise.compile(*outputs)
         end = in_order("point_output", dict(zip(End._fields, energies, strict=False)))
         self.end = pointwise.compile(*end, *stress, *changes)
 
@@ -297,7 +296,7 @@ class Points:
     def return_map(self, strains: Array) -> tuple[Array, Array]:
         """Return (N, V, M) in a step to ``strains``, and derivatives; (cells, 3), (cells, 9).
 
-        They are NaN in a cell where an opening, or the variables for which a law solves, are not
+        Both are NaN in a cell where an opening, or the variables for which a law solves, are not
         found.  Later calls overwrite the arrays.  Predictions of the last tangent are ignored.
         """
         self.c.predicts, self.c.linear = 0, ffi.NULL
@@ -321,7 +320,7 @@ class Points:
     def remaining(self, change: Array) -> Array:
         """Return the fraction of elastic stiffness that remains against ``change``; (cells,).
 
-        It compares the tangent of the latest response; ``change`` are strains; (cells, 3).
+        The stiffness is the tangent of the latest response.  ``change`` are strains; (cells, 3).
         """
         section_points, theta = self._section_points, self["theta"][0, 0]
         elastic = theta * change**2 @ section_points.rest

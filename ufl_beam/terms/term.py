@@ -35,8 +35,8 @@ class InCells(NamedTuple):
     """Forces of a term on the nodes of cells; see cell_forces.py.
 
     Attributes:
-        form: Creates the form whose entries are the forces.  If there is no ``vector``, the forces
-            are the entries of its latest evaluation.
+        form: Function that creates the form whose entries are the forces.  Without a
+            ``vector``, the forces are the entries of its latest evaluation.
         kind: ``force_kind`` of loops.h.
         order: Positions of the cells of the form in ``subdomain.cells``.
         vector: Pointer to the address of the vector at which the form is evaluated, if the form is
@@ -111,7 +111,7 @@ class Term(ABC):
             tangent[0](tangent[1], doubles(q1), doubles(self._A.data))
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
-        """Add the derivative of the tangent at ``q1`` along ``u`` at constant variables."""
+        """Add the derivative of the tangent along ``u``, at constant variables, to the matrix."""
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a law generates energy in the step to ``q1``."""

@@ -84,7 +84,7 @@ class Acting:
         )  # fmt: skip
 
     def initial_forces(self, q: Array, past: Archive | None) -> Array:
-        """Return the forces at ``q`` or, if it has them, in ``past``; the next step needs them."""
+        """Return the forces before the next step, from ``past`` or at ``q``, and store them."""
         force = np.zeros(len(q))
         self.residual.add(q, force)
         if self._energy is not None:
@@ -95,7 +95,7 @@ class Acting:
         return self._before
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the forces in the equation of the last step, of a virtual work."""
+        """Save or restore the forces in the equation of the last step; potentials need none."""
         if self._energy is None:
             self._before[:] = archive.added(self._saved_as, self._before)
 
