@@ -236,7 +236,7 @@ def _work_and_loss(
 
 @cached_forms
 def _viscous_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy; function with values retardation time / dt."""
+    """Return forms of virtual work and lost energy, and the function of their factor."""
     rate = element.at_points()
     return *_work_and_loss(element, scheme, rate, ufl.zero(3)), rate
 
@@ -333,7 +333,7 @@ def damping_forces(
 def _change_forms(
     element: Element, scheme: EnergyMomentumDecaying
 ) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy; function of last strain changes."""
+    """Return forms of virtual work and lost energy, and the function r Δe' in them."""
     before = element.at_points(3)
     return *_work_and_loss(element, scheme, element.constant(scheme.lost_fraction), before), before
 
