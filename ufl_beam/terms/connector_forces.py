@@ -145,7 +145,7 @@ class ConnectorForces(ConnectorTerm):
     """Connectors of the same relative motions with laws of one kind.
 
     Forms are stated on a cell of unit length between the two nodes of a connector.  The unknowns of
-    the cell are those of the nodes, then the forces.  A :class:`Bushing` is one cell; its
+    the cell are six of the nodes, then the forces.  A :class:`Bushing` is one cell; its
     components are consecutive connectors.  C evaluates the forms, and most laws.
 
     Attributes:
@@ -298,11 +298,11 @@ class ConnectorForces(ConnectorTerm):
 
 
 class Guides(ConnectorTerm):
-    """Forces across curves; over a step they are normal to the chord and do no work.
+    """Forces across curves; over a step they are normal to its chord, so they do no work.
 
     The round-off of points spoils the direction of a short chord.  A chord is replaced by the
-    tangent in its middle where the round-off is a larger error than the curvature.  The error of
-    either direction is at most the round-off to the power of two thirds.
+    tangent in its middle where round-off causes a larger error than curvature.  The error of either
+    direction is at most the round-off to the power of two thirds.
 
     The motion of a guide is the distance of the point from its curve, which is zero when a step is
     accepted.  guide_curves.c computes guides, and calls Python for points of the curves.

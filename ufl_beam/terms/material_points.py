@@ -332,8 +332,8 @@ class Points:
     def require_dissipation(self, describe: Callable[[int], str]) -> None:
         """Raise :class:`StepFailed` if a point generates energy; ``describe`` names its cell.
 
-        The law then has a negative dissipation: its equations have several solutions, and the
-        solver found a solution that no material reaches, or the law hides a part of its energy.
+        The law then has a negative dissipation.  Either its equations have several solutions, and
+        the solver found one that no material reaches; or it stores energy that it does not state.
         """
         if (worst := lib.gives_energy(self.c)) >= 0:
             law = type(self._section_points.kind.law).__name__
@@ -388,7 +388,7 @@ class Points:
     def in_steps(self, ledger: Ledger) -> dict[str, Any]:
         """Return fields of ``inelastic_term`` of loops.h, with entries of the ledger.
 
-        In statics they include a copy of the points, for the energy change of a step before it is
+        In statics a copy of the points is a field, for the energy change of a step before it is
         accepted.
         """
         state, lost = ledger.state, ledger.lost
@@ -405,7 +405,7 @@ class Points:
     # -- the state -----------------------------------------------------------------------------
 
     def state(self) -> Array:
-        """Return the internal variables of the accepted state; (cells, k); a copy."""
+        """Return a copy of variables, strains and energies of the accepted state; (cells, k)."""
         stored = np.zeros((len(self.recorded), 2))
         stored[:1] = self.sums[3:5]  # sums over all cells; any one row may have them
         return np.hstack(
@@ -418,14 +418,16 @@ class Points:
         Call :meth:`start` and :meth:`refresh` afterwards if strains or laws differ from that state.
         """
         ends = np.arange(1, len(self._state_names) + 1) * self._storage.shape[1]
-        *variables, kept, e0, stored = np.split(rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
+        *variables, recorded, e0, stored = np.split(
+            rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1
+        )
         for name, values in zip(self._state_names, variables, strict=True):
             self[name][:] = values
-        self.recorded[:], self._e0[:] = kept, e0
+        self.recorded[:], self._e0[:] = recorded, e0
         self.sums[3:5] = stored.sum(axis=0)
 
     def refresh(self, strains: Array) -> None:
-        """Compute (N, V, M) and stored energies at ``strains`` in the present state, not a step."""
+        """Compute (N, V, M) and stored energies at ``strains`` and the present variables."""
         section_points, length, law = (
             self._section_points,
             self["length"][:, :1],
