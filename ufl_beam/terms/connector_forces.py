@@ -145,7 +145,7 @@ class ConnectorForces(ConnectorTerm):
     """Connectors of the same relative motions with laws of one kind.
 
     Forms are stated on a cell of unit length between the two nodes of a connector.  The unknowns of
-    the cell are six of the nodes, then the forces.  A :class:`Bushing` is one cell; its
+    the cell are six nodal unknowns, then the forces.  A :class:`Bushing` is one cell; its
     components are consecutive connectors.  C evaluates the forms, and most laws.
 
     Attributes:

@@ -124,7 +124,7 @@ class Inertia(Term):
         size, number = len(v), FURTHER + len(scheme.kept)
         self.loses_energy = checked_coefficients(scheme).slip is not None
         # Rate 0, the nodal step, is stored elsewhere.  Velocities before the last step are not
-        # computed: they are the old velocities.  New velocities overwrite old ones nothing needs.
+        # computed: they are the old velocities.  If nothing needs them, new ones take their memory.
         asks = self.loses_energy or scheme.uses_last_step
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
