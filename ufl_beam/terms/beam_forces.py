@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: MIT
 """Forces inside beams: elastic cells, and cells whose material yields, flows or breaks.
 
-Inelastic cells compute resultants by the return map of their material points.  Both kinds share
-forms of a step, strains that an iteration of a static step predicts, and works of the tangent and
-of its derivative, which buckling needs.
+Inelastic cells compute resultants by the return map of their material points.  Cells of both kinds
+predict strains in the iterations of static steps, and compute works of the tangent and of its
+derivative, which buckling needs.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, beginning, ent
 class FormForces(Term):
     """Forces of a virtual work on cells, with forms of the energy lost in a step."""
 
-    _entry: str  # of the losses in the ledger
+    _entry: str  # entry of the losses in the ledger
 
     def __init__(
         self, work: ufl.Form, losses: Sequence[ufl.Form], fields: Fields, A: Csr, ledger: Ledger,
@@ -75,13 +75,13 @@ def _linear_strains(element: Element) -> tuple[ufl.Form, fem.Function]:
 def predicted_strains(fields: Fields) -> Any:
     """Return ``predicted_strains`` of loops.h, the strains predicted by a static iteration.
 
-    They follow from linear kinematics.  The error of the linearisation strains slender beams along
-    their axes, and the forces of these strains spoil the next iteration.  Strains that are linear
-    in the displacements predict forces without that error, so the tangent uses these forces.  The
-    residual still uses the forces of the displacements.  This is Newton's method for displacements
-    and forces as independent unknowns of the functional, with the forces eliminated; it converges
-    in few iterations at any slenderness.  The initial guess of a step strains beams in the same
-    way, so cells that yield extrapolate strains of states.
+    In an iteration nodes move along straight lines, so rotating beams become longer than linearised
+    strains predict.  In slender beams the axial forces of this error spoil the next iteration.  So
+    the tangent uses the forces of the linearised strains, and the residual uses the forces of the
+    displacements.  This is Newton's method for displacements and forces as independent unknowns of
+    the functional, with the forces eliminated; it converges in few iterations at any slenderness.
+    The initial guess of a step has the same error, so cells that yield extrapolate the strains of
+    the last states instead.
 
     Magisano, Leonetti and Garcea, Computer Methods in Applied Mechanics and Engineering 313 (2017).
     """
@@ -101,7 +101,10 @@ def predicted_strains(fields: Fields) -> Any:
 
 @cached_forms
 def _works(work: ufl.Form, q1: fem.Function) -> dict[str, Any]:
-    """Return works of the tangent and its change along u for x on y; the change; x, y, u."""
+    """Return forms, and their functions x, y and u, by name.
+
+    The forms are the work y·(K x) of the tangent K, and the derivatives along u of this work and K.
+    """
     x, y, u = (fem.Function(q1.function_space) for _ in range(3))
     tangent = ufl.derivative(work, q1, ufl.TrialFunction(q1.function_space))
     action = ufl.action(ufl.derivative(work, q1, x), y)
@@ -111,20 +114,21 @@ def _works(work: ufl.Form, q1: fem.Function) -> dict[str, Any]:
 
 
 class Cells(Term):
-    """Forces in cells whose tangent also has a work on two motions.
+    """Forces in cells, with the work of their tangent for two motions.
 
-    Works are summed over cells from the strains of the motions.  The entries of a matrix have the
-    round-off of axial and shear stiffness, which may exceed the bending stiffness of slender cells.
+    The work is a sum over cells, computed from the strains of the motions.  A product with the
+    matrix would have the round-off of axial and shear stiffness, which may exceed the bending
+    stiffness of slender cells.
     """
 
     _work_form: ufl.Form
     _q1: fem.Function
     _fields: Fields
     predicted: Any = None
-    """In statics, the :func:`predicted_strains` for the forces in tangents."""
+    """In statics, the :func:`predicted_strains` whose forces are in the tangent; else None."""
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
-        """Return the values at ``q1``, in the cells, of further functions in the virtual work."""
+        """Return further functions in the virtual work, with their values in cells at ``q1``."""
         return {}
 
     @cached_property
@@ -151,7 +155,7 @@ class Cells(Term):
         self._at(q1, "matrix", u=u).add(q1, self._A.data)
 
     def tangent_work(self, q1: Array, x: Array, y: Array, u: Array | None = None) -> float:
-        """Return the work of the tangent, or of its derivative along u, for motion x on y; J."""
+        """Return the work y·(K x) of the tangent K, or of its derivative along u; J."""
         if u is None:
             return self._at(q1, "tangent", x=x, y=y).value(q1)
         return self._at(q1, "change", u=u, x=x, y=y).value(q1)
@@ -170,7 +174,7 @@ class ElasticForms(NamedTuple):
 
 @cached_forms
 def elastic_forms(element: Element, scheme: Scheme) -> ElasticForms:
-    """Return the forms of a step of a time scheme."""
+    """Return the forms of elastic cells in a step of a time scheme."""
     q0, q1, w, C, dx = element.q0, element.q1, element.w, element.stiffness, element.dx(1)
     e0, e1 = strain(q0, element.axis), strain(q1, element.axis)
     r = scheme.resultants(C, e0, e1, element.constant)
@@ -182,7 +186,7 @@ def elastic_forms(element: Element, scheme: Scheme) -> ElasticForms:
 
 @cached_forms
 def _static_tangent(element: Element, scheme: Scheme) -> tuple[ufl.Form, fem.Function]:
-    """Return the tangent of elastic cells with given strains in its forces; these strains."""
+    """Return the tangent of elastic cells with the forces of given strains, and these strains."""
     q0, q1, C = element.q0, element.q1, element.stiffness
     e0, e1, e = strain(q0, element.axis), strain(q1, element.axis), element.at_points(3)
     w_e = scheme.virtual_strain(q0, q1, element.w, element.axis)
@@ -221,7 +225,7 @@ class ElasticBeams(FormForces, Cells):
         self.in_cells = [forces._replace(q0=self._q0) for forces in self.in_cells]
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the cells."""
+        """Return loops over the cells that begin and accept a step, and enter the stored energy."""
         begin, accept, *_ = super().phases(callbacks)
         if self.predicted is not None:
             begin = [*begin, loop("begin_static_tangent", self._static)]
@@ -232,15 +236,15 @@ class ElasticBeams(FormForces, Cells):
 # -- beams with material points --------------------------------------------------------------------
 
 WITHOUT_JUMP = np.array([1.0, 1.0, 1.0, 0.0, 1.0, 1.0])
-"""Factors of :attr:`Points.recorded` if its jump is a crack of a fibre instead of a hinge."""
+"""Factors of :attr:`Points.recorded` that remove the jump: without a hinge, it is of a fibre."""
 
 
 class InelasticForms(NamedTuple):
-    """Virtual work of resultants r, and of b + D e around an iterate with its derivative."""
+    """Forms with resultants r, or b + D e, which are linear in the strains e."""
 
-    work: ufl.Form
-    around: ufl.Form
-    tangent: ufl.Form
+    work: ufl.Form  # virtual work of r
+    around: ufl.Form  # virtual work of b + D e, around an iterate
+    tangent: ufl.Form  # derivative of ``around``
     r: fem.Function
     b: fem.Function
     D: fem.Function
@@ -248,7 +252,7 @@ class InelasticForms(NamedTuple):
 
 @cached_forms
 def inelastic_forms(element: Element, scheme: Scheme) -> InelasticForms:
-    """Return the forms of a step of a time scheme."""
+    """Return the forms of inelastic cells in a step of a time scheme."""
     r, b, D = element.at_points(3), element.at_points(3), element.at_points(3, 3)
     w_e, dx = scheme.virtual_strain(element.q0, element.q1, element.w, element.axis), element.dx(1)
     around = virtual_work(b + ufl.dot(D, strain(element.q1, element.axis)), w_e) * dx
@@ -259,9 +263,9 @@ def inelastic_forms(element: Element, scheme: Scheme) -> InelasticForms:
 class InelasticBeams(Cells):
     """Virtual work of the resultants of cells with material points, P(34).
 
-    The points map the strains of an iterate to resultants r and their derivatives D.  Around the
-    iterate, the resultants b + D e are linear in the strains e; UFL derives the material and
-    geometric tangent from them.  One loop in C evaluates points and forms.
+    The points map the strains of an iterate to resultants r and their derivatives D.  UFL derives
+    the material and the geometric tangent from b + D e, the resultants linearised in the strains e
+    about the iterate.  C evaluates points and forms.
 
     Attributes:
         recorded_factors: Factors of :attr:`Points.recorded` in :meth:`recorded`; (6,).
@@ -312,7 +316,7 @@ class InelasticBeams(Cells):
     # -- in C ----------------------------------------------------------------------------------
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the points."""
+        """Return loops over the points that begin and accept a step, and enter energies."""
         c = struct("inelastic_term", cells=self._in_c, **self.points.in_steps(self._ledger))
         begin = [*beginning((self._force, self._tangent), self._q0), loop("begin_inelastic", c)]
         if self.predicted is not None:
@@ -326,7 +330,7 @@ class InelasticBeams(Cells):
     # -- the step ------------------------------------------------------------------------------
 
     def start(self, q: Array) -> None:
-        """Start the points at the strains of a configuration."""
+        """Set the accepted strains of the points to those at ``q``, without a step."""
         strains = self._strains(q)
         self.points.start(strains)
         self.points.refresh(strains)
@@ -343,17 +347,17 @@ class InelasticBeams(Cells):
         return self.points.dissipation()
 
     def _coefficients(self, q1: Array) -> dict[fem.Function, Array]:
-        """Return b and D around ``q1``; the points keep this response as their latest."""
+        """Return b and D about ``q1``, whose response becomes the latest one of the points."""
         strains = self._strains(q1)
         r, D = self.points.return_map(strains)
-        self._latest.fill(np.nan)  # the points have another response now
+        self._latest.fill(np.nan)  # the latest response no longer belongs to these unknowns
         around = r - np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)
         return {self._b: around, self._D: D}
 
     def about_state(self) -> tuple[Index, Array, Array]:
         """Return cells (numbers of the scene), and b, D of b + D e about the accepted state.
 
-        Shapes (num_cells, 3) and (num_cells, 9).  D belongs to a step like the last one.
+        Shapes (num_cells, 3) and (num_cells, 9).  D holds for a step as long as the last one.
         """
         strains, D = self.points.tangent()
         elastic = np.einsum("kij,kj->ki", D.reshape(-1, 3, 3), strains)

@@ -24,17 +24,19 @@ from ufl_beam.terms.term import Callbacks
 class Supports:
     """Supports of a scene: constrained and prescribed degrees of freedom, reactions.
 
-    Unknowns and residuals of the solver are in the turned axes of the supports.  Unknowns and
-    residuals of the terms are in the axes of the plane.  :meth:`into_axes` and :meth:`into_plane`
-    transform them.
+    Unknowns and residuals of the solver are in the axes of the supports, which an angle may turn.
+    Unknowns and residuals of the terms are in the axes of the plane.  :meth:`into_axes` and
+    :meth:`into_plane` transform vectors.
 
     Attributes:
-        reactions: Forces of the supports on the scene in the latest residual, at the constrained
-            degrees of freedom, in turned axes.
-        entries: Matrix entries in rows and columns of ``dofs``, and their diagonal entries.
-        pivots: Values on the diagonal.
+        dofs: Local degrees of freedom that supports, or the ground, constrain.
+        reactions: Forces of the supports on the scene in the latest residual, at ``dofs``, in the
+            axes of the supports.
+        entries: Matrix entries in the rows and columns of ``dofs``; diagonal entries of ``dofs``.
+        pivots: Values of these diagonal entries in the constrained matrix.
         turned, axes: Number of supports at an angle; ``turned_axes`` of loops.h.
         moving: Local degrees of freedom whose values depend on time.
+        work: True if any support of the scene, on any process, moves.
     """
 
     def __init__(self, subdomain: Subdomain, scheme: Scheme, ledger: Ledger, A: Csr) -> None:
@@ -61,7 +63,6 @@ class Supports:
         self.entries = np.union1d(columns, rows), A.positions(self.dofs, self.dofs)
         self.pivots: Array = np.ones(len(self.dofs))
         self._scheme, self._ledger = scheme, ledger
-        # True if values depend on time anywhere in the scene
         self.work = any(support.moving for support in subdomain.numbering.scene.supports)
         if self.work:
             ledger.supplied["supports"] += 0.0
@@ -69,11 +70,11 @@ class Supports:
         self._before: Array = self.reactions.copy()
 
     def into_axes(self, x: Array) -> None:
-        """Transform from the axes of the plane to those of the supports, in place."""
+        """Transform ``x`` from the axes of the plane to the axes of the supports, in place."""
         lib.turn_axes(self.turned, self.axes, doubles(x), 1)
 
     def into_plane(self, x: Array) -> None:
-        """Transform from the axes of the supports to those of the plane, in place."""
+        """Transform ``x`` from the axes of the supports to the axes of the plane, in place."""
         lib.turn_axes(self.turned, self.axes, doubles(x), -1)
 
     def in_axes(self, q: Array) -> Array:
@@ -106,13 +107,13 @@ class Supports:
         )  # fmt: skip
 
     def hold(self, r: Array) -> None:
-        """Store the reactions of a complete residual, and remove them from it."""
+        """Take the reactions out of ``r``, the residual of all processes, and store them."""
         if len(self.dofs):
             self.reactions[:] = r[self.dofs]
             r[self.dofs] = 0.0
 
     def stop(self, v: Array) -> None:
-        """Set velocities at fixed supports to zero, in place; else they would oscillate."""
+        """Set velocities at fixed supports to zero, in place; otherwise they would oscillate."""
         self.into_axes(v)
         moving = v[self.moving]
         v[self.dofs] = 0.0
@@ -128,7 +129,7 @@ class Supports:
         self.reactions[:] = self._before
 
     def carry_on(self, archive: Archive, q: Array) -> None:
-        """Save or restore the reactions."""
+        """Save or restore the reactions in the equation of the last step."""
         reactions: Array = np.zeros(len(q))
         reactions[self.dofs] = self._before
         self.reactions[:] = archive.at_dofs("reactions", reactions)[self.dofs]
@@ -145,7 +146,7 @@ class Supports:
 def _turned_axes(dofs: Index, angle: float, A: Csr) -> tuple[Any, ...]:
     """Return fields of ``turned_axes`` of loops.h for the displacement of a place."""
     rows = [np.arange(A.indptr[d], A.indptr[d + 1], dtype=np.int32) for d in dofs]
-    # Both dofs belong to the same cells, so their rows and columns have the same sparsity.
+    # Both dofs belong to the same cells, so their rows and columns have the same pattern.
     columns = [np.flatnonzero(A.indices == d).astype(np.int32) for d in dofs]
     sizes, indices = (len(rows[0]), len(columns[0])), map(integers, (*rows, *columns))
     return *map(int, dofs), *sizes, math.cos(angle), math.sin(angle), *indices

@@ -2,7 +2,7 @@
 """Forces on the nodes of cells in the equation of a step, and in the accepted state.
 
 At a node, the forces of all cells and all other forces add up to the residual.  So the forces at
-both ends of a cell are its section forces, in equilibrium with supports and joints.
+both ends of a cell are section forces that are in equilibrium with supports and joints.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ class CellForces:
         c: ``cell_forces`` of loops.h.
         asks_for_before: True if the forces depend on the configuration at the beginning of the
             step.
-        vectors, entries, factors: Pointers to arrays, the last two with their sizes, that determine
-            the forces besides configurations: vectors of degrees of freedom, entries of forms, and
-            load factors, which are equal on all processes.
+        vectors: Pointers to vectors of degrees of freedom that determine forces.
+        entries: Pointers to entries of forms that determine forces, with their numbers.
+        factors: Pointers to load factors, which are equal on all processes, with their numbers.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class CellForces:
         self.vectors, self.entries = list[Any](), list[tuple[Any, int]]()
         self.factors = list[tuple[Any, int]]()
         self._forces = ffi.new("force_in_cells[]", len(forces))
-        vectors: dict[Any, Any] = {}  # latest vectors: accepted vectors, as pointers
+        vectors: dict[Any, Any] = {}  # pointer to each latest vector: to the accepted one
         for c, force in zip(self._forces, forces, strict=True):
             c.kind, c.factor, c.number = force.kind, force.factor, len(force.order)
             if not np.array_equal(force.order, np.arange(len(subdomain.cells))):
@@ -81,11 +81,11 @@ class CellForces:
         )  # fmt: skip
 
     def accept(self) -> None:
-        """Accept the forces of the latest residual."""
+        """Accept the forces of the latest residual as forces of the accepted step."""
         lib.accept_cell_forces(self.c)
 
     def begin(self, values: Array | None) -> None:
-        """Begin with these values, or with only the stresses of the latest residual."""
+        """Begin with known resultants ``values``, or with only the stresses of the residual."""
         if values is not None:
             fill(self.c, given=values)
             return
@@ -109,7 +109,7 @@ class CellForces:
         return out
 
     def _make(self) -> None:
-        """Make the forms that only cell forces need, once."""
+        """Create the forms that only cell forces need, at the first call."""
         for force, c in self._unmade:
             form = force.form()
             each, c.lanes, _ = form.keep_entries()
@@ -118,11 +118,11 @@ class CellForces:
         self._unmade = []
 
     def in_order(self, lanes: int) -> bool:
-        """Return whether all forms have all cells, in batches of ``lanes``."""
+        """Return whether each form has all cells, in batches of ``lanes`` cells."""
         return all(not c.cell and c.lanes == lanes for c in self._forces)
 
     def keep_latest(self) -> None:
-        """Keep all entries of the latest residual from now on, for requests after each step."""
+        """Store all entries of each residual from now on, so that they are known after a step."""
         self._make()
         structs = (c for c in self._forces if not c.latest and not c.vector)
         for c, (*_, each, values) in zip(structs, self._step_forms, strict=True):
@@ -134,7 +134,7 @@ class CellForces:
     # -- data of solutions ----------------------------------------------------------------------
 
     def forces_from_record(self, record: Array, q: Array, before: Array) -> Array:
-        """Return the numbers of a call from saved vectors, entries and factors, in this order."""
+        """Return the result of a call for saved vectors, entries and factors, in this order."""
         arrays = [*((x, self._subdomain.size) for x in self.vectors), *self.entries, *self.factors]
         values, addresses, at = self.c.given, [place[0] for place, _ in arrays], 0
         record = np.array(record)
@@ -150,6 +150,6 @@ class CellForces:
                 place[0] = old
 
     def save_or_restore(self, archive: Archive, q: Array, before: Array) -> None:
-        """Save or restore the forces of the accepted step."""
+        """Save or restore the resultants of the accepted step."""
         values = archive.rows("forces of cells", self._subdomain.cells, self(q, before).T)
         fill(self.c, given=np.ascontiguousarray(values.T))

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Connector laws stated as energy and resistance, compiled to C, or as functions of a user.
+"""Compiled connector laws, which state energy, resistance or a limit; and functions of a user.
 
-Functions of a user return a force, with a history and with any slope; C calls them in Python.
+A function of a user returns a force, which may depend on a history and have any slope.  C calls it
+in Python.
 """
 
 from __future__ import annotations
@@ -35,7 +36,7 @@ from ufl_beam.terms.term import Callbacks
 
 
 def inputs(law: ConnectorLaw) -> tuple[str, ...]:
-    """Return the names of the inputs of a compiled law; loops.h explains their order."""
+    """Return the names of the inputs of a compiled law, in the order that loops.h explains."""
     motions = (f"{when} {i}" for when in ("motion", "before") for i in range(law.components))
     data = (
         *(f"state {name}" for name in law.variables),
@@ -45,12 +46,12 @@ def inputs(law: ConnectorLaw) -> tuple[str, ...]:
 
 
 class LawForms:
-    """Compiled law of a connector, for any numbers of the law.
+    """C functions of a connector law, with the parameters of the law among their inputs.
 
     Attributes:
         force: Forces and their derivatives with respect to the motions at the end of the step.
         end: ``law_output`` of loops.h, then the variables at the end.
-        limit: Force up to which the motion is constrained.
+        limit: Force up to which a constraint holds the motion.
     """
 
     def __init__(self, law: ConnectorLaw, scheme: Scheme) -> None:
@@ -76,7 +77,7 @@ class LawForms:
 
     @cached_property
     def frozen(self) -> tuple[Any, Any]:
-        """Forces and their first and second derivatives at constant variables."""
+        """C functions at constant variables: forces with derivatives; second derivatives."""
         forces = law_step(self._law, self._at, self._scheme, frozen=True).forces
         slopes = self._slopes(forces)
         return self._compile(*forces, *slopes), self._compile(*self._slopes(slopes))
@@ -96,7 +97,7 @@ _law_forms = cached_forms(LawForms)
 
 
 class CompiledLaws(Response):
-    """Connectors with laws of one class; each law has its own numbers."""
+    """Connectors with laws of one class; each law has its own parameters."""
 
     def __init__(
         self, law: ConnectorLaw, connectors: Sequence[Connector], setting: Setting
@@ -118,7 +119,7 @@ class CompiledLaws(Response):
             at[f"state {name}"][:] = value
         for name in law.parameters():
             at[f"number {name}"][:] = [getattr(x, name) for x in self._laws[::k]]
-        self._stored, lost = np.zeros(n), np.zeros(n * k)  # losses, in the first component
+        self._stored, lost = np.zeros(n), np.zeros(n * k)  # losses are at the first components
         self.dissipated = (lost,)
         variables = [at[f"state {name}"] for name in law.variables]
         self._variables = [*variables, self._stored, lost[::k]]
@@ -139,7 +140,8 @@ class CompiledLaws(Response):
     def bends(self, e1: Array) -> Array:
         """Return minus the second derivatives of the forces at constant variables.
 
-        They are zero for laws that hold: sticking has none, and no analysis follows sliding.
+        They are zero for laws with a limit: sticking connectors have constant rows, and no analysis
+        follows sliding connectors.
         """
         if self._law.holds:
             return super().bends(e1)
@@ -151,14 +153,14 @@ class CompiledLaws(Response):
         return -bends
 
     def _accepted_state(self) -> tuple[ConnectorLaw, list[Array], State]:
-        """Return the law with the numbers of all connectors, their motions and their variables."""
+        """Return the law with the parameters of all connectors, their motions and variables."""
         law, at = self._law, self._at
         laws = law.with_parameters({name: at[f"number {name}"] for name in law.parameters()})
         motions = [at[f"before {i}"] for i in range(law.components)]
         return laws, motions, State({name: at[f"state {name}"] for name in law.variables})
 
     def start(self, e: Array) -> None:
-        """Begin at motions that no step has led to."""
+        """Set the accepted motions to ``e``, without a step, and compute the stored energies."""
         k = self._components
         self._w[:, k : 2 * k] = e.reshape(-1, k)
         with np.errstate(all="ignore"):
@@ -166,14 +168,14 @@ class CompiledLaws(Response):
             self._stored[:] = law.energy(law.as_argument(motions), variables)
 
     def borne(self) -> Array | None:
-        """Return the elastic forces at the motions of :meth:`start`; None if laws hold."""
+        """Return the elastic forces after :meth:`start`; None for laws with a limit."""
         if self._law.holds:
             return None
         law, motions, variables = self._accepted_state()
         return np.column_stack(law.elastic_forces(motions, variables)).ravel()
 
     def freeze(self) -> None:
-        """Keep variables constant from now on; sticking connectors stick."""
+        """Keep variables constant from now on; nothing changes for laws with a limit."""
         if not self._law.holds:
             fill(self._c, force=self._forms.frozen[0])
 
@@ -183,14 +185,14 @@ class CompiledLaws(Response):
 OVERSHOOT = 0.5
 """Ratio of residuals of successive iterates above which an iteration has overshot.
 
-At a root of order n, Newton's method reduces a residual by (1 - 1/n)ⁿ, which is less than 1/e.
+At a root of order n, Newton's method multiplies a residual by (1 - 1/n)ⁿ, which is below 1/e.
 """
 
 DIGITS = 1e-8
-"""Difference of forces, over the force, that leaves enough digits for a slope."""
+"""Difference of forces, as a fraction of the force, above which a slope has enough digits."""
 
 DIFFERENCE = 6e-6
-"""Relative increment of central differences with least error: third root of round-off."""
+"""Relative increment at which central differences have the least error: ∛(round-off)."""
 
 
 class Iterate(NamedTuple):
@@ -199,15 +201,15 @@ class Iterate(NamedTuple):
     e: float  # motion; m or rad
     λ: float  # force; N or N m
     residual: float  # force of the law at the motion, less λ
-    at: float  # motion about which the law was linearised
+    at: float  # motion about which the law was linearised; m or rad
 
 
 class UserLaw:
-    """Functions of the law of a connector in a step.
+    """Law of a connector in a step, by functions of a user.
 
     Attributes:
-        state: Internal variables of the accepted state; written to when a step is accepted.
-        last: Previous iterate in this step; None in the first.
+        state: Internal variables of the accepted state; :meth:`UserLaws.accept_end` writes them.
+        last: Previous iterate of this step; None in the first iterate.
         energy: Function of the recoverable energy; None if the law states none.
     """
 
@@ -223,7 +225,7 @@ class UserLaw:
         state[:] = law.state
 
     def begin(self, e0: float, t: float, dt: float) -> None:
-        """Begin a step at the motion ``e0``; the law acts at the time ``t``."""
+        """Begin a step of length ``dt`` at the motion ``e0``; the law acts at the time ``t``; s."""
         self._e0, self._dt = e0, dt
         state = self.state.copy()
         state.flags.writeable = False  # all iterates begin with the same state
@@ -251,7 +253,7 @@ class UserLaw:
         at = f"motion = {motion:.6g}, rate = {rate:.6g}, t = {self._known['t']:.9g} s"
         force = require_returned(value, f"{self._connector}: the function", at)
         for number in (force, *map(float, state)):
-            if not math.isfinite(number):  # a shorter step may avoid this motion
+            if not math.isfinite(number):  # NoNumber shortens the step, which may avoid the motion
                 raise NoNumber(f"{self._connector}: the function returned {number} at {at}")
         return force, state
 
@@ -278,7 +280,7 @@ class UserLaw:
     # -- the law around an iterate -------------------------------------------------------------
 
     def line(self, e: float, λ: float) -> tuple[float, float]:
-        """Return slope and intercept of the law around an iterate."""
+        """Return slope and intercept of the linearised law for the iteration from ``e``, ``λ``."""
         force, last = self.force(e), self.last
         residual, at = force - λ, e
         if last is not None and abs(residual) > OVERSHOOT * abs(last.residual) and e != last.e:
@@ -291,15 +293,15 @@ class UserLaw:
     def _meeting(self, e: float, λ: float, last: Iterate) -> float:
         """Return the motion about which the law is linearised after an overshoot.
 
-        At an infinite slope of a law, Newton's method oscillates for ever.  The secant through
-        forces and motions of the two latest iterates approximates the rest of the scene.  The law
-        is linearised at its intersection with this line, if that is between ``e`` and the previous
-        motion ``last.at``.
+        Where the slope of a law is infinite, Newton's method oscillates for ever.  The line through
+        motions and forces of the two latest iterates approximates the rest of the scene.  The law
+        is linearised where it intersects this line, if the intersection is between ``e`` and the
+        previous motion ``last.at``.
         """
-        yielding = max(0.0, (last.λ - λ) / (e - last.e))
+        stiffness = max(0.0, (last.λ - λ) / (e - last.e))
 
         def excess(x: float) -> float:
-            return self.force(x) - λ + yielding * (x - e)
+            return self.force(x) - λ + stiffness * (x - e)
 
         excess_now, excess_last = excess(e), excess(last.at)
         if not (excess_now < 0.0 < excess_last or excess_last < 0.0 < excess_now):
@@ -309,9 +311,10 @@ class UserLaw:
     def _slope(self, e: float, force: float) -> float:
         """Return the derivative of the force at ``e`` by central differences.
 
-        The increment is a fraction of the step or of the scene.  Near zero the slope may be
-        infinite; there it is a fraction of the motion in this or the previous iterate, if that
-        leaves digits.
+        The increment is in proportion to the change of the motion in the step, at least to a
+        thousandth of the motion and a millionth of the scene.  Near zero the slope may be infinite.
+        There a smaller increment, in proportion to the motion in this or the previous iterate, is
+        taken if the difference of forces has enough digits.
         """
         ε = DIFFERENCE * max(abs(e - self._e0), 1e-3 * max(abs(e), self._small))
         ε_motion = DIFFERENCE * max(abs(e), 0.0 if self.last is None else abs(self.last.at))
@@ -322,11 +325,11 @@ class UserLaw:
         return (self.force(e + ε) - self.force(e - ε)) / (2 * ε)
 
     def bend(self, e: float) -> float:
-        """Return the second derivative of the force by a fourth-order difference.
+        """Return minus the second derivative of the force by a fourth-order difference.
 
-        The increment is a thousandth of the scene, or of a radian.  The round-off is 1e-10, and the
-        error by the sixth derivative is smaller if the law bends over a thirtieth of the scene or
-        more.
+        The increment is a thousandth of the scene, or of a radian.  The relative error by round-off
+        is 1e-10.  The error by the sixth derivative is smaller if the slope of the law changes over
+        a length of a thirtieth of the scene or more.
         """
         ε, weights = self._small, (-1.0, 16.0, -30.0, 16.0, -1.0)
         forces = [w * self.force(e + k * ε) for k, w in zip(range(-2, 3), weights, strict=True)]
@@ -334,7 +337,7 @@ class UserLaw:
 
 
 class UserLaws(Response):
-    """Forces by functions; all laws have the same number of internal variables."""
+    """Connectors with forces by functions; all have the same number of internal variables."""
 
     def __init__(self, law: ForceLaw, connectors: Sequence[Connector], setting: Setting) -> None:
         super().__init__(connectors, setting, "AskedLaws")
@@ -355,16 +358,16 @@ class UserLaws(Response):
         self.in_c = {"asked": self._c}
 
     def in_steps(self, callbacks: Callbacks) -> dict[str, Any]:
-        """Return fields of loops.h, and set the functions that C calls."""
+        """Return fields as :class:`Response` does, and set the functions that C calls."""
         c, handle = self._c, callbacks.handle
         fill(c, begin=lib.begin_in_python, find_rows=lib.run_in_python, again=lib.run_in_python)
         c.begin_self, c.rows_self = handle(self._begin), handle(self._find_rows)
         c.again_self = handle(self._again)
         return super().in_steps(callbacks)
 
-    def know(self, connector_terms: Any) -> None:
-        """Set the arrays of motions in the accepted state and in the iterate."""
-        self._e0, self._e1 = connector_terms.motions
+    def know(self, term: Any) -> None:
+        """Take the arrays of the motions in the accepted state and in the iterate."""
+        self._e0, self._e1 = term.motions
 
     def _begin(self, t: float, dt: float) -> None:
         for law, e0 in zip(self._each, self._e0.tolist(), strict=True):
@@ -375,19 +378,19 @@ class UserLaws(Response):
             law.last = None
 
     def _find_rows(self) -> None:
-        """Write the laws around the iterate to the rows of C."""
-        self._rows[:, 2] = math.nan  # where a law has no value
+        """Write the laws, linearised about the iterate, into the rows of C."""
+        self._rows[:, 2] = math.nan  # stays where a function raises an exception
         motions = zip(self._each, self._e1.tolist(), self._force.tolist(), strict=True)
         for row, (law, e1, λ) in zip(self._rows, motions, strict=True):
             slope, intercept = law.line(e1, λ)
             row[0], row[2] = -slope, intercept
 
     def bends(self, e1: Array) -> Array:
-        """Return the derivatives of the slopes."""
+        """Return minus the second derivatives of the forces; (num_connectors,)."""
         return np.array([law.bend(e1[i]) for i, law in enumerate(self._each)])
 
     def accept_end(self, e1: Array) -> None:
-        """Accept the internal variables after a step to the motions, and enter stored energies."""
+        """Accept the variables after a step to ``e1``; stored energy does not count as lost."""
         states = [law.end(float(x))[1] for law, x in zip(self._each, e1, strict=True)]
         before = float(self._stored[0])
         for law, state in zip(self._each, states, strict=True):
@@ -397,10 +400,10 @@ class UserLaws(Response):
         account[entry] -= float(self._stored[0]) - before
 
     def start(self, e: Array) -> None:
-        """Compute the stored energy at these motions."""
+        """Compute the energy stored at the motions ``e``."""
         self._stored[0] = sum([law.stored(float(x)) for law, x in zip(self._each, e, strict=True)])
 
     def restore(self, rows: Array) -> None:
-        """Restore the internal variables of :meth:`state`, at the accepted motions."""
+        """Restore the variables of :meth:`state`; the accepted motions are restored before."""
         super().restore(rows)
         self.start(self._e0)

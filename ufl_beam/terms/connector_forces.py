@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """The virtual work of connectors: the force of a law on the variation of a relative motion.
 
-Guides hold a point on a curve of the plane, free along it.
+Guides hold a point on a curve in the plane; the point moves freely along the curve.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from ufl_beam.terms.term import Callbacks, Phases, Term, beginning
 
 
 def response_of(law: Any, connectors: Sequence[Connector], setting: Setting) -> Response:
-    """Make the response of connectors whose laws are of the kind of ``law``."""
+    """Create the response of connectors whose laws are of the same kind as ``law``."""
     if isinstance(law, ConnectorLaw):
         return CompiledLaws(law, connectors, setting)
     kinds: dict[type, Any] = {Spring: Springs, RigidPlastic: RigidPlasticLaws, ForceLaw: UserLaws}
@@ -53,11 +53,12 @@ class ConnectorTerm(Term):
 
     Attributes:
         indices: Indices of the connectors in :attr:`Scene.all_connectors`.
-        forces_at: Local degrees of freedom of the forces; (num_links,).
-        response: Response of their law to motions and forces.
-        rate: Mean rate of the motions in the last step; (num_links,); m/s or rad/s.
-        kept: Numbers of the accepted state, except forces, that are added to fields of
-            ``Connection``; (num_links,) each.  Later steps change them.
+        connectors: The connectors; each component of a :class:`Bushing` is one.
+        forces_at: Local degrees of freedom of the forces; (num_connectors,).
+        response: Response of the laws to motions and forces.
+        rate: Mean rate of the motions in the last step; (num_connectors,); m/s or rad/s.
+        recorded: Pairs of a field of :class:`Connection`, except the force, and a summand of its
+            values in the accepted state, (num_connectors,).  Later steps change the arrays.
     """
 
     kind = "connectors"
@@ -70,10 +71,10 @@ class ConnectorTerm(Term):
         self._dofs = subdomain.connector_dofs[positions].astype(np.int32)
         self.forces_at: Index = self._dofs[:, 6]
         self._A = A
-        self._callbacks: Callbacks  # set when the phases are made
+        self._callbacks: Callbacks  # set when the phases are created
         self.response = response = response_of(self.connectors[0].law, self.connectors, setting)
         self.must_dissipate = response.must_dissipate
-        # Motions and forces of the accepted state, and `connector_number` of loops.h
+        # Motions and forces of the accepted state, and its `connector_number` of loops.h
         self._e, self._before = np.zeros((2, len(self.connectors)))
         self._recorded: Array = np.zeros((lib.CONNECTOR_NUMBERS, len(self.connectors)))
         self.rate: Array = self._recorded[lib.CONNECTOR_RATE]
@@ -84,7 +85,7 @@ class ConnectorTerm(Term):
 
     @abstractmethod
     def motion(self, q: Array) -> Array:
-        """Return the relative motions at ``q``; (num_links,); m or rad."""
+        """Return the relative motions at ``q``; (num_connectors,); m or rad."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add forces and rows of laws, and raise exceptions of functions of a user."""
@@ -97,14 +98,14 @@ class ConnectorTerm(Term):
             super().add_tangent(q1)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
-        """Set the motions in ``works`` that force laws work on in the step ``v`` from ``q``."""
+        """Set ``works`` at forces that laws determine to conjugate motions in a step ``v``."""
 
     def commit(self, q: Array) -> None:
-        """Set the forces before the next step to those in ``q``."""
+        """Set the forces before the next step to the forces in ``q``."""
         self._before[:] = q[self.forces_at]
 
     def put_forces(self, q: Array) -> None:
-        """Put the forces that springs bear in the undeformed scene into its configuration."""
+        """Put the elastic forces of the undeformed scene into its configuration ``q``."""
         if (borne := self.response.borne()) is not None:
             q[self.forces_at] = self._before[:] = borne
 
@@ -113,12 +114,12 @@ class ConnectorTerm(Term):
         self.response.require_dissipation(self.motion(q1))
 
     def dissipation(self, q1: Array) -> float:
-        """Return the plastic dissipation of connectors of this process in the step to ``q1``; J."""
+        """Return the plastic dissipation of these connectors in the step to ``q1``; J."""
         return self.response.dissipation(self.motion(q1), q1[self.forces_at])
 
 
 def _motions_with(connector: Connector) -> tuple[str, ...]:
-    """Return the motions that the law of a connector acts on, including its own."""
+    """Return the motions on which the law of a connector acts: its own, or all of a bushing."""
     if isinstance(connector.law, ConnectorLaw) and connector.law.components > 1:
         return ("sliding", "sliding", "turning")[: connector.law.components]
     return (connector.motion,)
@@ -143,13 +144,13 @@ def _unit_cell() -> meshes.Mesh:
 class ConnectorForces(ConnectorTerm):
     """Connectors of the same relative motions with laws of one kind.
 
-    Each is a cell of unit length between both nodes; its forces follow the unknowns of the nodes.
-    Components of a :class:`Bushing` are consecutive connectors.  C evaluates forms, and laws of
-    many kinds.
+    Forms are stated on a cell of unit length between the two nodes of a connector.  The unknowns of
+    the cell are six nodal unknowns, then the forces.  A :class:`Bushing` is one cell; its
+    components are consecutive connectors.  C evaluates the forms, and most laws.
 
     Attributes:
         forms: Forms of a connector, and the functions in them.
-        motions: Motions in the accepted state and in the latest iterate, as C has them.
+        motions: Motions in the accepted state and in the latest iterate, which C writes.
     """
 
     def __init__(self, subdomain: Subdomain, positions: Index, setting: Setting, A: Csr) -> None:
@@ -168,7 +169,7 @@ class ConnectorForces(ConnectorTerm):
         self._step_kernels = work, tangent
         self._now, self._rows = np.zeros(n), np.zeros((n, k + 2))
         self.motions = self._e, self._now
-        self._rows[:, 0] = 1.0  # constrained, unless a law changes the row
+        self._rows[:, 0] = 1.0  # a constraint, unless a law changes the row
         for kernel in self._step_kernels:
             kernel.put(forms.row, self._rows.reshape(self._cells, -1))
         self._in_c = struct(
@@ -187,7 +188,7 @@ class ConnectorForces(ConnectorTerm):
         self.response.know(self)
 
     def _form(self, form: ufl.Form) -> Kernel:
-        """Return a kernel of a form on the connectors, with their numbers."""
+        """Return a kernel of a form on the connectors, with their geometry."""
         unit = np.tile([[0.0, 0.0], [1.0, 0.0]], (self._cells, 1, 1))
         kernel = Kernel(form, self.forms.q1, self._dofs, unit)
         if kernel.uses(self.forms.geometry):
@@ -195,7 +196,7 @@ class ConnectorForces(ConnectorTerm):
         return kernel
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the connectors, with callbacks for laws of a user with a history."""
+        """Return loops over the connectors; laws of a user accept the end of a step in Python."""
         self._callbacks, response = callbacks, self.response
         law_fields = response.in_steps(callbacks)
         fields = {name for name, _ in ffi.typeof("connector_term").fields}
@@ -232,7 +233,7 @@ class ConnectorForces(ConnectorTerm):
     # -- the step ------------------------------------------------------------------------------
 
     def motion(self, q: Array) -> Array:
-        """Return the relative motions at ``q``; (num_links,); m or rad."""
+        """Return the relative motions at ``q``; (num_connectors,); m or rad."""
         lib.find_motions(self._in_c, doubles(q))
         return self._now.copy()
 
@@ -242,7 +243,7 @@ class ConnectorForces(ConnectorTerm):
         return self._form(self.forms.rate)
 
     def put_motions(self, q: Array, v: Array, works: Array) -> None:
-        """Set minus the change of the motions for rows about the force."""
+        """Set ``works`` at forces that laws determine to -1/β times the motion in a step ``v``."""
         β = self.rows(q)[:, -2]
         about_force = β != 0.0
         factors = np.divide(-1.0, β, out=np.zeros(len(β)), where=about_force)
@@ -257,7 +258,7 @@ class ConnectorForces(ConnectorTerm):
             works[at] = np.where(about_force, factors * rates, works[at])
 
     def rows(self, q: Array) -> Array:
-        """Return rows of the laws around ``q``; (num_links, k + 2) with k components."""
+        """Return rows of the laws, linearised at ``q``; (num_connectors, k + 2), k components."""
         lib.find_rows(self._in_c, doubles(q), doubles(self._rows))
         return self._rows
 
@@ -281,12 +282,12 @@ class ConnectorForces(ConnectorTerm):
     # -- the state -----------------------------------------------------------------------------
 
     def start(self, q: Array) -> None:
-        """Begin at the motions of a configuration."""
+        """Set the accepted motions to those of ``q``, without a step."""
         self._e[:] = self.motion(q)
         self.response.start(self._e)
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore motions, forces, works, and internal variables of laws."""
+        """Save or restore works, rates, forces, motions, and internal variables of laws."""
         response = self.response
         mine = *self._recorded, self._before, self._e
         rows = np.column_stack([*mine, response.state()])
@@ -297,14 +298,14 @@ class ConnectorForces(ConnectorTerm):
 
 
 class Guides(ConnectorTerm):
-    """Forces across curves; over a step they are normal to the chord and do no work.
+    """Forces across curves; over a step they are normal to its chord, so they do no work.
 
-    Round-off of the curve spoils the direction of a short chord.  If it spoils more than the
-    curvature does, the direction of the curve in the middle is used.  Either direction errs at most
-    by the round-off to the power of two thirds.
+    The round-off of points spoils the direction of a short chord.  A chord is replaced by the
+    tangent in its middle where round-off causes a larger error than curvature.  The error of either
+    direction is at most the round-off to the power of two thirds.
 
-    The motion of a guide is the distance from its curve, zero when a step is accepted.  Guides are
-    computed in guide_curves.c, which calls Python for points of the curves.
+    The motion of a guide is the distance of the point from its curve, which is zero when a step is
+    accepted.  guide_curves.c computes guides, and calls Python for points of the curves.
     """
 
     def __init__(self, subdomain: Subdomain, positions: Index, setting: Setting, A: Csr) -> None:
@@ -333,7 +334,7 @@ class Guides(ConnectorTerm):
         self.law_residual = loop("missed_by_guides", self._c)
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops that begin at the points of the last step and save its end points."""
+        """Return loops that begin at the accepted points of the curves, and accept new ones."""
         self._callbacks = callbacks
         curves = [callbacks.handle(curve, 2 * lib.CURVE_POINTS) for curve in self._curves]
         fill(self._c, ask=lib.curve_in_python, curve=ffi.new("void *[]", curves))
@@ -355,8 +356,8 @@ class Guides(ConnectorTerm):
     def add_tangent_change(self, q1: Array, u: Array) -> None:
         """Add the derivative of the tangent at ``q1`` along ``u``.
 
-        The curves are Python functions, so it is a difference of fourth order over a hundredth of
-        the scene.  Curvatures are known to 1e-8, which leaves 1e-6.
+        Curves are Python functions, so the derivative is a fourth-order difference whose increment
+        is a hundredth of the scene.  Curvatures have an error of 1e-8, the derivative one of 1e-6.
         """
         increment = np.abs(u[np.r_[self._x, self._y]]).max(initial=0.0)
         ε = 1e-2 * self._size / increment if increment > 0 else 1.0
@@ -369,7 +370,7 @@ class Guides(ConnectorTerm):
         data[:] = before + change
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore points on curves, their parameters, and parameter steps for tangents."""
+        """Save or restore distances, and points on curves, their parameters and parameter steps."""
         arrays = (self._e, self._s, self._s0, self._steps)
         rows = archive.rows("guides", self.indices, np.column_stack([*arrays, self._on0]))
         for array, column in zip(arrays, rows.T, strict=False):
@@ -378,9 +379,9 @@ class Guides(ConnectorTerm):
 
 
 def connector_terms(subdomain: Subdomain, setting: Setting, A: Csr) -> list[ConnectorTerm]:
-    """Make the connectors of a process, grouped by kind, and its guides.
+    """Create the terms of the connectors of a process, one for each kind, guides last.
 
-    Each process makes the entries of the ledger in the order of the scene, including the entries
+    Each process creates the entries of the ledger in the order of the scene, including the entries
     that only other processes write.
     """
     connectors = subdomain.numbering.scene.all_connectors

@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: MIT
 """Laws of connectors over a step: a row ``α e + β λ = γ`` for each component of each law.
 
-e is the relative motion at the end of the step and λ the force that resists its growth.
-Constrained motions have a row about e.  All other laws have a row about λ, linear in e around the
-latest iterate.
+e is the relative motion at the end of the step, of all components of a connector; λ is the force
+that resists the growth of the motion.  The row of a constraint determines e.  The row of any other
+law determines λ as a function of e, which is linearised about the latest iterate.
 
-This module has laws that prescribe a motion or a force, dry friction, springs, and rigid-plastic
-laws, such as plastic hinges of zero length.  Laws that call functions of a user are in
-compiled_connector_laws.py.
+This module has laws that prescribe a motion or a force, dampers, dry friction, springs, and
+rigid-plastic laws, such as plastic hinges of zero length.  Compiled laws and functions of a user
+are in compiled_connector_laws.py.
 """
 
 from __future__ import annotations
@@ -48,46 +48,48 @@ from ufl_beam.terms.material_points import EXHAUSTED, FREED_STIFFNESS, Points, e
 from ufl_beam.terms.term import Callbacks
 
 CREEP = 1e-12
-"""Creep in a step of a sticking connector under its limit; over the size of the scene, or rad.
+"""Motion in a step of a sticking connector at its limit; rad, or a fraction of the scene's size.
 
-It occurs only if several sticking connectors constrain the same motion, so that they share the
-force.
+Sticking connectors move only if several of them may constrain the same motion.  Then their motions
+decide how they share the force.
 """
 
 
 class Setting(NamedTuple):
-    """Arguments that all responses are made with."""
+    """Data of a scene that all responses refer to."""
 
     requested_forces: Callable[
         [Connector], Any
-    ]  # pointers to forces of controllers, limits of friction
+    ]  # pointer to the force of a controller, or to the limit of friction
     rates: Any  # ``rates`` of loops.h, with the velocities; None in statics
     size: float  # of the scene; m
     scheme: Scheme
     ledger: Ledger
-    friction_repeats: bool  # True if sticking may repeat a constraint
+    friction_repeats: bool  # True if constraints of sticking connectors may be redundant
     search: Index  # flags shared by all points and connectors, see loops.h
-    switched: Index  # whether a row has changed between motion and force; (1,)
+    switched: Index  # whether a row began or ceased to be a constraint since the tangent; (1,)
 
 
 class Response:
     """Connectors with laws of one kind; motions and forces are arrays.
 
-    Methods that a law does not define do nothing.  Arrays are views, which later steps change.
+    Each component of a :class:`Bushing` counts as a connector.  The attributes are views, which
+    later steps change.
 
     Attributes:
         name: Name of the internal variables in files.
-        in_c: Data of laws in C, by names in ``connectors`` of loops.h.
+        in_c: Fields of ``connectors`` of loops.h that the laws set.
         must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
             accepted.
-        opens: True if connectors yield beyond a limit.
+        opens: True if connectors may open or slip by the rule in material_points.py.
         asks_at_ends: True if :meth:`accept_end` must be called when a step is accepted.
-        motion: Motions of the accepted state in solutions, (num_links,); None if they are the
+        motion: Motions of the accepted state in solutions, (num_connectors,); None if they are the
             motions of the nodes.
         way: Direction of plastic slip in the latest iterate, 1 or -1; 0 without slip.
         sticks: True for each connector that friction holds in the latest iterate; None without
             friction.
-        dissipated: Energies whose sum is the plastic dissipation; (num_links,) each; J.
+        dissipated: Energies since the beginning whose sum is ``dissipated`` of
+            :class:`Connection`; (num_connectors,) each; J.
     """
 
     must_dissipate = opens = asks_at_ends = False
@@ -107,20 +109,20 @@ class Response:
         self._in_steps: dict[str, Any] = {}
         self._time_functions: dict[str, list[tuple[TimeFunction, object]]] = {}
         self._accounts: dict[str, tuple[Account, str]] = {}
-        # Internal variables, one for each connector with all its components
+        # Arrays of internal variables; all components of a bushing share a number
         self._variables: list[npt.NDArray[Any]] = []
         self._components = 1
 
     def _enter(self, **accounts: tuple[Account, str]) -> None:
-        """Make entries of the ledger; C finds them by these names."""
+        """Create entries of the ledger; the keywords are the fields in C for their addresses."""
         self._accounts.update(accounts)
         for account, name in accounts.values():
             account[name] += 0.0
 
     def _rub(self, limits: list[Any], **law_fields: Any) -> None:
-        """Let connectors stick or slip; ``limits`` are addresses of the limits of the forces."""
+        """Let connectors stick or slip; ``limits`` are the addresses of their limit forces."""
         n, setting = len(self._connectors), self._setting
-        # Direction of slip, or 0, in the step and in the accepted state
+        # Direction of slip, or 0, in the step and in the accepted state; ``friction`` of loops.h
         self._direction, self._accepted, distance, creep = np.zeros((4, n))
         self.sticks, against = np.zeros((2, n), dtype=np.int32)
         softness = CREEP if setting.friction_repeats else 0.0
@@ -144,14 +146,14 @@ class Response:
         functions = {field: callbacks.time_functions(some) for field, some in wanted}
         return {**self._in_steps, **functions, **places}
 
-    def know(self, connector_terms: Any) -> None:
-        """Set the arrays and forms of connectors that the laws need."""
+    def know(self, term: Any) -> None:
+        """Take the arrays and forms of the :class:`ConnectorForces` ``term`` that the laws need."""
         if self.sticks is not None:
-            rate, v = connector_terms.motion_rate, connector_terms.forms.u
+            rate, v = term.motion_rate, term.forms.u
             fill(self.in_c["friction"], rate=rate.cells, at_v=rate.position(v))
 
     def accept_end(self, e1: Array) -> None:
-        """Accept the end of a step at the motions ``e1``, before C does; this may raise."""
+        """Accept the end of a step at ``e1`` before C does; functions of a user may raise."""
 
     def dissipation(self, e1: Array, λ: Array) -> float:
         """Return the energy dissipated plastically in a step to the motions ``e1``; J."""
@@ -161,15 +163,18 @@ class Response:
         """Raise :class:`StepFailed` if a law generates energy in a step to motions ``e1``."""
 
     def remaining(self) -> Array:
-        """Return the remaining fraction of elastic stiffness in the iterate; (num_links,)."""
+        """Return the fraction of elastic stiffness left in the iterate; (num_connectors,)."""
         return np.where(self.way == 0, 1.0, 0.0)
 
     def bends(self, e1: Array) -> Array:
-        """Return derivatives of α by motions at constant variables; (num_connectors, n)."""
+        """Return ∂α/∂e at constant internal variables; (num_connectors / k, k³).
+
+        k is the number of components of a bushing, else 1.
+        """
         return np.zeros((len(self._connectors), 1))
 
     def state(self) -> Array:
-        """Return the internal variables; (num_links, k)."""
+        """Return the internal variables; (num_connectors, number of variables)."""
         rows = np.zeros((len(self._connectors) // self._components, len(self._variables)))
         for column, values in zip(rows.T, self._variables, strict=True):
             column[:] = values
@@ -183,10 +188,10 @@ class Response:
             self._direction[:] = self._accepted
 
     def start(self, e: Array) -> None:
-        """Begin at motions that no step has led to."""
+        """Set the accepted motions to ``e``, without a step."""
 
     def borne(self) -> Array | None:
-        """Return the forces of springs in the state of :meth:`start`; (num_links,)."""
+        """Return the elastic forces after :meth:`start`, (num_connectors,), or None."""
         return None
 
     def freeze(self) -> None:
@@ -202,13 +207,13 @@ LEDGER_ENTRIES = {
     Damper: ("_Damped", "lost", "damping", 1.0),
     Coulomb: ("_Rubbing", "lost", "friction", 1.0),
 }
-"""Name in files, part and entry of the ledger for the work of the forces, and its sign."""
+"""For each law: name in files; part, entry and sign of the work of its forces in the ledger."""
 
 
 class PrescribedLaws(Response):
     """Laws that prescribe the motion, the force or its limit: motors, dampers, dry friction, ...
 
-    Joints and guides constrain a motion, without work.
+    Joints and guides constrain a motion by forces that do no work.
     """
 
     def __init__(self, law: Any, connectors: Sequence[Connector], setting: Setting) -> None:
@@ -230,7 +235,7 @@ class PrescribedLaws(Response):
         elif isinstance(law, Coulomb):
             self._rub([setting.requested_forces(connector) for connector in connectors])
         elif isinstance(law, PrescribedForce | Controller):
-            # The forces at the ends of this step and of the last step
+            # Forces at the end of this step, and at the end of the last step
             end, reached = np.zeros((2, len(connectors)))
             self._in_steps.update(end=end, reached=reached)
             self._variables = [reached]
@@ -238,7 +243,7 @@ class PrescribedLaws(Response):
                 self._time_functions["wanted_force"] = [
                     (load.force, connector) for load, connector in both
                 ]
-            else:  # the values of controllers at the beginning of the step
+            else:  # the force of a controller is constant in a step
                 self._always = np.zeros(1)
                 wanted = ffi.new("time_function[]", len(connectors))
                 for place, connector in zip(wanted, connectors, strict=True):
@@ -254,7 +259,7 @@ class PrescribedLaws(Response):
 
 
 class Springs(Response):
-    """Springs of one law that may yield and break: points whose strain is the motion."""
+    """Springs of one law, which may yield and break: material points whose strain is the motion."""
 
     def __init__(self, law: Spring, connectors: Sequence[Connector], setting: Setting) -> None:
         super().__init__(connectors, setting, "_Sprung")
@@ -295,7 +300,7 @@ class Springs(Response):
         self.points.require_dissipation(lambda number: str(self._connectors[number]))
 
     def remaining(self) -> Array:
-        """Return the remaining fraction of elastic stiffness in the iterate; (num_links,)."""
+        """Return the fraction of elastic stiffness left in the iterate; (num_connectors,)."""
         return self.points.remaining(np.eye(1, 3).repeat(len(self._strains), axis=0))
 
     def state(self) -> Array:
@@ -307,7 +312,7 @@ class Springs(Response):
         self.points.restore(rows)
 
     def start(self, e: Array) -> None:
-        """Begin at motions that no step has led to."""
+        """Set the accepted motions to ``e``, without a step."""
         self.points.start(self._at(e))
         self.points.refresh(self._at(e))
 
@@ -323,15 +328,15 @@ class Springs(Response):
 # -- rigid-plastic laws ---------------------------------------------------------------------------
 
 INPUTS = (*names("slip_input", "slip_"), "θ", "dt")
-"""First inputs of the compiled laws: the slip of the step and its direction (1 or -1).
+"""First inputs of the compiled laws: slip of the step and its direction (1 or -1), accumulated slip
+and motion at t_n; θ and length of the step.
 
-The next inputs are accumulated slip and motion at t_n, which loops.h names as well, and numbers of
-the scheme.  Numbers of the law follow.
+loops.h has the order of the first four in ``slip_input``.  The parameters of the law follow.
 """
 
 
 class RigidPlasticForms:
-    """Compiled laws of slip: force and its derivative by the slip; ``slip_output`` of loops.h."""
+    """C functions of a law of slip: force and its derivative; ``slip_output`` of loops.h."""
 
     def __init__(self, law: SofteningLaw | ElastoPlastic, scheme: Scheme) -> None:
         self._pointwise = pointwise = Pointwise((*INPUTS, *parameters(law)))
@@ -346,7 +351,7 @@ class RigidPlasticForms:
 
     @cached_property
     def spent(self) -> Any:
-        """Force and its derivative, reduced to almost zero."""
+        """C function of force and derivative, reduced by the factor ``FREED_STIFFNESS``."""
         return self._pointwise.compile(*(FREED_STIFFNESS * x for x in self._response))
 
 
@@ -354,20 +359,20 @@ _rigid_plastic_forms = cached_forms(RigidPlasticForms)
 
 
 REFERENCE_MOTION = 0.01
-"""Motion, in rad or over the size of the scene, that weighs as much as the limit of the force.
+"""Motion m at which r m, see rigid_plastic.c, is the limit force; rad, or part of the scene's size.
 
-It decides whether a connector slips in an iterate; solutions do not depend on it.
+r decides whether a connector slips in an iterate; solutions do not depend on r.
 """
 
 LEAST_SLOPE = 1e-9
-"""Least factor of motions, over EI of the member divided by the size of the scene."""
+"""Least r in rigid_plastic.c, as a multiple of EI of the beam divided by the size of the scene."""
 
 
 def _slope(connector: Connector, size: float) -> float:
-    """Return the factor of motions in the equation of a connector, see rigid_plastic.c.
+    """Return r, the factor of the motion in the equation of a connector, see rigid_plastic.c.
 
-    It exceeds the steepest softening, so that an open branch stays open.  It is so large that
-    motions, not the round-off of forces, decide in which direction a weak hinge slips.
+    r exceeds the steepest slope of softening, so that an open branch stays open.  It is so large
+    that the motion, not the round-off of the force, decides in which direction a weak hinge slips.
     """
     law = law_of(connector)
     if not 0.0 < law.limit < np.inf:
@@ -383,8 +388,8 @@ def _slope(connector: Connector, size: float) -> float:
 class RigidPlasticLaws(Response):
     """Rigid-plastic connectors with laws of one kind; see rigid_plastic.c.
 
-    A connector is constrained exactly until its force reaches the limit of its law.  Then the law
-    gives the force, a function of the slip that grows in the step.
+    A constraint holds a connector until its force reaches the limit of its law.  Then the law
+    gives the force as a function of the slip in the step.
     """
 
     opens = True
@@ -412,10 +417,10 @@ class RigidPlasticLaws(Response):
         self._limit = self._initial_limit.copy()
         back_force, dissipated, excess = np.zeros((3, n))
         self._slipped, self.way, self._direction_before = np.zeros((3, n), dtype=np.int32)
-        self._stored = np.zeros(1)  # of all together; the owner does not matter
+        self._stored = np.zeros(1)  # energy of hardening of all connectors together; J
         at = self._at["slipped"], self._at["start"]
         self._variables = [*at, self._limit, back_force, dissipated, self._direction_before]
-        # Motions without the round-off of constraints
+        # Accumulated motions do not have the round-off of the constraints
         self.motion, self.dissipated = self._at["start"], (dissipated,)
 
         kind = ElastoPlastic(1.0) if isinstance(law.law, ElastoPlastic) else law.law.kind()
@@ -434,28 +439,31 @@ class RigidPlasticLaws(Response):
         }  # fmt: skip
 
     def dissipation(self, e1: Array, λ: Array) -> float:
-        """Return the energy dissipated in a step to the motions ``e1``, positive in slip; J."""
+        """Return the energy dissipated in a step to the motions ``e1``; J.
+
+        A held connector beyond its limit counts with its excess times a unit of motion.
+        """
         arrays = doubles(e1), doubles(np.ascontiguousarray(λ))
         return float(lib.dissipation_of_rigid_plastic(self._c, *arrays))
 
     def state(self) -> Array:
-        """Return the internal variables; (num_links, 7)."""
-        stored = np.zeros(len(self._connectors))
+        """Return the internal variables; (num_connectors, 7)."""
+        stored = np.zeros(len(self._connectors))  # any one row may have the sum
         stored[:1] = self._stored
         return np.column_stack([super().state(), stored])
 
     def restore(self, rows: Array) -> None:
-        """Take over the variables of :meth:`state`."""
+        """Restore the variables of :meth:`state`."""
         super().restore(rows[:, :-1])
         self._slipped[:] = np.abs(self._direction_before)
         self._stored[0] = rows[:, -1].sum()
 
     def start(self, e: Array) -> None:
-        """Begin at motions that no step has led to."""
+        """Set the accepted motions to ``e``, without a step."""
         self._at["start"][:] = e
 
     def freeze(self) -> None:
-        """Hold connectors from now on, and free those with exhausted limits."""
+        """Hold connectors from now on, except those with exhausted limits, which are free."""
         spent = self._limit <= EXHAUSTED * self._initial_limit
         self._limit[:] = np.where(spent, 0.0, np.inf)
         if not self._hardens:

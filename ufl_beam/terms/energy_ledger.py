@@ -17,20 +17,20 @@ from ufl_beam.display import Rich
 from ufl_beam.model.connector_law import CONTRIBUTIONS
 
 EXPLAINED = 0.1
-"""Fraction of an imbalance above which an estimate of round-off explains it."""
+"""Estimate of round-off, as a fraction of an imbalance, from which on it explains the imbalance."""
 
 ROUND_OFF_ENERGY = 1e-3
-"""Ratio of stored and lost energies to works up to which the works are round-off."""
+"""Stored and lost energy, as a fraction of transferred energy, up to which works are round-off."""
 
 
 class Account(Mapping[str, float]):
-    """Entries of one part of the ledger by name; entries never written are zero.
+    """Entries of one part of the ledger by name; entries that were never written are zero.
 
-    Their numbers are in one array, in the order of the first use of the names, so that C can add to
+    The values are in one array, in the order in which names were first used, so that C can add to
     them.
 
     Attributes:
-        numbers: The entries, and room for more.
+        amounts: Values of the entries, and space for more; J.
     """
 
     def __init__(self) -> None:
@@ -61,7 +61,7 @@ class Account(Mapping[str, float]):
         return len(self._at)
 
     def pointer(self, name: str) -> Any:
-        """Return the address of an entry; afterwards the array cannot grow."""
+        """Return the address of an entry for C; afterwards the array cannot grow."""
         self[name] += 0.0
         self._fixed = True
         return doubles(self.amounts) + self._at[name]
@@ -71,8 +71,8 @@ class Account(Mapping[str, float]):
 class Ledger:
     """Energies of one process at one time; terms write them when a step is accepted.
 
-    Terms make their entries when they are constructed, so that all processes have the same entries;
-    see :class:`Energy` for the three parts.
+    All processes create the same entries before the first step.  :class:`Energy` explains the three
+    parts.
     """
 
     state: Account = field(default_factory=Account)
@@ -85,13 +85,13 @@ class Ledger:
         return float(sum(np.abs(account.amounts).sum() for account in accounts))
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the works and losses since the beginning."""
+        """Save or restore the supplied works and the losses since the beginning."""
         for kind, entries in (("supplied", self.supplied), ("lost", self.lost)):
             for name, value in entries.items():
                 entries[name] = archive.total(f"{kind}: {name}", value)
 
     def begin(self) -> None:
-        """Clear the state; supplied work and losses remain."""
+        """Set the energies in the scene to zero; supplied work and losses remain."""
         self.state.amounts.fill(0.0)
 
 
@@ -114,9 +114,10 @@ class Energy(Mapping[str, Array], Rich):
     """Energy ledger of a run: energy in the scene, work supplied, losses; a mapping of all entries.
 
     Attributes:
-        state: Arrays by name, "kinetic", "stored", and potentials of a user; each (n+1,); J.
-        supplied: Work since the beginning, by source: "loads", "supports"; each (n+1,); J.
-        lost: Energy that went out since the beginning, by sink: "numerical", ...; each (n+1,); J.
+        state: Energy in the scene, by kind: "kinetic", "stored", "hardening", and potentials of a
+            user; each (n+1,); J.
+        supplied: Work since the beginning, by source: "loads", "supports", ...; each (n+1,); J.
+        lost: Energy lost since the beginning, by cause: "numerical", ...; each (n+1,); J.
 
     Example:
         >>> ledger = solution.energy
@@ -124,7 +125,7 @@ class Energy(Mapping[str, Array], Rich):
         ['kinetic', 'stored'] ['loads']
         >>> "stored" in ledger, [*ledger]
         (True, ['stored', 'kinetic', 'loads'])
-        >>> bool(ledger.worst < 1e-9)  # largest imbalance over the energy that went through
+        >>> bool(ledger.worst < 1e-9)  # largest imbalance, as a fraction of the transferred energy
         True
     """
 
@@ -163,35 +164,37 @@ class Energy(Mapping[str, Array], Rich):
     def imbalance(self) -> Array:
         """Energy that the ledger does not account for since the first state; (n+1,); J.
 
-        A path begins in a state under its constant loads, with their work in the entries.
+        The difference from the first state is taken because a path begins under its constant loads,
+        and the entries have their work.
         """
         since = self.total - _sum(self.supplied) + _sum(self.lost)
         return np.asarray(since - since[0])
 
     @property
     def energy_transferred(self) -> float:
-        """Energy that went through: maximum energy in the scene plus all work on or by it; J."""
+        """Maximum energy in the scene plus the magnitudes of all works on and by the scene; J."""
         works = sum(float(np.sum(np.abs(np.diff(work)))) for work in self.supplied.values())
         return float(np.max(self._in_scene)) + works
 
     @property
     def _in_scene(self) -> Array:
-        """Energy in the scene, with changes of a user's potentials, whose zero is arbitrary."""
+        """Energy in the scene; a user's potentials count as changes, as their zero is arbitrary."""
         sizes = {n: e if n in CONTRIBUTIONS else np.abs(e - e[0]) for n, e in self.state.items()}
         return _sum(sizes)
 
     @property
     def worst(self) -> float:
-        """Largest imbalance over the energy that went through."""
+        """Largest imbalance, as a fraction of :attr:`energy_transferred`."""
         largest, transferred = float(np.max(np.abs(self.imbalance))), self.energy_transferred
         return largest / transferred if transferred > 0 else largest
 
     def opened(self, claimed: float, round_off: float) -> str:
-        """Describe the imbalance of the ledger; empty if it is as small as claimed.
+        """Describe the imbalance of the ledger; empty if it is as small as claimed, or round-off.
 
         Args:
-            claimed: Largest imbalance claimed, over the energy that went through.
-            round_off: Estimate of the energy by round-off of the unknowns; J.
+            claimed: Largest imbalance that the scheme claims, as a fraction of the transferred
+                energy.
+            round_off: Estimate of the error of the energy by round-off of the unknowns; J.
         """
         # Squares of the smallest numbers have lost their digits.
         if not self.energy_transferred > sys.float_info.min / sys.float_info.epsilon:
@@ -207,16 +210,16 @@ class Energy(Mapping[str, Array], Rich):
             ", the last digits of positions times the largest stiffness; lower the stiffness of "
             "members that hardly deform, or use fewer cells"
             if fraction >= EXPLAINED * self.worst
-            else " and does not explain it; a smaller rtol of Newton may, or a force that the "
-            "ledger does not know"
+            else " and does not explain it; use a smaller rtol of Newton, or look for a force that "
+            "the ledger does not know"
         )
         return (
-            f"the energy ledger is open by {self.worst:.1e} of the energy that went through, and "
-            f"the scheme claims {claimed:.0e}: round-off is estimated at {fraction:.1e}{reason}"
+            f"the energy ledger is open by {self.worst:.1e} of the transferred energy, and the "
+            f"scheme claims {claimed:.0e}: round-off is estimated at {fraction:.1e}{reason}"
         )
 
     def entries(self) -> list[tuple[str, str, float]]:
-        """Return part ("in scene", "supplied" or "lost"), name and value of all entries; J."""
+        """Return part ("in scene", "supplied" or "lost"), name and last value of each entry; J."""
         return [
             (kind, name, float(values[-1]))
             for kind, entries in zip(("in scene", "supplied", "lost"), self._accounts, strict=True)
@@ -224,7 +227,7 @@ class Energy(Mapping[str, Array], Rich):
         ]
 
     def balance(self) -> str:
-        """Return the largest imbalance and the transferred energy in words."""
+        """Return a text with the largest imbalance and the transferred energy."""
         return f"imbalance at most {self.worst:.1e} of {self.energy_transferred:.6e} J transferred"
 
     def __str__(self) -> str:

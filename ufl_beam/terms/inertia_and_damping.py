@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: MIT
 """Inertia, damping, and the rates of a time scheme in C.
 
-A scheme computes the coefficients of a step once for each step length.
+Coefficients of a scheme are stored, because most steps have one of few lengths.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ from ufl_beam.terms.energy_ledger import Ledger
 from ufl_beam.terms.term import Callbacks, InCells, Phases, Term, knowing
 
 BEFORE = "velocity before"
-"""Name in saved data of the velocities at the beginning of the last step."""
+"""Name of the velocities at the beginning of the last step in saved data."""
 
 
-@lru_cache(maxsize=1024)  # rounded times give about ten lengths for a constant step
+@lru_cache(maxsize=1024)  # constant steps between rounded times have about ten lengths
 def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coefficients:
     """Return the coefficients of a step as lists of numbers."""
     c = scheme.coefficients(dt, last_dt, known)
@@ -60,10 +60,10 @@ def _coefficients(scheme: Any, dt: float, last_dt: float, known: int) -> Coeffic
 
 
 def checked_coefficients(scheme: DynamicScheme) -> Coefficients:
-    """Return coefficients of steps of 1 s, after a check of the row lengths.
+    """Return the coefficients of a step of 1 s, after a check of their rows.
 
     Raises:
-        ModelError: They do not match :class:`Coefficients`.
+        ModelError: The rows do not match :class:`Coefficients`.
     """
     known: Any = scheme
     number = len(scheme.kept)
@@ -96,14 +96,14 @@ def numbers_in_python(handle: Any, c: Any) -> int:
 
 
 class Inertia(Term):
-    """Inertia of beams and point masses: constant matrix, P(18), and the rates of a scheme in C.
+    """Inertia of beams, point masses and bodies: constant matrix, P(18); rates of a scheme in C.
 
-    Rates are velocities, velocities before the last step, and further rates of the scheme; arrays
-    of them are copies.
+    Rates are velocities, velocities before the last step, and further rates of the scheme, such as
+    accelerations.  Properties return copies of them.
 
     Attributes:
         scheme: The time scheme.
-        c: ``rates`` of loops.h; also has the length of the last step, infinite before the first.
+        c: ``rates`` of loops.h; its ``last_dt`` is infinite before the first step.
         loses_energy: True if the scheme loses energy by the rates.
 
     Raises:
@@ -122,8 +122,8 @@ class Inertia(Term):
         self._ledger, self._A, self.scheme = ledger, A, scheme
         size, number = len(v), FURTHER + len(scheme.kept)
         self.loses_energy = checked_coefficients(scheme).slip is not None
-        # Changes are stored elsewhere.  Velocities before the last step are not computed anew; if
-        # nothing needs them, new velocities use their memory.
+        # Rate 0, the nodal step, is stored elsewhere.  Velocities before the last step are not
+        # computed: they are the old velocities.  If nothing needs them, new ones take their memory.
         asks = self.loses_energy or scheme.uses_last_step
         self._now = np.zeros((number - V, size))
         self._next = np.zeros((number - V_BEFORE - (not asks), size))
@@ -156,7 +156,7 @@ class Inertia(Term):
     # -- the rates -----------------------------------------------------------------------------
 
     def _rate(self, k: int) -> Array:
-        """Return a rate in the memory of C; a view."""
+        """Return a view of the rate ``k`` in the memory of C."""
         return np.frombuffer(ffi.buffer(self.c.rate[k], 8 * self.c.size))
 
     @property
@@ -175,13 +175,13 @@ class Inertia(Term):
         return tuple(self._rate(FURTHER + k).copy() for k in range(self.c.more))
 
     def keep(self, *more: Array) -> None:
-        """Set the further rates of the scheme; a step can begin with any, or if none are needed."""
+        """Set the further rates; a step can begin if some are set, or if the scheme has none."""
         for k, rate in enumerate(more):
             self._rate(FURTHER + k)[:] = rate
         self.c.more, self.c.ready = len(more), bool(more) or not self.scheme.kept
 
     def commit(self, v: Array, v_before: Array, last_dt: float) -> None:
-        """Set velocities, velocities before the last step, and its length."""
+        """Set velocities, and velocities before the last step and the length of that step."""
         self._rate(V)[:], self._rate(V_BEFORE)[:], self.c.last_dt = v, v_before, last_dt
 
     def after(self, s: Array, dt: float) -> list[Array]:
@@ -204,13 +204,13 @@ class Inertia(Term):
         self.keep(*map(archive.at_dofs, self.scheme.kept[:known], more))
 
     def pass_on_step(self, archive: Archive) -> None:
-        """Save or restore velocities before the last step and its length, by degree of freedom."""
+        """Save or restore velocities before the last step, and its length at each unknown."""
         v_before = archive.at_dofs(BEFORE, self.v_before)
         lengths = archive.at_dofs("last step", np.full(self.c.size, self.c.last_dt))
         self.commit(self.v, v_before, float(lengths[0]) if len(lengths) else self.c.last_dt)
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore velocities and the last step."""
+        """Save or restore all rates and the length of the last step."""
         v = archive.at_dofs("velocity", self.v)
         v_before = archive.at_dofs(BEFORE, self.v_before)
         self.commit(v, v_before, archive.number("step of velocity", self.c.last_dt))
@@ -223,7 +223,10 @@ class Inertia(Term):
 def _work_and_loss(
     element: Element, scheme: Scheme, factor: Expr, before: Expr
 ) -> tuple[ufl.Form, ufl.Form]:
-    """Return forms of resultants ``factor C (Δe - before)`` with the change Δe of the strains."""
+    """Return forms of virtual work and lost energy of resultants ``factor C (Δe - before)``.
+
+    Δe is the change of the strains in the step.
+    """
     change = strain(element.q1, element.axis) - strain(element.q0, element.axis)
     r = factor * resultants(change - before, element.stiffness)
     w_e = scheme.virtual_strain(element.q0, element.q1, element.w, element.axis)
@@ -232,13 +235,13 @@ def _work_and_loss(
 
 @cached_forms
 def _viscous_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy, and the retardation time over the step."""
+    """Return forms of virtual work and lost energy, and the function of their factor."""
     rate = element.at_points()
     return *_work_and_loss(element, scheme, rate, ufl.zero(3)), rate
 
 
 class KelvinVoigtForces(FormForces):
-    """Resultants in proportion to the rates of the strains, P(89) with a weight of time over dt."""
+    """Resultants in proportion to strain rates, P(89) with the factor retardation time / dt."""
 
     kind = _entry = "damping"
 
@@ -250,7 +253,7 @@ class KelvinVoigtForces(FormForces):
         self._time, self._dt = damping.retardation_time, np.zeros(1)
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the cells; the step length is a number of the forms."""
+        """Return loops over the cells, which also put the factor of the step into the forms."""
         begin, accept, *_ = super().phases(callbacks)
         c = struct(
             "viscous_forms", **knowing(self._step_kernels, self._rate),
@@ -268,7 +271,7 @@ def _reference_stiffness(element: Element) -> ufl.Form:
 
 
 class RayleighForces(Term):
-    """A constant matrix times the velocity of the step, P(92)."""
+    """Constant matrix of mass and stiffness times the velocity of the step, P(92)."""
 
     kind = "damping"
 
@@ -303,7 +306,7 @@ def damping_forces(
     damping: Rayleigh | KelvinVoigt, fields: Fields, scheme: Scheme, A: Csr, ledger: Ledger,
     rates: Inertia | None,
 ) -> list[Term]:  # fmt: skip
-    """Return the forces of a damping on the cells of a process; none without such cells."""
+    """Return the terms of a damping on the cells of a process; none if it has no such cells."""
     ledger.lost["damping"] += 0.0
     if isinstance(damping, Rayleigh):
         if rates is None:
@@ -327,13 +330,13 @@ def damping_forces(
 
 @cached_forms
 def _change_forms(element: Element, scheme: Scheme) -> tuple[ufl.Form, ufl.Form, fem.Function]:
-    """Return forms of virtual work and lost energy, and changes of strains in the last step."""
+    """Return forms of virtual work and lost energy, and the function r Δe' in them."""
     before = element.at_points(3)
     return *_work_and_loss(element, scheme, element.constant(scheme.lost_fraction), before), before
 
 
 class SecondDifferences(FormForces):
-    """Resultants c C (Δe - r Δe'), see :class:`EnergyMomentumDecaying`."""
+    """Resultants c C (Δe - r Δe') of cells, see :class:`EnergyMomentumDecaying`."""
 
     kind, _entry = "beams", "numerical"
 
@@ -362,7 +365,7 @@ class SecondDifferences(FormForces):
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
         """Save or restore changes of the strains in the last step, and its length."""
-        # The length is in the rows: the process that saves numbers for all may have no such cells.
+        # The rows have the length, as process 0, which saves numbers, may have no such cells.
         rows = np.column_stack([self._change, np.full(len(self._change), self._last_dt)])
         rows = archive.rows("changes of strains", self._cells, rows)
         self._change[:], self._last_dt[0] = rows[:, :-1], rows[0, -1]

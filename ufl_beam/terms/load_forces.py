@@ -54,7 +54,7 @@ class LoadTerm(Term):
     """Forces that depend on time or on the configuration.
 
     Attributes:
-        vector: ``vector`` of loops.h: forces whose size enters the scale of convergence.
+        vector: ``vector`` of loops.h: forces whose norm is in the scale of the convergence test.
     """
 
     kind = "loads"
@@ -64,9 +64,10 @@ class LoadTerm(Term):
 
     @abstractmethod
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them.
+        """Set the loads before the next step to the loads at the time ``t``, and return them.
 
-        ``v`` are the velocities, None in statics; ``past`` is the end of a run of the same scene.
+        The state ``q`` is assumed in equilibrium with them.  ``v`` are the velocities, None in
+        statics; ``past`` is the end of a run of the same scene.
         """
 
     def pass_on(self, archive: Archive) -> None:
@@ -74,16 +75,18 @@ class LoadTerm(Term):
 
 
 class _AtDofs(LoadTerm):
-    """Loads at some degrees of freedom, whose sizes are functions of time.
+    """Loads that act at some degrees of freedom, with sizes that are functions of time.
 
     Attributes:
-        dofs: Local degrees of freedom that are loaded; forces are at these alone.
+        dofs: Local degrees of freedom that any process loads; rows of forces have no others.
     """
 
-    _forces: Array  # rows of forces: the first is in the equation
+    _forces: Array  # rows of forces; the first row is in the equation
 
-    def _load(self, subdomain: Subdomain, loaded: Array, owners: Sequence[Load], rows: int) -> None:
-        """Make ``dofs`` of the nonzero entries of ``loaded`` on any process, and the forces."""
+    def _set_dofs(
+        self, subdomain: Subdomain, loaded: Array, owners: Sequence[Load], rows: int
+    ) -> None:
+        """Set ``dofs`` to the nonzero entries of ``loaded`` on any process; create the forces."""
         # Other processes may load degrees of freedom that this process owns.
         self.dofs: Index = np.flatnonzero(subdomain.added(loaded)).astype(np.int32)
         self._size, self._in_time = subdomain.size, [(load.amplitude, load) for load in owners]
@@ -107,8 +110,8 @@ class DeadLoads(_AtDofs):
         self, loads: Sequence[Load], subdomain: Subdomain, scheme: Scheme, ledger: Ledger
     ) -> None:
         self._scheme, self._ledger = scheme, ledger
-        # Loads with the same time function share a vector; messages name the first of them.
-        # Functions need not be hashable.
+        # Loads with the same time function share a vector; messages name the first of them.  Keys
+        # are identities, because functions need not be hashable.
         vectors: dict[int, tuple[Load, Array]] = {}
         in_cells: dict[int, Array] = {}
         for load in loads:
@@ -120,10 +123,10 @@ class DeadLoads(_AtDofs):
             np.add.at(vectors[key][1], subdomain.cell_dofs, along)
         owners, whole = zip(*vectors.values(), strict=True)
         # Forces in the equation, at the end of the step, and at the end of the last step.
-        self._load(subdomain, np.any(whole, axis=0) * 1.0, owners, rows=3)
+        self._set_dofs(subdomain, np.any(whole, axis=0) * 1.0, owners, rows=3)
         self._vectors = [vector[self.dofs] for vector in whole]
-        # Factors of the vectors: now, at the end of the step, at the end of the last step, and in
-        # the equation of the last step.
+        # Factors of the vectors: in the equation, at the end of the step, at the end of the last
+        # step, and in the equation of the last step.
         self._factors: Array = np.zeros((4, len(vectors)))
         self._along = [in_cells.get(key) for key in vectors]
         self.loops = loop("subtract_vector", self.vector), None
@@ -140,7 +143,7 @@ class DeadLoads(_AtDofs):
         return ffi.gc(c, lambda _, alive=(c, along): None)  # solutions outlive the term
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the vectors."""
+        """Return loops over the vectors of forces."""
         number = len(self._vectors)
         c = self._c = struct(
             "dead_loads", size=len(self.dofs), dof=self.dofs, vectors=number,
@@ -154,13 +157,13 @@ class DeadLoads(_AtDofs):
         return Phases([loop("begin_dead_loads", c)], [loop("accept_dead_loads", c)])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them."""
+        """Set the loads before the next step to the loads at the time ``t``, and return them."""
         self._factors[:3] = factors = self._factors_at(t)
         self._forces[:] = sum(f * vector for f, vector in zip(factors, self._vectors, strict=True))
         return self._whole(self._forces[0])
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore the forces at the end of the last step."""
+        """Save or restore the forces at the end of the last step, and their factors."""
         self._forces[:] = archive.added("dead loads", self._whole(self._forces[2]))[self.dofs]
         for k, factor in enumerate(self._factors[2]):
             self._c.factors[k] = math.nan
@@ -168,10 +171,11 @@ class DeadLoads(_AtDofs):
 
 
 def _add_forces(load: Load, subdomain: Subdomain, forces: Array) -> Array | None:
-    """Add the nodal forces of a dead load with factor one, consistent with displacements.
+    """Add the concentrated forces of a dead load with the factor 1 to ``forces``.
 
     Returns:
-        Forces on the nodes of the cells, (num_cells, dofs of a cell); None if there are none.
+        Forces along beams as consistent forces on the nodes of the cells, (num_cells, dofs of a
+        cell); None if there are none.
     """
     numbering, per_beam, at_places = subdomain.numbering, None, []
     if isinstance(load, PointLoad):
@@ -186,7 +190,7 @@ def _add_forces(load: Load, subdomain: Subdomain, forces: Array) -> Array | None
     else:
         raise TypeError(f"{type(load).__name__} is not a dead load")
     for place, force in at_places:
-        if carries(place):  # else Scene.all_connectors has connectors for it
+        if carries(place):  # else a connector of Scene.all_connectors applies the force
             dofs = subdomain.numbering.node(place)
             mine = subdomain.owns(dofs)
             forces[subdomain.local(dofs[mine])] += np.array(force)[mine]
@@ -201,7 +205,7 @@ def _add_forces(load: Load, subdomain: Subdomain, forces: Array) -> Array | None
 
 
 class FollowerLoads(_AtDofs):
-    """Forces that rotate with the cross-section they act on."""
+    """Forces that rotate with the cross-section on which they act."""
 
     def __init__(
         self,
@@ -221,10 +225,10 @@ class FollowerLoads(_AtDofs):
         loaded: Array = np.zeros(subdomain.size)
         loaded[dofs] = 1.0
         # Forces in the latest residual, and in the residual of the last step.
-        self._load(subdomain, loaded, owners, rows=2)
+        self._set_dofs(subdomain, loaded, owners, rows=2)
         forces = [[*load.force, load.moment] for load in owners]
         self._unit_forces = np.array(forces, dtype=np.float64).reshape(-1, 3)
-        # In the equation, at the end of the step, and at the end of the last step.
+        # Sizes in the equation, at the end of the step, and at the end of the last step.
         self._sizes = np.zeros((3, *self._unit_forces.shape))
         self._rotations, self._A = np.zeros(len(indices)), A
         self._c = struct(
@@ -246,7 +250,7 @@ class FollowerLoads(_AtDofs):
         return Phases([loop("begin_follower_loads", c)], [loop("accept_follower_loads", c)])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Return the loads at time ``t``; the state ``q`` is assumed in equilibrium with them."""
+        """Set the loads before the next step to the loads at the time ``t``, and return them."""
         self._sizes[:] = self._unit_forces * self._factors_at(t).reshape(-1, 1)
         self._rotations[:] = q[self._turning]
         self.add_residual(q, np.zeros(self._size))
@@ -254,7 +258,7 @@ class FollowerLoads(_AtDofs):
         return self._whole(self._forces[0])
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore the forces in the equation of the last step, and their sizes."""
+        """Save or restore the forces in the equation of the last step, and sizes at its end."""
         self._forces[:] = archive.added("follower loads", self._whole(self._forces[1]))[self.dofs]
         self._sizes[:] = archive.rows("follower loads", self._indices, self._sizes[2])
 
@@ -276,7 +280,7 @@ class FrameForces(LoadTerm):
     ) -> None:
         subdomain = fields.subdomain
         self._ledger = ledger
-        # Mass times a quarter turn; Coriolis' force is 2 Ω times it times the velocities
+        # G v is the mass matrix times velocities turned by 90°; the Coriolis force is -2 Ω G v
         S, G = mass_matrix(fields), fields.assembled(_turned_mass(fields.element))
         for at, mass, _ in lumps(subdomain.numbering.scene):
             dofs = subdomain.numbering.node(at)[:2]
@@ -289,8 +293,8 @@ class FrameForces(LoadTerm):
         G.data *= coriolis
         self._matrices, self._A = (Product(S), Product(G)), A
         x, y = (np.ascontiguousarray(axis, dtype=np.int32) for axis in subdomain.translations())
-        # Vectors from the axis to the places of all displacements.  Beams come last: beams joined
-        # to the ground share its displacement, not the place of its centre.
+        # Vectors from the axis to all nodes.  Beams overwrite bodies, because beams joined to the
+        # ground share its displacement, but are not at its centre.
         numbering, from_axis = subdomain.numbering, np.zeros(subdomain.numbering.size)
         centers = np.array([body.center for body in numbering.scene.rigid_bodies]).reshape(-1, 2)
         points = np.concatenate([centers, numbering.points]) - frame.about
@@ -317,7 +321,7 @@ class FrameForces(LoadTerm):
         return Phases([loop("begin_frame", self._c)], [loop("accept_frame", self._c)])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Return the forces at ``q``; this state is assumed in equilibrium with them."""
+        """Set the forces before the next step to the forces at ``q``, and return them."""
         self._c.grown = 1.0
         still = np.zeros(len(q))
         step = struct("time_step", q0=q, dt=math.inf, fraction=1.0, at=1.0)
@@ -327,6 +331,6 @@ class FrameForces(LoadTerm):
         return self._force.copy()
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore the forces in the equation of the last step, and their growth."""
+        """Save or restore the forces in the equation of the last step, and their load factor."""
         self._force[:] = self._before[:] = archive.added("rotating frame", self._before)
         self._c.grown = archive.number("growth of the rotating frame", self._c.grown)

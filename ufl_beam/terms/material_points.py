@@ -1,18 +1,19 @@
 # SPDX-License-Identifier: MIT
 """Material points: return map, internal variables, stored and dissipated energies.
 
-The laws are traced with UFL symbols.  UFL derives the consistent tangents, by the implicit function
-theorem at opening discontinuities, and FFCx compiles them.  The return map is a loop in C over the
-points, material_points.c, which calls the compiled laws.
+The laws are traced with UFL symbols, UFL derives their derivatives, and FFCx compiles both.  The
+return map is in material_points.c, a loop over the points that calls the compiled laws.  There the
+tangents of opening discontinuities, and of laws that solve for their variables, follow from the
+implicit function theorem.
 
 With strong softening a step has two solutions: a hinge stays closed or opens.  A rule chooses
-between them.  A hinge, a crack of a fibre or a softening spring that does not flow at the beginning
-of a step stays closed if an equilibrium exists in which it bears at most its limit.  Of several
-points above their limits, the point with the largest excess opens first; the rest open only if they
-still exceed their limits.
+between them.  A hinge, a crack of a fibre or a softening spring that did not open further in the
+last step stays closed if an equilibrium exists in which it bears at most its limit.  Of several
+points above their limits, the point with the largest excess opens first; the others open only if
+they still exceed their limits.
 
-Connector laws that hold a motion follow the same rule if the sliding force may be below the limit:
-sticking and sliding continue if such an equilibrium exists.
+Rigid-plastic connectors follow the same rule, and so do connector laws with a limit, because their
+sliding force may be below the limit: sticking or sliding continues if such an equilibrium exists.
 """
 
 from __future__ import annotations
@@ -53,21 +54,24 @@ law_functions.log.register(Expr, ufl.ln)
 law_functions.tanh.register(Expr, ufl.tanh)
 
 DIGITS = 16 * float(np.finfo(float).eps)
-"""Round-off of dissipated energies over elastic energies of the strains."""
-
+"""Round-off of a plastic dissipation, as a fraction of C e² summed over points and both ends."""
 
 EXHAUSTED = 1e-6
-"""Fraction of its limit below which an open hinge is a joint.
+"""Resistance of an open hinge, as a fraction of its limit, up to which modes treat it as a joint.
 
-For an exponential law this is also the fraction of its fracture energy that is left.
+An exponential law then has the same fraction of its fracture energy left.
 """
 
 FREED_STIFFNESS = 1e-30
-"""Factor of the stiffness of such a joint: frequencies, its square root, are zero to round-off."""
+"""Factor of the stiffness of such a hinge; its square root makes frequencies zero to round-off."""
 
 
 def expect_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger) -> None:
-    """Make the entries of the ledger that points of a layout write, on every process."""
+    """Create the entries of the ledger that points of a layout write.
+
+    Every process calls it, even without such points, so that all ledgers have the same entries in
+    the same order.
+    """
     if section_points.yields:
         ledger.state["hardening"] += 0.0
         ledger.lost["plastic"] += 0.0
@@ -80,8 +84,9 @@ def expect_entries(section_points: SectionPoints, scheme: Scheme, ledger: Ledger
 def releases(section_points: SectionPoints, scheme: Scheme) -> bool:
     """Return whether points have numerical losses besides those by ``alpha`` of a scheme.
 
-    Broken points bear no stress, except perhaps at the ends of a step.  In nonlinear elasticity the
-    stress of a step is not its mean over the step.
+    Schemes with forces over the step have two such losses.  A point that breaks loses the energy of
+    its stress at the end of the step.  In nonlinear elasticity the work of the stress at t_n+θ
+    differs from the change of the energy.
     """
     return scheme.average(0.0, 1.0) != 1.0 and (
         section_points.softening is not None or curved(section_points.kind)
@@ -89,17 +94,16 @@ def releases(section_points: SectionPoints, scheme: Scheme) -> bool:
 
 
 class PointForms:
-    """Compiled laws: C functions of the inputs of a point for the loops.
+    """C functions of the inputs of a point, compiled from its laws.
 
-    The numbers of ``softening`` do not matter: they are inputs.
+    The parameters of ``softening`` are inputs, so their values do not matter here.
 
     Attributes:
-        law: Stresses and their derivatives by strains.  For a law that solves for its variables:
-            residuals and their derivatives, then stresses and their derivatives, see solve_law in
-            C.
-        resistance: Resistance of the discontinuity, and its derivative by the growth.
+        law: Stresses and their derivatives with respect to strains.  A law that solves for its
+            variables has more outputs, see improve_sized in material_points.c.
+        resistance: Resistance of the discontinuity, and its derivative with respect to the growth.
         end: ``point_output`` of loops.h, stresses, and changes of the variables.
-        own: Dissipation of a law that must dissipate, and the size of its terms; or null.
+        own: Dissipation of a law that must dissipate, and the size of its terms; else null.
     """
 
     def __init__(
@@ -121,15 +125,14 @@ class PointForms:
             self.resistance = pointwise.compile(resistance, slope)
         with traced(law):
             stress = tuple(map(ufl.as_ufl, equations.stress(at)))
-            answer = [*stress, *self._derivatives(stress, self._strains)]
+            outputs = [*stress, *self._derivatives(stress, self._strains)]
             if law.solves:
                 r = tuple(map(ufl.as_ufl, equations.residuals(at)))
-                by_both = [self._derivatives(r, names) for names in (unknown, self._strains)]
-                answer = [
+                outputs = [
                     *r,
-                    *by_both[0],
-                    *by_both[1],
-                    *answer,
+                    *self._derivatives(r, unknown),
+                    *self._derivatives(r, self._strains),
+                    *outputs,
                     *self._derivatives(stress, unknown),
                 ]
             *energies, stress, changes = equations.end(at)
@@ -138,18 +141,18 @@ class PointForms:
                 stored = ufl.as_ufl(equations.stored(at))
                 slopes = tuple(self._derivatives((stored,), unknown))
                 self.own = pointwise.compile(*equations.own_dissipation(at, slopes))
-        self.law = pointwise.compile(*answer)
+        self.law = pointwise.compile(*outputs)
         end = in_order("point_output", dict(zip(End._fields, energies, strict=False)))
         self.end = pointwise.compile(*end, *stress, *changes)
 
     @cached_property
     def elastic(self) -> Any:
-        """Stresses and their derivatives by strains at constant variables."""
+        """Stresses and their derivatives with respect to strains at constant variables."""
         stress = tuple(map(ufl.as_ufl, self._equations.elastic_stress(self._at)))
         return self._pointwise.compile(*stress, *self._derivatives(stress, self._strains))
 
     def _derivatives(self, functions: tuple[Expr, ...], by: tuple[str, ...]) -> list[Expr]:
-        """Return derivatives, a row for each function."""
+        """Return derivatives with respect to the inputs ``by``, one function after the other."""
         return [ufl.diff(f, self._at[name]) for f in functions for name in by]
 
 
@@ -161,27 +164,31 @@ class Points:
 
     Args:
         section_points: The points of a cell.
-        keys: See :meth:`SectionPoints.parameters`.
+        keys: Keys of the cells for random values, see :meth:`SectionPoints.parameters`.
         length: Lengths of the cells; (cells,); m.
         scheme: The time scheme.
-        search: Flags of the present search for an equilibrium, see loops.h, shared by all points
-            and connectors of a scene; (SEARCH_FLAGS,).
-        predicts: True if tangents predict stresses of yielding points, see follow_prediction in C.
+        search: Flags of the present search for an equilibrium, which all points and connectors of
+            a scene share, see loops.h; (SEARCH_FLAGS,).
+        predicts: True if tangents predict the stresses of yielding points with one strain, see
+            follow_prediction in material_points.c.
 
     Attributes:
         c: ``points`` of loops.h.
-        names: Names of the inputs.
-        strains: Strains of the cells at the latest response; (cells, 3); may be written to.
-        r, D: The latest response, see :meth:`respond`.
+        names: Names of the inputs of a point.
+        strains: Strains of the cells in the latest response; (cells, 3); 1, 1, 1/m.
+        r, D: The latest response, see :meth:`return_map`.
         dt: Length of the step; (1,); s.
-        over: Largest ``|stress| / limit - 1`` of a point that was kept closed, or zero; (1,).
-        kept: By cell: (N, V, M) in the accepted state, the jump of the last point, and the energy
-            dissipated by plastic strains and by discontinuities; (cells, 6); N, N m, rad or m, J.
-        sums: Sums over all cells: energy dissipated in the last step by plastic strains and by
-            discontinuities, lost numerically by backward Euler (θ = 1); stored elastically, and by
-            hardening; lost in the last step as in :func:`releases`; work on plastic strains of the
-            mean of the stresses at both ends, less the work of the end stresses, for points with
-            stress relaxation; (7,); J.
+        softens: True if points may break.
+        over: Largest ``|stress| / limit - 1`` of the points that the latest response has held
+            closed, at least zero; (1,).
+        recorded: For each cell: (N, V, M) in the accepted state, the jump of the last point, and
+            the energies that plastic strains and discontinuities have dissipated since the
+            beginning; (cells, 6); N, N, N m, rad or m, J, J.
+        sums: Seven sums over all cells; J.  Energies in the accepted state: (3) elastic, (4) stored
+            by hardening.  Energies lost in the last step: (0) by plastic strains, (1) by
+            discontinuities, (2) numerically, with θ = 1, (5) numerically, see :func:`releases`.
+            (6) is the work of the mean of both end stresses on plastic strains less the work of the
+            stress at the end, of points whose stress relaxes.
     """
 
     def __init__(
@@ -223,7 +230,7 @@ class Points:
         if section_points.softening is not None:
             for name, value in section_points.softening.parameters().items():
                 self._at[f"softening {name}"][:] = value
-            self._resist()
+            self._update_resistance()
 
         self.recorded = np.zeros((cells, int(lib.POINT_KEPT)))
         self.sums = np.zeros(int(lib.POINT_SUMS))
@@ -253,7 +260,7 @@ class Points:
             fill(self.c, line=lines[0], predicted=lines[1])
 
     def __getitem__(self, name: str) -> Array:
-        """Return the values of an input at the points, by its name; a view; (cells, n)."""
+        """Return a view of the values of the input ``name`` at the points; (cells, n)."""
         return self._at[name]
 
     def _rows(self, name: str) -> tuple[str, ...]:
@@ -261,12 +268,12 @@ class Points:
         return rows(self._section_points.kind.law, name)
 
     def _at_points(self, strains: Array) -> tuple[Array, ...]:
-        """Return strains of the points by component, (cells, n) each, from strains of the cells."""
+        """Return each strain component of the points, (cells, n), from strains of the cells."""
         d = self._components
         return tuple(strains @ self._section_points.strains[k::d].T for k in range(d))
 
-    def _resist(self) -> None:
-        """Update the resistance after the openings so far."""
+    def _update_resistance(self) -> None:
+        """Set the resistance of discontinuities to its value at their accumulated openings."""
         softening, breaking = self._section_points.softening, self._section_points.breaking
         if softening is not None:
             self["traction"][:, breaking] = softening.traction(self["opening"][:, breaking])
@@ -274,23 +281,23 @@ class Points:
     # -- the step ------------------------------------------------------------------------------
 
     def start(self, strains: Array) -> None:
-        """Begin at these strains of the cells, not the accepted strains; (cells, 3); 1, 1, 1/m."""
+        """Replace the accepted strains of the cells by ``strains``; (cells, 3); 1, 1, 1/m."""
         self._e0[:] = strains
         for name, values in zip(self._rows("before"), self._at_points(strains), strict=True):
             self[name][:] = values
-        self._resist()
+        self._update_resistance()
 
     def begin(self, dt: float) -> None:
         """Begin a step of length ``dt``; s."""
         if dt != self.dt[0]:
             self["dt"][:] = self.dt[0] = dt
-        self.c.tried = 0  # of a law that solves for its variables
+        self.c.tried = 0  # a law that solves for its variables has no iterate to start from
 
     def return_map(self, strains: Array) -> tuple[Array, Array]:
-        """Return (N, V, M) in a step to these strains, and derivatives; (cells, 3), (cells, 9).
+        """Return (N, V, M) in a step to ``strains``, and derivatives; (cells, 3), (cells, 9).
 
-        They are NaN if an opening was not found.  The arrays are reused.  Predictions of the last
-        tangent do not matter.
+        Both are NaN in a cell where an opening, or the variables for which a law solves, are not
+        found.  Later calls overwrite the arrays.  Predictions of the last tangent are ignored.
         """
         self.c.predicts, self.c.linear = 0, ffi.NULL
         self.strains[:] = strains
@@ -298,9 +305,9 @@ class Points:
         return self.r, self.D
 
     def tangent(self) -> tuple[Array, Array]:
-        """Return strains of the accepted state, and derivatives of a response; nothing changes.
+        """Return the accepted strains, and derivatives of (N, V, M) in a step that stays there.
 
-        Shapes (cells, 3) and (cells, 9).
+        Shapes (cells, 3) and (cells, 9).  The latest response is restored.
         """
         arrays = self._storage, self.strains, self.r, self.D, self._search
         before = [array.copy() for array in arrays]
@@ -311,7 +318,10 @@ class Points:
                 array[:] = values
 
     def remaining(self, change: Array) -> Array:
-        """Return the remaining fraction of elastic stiffness for small ``change``; (cells,)."""
+        """Return the fraction of elastic stiffness that remains against ``change``; (cells,).
+
+        The stiffness is the tangent of the latest response.  ``change`` are strains; (cells, 3).
+        """
         section_points, theta = self._section_points, self["theta"][0, 0]
         elastic = theta * change**2 @ section_points.rest
         for name, by_point in zip(self._rows("stiffness"), self._at_points(change), strict=True):
@@ -322,8 +332,8 @@ class Points:
     def require_dissipation(self, describe: Callable[[int], str]) -> None:
         """Raise :class:`StepFailed` if a point generates energy; ``describe`` names its cell.
 
-        The dissipation of the law is then negative: its equations have several solutions, and the
-        solver found a solution that no material reaches.
+        The law then has a negative dissipation.  Either its equations have several solutions, and
+        the solver found one that no material reaches; or it stores energy that it does not state.
         """
         if (worst := lib.gives_energy(self.c)) >= 0:
             law = type(self._section_points.kind.law).__name__
@@ -341,7 +351,8 @@ class Points:
     def dissipation(self) -> float:
         """Return the energy that :meth:`accept` would add to the dissipated energies; J.
 
-        It is zero up to the round-off of the energies from whose difference laws may compute it.
+        A plastic dissipation within the round-off of the elastic energies counts as zero, because
+        laws may compute it as a difference of energies.
         """
         copy = self._copy()
         lib.commit(copy)
@@ -352,7 +363,7 @@ class Points:
         return float(broken + (plastic if abs(plastic) > DIGITS * size else 0.0))
 
     def _copy(self) -> Any:
-        """Return points with the same response and a copy of the state, which loops may change."""
+        """Return ``points`` of loops.h with this response, and a copy of the state to change."""
         copy = ffi.new("points *", self.c[0])
         return fill(
             copy, e0=self._e0.copy(), w=self._storage.copy(), kept=self.recorded.copy(),
@@ -360,9 +371,9 @@ class Points:
         )  # fmt: skip
 
     def freeze(self) -> None:
-        """Make all points elastic from now on; hinges without remaining moment are free.
+        """Make all points elastic from now on; discontinuities without resistance are free.
 
-        So points respond to any small vibration of a yielded state by elastic unloading.
+        Small vibrations about a yielded state unload its points elastically.
         """
         breaking, softening = self._section_points.breaking, self._section_points.softening
         if softening is not None:
@@ -377,7 +388,7 @@ class Points:
     def in_steps(self, ledger: Ledger) -> dict[str, Any]:
         """Return fields of ``inelastic_term`` of loops.h, with entries of the ledger.
 
-        In statics they include a copy, to compute the energy change of a step before it is
+        In statics a copy of the points is a field, for the energy change of a step before it is
         accepted.
         """
         state, lost = ledger.state, ledger.lost
@@ -394,9 +405,9 @@ class Points:
     # -- the state -----------------------------------------------------------------------------
 
     def state(self) -> Array:
-        """Return the internal variables of the accepted state; (cells, k); a copy."""
+        """Return a copy of variables, strains and energies of the accepted state; (cells, k)."""
         stored = np.zeros((len(self.recorded), 2))
-        stored[:1] = self.sums[3:5]  # of all cells together; the owner does not matter
+        stored[:1] = self.sums[3:5]  # sums over all cells; any one row may have them
         return np.hstack(
             [*(self[name] for name in self._state_names), self.recorded, self._e0, stored]
         )
@@ -407,14 +418,16 @@ class Points:
         Call :meth:`start` and :meth:`refresh` afterwards if strains or laws differ from that state.
         """
         ends = np.arange(1, len(self._state_names) + 1) * self._storage.shape[1]
-        *variables, kept, e0, stored = np.split(rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1)
+        *variables, recorded, e0, stored = np.split(
+            rows, [*ends, ends[-1] + 6, ends[-1] + 9], axis=1
+        )
         for name, values in zip(self._state_names, variables, strict=True):
             self[name][:] = values
-        self.recorded[:], self._e0[:] = kept, e0
+        self.recorded[:], self._e0[:] = recorded, e0
         self.sums[3:5] = stored.sum(axis=0)
 
     def refresh(self, strains: Array) -> None:
-        """Compute forces and stored energies of a state without a step."""
+        """Compute (N, V, M) and stored energies at ``strains`` and the present variables."""
         section_points, length, law = (
             self._section_points,
             self["length"][:, :1],

@@ -1,11 +1,11 @@
 # SPDX-License-Identifier: MIT
-"""Terms: virtual works that a scene contributes to the equation of a step, and their phases.
+"""Terms: virtual works in the equation of a step, and their phases.
 
 A term adds its contributions to the residual and to the tangent at the end of the step, and enters
 the energies of the step in the ledger.  Vectors hold the local degrees of freedom of a process,
 ghosts included.  The solver sums the contributions of several processes to a degree of freedom.
 
-Loops in C begin and accept a step, with callbacks for functions of a user.
+Phases are loops in C that begin and accept a step; they call functions of a user in Python.
 """
 
 from __future__ import annotations
@@ -28,21 +28,22 @@ from ufl_beam.errors import StepFailed
 from ufl_beam.model.functions import Constant, Table, TimeFunction, steady, value_at
 
 KINDS = ("beams", "connectors", "loads", "inertia", "damping")
-"""Kinds of forces."""
+"""Kinds of terms, by the cause of their forces."""
 
 
 class InCells(NamedTuple):
     """Forces of a term on the nodes of cells; see cell_forces.py.
 
     Attributes:
-        form: Makes the form whose entries are the forces; its latest evaluation counts.
+        form: Function that creates the form whose entries are the forces.  Without a
+            ``vector``, the forces are the entries of its latest evaluation.
         kind: ``force_kind`` of loops.h.
-        order: Positions in ``subdomain.cells`` of its cells.
-        vector: Pointer to the address of the vector that the form is evaluated at, if the form is
-            linear and nothing else evaluates it.
+        order: Positions of the cells of the form in ``subdomain.cells``.
+        vector: Pointer to the address of the vector at which the form is evaluated, if the form is
+            linear and the residual does not evaluate it; else None.
         factor: Factor of the forces.
-        q0: Configuration at the beginning of the step, if the form depends only on it and on the
-            configuration at the end.
+        q0: Function of the configuration at the beginning of the step, if the form depends only on
+            the configurations at the beginning and at the end; else None.
     """
 
     form: Callable[[], Any]
@@ -56,9 +57,10 @@ class InCells(NamedTuple):
 class Phases(NamedTuple):
     """Loops of the type ``phase`` of loops.h, each with its data.
 
-    ``change``, of the type ``change_of_energy``, computes the stored and dissipated energy of a
-    step.  ``opens`` has fields of ``openable``, if something may open.  ``admits``, of the type
-    ``admission``, checks a step before it is accepted.  ``again`` resets a step after iterations.
+    ``change``, of the type ``change_of_energy``, computes the energy that a step stores and
+    dissipates.  ``opens`` has fields of ``openable``, if points or connectors may open.
+    ``admits``, of the type ``admission``, checks a step before it is accepted.  ``again`` discards
+    the results of iterates before a step is solved anew.
     """
 
     begin: Sequence[Loop] = ()
@@ -71,12 +73,14 @@ class Phases(NamedTuple):
 
 
 class Term(ABC):
-    """Virtual work of one physical effect; methods that a term does not define do nothing.
+    """Virtual work of one physical effect.
 
     Attributes:
-        kind: Kind of its forces, one of :data:`KINDS`.
-        loops: C functions of residual and tangent, with their data.
-        in_cells: Forces on the nodes of cells; none if all act between nodes that joints may share.
+        kind: One of :data:`KINDS`.
+        loops: C functions that add to the residual and to the tangent, with their data; the second
+            is None if the tangent is zero.
+        in_cells: Forces on the nodes of cells, except dead loads, which have
+            :meth:`DeadLoads.loads_in_cells`.
         law_residual: C function of the residual of a law, with its data; None if it is always zero.
         must_dissipate: True if :meth:`require_dissipation` has to be called before a step is
             accepted.
@@ -93,7 +97,7 @@ class Term(ABC):
 
     @abstractmethod
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return C functions that begin and accept a step; called once."""
+        """Return the C functions that begin and accept a step; it is called once."""
 
     def add_residual(self, q1: Array, r: Array) -> None:
         """Add the virtual work at ``q1`` to ``r``."""
@@ -101,13 +105,13 @@ class Term(ABC):
         force(data, doubles(q1), doubles(r))
 
     def add_tangent(self, q1: Array) -> None:
-        """Add the derivative at ``q1`` to the matrix that the term was made with."""
+        """Add the derivative at ``q1`` to the matrix with which the term was created."""
         _, tangent = self.loops
         if tangent is not None:
             tangent[0](tangent[1], doubles(q1), doubles(self._A.data))
 
     def add_tangent_change(self, q1: Array, u: Array) -> None:
-        """Add the derivative of the tangent at ``q1`` along ``u`` at constant variables."""
+        """Add the derivative of the tangent along ``u``, at constant variables, to the matrix."""
 
     def require_dissipation(self, q1: Array) -> None:
         """Raise :class:`StepFailed` if a law generates energy in the step to ``q1``."""
@@ -116,16 +120,17 @@ class Term(ABC):
         """Set the accepted configuration to ``q``, without a step."""
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore the data for later steps; ``q`` is the configuration of the state."""
+        """Save or restore the data on which later steps depend; ``q`` is the configuration."""
 
 
 class Callbacks:
     """Python functions that C calls while it takes steps.
 
-    Exceptions must not pass through C: the first exception is kept, and the step fails.
+    Exceptions must not pass through C: the first exception is stored, and the step fails.
 
     Attributes:
-        error: Exception in the latest step; any other exception replaces a failure of the step.
+        error: First exception in the latest step.  Any other exception replaces a
+            :class:`StepFailed`.
         c: ``equation`` of loops.h.
     """
 
@@ -137,7 +142,10 @@ class Callbacks:
     # -- functions, with their data ---------------------------------------------------------------
 
     def time_functions(self, functions: Sequence[tuple[TimeFunction, object]]) -> Any:
-        """Return ``time_function`` of loops.h for functions with their owners, see value_at."""
+        """Return ``time_function`` of loops.h for pairs of a function and its owner.
+
+        Errors of functions name the owners, see :func:`value_at`.
+        """
         functions_in_c = ffi.new("time_function[]", len(functions))
         for place, (function, owner) in zip(functions_in_c, functions, strict=True):
             if function is steady:
@@ -154,20 +162,20 @@ class Callbacks:
         return functions_in_c
 
     def phase(self, function: Callable[[Any, Any, Any], None]) -> Loop:
-        """Return a phase of C that calls ``function(step, q1, s)`` with pointers."""
+        """Return a phase for C that calls ``function(step, q1, s)`` with C pointers."""
         return lib.phase_in_python, self.handle(function)
 
     # -- exceptions -------------------------------------------------------------------------------
 
     def synchronize(self) -> None:
-        """Raise the exception of a function that C has called."""
+        """Raise the exception of a function that C has called, if there is one."""
         error, self.error = self.error, None
         if error is not None:
             raise error
 
     @contextmanager
     def raising(self) -> Iterator[None]:
-        """Raise the exception of a callback at the end of a block outside of steps."""
+        """Raise the exception of a callback at the end of a ``with`` block, outside of steps."""
         before, self.error = (self.error, self.c.raised), None
         try:
             yield
@@ -176,15 +184,16 @@ class Callbacks:
             self.error, self.c.raised = before
 
     def handle(self, function: Any, size: int = 0) -> Any:
-        """Return a handle of a function for C; ``size`` is the number of its output values."""
+        """Return a handle of a function for C; ``size`` is the length of its output array."""
         self._alive.append(ffi.new_handle((self, function, size)))
         return self._alive[-1]
 
 
 def _record_error(kind: type, error: BaseException, traceback: Any) -> None:
-    """Keep an exception of a callback, and let C end the step on all processes.
+    """Store an exception of a callback, and let C end the step on all processes.
 
-    An interrupt may come before the first line of the callback has run.
+    The handle is read from the arguments of the callback, because an interrupt may come before its
+    first line has run.
     """
     arguments = traceback.tb_frame.f_locals
     callbacks, _, size = ffi.from_handle(arguments["handle"])
@@ -199,7 +208,7 @@ def _record_error(kind: type, error: BaseException, traceback: Any) -> None:
 def from_c(
     error: float | None = None, name: str | None = None
 ) -> Callable[[Callable[..., Any]], Any]:
-    """Decorate a callback of C, declared in c_library.py; it returns ``error`` if it raises."""
+    """Decorate a callback that c_library.py declares; it returns ``error`` if it raises."""
     more = {} if error is None else {"error": error}
     declared: Any = ffi.def_extern(name=name, onerror=_record_error, **more)
     return declared  # type: ignore[no-any-return]
@@ -207,7 +216,7 @@ def from_c(
 
 @from_c()
 def curve_in_python(handle: Any, s: float, step: float, out: Any) -> None:
-    """Callback of C, declared in c_library.py."""
+    """Write CURVE_POINTS points of a curve at steps of its parameter around ``s`` to ``out``."""
     curve, far = ffi.from_handle(handle)[1], 2 * step
     out[0 : 2 * lib.CURVE_POINTS] = (
         *curve(s - far), *curve(s - step), *curve(s), *curve(s + step), *curve(s + far),
@@ -216,12 +225,12 @@ def curve_in_python(handle: Any, s: float, step: float, out: Any) -> None:
 
 @from_c(math.nan)
 def time_in_python(handle: Any, t: float) -> float:
-    """Callback of C, declared in c_library.py."""
+    """Return the value of a function of time at ``t``."""
     return float(ffi.from_handle(handle)[1](t))
 
 
 def call_in_python(handle: Any, *arguments: Any) -> None:
-    """Callbacks of C, declared in c_library.py."""
+    """Call a Python function for C; the callbacks of three signatures share this function."""
     ffi.from_handle(handle)[1](*arguments)
 
 
@@ -230,7 +239,7 @@ for _name in ("run", "begin", "phase"):
 
 
 def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
-    """Return loops that set the initial configuration of a step in kernels that use it."""
+    """Return loops that set ``q0``, the configuration before a step, in the kernels that use it."""
     return [
         loop("begin_forms", struct("form_of_step", form=kernel.cells, at=kernel.position(q0)))
         for kernel in kernels if kernel.uses(q0)
@@ -238,7 +247,7 @@ def beginning(kernels: Iterable[Any], q0: fem.Function) -> list[Loop]:
 
 
 def knowing(kernels: Sequence[Any], function: fem.Function) -> dict[str, Any]:
-    """Return fields of a struct for forms in which a phase sets the values of a function."""
+    """Return the fields ``forms`` and ``form`` for a phase that sets a function in kernels."""
     forms = [(kernel.cells, kernel.position(function)) for kernel in kernels]
     return {"forms": len(forms), "form": ffi.new("form_of_step[]", forms)}
 

@@ -29,14 +29,14 @@ from ufl_beam.terms.term import Callbacks, InCells, Phases, entering
 
 
 class Acting:
-    """Work on the cells of a process on which it acts.
+    """Work of a user on the cells of a process on which it acts.
 
     Attributes:
         order: Positions of the cells in ``subdomain.cells``.
-        residual: Form of the forces.
-        tangent: Form of their derivative, if there is any.
-        passes_on: True if forces depend on the motion of the last step and enter the work of the
-            next.
+        residual: Form of minus the forces.
+        tangent: Form of the derivative of ``residual``; None if it is zero.
+        passes_on: True if a continued run needs the forces of the last step, because they depend
+            on its motion and do a part of the work of the next step.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class Acting:
         )  # fmt: skip
 
     def initial_forces(self, q: Array, past: Archive | None) -> Array:
-        """Return the forces at ``q`` or in ``past``, and keep them for the next step."""
+        """Return the forces before the next step, from ``past`` or at ``q``, and store them."""
         force = np.zeros(len(q))
         self.residual.add(q, force)
         if self._energy is not None:
@@ -95,7 +95,7 @@ class Acting:
         return self._before
 
     def save_or_restore(self, archive: Archive) -> None:
-        """Save or restore the forces of a virtual work in the equation of the last step."""
+        """Save or restore the forces in the equation of the last step; potentials need none."""
         if self._energy is None:
             self._before[:] = archive.added(self._saved_as, self._before)
 
@@ -122,7 +122,7 @@ class Acting:
 
 
 def _position(form: Kernel, function: fem.Function) -> int:
-    """Return the position of the values of a function in a form; -1 if it has none."""
+    """Return the position of the values of ``function`` in ``form``; -1 without ``function``."""
     return form.position(function) if form.uses(function) else -1
 
 
@@ -132,8 +132,8 @@ def _position(form: Kernel, function: fem.Function) -> int:
 class Works(LoadTerm):
     """Works of a scene on the cells of a process; all processes have the term.
 
-    Virtual works are entered as supplied work, energies of potentials as state.  Virtual works grow
-    over substeps of the first step, as loads do; potentials act fully from the start.
+    The ledger has virtual works in ``supplied``, and energies of potentials in ``state``.  Virtual
+    works grow in the substeps of the first step, as loads do; potentials act fully from the start.
     """
 
     def __init__(self, fields: Fields, scheme: Scheme, ledger: Ledger, A: Csr, t0: float) -> None:
@@ -143,7 +143,7 @@ class Works(LoadTerm):
         self._works: list[Acting] = []
         for work in numbering.scene.works:
             work_forms = statement(work, element_of(numbering.mesh), scheme)
-            # Make entries also on processes without such cells
+            # All processes create the entries, even those without such cells
             potential = isinstance(work, Potential)
             (ledger.state if potential else ledger.supplied)[work.name] += 0.0
             if work_forms.varies(work):
@@ -177,7 +177,7 @@ class Works(LoadTerm):
         ]
 
     def phases(self, callbacks: Callbacks) -> Phases:
-        """Return loops over the works."""
+        """Return loops over the works that begin and accept a step, and enter energies."""
         self._callbacks = callbacks
         self._in_c = [work.in_c(self._ledger, callbacks) for work in self._works]
         fill(self._c, work=ffi.new("user_work *[]", self._in_c))
@@ -185,9 +185,9 @@ class Works(LoadTerm):
         return Phases([begin], [accept], [loop("add_energy_of_works", self._c)])
 
     def carry_on(self, t: float, q: Array, v: Array | None, past: Archive | None) -> Array:
-        """Return the forces at ``q``; this state is assumed in equilibrium with them."""
+        """Set the forces before the next step to the forces at ``q``, and return them."""
         self._c.t, self._c.grown = t, 1.0
-        # As at the end of a second with constant velocities
+        # The last step is taken as 1 s at constant velocities; in statics, as infinitely long
         before, dt = (q, math.inf) if v is None else (q - v, 1.0)
         times = {"load_time": t, "motion_time": t, "fraction": 1.0, "at": 1.0}
         step = struct("time_step", q0=before, dt=dt, **times)
@@ -203,7 +203,7 @@ class Works(LoadTerm):
                 work.save_or_restore(archive)
 
     def save_or_restore(self, archive: Archive, q: Array) -> None:
-        """Save or restore time and growth of the works, and their forces in the last equation."""
+        """Save or restore time, load factor, and forces in the equation of the last step."""
         self._c.t = archive.number("time of works", self._c.t)
         self._c.grown = archive.number("growth of works", self._c.grown)
         self._force[:] = archive.added("works", self._force)
@@ -217,6 +217,6 @@ class Works(LoadTerm):
 
 
 def _calls(kernels: list[Kernel]) -> tuple[Any, Any]:
-    """Return the argument of ``add_calls`` of loops.h, and an object to keep alive."""
+    """Return the argument of ``add_calls`` of loops.h, and an array that must stay alive."""
     calls = ffi.new("call[]", [loop("add_cells", kernel.cells) for kernel in kernels])
     return ffi.new("calls *", {"number": len(kernels), "part": calls}), calls
