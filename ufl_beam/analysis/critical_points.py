@@ -213,7 +213,7 @@ class Candidate(NamedTuple):
     direction: Array
     #: Change of the load factor t along the path, divided by the size of the change of the
     #: configuration q.  As K q' = f t', a slope of zero means that the direction of the path is a
-    #: critical mode.  The load f does work on this mode, and none at a bifurcation point.
+    #: critical mode.  The load f does work on this mode, but none on a bifurcation point's mode.
     slope: float
     mode: Array | None = None
 

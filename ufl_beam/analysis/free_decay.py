@@ -160,8 +160,8 @@ def peaks(
     Minima of x do not count, so the peaks are one period apart for any equilibrium.  Each maximum
     is interpolated by a parabola through three samples.  The ends of the history do not count.
 
-    Noise raises small peaks by a larger fraction than large peaks.  Filter noise that exceeds 0.3 %
-    of the amplitudes before.
+    Noise raises small peaks by a larger fraction than large peaks.  First filter noise that exceeds
+    0.3 % of the amplitudes.
 
     Args:
         t: Increasing times, not necessarily equidistant; (n,); s.

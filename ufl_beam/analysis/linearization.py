@@ -36,7 +36,7 @@ V = TypeVar("V", Array, Complex)
 
 MODAL_TOLERANCE = 1e-9  # couplings below this fraction of the largest damping do not count
 BALANCED = 1e-13  # forces below this fraction of the stiffness times the scene's size are round-off
-AT_REST = 1e150  # time step so long that rates vanish, whose square is finite; s
+AT_REST = 1e150  # time step so long that rates vanish; its square is finite; s
 
 
 def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array]:
@@ -265,8 +265,8 @@ class SmallMotions:
     def _with_laws(self) -> tuple[csr_array, csr_array]:
         """Return motions, in columns, and virtual motions, in rows, with the forces of laws.
 
-        Virtual motions times the tangent times motions is K; with the derivative of the tangent,
-        the product is the derivative of K.
+        The product of virtual motions, tangent and motions is K; with the derivative of the
+        tangent it is the derivative of K.
         """
         T, laws, Z = self._derivative(self.q, AT_REST), self._laws, self._Z
         flexibility = diags_array(1 / T.diagonal()[laws])

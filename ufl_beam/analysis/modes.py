@@ -272,7 +272,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     """Compute natural frequencies, damping ratios and shapes of small vibrations.
 
     The vibrations are about the undeformed, unloaded scene, or about the last state of a solution.
-    Its section forces, loads and :class:`RotatingFrame` contribute to the stiffness; yielded
+    In this state section forces, loads and a :class:`RotatingFrame` have a stiffness, and yielded
     material is elastic.  If only loads hold the scene, as its weight holds a pendulum, the state is
     the equilibrium with these loads.  Yielding and opening are frozen; hinges that no longer carry
     a moment act as joints.  Sticking friction is a constraint; sliding friction and controllers are

@@ -183,7 +183,7 @@ def study(
         Results in the order of the cases.
 
     Raises:
-        ArgumentError: The call or the file is wrong, or a member returned something else than
+        ArgumentError: The call or the file is wrong, or a member returned anything but
             numbers and arrays, or other names or shapes than the other members.  The file then has
             the results of the earlier members.
         RuntimeError: All members failed.

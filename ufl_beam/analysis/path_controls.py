@@ -412,7 +412,7 @@ class ArcLength(Control):
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return the sense: initially by the sign of ``step``, later such that dissipation grows.
 
-        Without dissipation, the angle between successive steps is less than π/2.
+        Without dissipation, the sense is such that the path turns by less than π/2.
         """
         if increment is None:
             return self.step * float(direction[-1])
@@ -502,7 +502,7 @@ class DisplacementControl(Control):
 
 @dataclass(frozen=True)
 class DissipationControl(Control):
-    """Control by the energy that hinges, yielding beams and springs dissipate: sharp snap-backs.
+    """Control by the energy that hinges, beams and springs dissipate, for sharp snap-backs.
 
     Softening and unloading may begin in nearly the same direction; only softening dissipates.
 
@@ -544,8 +544,8 @@ class DissipationControl(Control):
     def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
         """Solve for a step that dissipates an energy, or by arc length.
 
-        Arc-length steps are taken while they dissipate nothing, and if no step dissipates the
-        energy although the latest step was dissipative.
+        Arc-length steps are taken while they dissipate nothing.  If the latest step dissipated and
+        this step fails, an arc-length step replaces it.
         """
         if not corrector.dissipates:
             with suppress(StepFailed):

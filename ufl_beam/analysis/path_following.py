@@ -61,7 +61,7 @@ LEAST_COSINE = 0.5  # least cosine of the angle between a step and its predictor
 LARGEST_LENGTH_RATIO = 10.0  # largest ratio of the lengths of a step and its predictor
 UNCHECKED_FRACTION = 2.0**-6  # largest fraction of a step that may turn sharply, as at a kink
 SAME_POINT_FRACTION = 1e-3  # fraction of a step within which a critical point is the last one again
-# Largest distance of the states before and at a critical point, as a fraction of the step to it; a
+# Largest distance between states before and at a critical point, as a fraction of the step to it; a
 # longer distance is a leap to another branch.
 LARGEST_GAP = 0.1
 SINGULAR_RATIO = 1e-3  # ratio to its size at the ends of a step below which a measure vanishes
@@ -265,7 +265,7 @@ class PathStepper:
         self._at_point = not fresh
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take a step to its end or to a critical point before, or a shorter step if it fails.
+        """Take a step to its end or to the first critical point in it; shorten steps that fail.
 
         The end is stored in the solution if ``keep``.
 
@@ -329,10 +329,10 @@ class PathStepper:
             self._store(candidate, direction, len(self._simulation.solution), limit)
 
     def _pass_kink(self, after: Candidate, last: float, fraction: float, limit: bool) -> None:
-        """Pass the onset of dissipation, a limit point if the load factor turns there (``limit``).
+        """Go to the onset of dissipation if the load factor turns there (``limit``), else past it.
 
-        The last state without dissipation is at the fraction ``last`` of the step, or is the
-        present state if ``last`` is not positive.
+        The onset is at the fraction ``last`` of the step, or at the present state if ``last`` is
+        not positive.
         """
         before, n = self.corrector.direction, len(self._simulation.solution)
         if limit and last > 0:
@@ -357,7 +357,7 @@ class PathStepper:
         return Candidate(trial, stiffness, direction, slope, mode)
 
     def _seek(self, fraction: float) -> Candidate:
-        """Solve for the end of a fraction of a step; :class:`StepFailed` if the path leaps."""
+        """Solve for the end of a fraction of a step; StepFailed if it is far from its predictor."""
         corrector = self.corrector
         trial = self._control.solve_step(corrector, fraction)
         stiffness, direction = corrector.direction_at(trial.q1, trial.step.t1)

@@ -55,7 +55,7 @@ class Convergence:
         order, trusted, most = math.nan, False, last
         if len(values) > 2:
             order = math.log2(first / last) if min(sizes) > 0 else math.copysign(9, first - last)
-            # A safety factor of 1.25 covers changes that deviate from this by a quarter.
+            # A safety factor of 1.25 covers changes that deviate by a quarter from an integer order.
             trusted = first > 0 and any(
                 size(changes[1] * 2**k - changes[0]) <= (TRUSTED - 1) * first
                 for k in range(1, round(method) + 1)
@@ -63,7 +63,7 @@ class Convergence:
             # A change that fell faster than the order of the method may have passed through zero.
             most = max(last, first / 2**method)
         used = method if math.isnan(order) else min(max(order, LEAST_ORDER), method)
-        rest, bound = changes[-1] * 0.0, DOUBTED * max(sizes)  # irregular changes
+        rest, bound = changes[-1] * 0.0, DOUBTED * max(sizes)  # if changes are irregular
         if not order < LEAST_ORDER:
             rest = changes[-1] / (2**used - 1)
             bound = (TRUSTED if trusted else DOUBTED) * most / (2**used - 1) - size(rest)

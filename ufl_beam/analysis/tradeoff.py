@@ -56,7 +56,7 @@ NOISE = 1e-9  # noise as a fraction of a quantity: Newton's method leaves residu
 STEP_ORDER = 2.0  # largest order of the schemes; the order of cells is twice their degree
 FURTHER = 2  # most levels from a base to the next, which may begin at the finest run of the last
 REACH = 8  # most levels of a choice beyond the runs; an error of second order falls to 2**-16 there
-SETTINGS_PER_LEVEL = 8  # from one to the next an error of second order changes by 2**(2/8), a fifth
+SETTINGS_PER_LEVEL = 8  # between two settings an error of second order changes by a fifth, 2**(2/8)
 MOST_DOUBTS = 4  # most bases without visible convergence, each finer than the last
 MOST_TRIALS = 3  # most settings tried, each at about a quarter of the cost of the run for the limit
 SCATTER = 0.1  # relative scatter of times of one run on a quiet machine, see bench_budget.py
@@ -102,8 +102,8 @@ def tradeoff(
         budget: Wall time of one run, instead of a tolerance; s.
         mesh: Mesh with the coarsest cells, or several meshes; by default cells of degree 1, and
             cells of degree 2 if the scene allows them.
-        newton: Options of Newton's method, or several.  Runs use the first, and the others are
-            compared with it on a coarse run.  The recommendation uses the fastest options that
+        newton: Options of Newton's method, or several.  Runs use the first options; the others are
+            compared with these on a coarse run.  The recommendation uses the fastest options that
             change the quantities little.
         max_seconds: Largest total wall time of the runs; s.
         progress: Show the number of runs in a terminal or notebook.
@@ -181,7 +181,7 @@ def tradeoff(
 def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str]]:
     """Search with the family that coarse runs predict to be the best; if this fails, the next.
 
-    Returns the successful search, the other searches, and notes on them.
+    The results are the successful search, the other searches, and notes on the other searches.
     """
     searches: list[_Search] = []
     notes: list[str] = []
@@ -267,7 +267,7 @@ class _Runs:
     _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
 
     def begin(self, family: int) -> None:
-        """Compile in a run of one step if steps are equal; then time the coarsest run."""
+        """Compile in a first run, of one step if steps are equal; then time the coarsest run."""
         first = Refinement(family, Fraction(1), 0.0)
         dt = self.families[family].dt
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
@@ -440,7 +440,7 @@ class _Search:
         while True:
             candidate = self._choose(
                 min(self.uncertainty, NEGLIGIBLE)
-            )  # uncertainty after refinement
+            )  # expected uncertainty after refinement
             some, base = next(iter(self.crosses.values())), self._base
             finest = some.cells.finest, some.steps.finest
             far = any(level > last for level, last in zip(candidate.levels, finest, strict=True))
@@ -477,7 +477,7 @@ class _Search:
         return min(self._runs.in_family(self.family), key=self._rank)
 
     def remarks(self, run: Run) -> list[str]:
-        """Return notes on an unseen order, and on a run that misses the target."""
+        """Return notes on convergence that is not seen, and on a run that misses the target."""
         notes = [
             f"the order of convergence is not seen: {name}{convergence}"
             for name, convergence in self.crosses.items()
@@ -628,7 +628,7 @@ class _Search:
     # -- decisions -----------------------------------------------------------------------------
 
     def _negligible(self, candidate: _Candidate) -> float:
-        """Return the largest negligible error; with a budget, as a fraction of a choice's error."""
+        """Return the largest negligible error: with a budget, NEGLIGIBLE times a choice's error."""
         return NEGLIGIBLE * (1.0 if math.isinf(self._target.budget) else candidate.bound)
 
     def _choose(self, uncertainty: float) -> _Candidate:
@@ -661,7 +661,7 @@ class _Search:
             least, most = ((LEAST_USED ** (1 - p)) * largest**p for p in (1 / 4, 3 / 4))
             allowed = (likely <= most) & (bound <= largest)
             costs = np.where(allowed, seconds, np.inf)
-            # A setting whose errors cancel below this is avoided, even at twice the cost.
+            # A setting whose errors cancel below ``least`` is avoided, even at twice the cost.
             used = allowed & (likely >= least) & (seconds <= 2 * costs.min())
             costs = np.where(used, seconds, np.inf) if used.any() else costs
             k = costs.argmin() if allowed.any() else bound.argmin()

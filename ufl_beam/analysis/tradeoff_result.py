@@ -89,7 +89,7 @@ class Run:
 
 @dataclass(frozen=True)
 class Target:
-    """Target: tolerances, in the unit of each quantity or relative, or the wall time of a run."""
+    """Target of a trade-off: absolute or relative tolerances, or the wall time of a run."""
 
     absolute: Mapping[str, float]  # tolerance of each quantity, in its unit; or empty
     relative: float  # tolerance as a fraction of largest magnitudes; 1 with a budget
@@ -162,7 +162,7 @@ class Tradeoff(Rich):
         return {name: convergence.uncertainty for name, convergence in self.crosses.items()}
 
     def errors(self, run: Run) -> dict[str, float]:
-        """Return the distances of a run from the limits, by quantity, in its unit."""
+        """Return the distance of a run from the limit of each quantity, in the unit of each."""
         return {name: size(run.values[name] - limit) for name, limit in self.limit.items()}
 
     def ratio(self, run: Run) -> float:
@@ -171,7 +171,7 @@ class Tradeoff(Rich):
 
     @property
     def effort(self) -> float:
-        """Wall time of the steps of all runs, as a multiple of those of the recommended run."""
+        """Wall time of the steps of all runs, divided by this time of the recommended run."""
         return sum(run.stepping for run in self.runs) / self.best.stepping
 
     @property

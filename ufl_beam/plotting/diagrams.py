@@ -213,7 +213,7 @@ def _draw_diagrams(
             first, *_, last = np.flatnonzero(diagram == k)
             low, high = (first + last) // 2, (first + last + 1) // 2
             (x, y), (across, up) = (axis[low] + axis[high]) / 2, left[high]
-            angle = math.degrees(math.atan2(up, across)) - 180.0  # 0 points up
+            angle = math.degrees(math.atan2(up, across)) - 180.0  # at 0 it points up
             axes.plot(x, y, marker=(3, 0, angle), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
     for color, group in outlines.items():
         look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}

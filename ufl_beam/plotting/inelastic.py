@@ -62,7 +62,7 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
 
 
 def dissipated_per_length(solution: Solution, n: int) -> Array:
-    """Compute the energy per length that cells dissipated, except hinges; (num_cells,); J/m."""
+    """Compute energies per length dissipated by plastic strains and cracks; (num_cells,); J/m."""
     numbering = solution.numbering
     energy = np.zeros(len(numbering.cells))
     for beam in solution.scene.beams:

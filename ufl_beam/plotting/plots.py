@@ -38,7 +38,7 @@ COMPONENTS = {
 MOST_MODES, NUM_SHAPES = 6, 5  # modes, and shapes of a solution, in a notebook
 VISIBLE = 0.1  # largest magnified displacement in a notebook, as a fraction of the scene's size
 FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # magnifications; more would show round-off
-LEAST_ERROR = 1e-12  # least drawn error; smaller ones are drawn here, in the quantity's unit
+LEAST_ERROR = 1e-12  # least drawn ratio of an error; smaller ratios are drawn at this value
 CLASSES = 40  # number of classes of ranges, and of means, of cycles in pictures
 
 
@@ -131,8 +131,8 @@ def draw_history(
         ax: Axes to draw in; by default a new figure.
 
     Raises:
-        ArgumentError: ``component`` is unknown, a place is not in the scene, a static run has no
-            velocity, or ``ax`` is no axes.
+        ArgumentError: ``component`` is unknown, or a velocity in a static run; a place is not in
+            the scene; or ``ax`` is no axes.
 
     Example:
         >>> ub.plot(solution, "history", beam.end, component="v").savefig("history.png")
@@ -311,9 +311,9 @@ def tradeoff_page(result: Tradeoff) -> str:
 
 
 def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = None) -> Figure:
-    """Draw the envelope of a section force on the undeformed frame: maxima red, minima blue.
+    """Draw maxima and minima of a section force on the undeformed frame, as two diagrams.
 
-    The values at different points may occur at different times.
+    Positive values are red, negative values blue.  Values may occur at different times.
 
     Raises:
         ArgumentError: Nothing was run, or ``ax`` is no axes.
@@ -342,7 +342,8 @@ def draw_study(study: Study) -> Figure:
     An array result is drawn by its largest magnitude; failed cases are omitted.
 
     Raises:
-        ArgumentError: The cases have no number, or several of which none varies, or all failed.
+        ArgumentError: The cases have no number, or several numbers of which none varies, or all
+            members failed.
 
     Example:
         >>> spans = [{"length": 1.0 + 0.25 * k} for k in range(5)]
