@@ -55,7 +55,7 @@ class Convergence:
         order, trusted, most = math.nan, False, last
         if len(values) > 2:
             order = math.log2(first / last) if min(sizes) > 0 else math.copysign(9, first - last)
-            # A safety factor of 1.25 covers changes that deviate by a quarter from an integer order.
+            # A safety factor of 1.25 allows changes to deviate from an integer order by a quarter.
             trusted = first > 0 and any(
                 size(changes[1] * 2**k - changes[0]) <= (TRUSTED - 1) * first
                 for k in range(1, round(method) + 1)

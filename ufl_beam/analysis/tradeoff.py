@@ -170,7 +170,10 @@ def tradeoff(
             known = best.crosses[name]
             apart = size(convergence.limit - known.limit)
             if apart > convergence.uncertainty + known.uncertainty:
-                notes.append(f"{families[search.family]}: limit of {name} differs by {apart:.2g}")
+                notes.append(
+                    f"{families[search.family]}: its limit of {name} differs by {apart:.2g} from "
+                    "the limit of the recommended family"
+                )
     return Tradeoff(
         runs=tuple(runs.runs.values()), best=run, t=t, crosses=best.crosses, units=best.units,
         target=target, families=tuple(map(str, families)), notes=tuple(notes + best.remarks(run)),
@@ -205,7 +208,7 @@ def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str
             notes.append(f"{runs.families[best.family]}: {error}")
             continue
         notes += [
-            f"{runs.families[search.family]}: given up, others are better in coarse runs"
+            f"{runs.families[search.family]}: given up, another is better in coarse runs"
             for search in searches[n + 1 :]
         ]
         return best, [search for search in searches if search is not best], notes
