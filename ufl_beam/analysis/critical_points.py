@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: MIT
-"""Critical points of static paths: tangent stiffness of the whole scene, its signs and modes.
+"""Critical points of static paths: tangent stiffness of the whole scene, its eigenvalues and modes.
 
-A point of a path is an array: the configuration at the local degrees of freedom (m, m, rad),
-followed by the load factor.  A direction has the changes of both in the same order.
+A point of a path is an array: the configuration at the local degrees of freedom (m, rad, forces of
+connectors), followed by the load factor.  A direction has the changes of both in the same order.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ from ufl_beam.simulation.stepper import Trial
 from ufl_beam.solvers.factorization import Factorisation
 
 INVERSE_ITERATIONS = 50  # most inverse iterations for a mode
-MODE_TOLERANCE = 1e-8  # change of the mode that ends them; its square is the eigenvalue's error
+# Change of the mode at which the iterations end.  The relative error of the eigenvalue is about the
+# square of this change.
+MODE_TOLERANCE = 1e-8
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +36,8 @@ class Branch:
 
     Attributes:
         state: Solution whose last state is the start of the path.
-        mode: Direction at all degrees of freedom, in the order of the numbering.
+        mode: Direction of the path at its start, at all degrees of freedom in the order of the
+            numbering.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), amplitude=lambda t: t)
@@ -62,7 +65,8 @@ class CriticalPoint:
         n: Number of the state in the path.
         state: Solution with this state only.
         mode: Critical mode at all degrees of freedom, in the order of the numbering.  The root mean
-            square of its rotations, and displacements over the size of the scene, is 1.
+            square of its rotations (rad), and of its displacements divided by the size of the
+            scene, is 1.
 
     Example:
         >>> push = ub.PointLoad(beam.end, force=(-2e7, 0), amplitude=lambda t: t)
@@ -81,10 +85,11 @@ class CriticalPoint:
     __repr__ = bracketed
 
     def branch(self, sign: int = 1) -> Branch:
-        """Return the start of the path along the mode, or against it with ``sign = -1``.
+        """Return the start of the secondary path along ``sign`` times the mode.
 
         Raises:
-            ArgumentError: ``sign`` is neither 1 nor -1, or nothing branches at a limit point.
+            ArgumentError: ``sign`` is neither 1 nor -1, or the point is a limit point, at which no
+                path branches.
         """
         if sign not in (1, -1):
             raise ArgumentError(f"branch: sign = {sign!r} must be 1 or -1")
@@ -99,21 +104,23 @@ class CriticalPoint:
 class Stiffness:
     """Tangent stiffness of the whole scene, factored by every process; StepFailed if singular.
 
-    Each process contributes its subdomain's tangent A, the local degrees of freedom ``held`` by
-    supports, and its contribution ``rate`` to the derivative of the residual by the load factor.
-    ``weights`` are the weights of the norm of a direction, at all degrees of freedom of the scene.
+    Each process contributes its subdomain's tangent A, the local degrees of freedom ``constrained``
+    by supports, and its part ``rate`` of the derivative of the residual with respect to the load
+    factor.  ``weights`` are the weights of the norm of a direction, at all degrees of freedom of
+    the scene.
 
-    The tangent is factored in a symmetric form.  The column of a connector holds the gradient g of
-    its motion; the row holds α g and β.  The row is divided by α.  If β is not zero, the unit of
-    the force is chosen so that the diagonal entry is ±1; this includes laws whose force does not
-    depend on the motion (α = 0).  Each force adds one negative eigenvalue if it constrains a motion
-    or grows with it, and none if it falls when the motion grows.
+    The tangent is factored in a symmetric form.  The column of a connector's force holds the
+    gradient g of the motion; its row holds α g, and β on the diagonal.  The row is divided by α.
+    If β is not zero, the unit of the force is chosen so that the diagonal entry becomes ±1.  A law
+    whose force does not depend on the motion has α = 0.  Each force adds one negative eigenvalue if
+    it constrains a motion or grows with it, and otherwise none.
 
     Attributes:
         negative: Number of negative eigenvalues after elimination of the connectors' forces.  If
             the tangent is not symmetric, as with follower loads: 1 if its determinant is negative,
             else 0.
-        flow: Change of the configuration for a unit of the load factor, zero at supported degrees
+        symmetric: True if the tangent is symmetric.
+        flow: Change of the configuration per unit of the load factor, zero at supported degrees
             of freedom; (numbering.size,).
     """
 
@@ -131,7 +138,7 @@ class Stiffness:
         self._K = csr_array(coo_array((data, (rows, columns)), shape=shape))[free][:, free]
         self._forces = np.bincount(dofs, weights=rates, minlength=numbering.size)[free]
         self._free, self._size, self._weights = free, numbering.size, weights[free]
-        self._motions = n = len(free) - len(numbering.multipliers)
+        self._num_motions = n = len(free) - len(numbering.multipliers)
 
         K, G, B = self._K[:n, :n], self._K[:n, n:], self._K[n:, :n]
         β = self._K.diagonal()[n:]
@@ -159,7 +166,7 @@ class Stiffness:
 
     def _solve(self, b: Array) -> Array:
         """Solve with the tangent for one right-hand side."""
-        n = self._motions
+        n = self._num_motions
         forces = b[n:] / self._β
         scaled = np.where(np.isinf(self._β), self._row_scale * b[n:], 0.0)
         x = self._factors.solve(np.concatenate([b[:n] - self._G @ forces, scaled]))
@@ -168,7 +175,7 @@ class Stiffness:
 
     @property
     def most_work(self) -> float:
-        """Work of the load if all of it moved by the largest motion of the softest mode; N m."""
+        """Work of the load if each component did the largest motion of the softest mode; N m."""
         units = np.sqrt(self._weights)
         moving = units > 0.0
         forces = np.abs(self._forces[moving]) / units[moving]
@@ -181,7 +188,7 @@ class Stiffness:
 
     @cached_property
     def softest(self) -> tuple[float, Array]:
-        """Eigenvalue nearest to zero (N m), and its mode of norm 1 with ``weights``."""
+        """Eigenvalue nearest to zero (N m), and its mode, whose norm with ``weights`` is 1."""
         w = self._weights
         mode = np.random.default_rng(0).normal(size=len(w)) / np.sqrt(np.maximum(w, w.max()))
         for _ in range(INVERSE_ITERATIONS):
@@ -198,35 +205,36 @@ class Stiffness:
 class Candidate(NamedTuple):
     """End of a step that may be accepted, with the stiffness and the direction of the path.
 
-    At a bifurcation point it also has the critical mode.
+    ``mode`` is the critical mode if the end is a bifurcation point, else None.
     """
 
     trial: Trial
     stiffness: Stiffness
     direction: Array
-    #: Change of the load factor along the path over the change of the configuration.  As
-    #: K q' = f t', a slope of zero means that the direction of the path is critical, and that the
-    #: load f does work on it.  At a bifurcation it does no work on the critical direction.
+    #: Change of the load factor t along the path, divided by the size of the change of the
+    #: configuration q.  As K q' = f t', a slope of zero means that the direction of the path is a
+    #: critical mode.  The load f does work on this mode, but none on a bifurcation point's mode.
     slope: float
     mode: Array | None = None
 
     @property
     def softness(self) -> float:
-        """Size of the eigenvalue nearest to zero; N m."""
+        """Magnitude of the eigenvalue nearest to zero; N m."""
         return abs(self.stiffness.softest[0])
 
     @property
     def work(self) -> float:
         """Work of the load on the critical mode, near a critical point; N m.
 
-        It follows from t'/|q'| = λ/(f·x) for a motion along a mode x of norm 1 with the eigenvalue
-        λ.  The quotient tends to zero if the load does no work on x, despite round-off in q'.
+        This work f·x is softness divided by slope, as t'/|q'| = λ/(f·x) for a motion along a mode x
+        of norm 1 with the eigenvalue λ.  If the load does no work on x, the quotient tends to zero
+        despite round-off in q'.
         """
         return self.softness / self.slope if self.slope else math.inf
 
     @property
     def end(self) -> Array:
-        """State and load factor."""
+        """Configuration and load factor at the end of the step."""
         return np.append(self.trial.q1, self.trial.step.t1)
 
     def passed(self, before: Candidate) -> bool:

@@ -16,13 +16,13 @@ from ufl_beam.errors import ArgumentError, require_array, require_number, requir
 
 @dataclass(frozen=True)
 class Envelope:
-    """Decay law fitted to peaks; ``_95`` is the half-width of a 95 % interval (Student's t).
+    """Decay law fitted to peaks, with half-widths of 95 % intervals (Student's t).
 
     Attributes:
         initial: A_0, the amplitude at the first peak; unit of x.
-        rate: r of A_0 − r t, unit of x per s, or λ of A_0 exp(−λ t), 1/s; t from the first peak.
-        initial_95: Uncertainty of ``initial``; unit of x.
-        rate_95: Uncertainty of ``rate``; same unit.
+        rate: r of A_0 − r t, unit of x per s, or λ of A_0 exp(−λ t), 1/s; t is 0 at the first peak.
+        initial_95: Half-width of the interval of ``initial``; unit of x.
+        rate_95: Half-width of the interval of ``rate``, in the same unit.
         rms: Root mean square of the residuals; unit of x.
 
     Example:
@@ -53,7 +53,7 @@ class Decay:
 
     Attributes:
         times: Times of the n peaks; (n,); s.
-        amplitudes: Their amplitudes; (n,); unit of x.
+        amplitudes: Amplitudes of the peaks; (n,); unit of x.
         decrement: Logarithmic decrement δ, mean of all periods.
         decrements: Logarithmic decrement of each period; (n-1,).
         linear: Fit of A_0 − r t, as under dry friction: equal losses in all periods.
@@ -103,7 +103,8 @@ class Decay:
     def evidence(self) -> float:
         """Evidence ratio of the better law, exp(ΔAIC/2); both have two parameters.
 
-        Residuals are assumed independent and normal; an rms below round-off counts as round-off.
+        Residuals are assumed independent and normal.  An ``rms`` below round-off is replaced by
+        round-off.
         """
         least = np.finfo(float).eps * np.max(self.amplitudes)
         linear, exponential = (max(law.rms, least) for law in (self.linear, self.exponential))
@@ -130,10 +131,11 @@ class Decay:
 def damping(
     t: npt.ArrayLike, x: npt.ArrayLike, about: float = 0.0, *, prominence: float = 0.05
 ) -> Decay:
-    """Estimate the damping of a free vibration; arguments and errors of :func:`peaks`.
+    """Estimate the damping of a free vibration; the arguments are as in :func:`peaks`.
 
     Raises:
-        ArgumentError: Less than 3 peaks, or not all of them are above ``about``.
+        ArgumentError: As in :func:`peaks` and :func:`fit_decay`; or there are fewer than 3 peaks,
+            or a peak is not above ``about``.
 
     Example:
         >>> t = np.arange(0, 5, 0.01)
@@ -155,18 +157,19 @@ def peaks(
 ) -> tuple[Array, Array]:
     """Find times (s) and amplitudes (unit of x) of the maxima of a vibration; (m,) each.
 
-    They are maxima of x, not of its magnitude, so they are one period apart for any equilibrium.
-    Each is interpolated by a parabola through three samples.  Ends of the history do not count.
+    Minima of x do not count, so the peaks are one period apart for any equilibrium.  Each maximum
+    is interpolated by a parabola through three samples.  The ends of the history do not count.
 
-    Noise raises small peaks more than large peaks.  Filter it first if it exceeds 0.3 % of the
-    amplitudes.
+    Noise raises small peaks by a larger fraction than large peaks.  First filter noise that exceeds
+    0.3 % of the amplitudes.
 
     Args:
         t: Increasing times, not necessarily equidistant; (n,); s.
         x: Values of the free vibration alone; (n,).
-        about: Equilibrium from which amplitudes count; unit of x.
+        about: Equilibrium, from which amplitudes are measured; unit of x.
         prominence: Fraction of the range of x by which x must fall on both sides of a maximum.
-            Superposed vibrations of high frequency must be smaller, the last peaks larger.
+            Choose it larger than superposed vibrations of high frequency, and smaller than the
+            last peaks.
 
     Raises:
         ArgumentError: t and x differ in length, are not finite, or t does not increase.
@@ -192,16 +195,16 @@ def _maxima(
     rise, fall = (x[i] - x[i - 1]) / before, (x[i + 1] - x[i]) / after
     curvature = 2 * (fall - rise) / (before + after)
     slope = (rise * after + fall * before) / (before + after)
-    # Three equal samples have neither slope nor curvature.
+    # Three equal samples have no slope and no curvature; their peak is not shifted.
     shift = np.divide(-slope, curvature, out=np.zeros(len(i)), where=curvature < 0)
     return t[i] + shift, x[i] + slope * shift / 2 - about
 
 
 def logarithmic_decrement(amplitudes: npt.ArrayLike) -> tuple[float, Array]:
-    """Compute logarithmic decrements δ of n + 1 amplitudes: the mean, and each period's; (n,).
+    """Compute the mean logarithmic decrement δ of n + 1 amplitudes, and δ of each period; (n,).
 
     Raises:
-        ArgumentError: Less than two amplitudes, or some are not positive.
+        ArgumentError: There are fewer than two amplitudes, or one is not positive.
 
     Example:
         >>> mean, each = ub.logarithmic_decrement([1.0, 0.9, 0.81])
@@ -241,11 +244,11 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
 
     Args:
         t: Increasing times of the peaks; (n,); s.
-        amplitudes: Their amplitudes; (n,).
+        amplitudes: Amplitudes of the peaks; (n,).
 
     Raises:
-        ArgumentError: t and amplitudes differ in length, are less than 3, or not finite; t does not
-            increase; an amplitude is not positive; or no exponential fits the amplitudes.
+        ArgumentError: t and amplitudes differ in length, or are fewer than 3 or not finite; t does
+            not increase; an amplitude is not positive; or no exponential fits the amplitudes.
 
     Example:
         >>> t = np.arange(6.0)
@@ -261,7 +264,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
     line = scipy.stats.linregress(s, A)
     errors = line.intercept_stderr, line.stderr
     linear = _envelope((line.intercept, -line.slope), errors, A - line.intercept - line.slope * s)
-    # Dimensionless.  Initial guess: the line through the logarithms, weighted by the amplitudes.
+    # The dimensionless fit begins at the line through the logarithms, weighted by the amplitudes.
     τ, a, units = s / s[-1], A / np.max(A), np.array([np.max(A), 1 / s[-1]])
     slope, logarithm = np.polyfit(τ, np.log(a), 1, w=a)
     guess = np.exp(logarithm), -slope
@@ -269,7 +272,7 @@ def fit_decay(t: npt.ArrayLike, amplitudes: npt.ArrayLike) -> Decay:
         with np.errstate(over="ignore"):
             fitted, covariance = scipy.optimize.curve_fit(
                 lambda t, initial, rate: initial * np.exp(-rate * t), τ, a, guess,
-                # A difference quotient fails at rate 0.
+                # Derivatives by difference quotients would fail at the rate 0.
                 jac=lambda t, initial, rate: np.exp(-rate * t)[:, None] * np.stack(
                     [np.ones_like(t), -initial * t], axis=1
                 ),

@@ -35,14 +35,15 @@ from ufl_beam.solvers.eigensolvers import ROUND_OFF, SHIFT, ZERO
 V = TypeVar("V", Array, Complex)
 
 MODAL_TOLERANCE = 1e-9  # couplings below this fraction of the largest damping do not count
-BALANCED = 1e-13  # forces below this fraction of stiffness times size are round-off
-AT_REST = 1e150  # time step so long that rates vanish, but with a finite square; s
+BALANCED = 1e-13  # forces below this fraction of the stiffness times the scene's size are round-off
+AT_REST = 1e150  # time step so long that rates vanish; its square is finite; s
 
 
 def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array]:
-    """Return :meth:`StepEquation.linearise` at ``q`` in the simulation's state, K + C / dt.
+    """Return all forces except inertia at ``q``, and the entries of their derivative K + C / dt.
 
-    Yielding and opening stay frozen afterwards, so no step may follow.
+    See :meth:`StepEquation.linearise`.  Yielding and opening stay frozen afterwards, so no step may
+    follow.
     """
     simulation.controllers.evaluate(simulation)
     for cells in simulation.inelastic:
@@ -54,12 +55,12 @@ def linearise(simulation: Simulation, q: Array, dt: float) -> tuple[Array, Array
 
 
 def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | None]:
-    """Return the scene without loads, or with its loads and the equilibrium in which they hold it.
+    """Return the scene without loads; if only its loads hold it, the scene and its equilibrium.
 
-    Loads that are not in equilibrium in a state do not contribute to its stiffness.
+    Loads are left out because the undeformed scene is not in equilibrium with them.
 
     Raises:
-        ArgumentError: The scene rotates steadily, so the state of steady rotation must be given.
+        ArgumentError: The scene has a :class:`RotatingFrame`, so a state must be given.
     """
     if any(isinstance(load, RotatingFrame) for load in scene.loads):
         raise ArgumentError(
@@ -67,8 +68,8 @@ def reference_state(scene: Scene, mesh: Mesh | None) -> tuple[Scene, Solution | 
             "steady rotation, at=simulate(scene, Static(), ...), or leave the frame out"
         )
     if scene.loads and require_no_mechanism(scene):
-        simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)  # at rest
-        # Without an equilibrium, loads do not count either.
+        simulation = Simulation(replace(scene, damping=()), Static(), mesh=mesh)
+        # If there is no equilibrium, as for a falling body, loads are left out, too.
         with suppress(ArgumentError), closing(simulation):
             simulation.step_to(1.0)
             return scene, simulation.snapshot()
@@ -91,7 +92,7 @@ class SmallMotions:
     """Matrices of small motions about a state, without the degrees of freedom that supports hold.
 
     The state is the last state of ``at``, by default the undeformed scene.  Loads are evaluated at
-    the time t (s).
+    the time t (s), by default the time of the state.
     """
 
     def __init__(
@@ -100,7 +101,7 @@ class SmallMotions:
         time = 0.0 if at is None else float(at.times[-1])
         # All processes compute the same, so that no result depends on their number.
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore", ModelWarning)  # they concern runs
+            warnings.simplefilter("ignore", ModelWarning)  # these warnings concern runs
             simulation = Simulation(
                 scene, _Standstill(), t0=time, start=at, mesh=mesh, comm=MPI.COMM_SELF
             )
@@ -116,11 +117,11 @@ class SmallMotions:
         left = np.ones(self.numbering.size, dtype=bool)
         left[simulation.supports.dofs] = left[self._laws] = False
         scale = np.ones(self.numbering.size)
-        scale[constraints] = abs(T.data).max()  # as stiff as the constrained motions
-        # Columns: the free motions, in the axes of supports, and the Lagrange multipliers.
+        scale[constraints] = abs(T.data).max()  # its entries become as large as stiffnesses
+        # Columns: the free motions, in the axes of supports, and the forces of constraints.
         self._Z = (self._axes() @ diags_array(scale, format="csr"))[:, np.flatnonzero(left)]
         self.K, self.M = self._reduced(T), self._reduced(self._matrix(simulation.inertia.M.data))
-        # A constraint removes its multiplier and a motion; massless motions follow the others.
+        # Number of modes: a constraint removes its force and a motion; massless motions add none.
         self.most = self.K.shape[0] - len(constraints) - int(np.sum(self.M.diagonal() == 0.0))
 
     def _matrix(self, data: Array) -> csr_array:
@@ -132,7 +133,7 @@ class SmallMotions:
         return self._matrix(linearise(self._simulation, q, dt)[1])
 
     def _axes(self) -> csr_array:
-        """Return the components of motion in the axes of supports, in columns."""
+        """Return the unit motions along the axes of supports, in columns."""
         Q = eye_array(self.numbering.size, format="lil")
         for support in (support for support in self.scene.supports if support.angle):
             i, j = self.numbering.node(support.place)[:2]
@@ -141,7 +142,7 @@ class SmallMotions:
         return csr_array(Q)
 
     def _reduced(self, T: csr_array) -> csr_array:
-        """Reduce a full matrix to free motions and multipliers; eliminate laws of connectors."""
+        """Reduce a matrix to free motions and forces of constraints; eliminate forces of laws."""
         laws = self._laws
         if len(laws):
             flexibility = diags_array(1 / (T.diagonal()[laws] + (T.diagonal()[laws] == 0.0)))
@@ -149,9 +150,9 @@ class SmallMotions:
         return csr_array(self._Z.T @ T @ self._Z)
 
     def unbalanced(self) -> str:
-        """List works, connectors and motions of supports that are not in equilibrium in the state.
+        """Name works, connectors and motions of supports that disturb the equilibrium of the state.
 
-        The text is empty if all are in equilibrium.
+        The text is empty if the state is in equilibrium.
         """
         t = self._simulation.t
         r, data = linearise(self._simulation, self.q, AT_REST)
@@ -174,25 +175,25 @@ class SmallMotions:
     # -- frequencies ---------------------------------------------------------------------------
 
     def exponents(self, n: int) -> tuple[Complex, Array | Complex]:
-        """Compute up to n exponents nearest to zero, and their shapes; (n,), (size, n)."""
+        """Compute up to n exponents nearest to zero, and their shapes; (n,), 1/s; (size, n)."""
         K, M = self.K, self.M
         heavy = (M.diagonal() > 0) & (K.diagonal() != 0)
         squares = np.abs(K.diagonal()[heavy]) / M.diagonal()[heavy]
         highest, low = (squares.max(), squares.min()) if heavy.any() else (1.0, 1.0)
         τ = highest**-0.5
         C = (self._reduced(self._derivative(self.q, τ)) - K) * τ
-        nothing = ROUND_OFF * abs(K).max()
-        symmetric = abs(K - K.T).max() <= nothing
+        round_off = ROUND_OFF * abs(K).max()
+        symmetric = abs(K - K.T).max() <= round_off
         matrix = (K + K.T) / 2 if symmetric else K
         solve = partial(eigensolvers.linear, matrix, M, n, most=self.most, definite=symmetric)
         values, x = solve(shift=-SHIFT * low)
         works, zero = self._works(x)
         first = np.abs(values[~zero]).min(initial=highest)
         if zero.any():
-            # Nearly infinite inverses leave few digits for the other eigenvalues.
+            # Huge inverses of the zero eigenvalues leave few digits for the other eigenvalues.
             values, x = solve(shift=-first / 2)
             works, zero = self._works(x)
-        if abs(C).max() <= nothing * τ and symmetric:
+        if abs(C).max() <= round_off * τ and symmetric:
             values = works / np.sum(x * (M @ x), axis=0)
             values[zero] = 0.0
             s, motions = np.sqrt((-values).astype(complex)), x.astype(complex)
@@ -202,7 +203,7 @@ class SmallMotions:
         return self._nearest(n, s[finite], motions[:, finite])
 
     def _works(self, x: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
-        """Return works (J) of the stiffness on motions, in columns, and which may be round-off."""
+        """Return works (J) of the stiffness on the columns of x, and which may be round-off."""
         right, left = self._with_laws()
         works = self._simulation.equation.stiffness_works(self.q, right @ x, left.T @ x)
         sizes = np.sum(np.abs(x) * (abs(self.K) @ np.abs(x)), axis=0)
@@ -211,12 +212,12 @@ class SmallMotions:
     def _damped(self, C: csr_array, free: Array, n: int, lowest: float) -> tuple[Complex, Complex]:
         """Compute at least n exponents and motions with velocity-dependent forces C.
 
-        The motions ``free``, in columns, have no stiffness; ``lowest`` is the first frequency;
-        rad/s.
+        The motions ``free``, in columns, have no stiffness; ``lowest`` is the lowest frequency of
+        the other motions without damping; rad/s.
         """
-        # Drifts have the double exponent zero, which no solver finds accurately.  Drifts with
-        # C N = M N Λ, whose velocities cause forces like inertia only, have known exponents:
-        # constraints exclude them from the eigenvalue problem.
+        # Motions without stiffness may have the double exponent zero, which no solver finds
+        # accurately.  A set N of these motions with C N = M N Λ has the exponents 0 and -Λ:
+        # constraints exclude N from the eigenvalue problem.
         N = free @ np.linalg.inv(np.linalg.cholesky(free.T @ (self.M @ free))).T
         Λ = N.T @ (C @ N)
         _, sizes, rows = np.linalg.svd(C @ N - self.M @ N @ Λ, full_matrices=False)
@@ -230,13 +231,13 @@ class SmallMotions:
         most = 2 * (self.most - B.shape[1])
         s, x = eigensolvers.quadratic(K, C, M, 2 * n, most=most, shift=lowest)
         s, x = self._with_zeros(s, x[: len(free)], free)
-        decay, how = np.linalg.eig(-Λ)
+        decay, mix = np.linalg.eig(-Λ)
         decay = np.where(np.abs(decay.imag) <= MODAL_TOLERANCE * np.abs(decay), decay.real, decay)
-        slows = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
-        return np.concatenate([s, decay[slows]]), np.hstack([x, N @ how[:, slows]])
+        nonzero = np.abs(decay) > ROUND_OFF * abs(C).max() / abs(self.M).max()
+        return np.concatenate([s, decay[nonzero]]), np.hstack([x, N @ mix[:, nonzero]])
 
     def _with_zeros(self, s: Complex, x: Complex, free: Array) -> tuple[Complex, Complex]:
-        """Replace eigenvalues of rigid-body modes that are nearly zero by exact zeros."""
+        """Replace nearly zero exponents of motions without stiffness, ``free``, by exact zeros."""
         momentum, mass = free.T @ (self.M @ x), np.sum(x.conj() * (self.M @ x), axis=0).real
         own = np.linalg.solve(free.T @ (self.M @ free), momentum)
         fraction = np.sum(momentum.conj() * own, axis=0).real / mass
@@ -256,15 +257,16 @@ class SmallMotions:
         )
         factors, x = eigensolvers.linear(self.K, -change, n, most=self.K.shape[0], definite=False)
         x = x[:, np.abs(factors) < 1e9 * np.abs(factors).min(initial=np.inf)]
-        # Solve again in the space of these shapes: works have only the round-off of strains.
+        # Solve again in the space of these shapes: works are more accurate than the matrices.
         works = self._simulation.equation.tangent_works(self.q, u, right @ x, left.T @ x)
         factors, mix = eigensolvers.small(works[0], -works[1])
         return self._nearest(n, factors, (x @ mix).astype(complex))
 
     def _with_laws(self) -> tuple[csr_array, csr_array]:
-        """Return motions with the forces of laws, in columns, and virtual motions, in rows.
+        """Return motions, in columns, and virtual motions, in rows, with the forces of laws.
 
-        The products of these with the tangent are K, and with its derivative, the derivative of K.
+        The product of virtual motions, tangent and motions is K; with the derivative of the
+        tangent it is the derivative of K.
         """
         T, laws, Z = self._derivative(self.q, AT_REST), self._laws, self._Z
         flexibility = diags_array(1 / T.diagonal()[laws])
@@ -287,7 +289,7 @@ class SmallMotions:
         if not rest.any():
             raise ArgumentError(
                 f"buckling: nothing acts on the scene at t = {simulation.t:g} s that does not act "
-                "in the state before; give it loads, or another t"
+                "in the initial state; give the scene loads, or another t"
             )
         try:
             return np.asarray(g - Z @ splu((Z.T @ T @ Z).tocsc()).solve(rest))
@@ -297,7 +299,7 @@ class SmallMotions:
     # -- shapes --------------------------------------------------------------------------------
 
     def _nearest(self, n: int, values: V, x: Complex) -> tuple[V, Array | Complex]:
-        """Return the n eigenvalues nearest to zero, and motions with the largest displacement 1."""
+        """Return the n eigenvalues nearest to zero, and shapes with the largest displacement 1."""
         order = np.argsort(np.abs(values), kind="stable")[:n]
         shapes = self._Z @ x[:, order]
         rotations = self._simulation.subdomain.rotations

@@ -52,8 +52,8 @@ class Shapes(Rich, ABC):
 
     Attributes:
         scene: Model.
-        numbering: Its vertices, cells and numbering.
-        q: The state; all degrees of freedom in the order of the numbering.
+        numbering: Vertices, cells and degrees of freedom of the scene.
+        q: Configuration in the state, at all degrees of freedom in the order of the numbering.
         shapes: Motions of all degrees of freedom, in columns, with the largest displacement 1 (or
             rotation, if only rotations move); (size, n); complex if phases differ.
     """
@@ -84,7 +84,7 @@ class Shapes(Rich, ABC):
         """Return the motion (u, v, ψ) of a place in the k-th mode; (3,).
 
         Raises:
-            ArgumentError: No such shape, or the place is not in the scene.
+            ArgumentError: There is no such shape, or the place is not in the scene.
         """
         self._require(k)
         shape: Any = self.shapes[:, k]
@@ -99,7 +99,7 @@ class Shapes(Rich, ABC):
             count: Number of intervals of the period, between states at times from 0 to 1.
 
         Raises:
-            ArgumentError: No such shape, or a number that is not positive.
+            ArgumentError: There is no such shape, or a number is not positive.
         """
         self._require(k)
         require_number(amplitude, "motion: amplitude", positive=True)
@@ -122,9 +122,9 @@ class Shapes(Rich, ABC):
         return solution
 
     def write(self, path: str | Path, *, amplitude: float = AMPLITUDE) -> None:
-        """Write a time series for ParaView with the k-th mode at time k.
+        """Write a time series for ParaView, which shows the k-th mode at the time k.
 
-        Displacements include the state and the shape; N, V, M belong to the shape alone.
+        Displacements are the sum of state and shape; N, V, M belong to the shape alone.
 
         Args:
             path: File, ending in ``.xdmf`` or ``.vtkhdf``, see :class:`XDMF`, :class:`VTKHDF`.
@@ -154,7 +154,7 @@ class Shapes(Rich, ABC):
             recorder.close()
 
     def _scaled(self, k: int, amplitude: float) -> Array | Complex:
-        """Scale the k-th shape to ``amplitude`` times the scene's size, or 1 rad for rotations."""
+        """Scale a shape to ``amplitude`` times the scene's size, or 1 rad if it only rotates."""
         shape = self.shapes[:, k]
         lengths = np.r_[self.numbering.dofs, self.numbering.dofs_of_bodies][:, :2]
         size = self.scene.size if np.abs(shape[lengths]).max() > 0.5 else 1.0
@@ -167,7 +167,7 @@ class Shapes(Rich, ABC):
 
 
 class _Frame:
-    """State with one shape, as recorders read a simulation; histories of connectors are zero."""
+    """State plus one shape, which recorders read like a simulation; connectors have no history."""
 
     may_break = False
 
@@ -239,7 +239,7 @@ class Modes(Shapes):
 
     @property
     def titles(self) -> list[str]:
-        """Frequency, and the damping ratio if there is damping."""
+        """Frequency of each mode, and its damping ratio if there is damping."""
         return [
             f"{f:.4g} Hz" + (f", ζ = {ζ:.3g}" if abs(ζ) > 1e-6 else "")
             for f, ζ in zip(self.frequencies, self.damping, strict=True)
@@ -264,19 +264,19 @@ class Buckling(Shapes):
 
     @property
     def titles(self) -> list[str]:
-        """Titles of pictures: the load factors."""
+        """Load factor of each mode, by which the loads are multiplied."""
         return [f"loads × {factor:.4g}" for factor in self.factors]
 
 
 def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None = None) -> Modes:
     """Compute natural frequencies, damping ratios and shapes of small vibrations.
 
-    They are vibrations about the undeformed, unloaded scene, or about the last state of a solution:
-    with its section forces, the stiffness of its loads and of a :class:`RotatingFrame`, and the
-    elastic stiffness of yielded material.  If only loads hold the scene, as its weight holds a
-    pendulum, they are vibrations about the equilibrium with these.  Yielding and opening are
-    frozen; hinges that no longer carry a moment act as joints.  Sticking friction is a constraint;
-    sliding friction and controllers are ignored.
+    The vibrations are about the undeformed, unloaded scene, or about the last state of a solution.
+    In this state section forces, loads and a :class:`RotatingFrame` have a stiffness, and yielded
+    material is elastic.  If only loads hold the scene, as its weight holds a pendulum, the state is
+    the equilibrium with these loads.  Yielding and opening are frozen; hinges that no longer carry
+    a moment act as joints.  Sticking friction is a constraint; sliding friction and controllers are
+    ignored.
 
     Without damping the modes solve K x = ω² M x.  With damping, Coriolis or follower forces they
     solve (K + s C + s² M) x = 0, without the assumption of modal damping.  Motions that decay
@@ -286,7 +286,7 @@ def modes(scene: Scene, n: int, *, at: Solution | None = None, mesh: Mesh | None
     Args:
         scene: Model.
         n: Number of modes, from the lowest frequency; fewer if the scene has fewer.
-        at: Solution whose last state is the reference state, of the same beams joined alike.
+        at: Solution of the same beams, joined alike; vibrations are about its last state.
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
@@ -325,15 +325,15 @@ def buckling(
 
     Loads and prescribed motions grow in proportion, from their values in the state ``at`` (λ = 0;
     zero without ``at``) to their values at the time ``t`` (λ = 1).  K' is the derivative of the
-    stiffness along the initial tangent of this path, by forces and by displacements.  So factors
-    are exact if the state is close to buckling; otherwise their error grows with the curvature of
-    the path.
+    stiffness along the initial tangent of this path, on which forces and displacements change.  So
+    factors are exact if the state is close to buckling; otherwise their error grows with the
+    curvature of the path.
 
     Args:
         scene: Model.
         n: Number of factors, from the smallest ``|λ|``.
         t: Time at which loads are evaluated; s.
-        at: Solution in whose last state the loads begin to grow, of the same beams joined alike.
+        at: Solution of the same beams, joined alike; the loads grow from its last state.
         mesh: Discretization; by default the mesh of ``at``, or the cells of the beams.
 
     Raises:
@@ -344,7 +344,7 @@ def buckling(
         >>> push = ub.PointLoad(beam.end, force=(-1.0, 0))
         >>> column = ub.Scene([beam], supports=[ub.Clamped(beam.start)], loads=[push])
         >>> critical = ub.buckling(column, 1, mesh=ub.Mesh(refine=4)).factors[0]
-        >>> print(f"{critical / (np.pi**2 * section.EI / (2 * 2) ** 2):.2f}")  # over Euler's load
+        >>> print(f"{critical / (np.pi**2 * section.EI / (2 * 2) ** 2):.2f}")  # times Euler's load
         1.00
     """
     require_kind(scene, Scene, "buckling: scene")

@@ -43,7 +43,7 @@ from ufl_beam.parallel import alone, communicator, on_first, print_once, progres
 Case = dict[str, Any]
 Member = Callable[..., dict[str, Any]]
 Outcome = dict[str, Array] | str  # result of a member, or the reason of its failure
-Record = tuple[Outcome, float]  # outcome and its wall time; s
+Record = tuple[Outcome, float]  # outcome of a member, and its wall time; s
 
 FORMAT = "study of ufl_beam, 2"
 
@@ -54,7 +54,7 @@ _MEMBER: ContextVar[Member] = ContextVar("member of the study that this process 
 class Study(Rich):
     """Results of the members of a study, the same on every process.
 
-    ``study["peak"]`` has a row for each case, of NaN if the member failed.
+    ``study["peak"]`` has a row for each case; the row of a failed member is NaN.
 
     Attributes:
         member: Name of the function.
@@ -77,7 +77,7 @@ class Study(Rich):
 
     @classmethod
     def from_records(cls, member: str, records: dict[str, Record]) -> Study:
-        """Make a study from outcome and seconds of each case; keys are as in :func:`_case_text`."""
+        """Make a study from outcome and seconds of each case; keys are from :func:`_case_text`."""
         outcomes = [outcome for outcome, _ in records.values()]
         failed = {i: outcome for i, outcome in enumerate(outcomes) if isinstance(outcome, str)}
         first: dict[str, Array] = next((row for row in outcomes if not isinstance(row, str)), {})
@@ -113,11 +113,11 @@ class Study(Rich):
         return "\n".join(lines)
 
     def save(self, path: str | Path) -> None:
-        """Write a file with a checksum; it replaces an existing file once it is complete.
+        """Write a file with a checksum; only the complete file replaces an existing file.
 
         Raises:
             ArgumentError: The file cannot be written.
-            OSError: There is no space for it.
+            OSError: There is no space for the file.
         """
         file = require_path(path, "study")
         content = {
@@ -131,7 +131,7 @@ class Study(Rich):
         """Read a file that :meth:`save` or :func:`study` wrote.
 
         Raises:
-            ArgumentError: There is no such file, or it holds no study, or is damaged.
+            ArgumentError: The file does not exist, holds no study, or is damaged.
         """
         file = require_path(path, "study")
         with decoding(file, FORMAT):
@@ -158,8 +158,9 @@ def study(
 ) -> Study:
     """Run a parameter study: call ``member(**case)`` for each case, in parallel under ``mpirun``.
 
-    One process computes each member; results agree to the last bit for any number of processes.
-    The first process also distributes cases and, between its own members, writes the file.
+    Each member is computed by one process; results agree to the last bit for any number of
+    processes.  The first process distributes cases and writes the file; it also computes members if
+    MPI allows threads, or if it is alone.
 
     A member fails if it raises an exception.  The failure is reported, and the study continues.
 
@@ -167,22 +168,22 @@ def study(
         member: Function that makes and simulates a scene and returns numbers and arrays by name,
             with the same names and shapes for each case.  It must write to different files for
             different cases.
-        cases: Its arguments: ``[{"seed": seed, "mass": m} for m in (1, 2) for seed in range(50)]``;
-            numbers, texts and lists of them, no two cases alike.
-        path: File of the results, saved repeatedly in at most a twentieth of the time.
-            Cases in the file are not computed again, unless they failed.  The file keeps its
-            results of other cases.
-        anew: Compute all cases again and discard the results in the file, after a change of the
-            member.
+        cases: Arguments: ``[{"seed": seed, "mass": m} for m in (1, 2) for seed in range(50)]``.
+            Values are numbers, texts, or lists of these; no two cases are alike.
+        path: File of the results.  It is saved repeatedly, in at most a twentieth of the time.
+            Cases in the file are not computed again, unless they failed.  Results of other cases
+            stay in the file.
+        anew: Compute all cases again and discard the results in the file, as is necessary after a
+            change of the member.
         progress: Show a progress bar in a terminal or notebook.
         comm: Processes; by default all, or this process alone inside a member of another study.
-            A member leaves out ``comm`` of :func:`simulate`.
+            In a member, leave out ``comm`` of :func:`simulate`.
 
     Returns:
         Results in the order of the cases.
 
     Raises:
-        ArgumentError: The call or the file is wrong, or a member returned something else than
+        ArgumentError: The call or the file is wrong, or a member returned anything but
             numbers and arrays, or other names or shapes than the other members.  The file then has
             the results of the earlier members.
         RuntimeError: All members failed.
@@ -270,7 +271,7 @@ def study(
 def _outcomes(
     comm: MPI.Intracomm, member: Member, cases: dict[str, Case]
 ) -> Generator[tuple[str, Outcome, float], None, None]:
-    """Yield case, outcome and seconds of each member; nothing on processes that only serve."""
+    """Yield key, outcome and seconds of each case on the first process; others yield nothing."""
     before = _MEMBER.set(member)
     try:
         if comm.size == 1:
@@ -280,15 +281,15 @@ def _outcomes(
         with MPICommExecutor(comm, root=0) as executor:
             pool: Any = executor
             if pool is not None:
-                yield from _shared_out(pool, cases)
+                yield from _distributed(pool, cases)
     finally:
         _MEMBER.reset(before)
 
 
-def _shared_out(
+def _distributed(
     pool: Any, cases: dict[str, Case]
 ) -> Generator[tuple[str, Outcome, float], None, None]:
-    """Yield case, outcome and seconds; the pool takes cases from the front, this from the back."""
+    """Yield key, outcome and seconds of cases; this process runs the last, others the first."""
     futures = {pool.submit(_run, case): key for key, case in cases.items()}
     ended: SimpleQueue[Any] = SimpleQueue()
 
@@ -298,7 +299,7 @@ def _shared_out(
 
     for future in futures:
         future.add_done_callback(finish)
-    # Meanwhile a thread of the pool communicates, which not every MPI allows.
+    # While this process runs members, a thread of the pool communicates: not every MPI allows it.
     left = [*futures] if MPI.Query_thread() == MPI.THREAD_MULTIPLE else []
     finished = 0
     try:
@@ -369,7 +370,7 @@ def _result_arrays(case: dict[str, Any], returned: Any) -> dict[str, Array]:
     for name, value in returned.items():
         if not isinstance(name, str) or name in {"", "."} or "/" in name or not name.isprintable():
             raise ArgumentError(f"study: {case} returned {name!r}, which names no result")
-        array = np.asarray(None)  # stays so if rows have different lengths
+        array = np.asarray(None)  # kept, and refused below, if rows have different lengths
         with suppress(ValueError):
             array = np.asarray(value)
         if array.dtype.kind not in "biuf":

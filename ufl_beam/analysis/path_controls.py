@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: MIT
 """Controls of static paths, and the corrector that solves their steps.
 
-A step ends in an equilibrium that fulfils the equation of a control.  The load factor is unknown.
+A step ends in an equilibrium that fulfils the equation of a control.  The load factor is one of the
+unknowns.
 """
 
 from __future__ import annotations
@@ -27,7 +28,7 @@ from ufl_beam.simulation.stepper import Trial
 from ufl_beam.terms.term import Term
 
 MOST_DOUBLINGS = 30  # most doublings of a step until something dissipates in it
-ONSET_FRACTION = 1e-6  # fraction of the energy dissipated in a step that defines the onset
+ONSET_FRACTION = 1e-6  # part of the energy dissipated in a step up to the onset of dissipation
 CONTROL_TOLERANCE = 1e-9  # largest error of the equation of the control, as a fraction of a step
 
 
@@ -35,9 +36,9 @@ class Crossing(NamedTuple):
     """Step to a bifurcation point, with the critical mode there.
 
     Along the mode the tangent is singular and the load does no work, so a correction along it would
-    be round-off over zero.  Hence corrections move along the mode only in proportion to the load
-    factor: ``speed`` is the path's motion along the mode for a unit of the load factor.  The mode
-    is in the axes of supports.
+    be round-off divided by zero.  Hence corrections move along the mode only in proportion to the
+    load factor: ``speed`` is the path's motion along the mode per unit of the load factor.  The
+    mode is in the axes of supports.
     """
 
     predicted: Array
@@ -48,8 +49,8 @@ class Crossing(NamedTuple):
 class PathCorrector:
     """Newton corrector of a path: equilibrium together with the equation of the control.
 
-    A change ``factor`` of the load factor counts as much as a unit of displacement.  If
-    ``crossing`` is set, it predicts and corrects the step.
+    A change ``factor`` of the load factor has the length 1.  While a step to a bifurcation point is
+    solved, ``crossing`` has the prediction and the critical mode.
 
     Attributes:
         weights: Weights of the squares in the norm of a direction.  Displacements are divided by
@@ -59,6 +60,7 @@ class PathCorrector:
         factor_gradient: Gradient of the load factor.
         direction: Direction of the path at the beginning of the step.
         sought: The predicted step.
+        dissipates: True if energy was dissipated in the latest accepted step.
     """
 
     def __init__(self, simulation: Simulation, factor: float) -> None:
@@ -103,7 +105,7 @@ class PathCorrector:
         return self.length(np.append(motion, 0.0))
 
     def dissipation(self, q: Array) -> float:
-        """Return the energy that beams and springs dissipate in the step to ``q``; J."""
+        """Return the energy that cells and connectors dissipate in the step to ``q``; J."""
         in_cells = sum(term.dissipation(q) for term in self.simulation.inelastic)
         local = sum((term.dissipation(q) for term in self.simulation.connector_terms), in_cells)
         return self.subdomain.total(local)
@@ -132,9 +134,9 @@ class PathCorrector:
         return step if kink is None else self._until(energy, *kink)
 
     def kink(self, step: Array) -> tuple[Array, Array] | None:
-        """Find the fraction of a step before dissipation begins, and the path's direction there.
+        """Find the step to the onset of dissipation, and the direction of the path there.
 
-        Return None if no dissipation begins in the step.
+        Return None if no dissipation begins in ``step``.
         """
         q, motion = self.simulation.q, step[:-1]
         self.begin()
@@ -147,7 +149,7 @@ class PathCorrector:
         return increment, -direction if self.dissipation_side(q, direction) < 0 else direction
 
     def _until(self, energy: float, increment: Array, direction: Array) -> Array:
-        """Extend the step ``increment`` along a direction until it dissipates an energy; J."""
+        """Extend the step ``increment`` along a direction until it dissipates ``energy`` (J)."""
         q = self.simulation.q + increment[:-1]
 
         def enough(length: float) -> bool:
@@ -175,15 +177,18 @@ class PathCorrector:
         return x
 
     def arrive(self, x: Array) -> None:
-        """Set the loads to the load factor of an iterate."""
+        """Store an iterate, and set the loads to its load factor."""
         self._x = x.copy()
         self.simulation.equation.begin(self.step_at(self.t), self._loading)
 
     def tangent(self, x: Array, r: Array) -> None:
-        """Assemble the tangent and the load-factor derivative, exact for linear functions."""
+        """Assemble the tangent, and add the derivative with respect to the load factor to ``r``.
+
+        The derivative is a central difference, which is exact for linear time functions.
+        """
         simulation, t = self.simulation, self.t
         q, ε = simulation.supports.in_plane(x), 1e-6 * max(1.0, abs(t))
-        for δ, weight in ((ε, 0.5 / ε), (-ε, -0.5 / ε), (0.0, 0.0)):  # last: the tangent's state
+        for δ, weight in ((ε, 0.5 / ε), (-ε, -0.5 / ε), (0.0, 0.0)):  # last: at the factor t
             simulation.equation.begin(self.step_at(t + δ), self._loading)
             forces = np.zeros(self.subdomain.size)
             for term in self._loading:
@@ -194,7 +199,11 @@ class PathCorrector:
         self._A = simulation.equation.tangent_at(x, self._rates, r)
 
     def correct(self, y: Array, z: Array) -> None:
-        """Correct an iterate by the linearised equation of the control."""
+        """Add to ``y`` the correction by the linearised equation of the control.
+
+        Corrections are subtracted from an iterate: ``y`` is the correction at a constant load
+        factor, ``z`` is added to it for each unit by which the load factor grows.
+        """
         supports, moving = self.simulation.supports, self.simulation.supports.moving
         if len(moving):
             z = z - self._rates
@@ -203,25 +212,25 @@ class PathCorrector:
             weighted = self.weights[:-1] * mode
             y -= self.along(weighted, y) * mode
             z = z - (self.along(weighted, z) + speed) * mode
-        by_y = self._derivative(np.append(supports.in_plane(y), 0.0))
-        by_z = self._derivative(np.append(supports.in_plane(z), -1.0))
-        change = (self._missing(supports.in_plane(self._x)) - by_y) / by_z if by_z else math.nan
+        by_y = self._error_derivative(np.append(supports.in_plane(y), 0.0))
+        by_z = self._error_derivative(np.append(supports.in_plane(z), -1.0))
+        change = (self._error(supports.in_plane(self._x)) - by_y) / by_z if by_z else math.nan
         y += change * z
         self.t += change
         y[moving] = self._x[moving] - self._moved(self.t)[moving]
 
     def met(self) -> bool:
         """Return whether the equation of the control is fulfilled."""
-        return abs(self._missing(self.simulation.supports.in_plane(self._x))) <= CONTROL_TOLERANCE
+        return abs(self._error(self.simulation.supports.in_plane(self._x))) <= CONTROL_TOLERANCE
 
-    def _missing(self, q: Array) -> float:
-        """Return the error of the equation of the control at ``q``, as a fraction of its reach."""
+    def _error(self, q: Array) -> float:
+        """Return the error of the equation of the control at ``q``, divided by ``reach``."""
         if self._normal is None:
             return self.dissipation(q) / self._reach - 1.0
         return self.along(self._normal, np.append(q, self.t) - self._end) / self._reach
 
-    def _derivative(self, direction: Array) -> float:
-        """Return the derivative of the error; for an energy, by a central difference."""
+    def _error_derivative(self, direction: Array) -> float:
+        """Return the derivative of this error along a direction; for energies, by differences."""
         if self._normal is not None:
             return self.along(self._normal, direction) / self._reach
         q, size = self.simulation.supports.in_plane(self._x), self.size(direction[:-1])
@@ -229,24 +238,23 @@ class PathCorrector:
             return 0.0
         ε = 1e-3 * self.size(q - self.simulation.q) / size
         change = ε * direction[:-1]
-        return (self._missing(q + change) - self._missing(q - change)) / (2 * ε)
+        return (self._error(q + change) - self._error(q - change)) / (2 * ε)
 
     # -- a step --------------------------------------------------------------------------------
 
     def attempt(
         self, predicted: Array, normal: Array | None, reach: float, *, hold: bool = True
     ) -> Trial:
-        """Solve for an equilibrium on the plane across a normal through a predicted step.
+        """Solve for an equilibrium on a plane through the end of a predicted step.
 
-        Without a normal, solve for an equilibrium up to which the energy ``reach`` (J) dissipates.
-        Closed openings that do not flow are held closed if possible, see material_points.py, unless
-        ``hold`` is false, as in a direction in which they open.
+        Without ``normal``, solve for a step that dissipates the energy ``reach`` (J).
 
         Args:
             predicted: Predicted step.
-            normal: Gradient of the controlled quantity.
-            reach: Change of this quantity in the step, the reference of its error.
-            hold: Whether closed openings are held.
+            normal: Gradient of the controlled quantity, normal to the plane.
+            reach: Change of this quantity in the step, by which its error is divided.
+            hold: Whether hinges, cracks and springs that do not flow stay closed if possible, see
+                material_points.py; false along a direction in which they open.
         """
         simulation = self.simulation
         self._end, self._normal, self._reach = self.start + predicted, normal, reach
@@ -264,9 +272,9 @@ class PathCorrector:
         simulation.together(simulation.equation.begin, self.step_at(simulation.t))
 
     def direction_at(self, q: Array, t: float) -> tuple[Stiffness, Array]:
-        """Return the tangent stiffness of a state, and the direction of a growing load factor."""
+        """Return the stiffness of a state, and the direction of the path with a growing factor."""
         self.t, supports = t, self.simulation.supports
-        for _ in range(2):  # the first tangent of a step belongs to the forces before it
+        for _ in range(2):  # the first tangent of a step belongs to the forces before
             rate = np.zeros(self.subdomain.size)
             self.simulation.together(self.tangent, supports.in_axes(q), rate)
         stiffness = Stiffness(self.subdomain, self._A, supports.dofs, rate, self._all_weights)
@@ -283,7 +291,7 @@ class PathCorrector:
 
 
 def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: int) -> float:
-    """Find by bisection where something is reached; return the upper end of the last interval."""
+    """Find by bisection where ``reached`` becomes true; return the upper end of the interval."""
     for _ in range(halvings):
         middle = (low + high) / 2
         low, high = (low, middle) if reached(middle) else (middle, high)
@@ -293,7 +301,7 @@ def bisect(reached: Callable[[float], bool], low: float, high: float, halvings: 
 class Control(ABC):
     """Base class of path controls, which set the lengths of steps.
 
-    A step changes a quantity by ``step``, or by a fraction of ``step``.
+    A step changes the controlled quantity by ``step``, or by a fraction of ``step``.
     """
 
     step: float
@@ -306,12 +314,12 @@ class Control(ABC):
 
     @property
     def factor(self) -> float:
-        """Change of the load factor that counts as much as a unit of displacement."""
+        """Change of the load factor that counts as much as a length of 1."""
         return 1.0
 
     @property
     def quantity(self) -> str:
-        """Name of the quantity if it may turn back along a path, else an empty text."""
+        """Name of the controlled quantity if it may turn back along a path, else an empty text."""
         return ""
 
     def require(self, scene: Scene) -> None:
@@ -319,19 +327,20 @@ class Control(ABC):
 
     @abstractmethod
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the quantity, which grows in a step along a direction."""
+        """Return the gradient of the quantity or of its negative, whichever grows in a step."""
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
         """Return a positive number if the path continues along ``direction``.
 
-        The path came by the step ``increment``, or begins (None).
+        ``increment`` is the step by which the path came, or None at the beginning of the path.
         """
         return corrector.along(self.normal(corrector, direction), direction)
 
     def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
         """Solve for the end of a fraction of a step; :class:`StepFailed` if there is none.
 
-        If this fails and dissipation begins in the step, the direction changes at its onset.
+        If no end is found and dissipation begins in the step, another attempt changes the direction
+        at the onset of dissipation.
         """
         reach, direction = abs(self.step) * fraction, corrector.direction
         increment = 0.0 * direction
@@ -365,8 +374,9 @@ class Control(ABC):
 class ArcLength(Control):
     """Arc-length control: passes limit points of loads and of displacements.
 
-    The length is the root mean square of all displacements over the size of the scene, of all
-    rotations (rad), and of the change of the load factor over ``factor``.
+    Displacements are divided by the size of the scene, the change of the load factor by ``factor``.
+    The square of the length is the mean square of all displacements and rotations (rad), plus the
+    square of the load factor's change.
 
     Args:
         step: Longest step; a path with a negative step begins with a falling load factor.
@@ -396,13 +406,13 @@ class ArcLength(Control):
         require_number(self.factor, "ArcLength: factor", positive=True)
 
     def normal(self, corrector: PathCorrector, direction: Array) -> Array:
-        """Return the gradient of the arc length, in a step along the direction of the path."""
+        """Return the gradient of the arc length in a step along ``direction``."""
         return np.asarray(corrector.weights * direction / corrector.length(direction))
 
     def sense(self, corrector: PathCorrector, direction: Array, increment: Array | None) -> float:
-        """Return the sense: first by the sign of ``step``, then by dissipation, else by the angle.
+        """Return the sense: initially by the sign of ``step``, later such that dissipation grows.
 
-        The angle between successive steps must be below π/2.
+        Without dissipation, the sense is such that the path turns by less than π/2.
         """
         if increment is None:
             return self.step * float(direction[-1])
@@ -492,7 +502,7 @@ class DisplacementControl(Control):
 
 @dataclass(frozen=True)
 class DissipationControl(Control):
-    """Dissipation control by the energy that hinges and yielding beams lose, for sharp snap-backs.
+    """Control by the energy that hinges, beams and springs dissipate, for sharp snap-backs.
 
     Softening and unloading may begin in nearly the same direction; only softening dissipates.
 
@@ -532,7 +542,11 @@ class DissipationControl(Control):
         return self.otherwise.sense(corrector, direction, increment)
 
     def solve_step(self, corrector: PathCorrector, fraction: float) -> Trial:
-        """Solve for the next dissipated energy, unless an arc-length step dissipates nothing."""
+        """Solve for a step that dissipates an energy, or by arc length.
+
+        Arc-length steps are taken while they dissipate nothing.  If the latest step dissipated and
+        this step fails, an arc-length step replaces it.
+        """
         if not corrector.dissipates:
             with suppress(StepFailed):
                 trial = self.otherwise.solve_step(corrector, fraction)

@@ -48,20 +48,22 @@ ADVICE = (
 )
 
 SMALLEST_FRACTION = 2.0**-12  # smallest fraction to which a step is cut
-TARGET_ITERATIONS = 12  # steps with more iterations shorten the next step, with fewer lengthen it
-MOST_FAILURES = 4  # failed steps before a critical point is sought from another state
+TARGET_ITERATIONS = 12  # more iterations in a step shorten the next step, fewer lengthen it
+MOST_FAILURES = 4  # failed steps after which the search for a critical point ends
 LOCATION_TOLERANCE = 1e-7  # accuracy of the location of critical points, as a fraction of a step
 BRACKET = 1e-2  # fraction of a step within which motions along a critical mode are interpolated
 SEPARABLE = 1.5e-5  # critical points closer than this fraction of a step may count as one point
 MOST_CROSSING_STEPS = 8  # most steps from a bracket to its bifurcation point
-SOFT = 0.1  # largest ratio of an eigenvalue in such a bracket to its size at the ends of a step
-NO_WORK = 1e-6  # fraction of the most work of a load below which the load does no work
+SOFT = 0.1  # fraction of its size at the ends of a step below which an eigenvalue is small
+NO_WORK = 1e-6  # fraction of Stiffness.most_work below which the work of a load counts as zero
 MOST_LOCATION_STEPS = 60  # most steps to locate a critical point
 LEAST_COSINE = 0.5  # least cosine of the angle between a step and its predictor
 LARGEST_LENGTH_RATIO = 10.0  # largest ratio of the lengths of a step and its predictor
-UNCHECKED_FRACTION = 2.0**-6  # shorter fractions of a step are not checked: a law may have a kink
+UNCHECKED_FRACTION = 2.0**-6  # largest fraction of a step that may turn sharply, as at a kink
 SAME_POINT_FRACTION = 1e-3  # fraction of a step within which a critical point is the last one again
-LARGEST_GAP = 0.1  # fraction of a step that states before and at a critical point never exceed
+# Largest distance between states before and at a critical point, as a fraction of the step to it; a
+# longer distance is a leap to another branch.
+LARGEST_GAP = 0.1
 SINGULAR_RATIO = 1e-3  # ratio to its size at the ends of a step below which a measure vanishes
 
 
@@ -116,7 +118,7 @@ class Path(Solution):
 
     @property
     def progress(self) -> Array:
-        """Arc length of the path in the displacements of nodes, root mean square; (n+1,); m."""
+        """Arc length of the path: sum of root mean square displacements in steps; (n+1,); m."""
         nodes = np.unique(np.vstack([self.numbering.dofs, self.numbering.dofs_of_bodies])[:, :2])
         steps = np.sqrt(2 * np.mean(np.diff(self.q[:, nodes], axis=0) ** 2, axis=1))
         return np.concatenate([[0.0], np.cumsum(steps)])
@@ -137,9 +139,9 @@ def follow(
 ) -> Path:
     """Follow a path of static equilibria through limit points and snap-backs.
 
-    The load factor replaces the time of loads and motions and is an unknown, as the displacements.
-    A path starts at the equilibrium with the factor 0, in the direction of the control, and then
-    follows its own direction.  It is quasi-static: viscosity and masses have no effect.
+    The load factor replaces the time of loads and motions; it is an unknown like the displacements.
+    Without ``start``, a path begins at the equilibrium with the factor 0, in the direction of the
+    control; then it follows its own direction.  Viscosity and masses have no effect.
 
     Limit points of the load factor and bifurcation points become states of the path.
 
@@ -151,15 +153,15 @@ def follow(
             ``until=lambda now: now.displacement(tip)[1] < -0.5``; ``now.t`` is the load factor.
         steps: Largest number of steps.
         start: Branch of a :class:`CriticalPoint`, or a solution that the path continues.
-        record: Files to write during the run.
+        record: Recorders of files or results, as in :func:`simulate`.
         newton: Tolerances and PETSc options; line searches and Krylov methods are not used.
         mesh: Discretization; by default the mesh of ``start``, or the cells of the beams.
         progress: Show a progress bar in a terminal or notebook.
-        comm: Processes that share the scene.
+        comm: Processes that share the scene, as in :func:`simulate`.
 
     Raises:
         ArgumentError: The call or the scene is wrong; nothing was computed.
-        ConvergenceError: A step failed; it carries the path so far.
+        ConvergenceError: A step failed; ``solution`` of the error is the path so far.
 
     Example:
         >>> path = ub.follow(scene, ub.LoadControl(0.5), until=lambda now: now.t >= 2)
@@ -241,7 +243,7 @@ class PathStepper:
         self.critical: list[CriticalPoint] = []
         self._fraction = 1.0
         self._before: Candidate | None = None
-        self._landed = False
+        self._at_point = False
 
     def begin(self, branch: Branch | None, *, fresh: bool) -> None:
         """Find the initial direction of the path; if ``fresh``, also its first equilibrium."""
@@ -260,10 +262,12 @@ class PathStepper:
         initial = Trial(step, simulation.q, np.zeros(corrector.subdomain.size))
         # The path may continue a run that ended at a critical point.
         self._before = self._candidate(initial, stiffness, corrector.direction)
-        self._landed = not fresh
+        self._at_point = not fresh
 
     def advance(self, most: int = 1, *, keep: bool = False) -> None:
-        """Take a step to its end or a critical point, shorter if it fails; store it if ``keep``.
+        """Take a step to its end or to the first critical point in it; shorten steps that fail.
+
+        The end is stored in the solution if ``keep``.
 
         Raises:
             StepFailed: Even the shortest step fails.
@@ -289,42 +293,47 @@ class PathStepper:
         """Go to the end of a step, or to a critical point before it."""
         corrector, before = self.corrector, self._before
         if before is None or not candidate.passed(before):
-            self._landed = False
+            self._at_point = False
             self._go_to(candidate)
             return
         after = candidate
         candidate, reached = self._locate(before, after, fraction)
-        if self._landed and reached < SAME_POINT_FRACTION * fraction:
-            # The signs at one critical point may change in different last digits.
-            self._landed = False
+        if self._at_point and reached < SAME_POINT_FRACTION * fraction:
+            # Signs of eigenvalue and load factor at one point may change in different last digits.
+            self._at_point = False
             self._go_to(self._seek(fraction))
             return
         if candidate.mode is not None:
-            direction, self._landed = corrector.direction, False  # has the signs beyond it
+            # The candidate has the signs beyond the point, so the point is not found again.
+            direction, self._at_point = corrector.direction, False
             self._go_to(candidate)
             self._store(candidate, direction, len(self._simulation.solution), limit=False)
             return
-        self._landed = candidate.passed(before)
+        self._at_point = candidate.passed(before)
         # At a limit point the load factor has turned in the located state, as at a kink, or its
-        # slope vanishes.  It and the eigenvalue may change their signs in different last digits.
+        # slope vanishes: slope and eigenvalue may change signs in different last digits.
         soft = _vanishes("softness", candidate, before, after)
         limit = self._turned(candidate) or _vanishes("slope", candidate, before, after)
         limit = limit and not (soft and _no_work(candidate, before, after))
         if (
-            self._landed
+            self._at_point
             and not corrector.dissipates
             and corrector.dissipation(candidate.trial.q1) > 0
         ):
             self._pass_kink(candidate, reached - 2 * LOCATION_TOLERANCE * fraction, fraction, limit)
             return
-        # Yielding or opening may change signs without an eigenvalue of zero.
+        # An eigenvalue may change its sign without passing zero where yielding or opening begins.
         direction = corrector.direction
         self._go_to(candidate)
-        if self._landed and (soft or limit):
+        if self._at_point and (soft or limit):
             self._store(candidate, direction, len(self._simulation.solution), limit)
 
     def _pass_kink(self, after: Candidate, last: float, fraction: float, limit: bool) -> None:
-        """Go to the last state without dissipation, if the load factor turns there."""
+        """Go to the onset of dissipation if the load factor turns there (``limit``), else past it.
+
+        The onset is at the fraction ``last`` of the step, or at the present state if ``last`` is
+        not positive.
+        """
         before, n = self.corrector.direction, len(self._simulation.solution)
         if limit and last > 0:
             self._go_to(self._seek(last))
@@ -348,7 +357,7 @@ class PathStepper:
         return Candidate(trial, stiffness, direction, slope, mode)
 
     def _seek(self, fraction: float) -> Candidate:
-        """Solve for the end of a fraction of a step; reject it if it leaves the direction."""
+        """Solve for the end of a fraction of a step; StepFailed if it is far from its predictor."""
         corrector = self.corrector
         trial = self._control.solve_step(corrector, fraction)
         stiffness, direction = corrector.direction_at(trial.q1, trial.step.t1)
@@ -368,8 +377,8 @@ class PathStepper:
         """Return the first state with changed signs, and the fraction of the step that leads to it.
 
         It is located by false position with halved weights (Illinois).  A bifurcation is located
-        from states on both sides that are far enough for small round-off along the mode, see
-        :meth:`_bifurcation_point`.  If an intermediate step fails, or the signs change by a leap to
+        from states on both sides, far enough from it that round-off along the mode is small, see
+        :meth:`_bifurcation_point`.  If intermediate steps fail, or the signs change by a leap to
         another branch, return the last state before, from which shorter steps follow.
         """
         low, high, first, last = 0.0, fraction, before, after
@@ -391,7 +400,7 @@ class PathStepper:
             value_low, value_high = weight_low * sizes[0], -weight_high * sizes[1]
             middle = (low * value_high - high * value_low) / (value_high - value_low)
             if not turned and high - low > bracket * fraction:
-                # Go beyond the estimate, so that two states bracket it.
+                # Go beyond the estimate, so that two states bracket the critical point.
                 middle += 0.4 * bracket * fraction * (1 if value_low < -value_high else -1)
             margin = min(0.01 * (high - low), LOCATION_TOLERANCE * fraction)
             middle = min(max(middle, low + margin), high - margin)
@@ -431,7 +440,7 @@ class PathStepper:
 
         Close to the point, round-off and residuals of the solver would move the state along the
         mode, perhaps to the other branch.  So a cubic between the two states sets the motion along
-        the mode and the direction of the path.  The second state sets the signs.
+        the mode and the direction of the path.  The second state gives the stiffness.
 
         Raises:
             StepFailed: The point is no bifurcation point, or was not found.
@@ -448,7 +457,7 @@ class PathStepper:
             x0, x = x, (x0 * λ - x * λ0) / (λ - λ0) if λ != λ0 else math.nan
             if not 0.0 <= x <= 1.0:
                 break
-            end, direction = path(x), path(x, 1)  # the load factor is linear
+            end, direction = path(x), path(x, 1)  # its load factor is linear
             mode = np.array(stiffness.softest[1][corrector.subdomain.dofs])
             to_plane(seen := mode.copy())
             speed = corrector.along(corrector.weights[:-1] * seen, direction[:-1]) / direction[-1]
@@ -487,7 +496,7 @@ class PathStepper:
         else:
             mode = np.array(candidate.stiffness.softest[1][corrector.subdomain.dofs])
             simulation.supports.into_plane(mode)
-            # A singular stiffness gives no accurate component of the path along the mode.
+            # The component along the mode stays: a singular stiffness does not give it accurately.
             along = corrector.along(corrector.weights[:-1] * mode, (direction - before)[:-1])
             corrector.direction = direction - along * np.append(mode, 0.0)
         kind = "limit" if limit else "bifurcation"
@@ -497,13 +506,13 @@ class PathStepper:
 
 
 def _vanishes(what: str, candidate: Candidate, before: Candidate, after: Candidate) -> bool:
-    """Return whether a measure is nearly zero in a state located between two others."""
+    """Return whether the attribute ``what`` is nearly zero, compared with states on both sides."""
     size, *ends = (getattr(x, what) for x in (candidate, before, after))
     return bool(size < SINGULAR_RATIO * max(ends))
 
 
 def _no_work(candidate: Candidate, before: Candidate, after: Candidate) -> bool:
-    """Return whether the load does no work on the critical mode, except round-off."""
+    """Return whether the load does no work on the critical mode, apart from round-off."""
     least = NO_WORK * candidate.stiffness.most_work
     return candidate.work < least or _vanishes("work", candidate, before, after)
 

@@ -18,8 +18,8 @@ import scipy  # its parts are loaded when they are used
 from ufl_beam.arrays import Array
 from ufl_beam.display import compact_repr
 
-# Roache's safety factors on the error of the finest level: for an observed order that agrees with
-# theory, and for an order that does not or is unknown because there are only two levels.
+# Roache's safety factors on the error of the finest level: TRUSTED if the observed order agrees
+# with theory, DOUBTED if it does not, or is unknown because there are only two levels.
 TRUSTED, DOUBTED = 1.25, 3.0
 # Half of the lowest order of a scheme.  At this order the sum of the changes to come is 2.4 times
 # the last change, so that no limit can be extrapolated.
@@ -41,7 +41,7 @@ class Convergence:
     order: float  # observed order; NaN from two levels, where predictions use the order in theory
     used: float  # order for predictions, at most the order in theory
     trusted: bool  # whether the changes fit an integer order, at most the order in theory
-    lacks: Array  # limit minus value of each level and of the limit (zero); (levels + 1, ...)
+    lacks: Array  # limit minus value of each level, and of the limit: zero; (levels + 1, ...)
     error_bound: float  # bound of the error of the limit; unit of the quantity
 
     __repr__ = compact_repr
@@ -55,15 +55,15 @@ class Convergence:
         order, trusted, most = math.nan, False, last
         if len(values) > 2:
             order = math.log2(first / last) if min(sizes) > 0 else math.copysign(9, first - last)
-            # A safety factor of 1.25 covers an error of a change by a quarter.
+            # A safety factor of 1.25 allows changes to deviate from an integer order by a quarter.
             trusted = first > 0 and any(
                 size(changes[1] * 2**k - changes[0]) <= (TRUSTED - 1) * first
                 for k in range(1, round(method) + 1)
             )
-            # A change that fell faster than the method can explain may have passed through zero.
+            # A change that fell faster than the order of the method may have passed through zero.
             most = max(last, first / 2**method)
         used = method if math.isnan(order) else min(max(order, LEAST_ORDER), method)
-        rest, bound = changes[-1] * 0.0, DOUBTED * max(sizes)  # irregular: as large on all levels
+        rest, bound = changes[-1] * 0.0, DOUBTED * max(sizes)  # if changes are irregular
         if not order < LEAST_ORDER:
             rest = changes[-1] / (2**used - 1)
             bound = (TRUSTED if trusted else DOUBTED) * most / (2**used - 1) - size(rest)
@@ -72,7 +72,7 @@ class Convergence:
 
     @property
     def seen(self) -> bool:
-        """True if changes fall, or a third level is missing."""
+        """True if the observed order is at least LEAST_ORDER, or unknown from two levels."""
         return not self.order < LEAST_ORDER
 
     @property
@@ -83,7 +83,7 @@ class Convergence:
     def lack(self, level: npt.ArrayLike) -> Array:
         """Predict the limit minus the value on levels, also fractional ones; (*level.shape, ...).
 
-        It is interpolated linearly in the cell or step size to the power of the order.
+        The result is interpolated linearly in the size of cells or steps raised to the order.
         """
         levels = np.append(np.arange(len(self.changes), -1.0, -1.0), 0.0)
         s = np.append(0.0, 2.0 ** (-self.used * levels[:-1]))
@@ -93,7 +93,8 @@ class Convergence:
     def bound_at(self, level: float) -> float:
         """Bound the error of the limit extrapolated from a run on a level; unit of the quantity.
 
-        It falls beyond the finest level.  Irregular changes are assumed equal on all levels.
+        The bound falls beyond the finest level, unless changes are irregular: these are assumed
+        equally large on all levels.
         """
         finer = max(0.0, level - self.finest) if self.seen else 0.0
         return float(self.error_bound * 2 ** (-self.used * finer))
@@ -112,7 +113,7 @@ class SelfConvergence:
     cells: Convergence  # with refined cells
     steps: Convergence  # with refined steps
     limit: Array  # extrapolated value
-    uncertainty: float  # of the limit; unit of the quantity
+    uncertainty: float  # uncertainty of the limit; unit of the quantity
 
     __repr__ = compact_repr
 
@@ -123,7 +124,7 @@ class SelfConvergence:
         return cls(cells, steps, limit, cells.error_bound + steps.error_bound)
 
     def lack(self, i: float, j: float) -> Array:
-        """Predict the limit minus the value of a run on two levels; unit of the quantity."""
+        """Predict the limit minus the value of a run on the levels i of cells and j of steps."""
         return self.cells.lack(i) + self.steps.lack(j)
 
     def confirmed(self, value: Array, i: float, j: float) -> SelfConvergence:
@@ -131,7 +132,8 @@ class SelfConvergence:
 
         The limit moves because errors of cells and steps depend on each other.  Take an error term
         proportional to the product of both, and let fractions c and s of the errors of cells and of
-        steps remain.  It moves the limit by its fraction (1 - c) (1 - s); the rest is uncertain.
+        steps remain in the run.  The fraction (1 - c) (1 - s) of this term moves the limit; the
+        rest of the term is uncertain.
         """
         limit = np.asarray(value + self.lack(i, j))
         c, s = (
@@ -148,7 +150,7 @@ class SelfConvergence:
 
 
 def fit_cost(steps: Array, cells: Array, seconds: Array) -> Array:
-    """Fit wall times (s) of runs by ``a + b cells + steps (c + d cells)``; none is negative."""
+    """Fit wall times (s) by ``a + b cells + steps (c + d cells)``; no coefficient is negative."""
     columns = np.stack([np.ones_like(steps), cells, steps, steps * cells], axis=1)
     return np.asarray(scipy.optimize.nnls(columns / seconds[:, None], np.ones_like(seconds))[0])
 

@@ -42,23 +42,23 @@ from ufl_beam.solvers.newton_options import Newton
 MESHES = Mesh(degree=2), Mesh()  # meshes that compete by default
 NEWTONS = (Newton(),)
 BAR = "trade-off: {n} runs [{elapsed}{postfix}]"
-WRONG = "ArgumentError: "  # start of failures of runs that no refinement can help
+WRONG = "ArgumentError: "  # start of texts of failures that no refinement can avoid
 
 LEAST_USED = 0.3  # least error of the recommended run, as a fraction of a tolerance
-# Largest uncertainty of a limit, as a fraction of a tolerance: a larger one leaves no room for
-# such an error.
-LIMIT = 1 - LEAST_USED
-# The search aims at the geometric mean of the least and the largest error, 0.55 for an accurate
-# limit.  The rest of the tolerance is divided by four, for cells and steps that are not refined,
-# for the options of Newton's method, and for the limit.
+# Largest uncertainty of a limit, as a fraction of a tolerance: an error of LEAST_USED and this
+# uncertainty add up to the tolerance.
+MOST_UNCERTAINTY = 1 - LEAST_USED
+# Largest negligible error, as a fraction of a tolerance.  The search aims at the geometric mean of
+# the least and the largest error, 0.55 for an accurate limit.  Four negligible errors share the
+# rest: by cells and by steps that are not refined, by options of Newton's method, and of the limit.
 NEGLIGIBLE = (1 - math.sqrt(LEAST_USED)) / 4
-NOISE = 1e-9  # fraction of a quantity: Newton's method leaves residuals of 1e-10 of the forces
+NOISE = 1e-9  # noise as a fraction of a quantity: Newton's method leaves residuals of 1e-10
 STEP_ORDER = 2.0  # largest order of the schemes; the order of cells is twice their degree
-FURTHER = 2  # most levels to the next base: up to the finest levels of the last base
-REACH = 8  # levels beyond all runs: errors of second order fall to 2**-16, the most possible
-SETTINGS_PER_LEVEL = 8  # settings per level: an error of second order changes by 2**(2/8), a fifth
-DOUBTS = 4  # levels without visible convergence before giving up; 16 times finer than the coarsest
-TRIALS = 3  # most settings tried; they cost less than the run for the limit, of 4 times the cost
+FURTHER = 2  # most levels from a base to the next, which may begin at the finest run of the last
+REACH = 8  # most levels of a choice beyond the runs; an error of second order falls to 2**-16 there
+SETTINGS_PER_LEVEL = 8  # between two settings an error of second order changes by a fifth, 2**(2/8)
+MOST_DOUBTS = 4  # most bases without visible convergence, each finer than the last
+MOST_TRIALS = 3  # most settings tried, each at about a quarter of the cost of the run for the limit
 SCATTER = 0.1  # relative scatter of times of one run on a quiet machine, see bench_budget.py
 
 Quantity = Callable[[Solution], npt.ArrayLike]
@@ -85,12 +85,12 @@ def tradeoff(
 
     The scene is run on three levels of cells and of steps.  Richardson extrapolation estimates the
     errors of the runs, the limits and the required setting.  A run finer than this setting confirms
-    the limits.  A run with the setting must have errors of 0.3 to 1 times the tolerance.  All
-    settings are arguments of :func:`simulate`.  Several schemes, steps and meshes compete by their
-    coarse runs.
+    the limits.  The setting is then run, and others are tried until errors are 0.3 to 1 times the
+    tolerance, or the time is 0.8 to 1 times the budget.  All settings are arguments of
+    :func:`simulate`.  Several schemes, steps and meshes compete by their coarse runs.
 
     Args:
-        scene: Model; ``cells`` of its beams are the coarsest.
+        scene: Model; the ``cells`` of its beams are the coarsest cells.
         quantities: Functions of a :class:`Solution` by name that return a number, or an array
             whose shape does not depend on steps and cells: ``{"tip": lambda s:
             s.position(beam.end)[-1]}``.  The error of an array is its largest error.
@@ -100,12 +100,12 @@ def tradeoff(
         tolerance: Largest error of each quantity, by name, in its own unit; or for all quantities,
             as a fraction of their largest magnitudes.
         budget: Wall time of one run, instead of a tolerance; s.
-        mesh: The coarsest cells, or several kinds; by default of degree 1, and of degree 2 if the
-            scene allows it.
-        newton: Options of Newton's method, or several.  Runs use the first, and the others are
-            compared with it on a coarse run.  The recommendation uses the fastest options that
+        mesh: Mesh with the coarsest cells, or several meshes; by default cells of degree 1, and
+            cells of degree 2 if the scene allows them.
+        newton: Options of Newton's method, or several.  Runs use the first options; the others are
+            compared with these on a coarse run.  The recommendation uses the fastest options that
             change the quantities little.
-        max_seconds: Wall time of all runs; s.
+        max_seconds: Largest total wall time of the runs; s.
         progress: Show the number of runs in a terminal or notebook.
         comm: Processes; each run uses one process, and several run at a time.  Simultaneous runs
             disturb each other's times: leave cores idle if times matter.
@@ -164,13 +164,16 @@ def tradeoff(
         best, others, notes = _find(runs, target)
         run = best.best()
     for search in others:
-        if search.uncertainty > LIMIT:
-            continue  # its coarse runs give no limit
+        if search.uncertainty > MOST_UNCERTAINTY:
+            continue  # its coarse runs give no accurate limit
         for name, convergence in search.crosses.items():
             known = best.crosses[name]
             apart = size(convergence.limit - known.limit)
             if apart > convergence.uncertainty + known.uncertainty:
-                notes.append(f"{families[search.family]}: its limit of {name} is {apart:.2g} away")
+                notes.append(
+                    f"{families[search.family]}: its limit of {name} differs by {apart:.2g} from "
+                    "the limit of the recommended family"
+                )
     return Tradeoff(
         runs=tuple(runs.runs.values()), best=run, t=t, crosses=best.crosses, units=best.units,
         target=target, families=tuple(map(str, families)), notes=tuple(notes + best.remarks(run)),
@@ -179,9 +182,9 @@ def tradeoff(
 
 
 def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str]]:
-    """Search with the family that coarse runs predict to be the best; if it fails, the next.
+    """Search with the family that coarse runs predict to be the best; if this fails, the next.
 
-    Returns the successful search, the other searches, and notes on them.
+    The results are the successful search, the other searches, and notes on the other searches.
     """
     searches: list[_Search] = []
     notes: list[str] = []
@@ -205,7 +208,7 @@ def _find(runs: _Runs, target: Target) -> tuple[_Search, list[_Search], list[str
             notes.append(f"{runs.families[best.family]}: {error}")
             continue
         notes += [
-            f"{runs.families[search.family]}: given up, others are better by its coarse runs"
+            f"{runs.families[search.family]}: given up, another is better in coarse runs"
             for search in searches[n + 1 :]
         ]
         return best, [search for search in searches if search is not best], notes
@@ -262,12 +265,12 @@ class _Runs:
     comm: MPI.Intracomm
     bar: Any  # progress bar
     runs: dict[Refinement, Run] = field(default_factory=dict, init=False)
-    failed: dict[Refinement, str] = field(default_factory=dict, init=False)  # why runs failed
+    failed: dict[Refinement, str] = field(default_factory=dict, init=False)  # reasons of failures
     spent: float = field(default=0.0, init=False)  # wall time of all runs; s
     _shapes: dict[str, tuple[int, ...]] = field(default_factory=dict, init=False)
 
     def begin(self, family: int) -> None:
-        """Compile by a single step, then do the coarsest run on every process."""
+        """Compile in a first run, of one step if steps are equal; then time the coarsest run."""
         first = Refinement(family, Fraction(1), 0.0)
         dt = self.families[family].dt
         until = min(self.t[1], self.t[0] + dt) if isinstance(dt, float | int) else self.t[1]
@@ -280,7 +283,7 @@ class _Runs:
                 self.failed[first] = f"{type(error).__name__}: {error}"  # finer steps may converge
 
     def allowed(self, refinements: Sequence[Refinement]) -> bool:
-        """Return whether there is time for runs."""
+        """Return whether ``max_seconds`` leave time for runs."""
         return self.spent + sum(map(self._longest, refinements)) <= self.max_seconds
 
     def run(self, refinements: Sequence[Refinement]) -> None:
@@ -329,7 +332,7 @@ class _Runs:
         return [run for refinement, run in self.runs.items() if refinement.family == family]
 
     def divisor(self, family: int) -> int:
-        """Return the largest q up to GRID so that refinement by (q+1)/q fits between all places."""
+        """Return the largest q up to SETTINGS_PER_LEVEL so that (q+1)/q can divide cells, or 1."""
         mesh, scene = self.families[family].mesh, self.scene
         for q in range(SETTINGS_PER_LEVEL, 1, -1):
             finer = replace(mesh, refine=mesh.refine * Fraction(q + 1, q))
@@ -342,7 +345,7 @@ class _Runs:
         return 1
 
     def _longest(self, refinement: Refinement) -> float:
-        """Bound the wall time by the nearest run; s; 0 if there is no run."""
+        """Bound the wall time (s) of a run by the other runs of its family; 0 without any."""
         times = (
             run.seconds
             * 2 ** max(0.0, refinement.level - run.refinement.level)
@@ -399,8 +402,8 @@ class _Candidate(NamedTuple):
 
     refine: Fraction  # divisor of each cell
     level: float  # the number of steps is multiplied by about 2**level
-    seconds: float  # wall time
-    likely: float  # largest error, of cells and steps together, in its unit
+    seconds: float  # wall time; s
+    likely: float  # largest error, see _Search; errors of cells and steps may cancel
     bound: float  # largest error if errors of cells and steps do not cancel
 
     @property
@@ -414,6 +417,9 @@ class _Search:
 
     The base moves until the chosen setting is about a level finer than the base.  Then the finest
     levels are about a level finer than the setting.
+
+    Errors and uncertainties are divided by ``units``, the tolerances, or the sizes of the
+    quantities if there is a budget.
     """
 
     def __init__(self, runs: _Runs, family: int, target: Target) -> None:
@@ -423,8 +429,9 @@ class _Search:
         self._runs, self._target = runs, target
         self._base = [0, 0]  # levels of cells and of steps
         self._doubts: list[str] = []
-        self._larger = 1.0  # errors of runs over predicted errors
-        self._speeds = [1.0] * len(runs.newtons)  # times over predicted times, by Newton options
+        self._error_ratio = 1.0  # errors of runs divided by predicted errors
+        # Times divided by predicted times, for each of the options of Newton's method.
+        self._time_ratios = [1.0] * len(runs.newtons)
         self._newton = 0
         self._divisor = runs.divisor(family)
         self._refine_base()
@@ -436,7 +443,7 @@ class _Search:
         while True:
             candidate = self._choose(
                 min(self.uncertainty, NEGLIGIBLE)
-            )  # uncertainty after refinement
+            )  # expected uncertainty after refinement
             some, base = next(iter(self.crosses.values())), self._base
             finest = some.cells.finest, some.steps.finest
             far = any(level > last for level, last in zip(candidate.levels, finest, strict=True))
@@ -448,7 +455,7 @@ class _Search:
             before = self._base.copy()
             if base == self._base:
                 self._confirm(candidate)
-                if self.uncertainty <= LIMIT:
+                if self.uncertainty <= MOST_UNCERTAINTY:
                     break
                 self._base[self._worst()[0]] += 1
             else:
@@ -456,16 +463,16 @@ class _Search:
             try:
                 self._refine_base()
             except TradeoffError:
-                if self.uncertainty > LIMIT:
+                if self.uncertainty > MOST_UNCERTAINTY:
                     raise
-                self._base = before  # no time for more runs, but these may suffice
+                self._base = before  # no time for more runs, but the limits are accurate enough
                 break
         self._choose_newton()
-        self._try()
+        self._try_settings()
 
     @property
     def uncertainty(self) -> float:
-        """Largest uncertainty of a limit, in its unit."""
+        """Largest uncertainty of a limit, divided by the unit of its quantity."""
         return max(x.uncertainty / self.units[n] for n, x in self.crosses.items())
 
     def best(self) -> Run:
@@ -473,7 +480,7 @@ class _Search:
         return min(self._runs.in_family(self.family), key=self._rank)
 
     def remarks(self, run: Run) -> list[str]:
-        """Return notes on an unseen order, and on a run that misses the target."""
+        """Return notes on convergence that is not seen, and on a run that misses the target."""
         notes = [
             f"the order of convergence is not seen: {name}{convergence}"
             for name, convergence in self.crosses.items()
@@ -482,13 +489,13 @@ class _Search:
         if not self._accepts(run):
             ratio = self.ratio(run)
             said = f"no setting was found that is nearer to {self._target}: errors are "
-            notes.append(f"{said}{ratio:.2g} of it")
+            notes.append(f"{said}{ratio:.2g} of the {self._target.measure}")
             if ratio < LEAST_USED and run.refinement == self._at(1, 0, run.refinement.newton):
                 notes[-1] += "; begin with coarser steps and cells"
         return notes
 
     def ratio(self, run: Run) -> float:
-        """Return the largest distance of a run from a limit, in its unit."""
+        """Return the largest distance of a run from a limit, divided by its unit."""
         return self._largest({n: run.values[n] - c.limit for n, c in self.crosses.items()})
 
     def _largest(self, differences: Mapping[str, Array]) -> float:
@@ -506,7 +513,7 @@ class _Search:
             first, *others = wanted = [
                 self._at(2**i, j), self._at(2 ** (i + 1), j), self._at(2**i, j + 1)
             ]  # fmt: skip
-            self._runs.run(wanted[:1])  # predicts the times of the others
+            self._runs.run(wanted[:1])  # its time predicts the times of the others
             self._runs.run(wanted)
             failed = [self._runs.failed[run] for run in wanted if run in self._runs.failed]
             if failed:
@@ -522,11 +529,11 @@ class _Search:
                     )
                 self.units[name] = unit
             thirds = [self._at(2 ** (i + 2), j), self._at(2**i, j + 2)]
-            counts = [self._counts(values[0], finer) for finer in values[1:]]
-            self._runs.run([run for run, needed in zip(thirds, counts, strict=True) if needed])
+            matter = [self._matters(values[0], finer) for finer in values[1:]]
+            self._runs.run([run for run, needed in zip(thirds, matter, strict=True) if needed])
             along = [
                 [first, second, third] if needed and third in self._runs.runs else [first, second]
-                for second, third, needed in zip(others, thirds, counts, strict=True)
+                for second, third, needed in zip(others, thirds, matter, strict=True)
             ]
             orders = 2.0 * self._runs.families[self.family].mesh.degree, STEP_ORDER
             for name in self.units:
@@ -537,13 +544,13 @@ class _Search:
                     for line, base, order in zip(along, self._base, orders, strict=True)
                 )
                 self.crosses[name] = SelfConvergence.extrapolate(values[0][name], cells, steps)
-            if self.uncertainty <= LIMIT or self._worst()[1]:
+            if self.uncertainty <= MOST_UNCERTAINTY or self._worst()[1]:
                 return
             self._move_base(
                 "".join(f"\n  {name}{convergence}" for name, convergence in self.crosses.items())
             )
 
-    def _counts(self, values: Mapping[str, Array], finer: Mapping[str, Array]) -> bool:
+    def _matters(self, values: Mapping[str, Array], finer: Mapping[str, Array]) -> bool:
         """Return whether a change between levels matters for the target."""
         least = NEGLIGIBLE if math.isinf(self._target.budget) else 0.0
         return any(
@@ -552,7 +559,7 @@ class _Search:
         )
 
     def _worst(self) -> tuple[int, bool]:
-        """Return the largest source of doubt, cells (0) or steps (1), and if its changes fall."""
+        """Return the main source of uncertainty, cells (0) or steps (1); and if changes fall."""
         sources = [
             (convergence.error_bound / self.units[name], axis, convergence.seen)
             for name, x in self.crosses.items()
@@ -561,19 +568,19 @@ class _Search:
         return max(sources)[1:]
 
     def _move_base(self, said: str, axis: int | None = None) -> None:
-        """Refine cells (``axis=0``) or steps (1) of the base, by default the main uncertainty.
+        """Refine cells (``axis=0``) or steps (1) of the base, by default the more uncertain.
 
         Raises:
-            TradeoffError: The base was refined too often.
+            TradeoffError: ``MOST_DOUBTS`` bases have not shown convergence.
         """
         where = self._runs.setting(self._at(2 ** self._base[0], self._base[1]))
         self._doubts.append(f"\n  from {where} on: {said}")
-        if len(self._doubts) == DOUBTS:
+        if len(self._doubts) == MOST_DOUBTS:
             raise TradeoffError("self-convergence is not seen" + "".join(self._doubts))
         self._base[self._worst()[0] if axis is None else axis] += 1
 
     def _confirm(self, candidate: _Candidate) -> None:
-        """Run with cells and steps a level finer than a choice and the base, for the limit."""
+        """Run, if time allows, with cells and steps a level finer than a choice, for the limit."""
         i, j = self._base
         intervals = 2 * max(round(2**candidate.level), 2**j)
         finer = self._at(2 * max(candidate.refine, Fraction(2**i)), math.log2(intervals))
@@ -597,15 +604,15 @@ class _Search:
             run = self._runs.runs.get(second)
             if run is None:
                 continue
-            self._speeds[newton] = run.seconds / strict.seconds
+            self._time_ratios[newton] = run.seconds / strict.seconds
             if run.stepping >= least:
                 continue
             if self._largest({n: run.values[n] - x for n, x in strict.values.items()}) <= most:
                 self._newton, least = newton, run.stepping
 
-    def _try(self) -> None:
+    def _try_settings(self) -> None:
         """Run the chosen setting; if it misses the target, correct predictions and try again."""
-        for _ in range(TRIALS):
+        for _ in range(MOST_TRIALS):
             candidate = self._choose(self.uncertainty)
             setting = self._at(candidate.refine, candidate.level, self._newton)
             if not self._rank(self.best())[0] and not self._runs.allowed([setting]):
@@ -616,46 +623,48 @@ class _Search:
             run = self._runs.runs[setting]
             if self._accepts(run):
                 return
-            self._speeds[self._newton] *= run.seconds / candidate.seconds
+            self._time_ratios[self._newton] *= run.seconds / candidate.seconds
             if candidate.likely > 0:
                 # Errors are not known more accurately than the limit.
-                self._larger *= max(self.ratio(run), self.uncertainty) / candidate.likely
+                self._error_ratio *= max(self.ratio(run), self.uncertainty) / candidate.likely
 
     # -- decisions -----------------------------------------------------------------------------
 
     def _negligible(self, candidate: _Candidate) -> float:
-        """Return the negligible error over its unit, for the size of the errors of a choice."""
+        """Return the largest negligible error: with a budget, NEGLIGIBLE times a choice's error."""
         return NEGLIGIBLE * (1.0 if math.isinf(self._target.budget) else candidate.bound)
 
     def _choose(self, uncertainty: float) -> _Candidate:
         """Choose the cheapest setting that is accurate enough, or the most accurate in the budget.
 
-        The uncertainty of the limit is ``uncertainty``, in its unit.
+        ``uncertainty`` is the uncertainty of the limit, see :class:`_Search`.
         """
         some, setting = next(iter(self.crosses.values())), self._runs.families[self.family]
         top = 2 ** (some.cells.finest + REACH), 2 ** (some.steps.finest + REACH)
         first = math.ceil(
             self._divisor / setting.mesh.degree
-        )  # nodes of the given cells at degree 1
-        refine = [Fraction(k, self._divisor) for k in _spread(first, self._divisor * top[0])]
+        )  # as many nodes as the given cells at degree 1
+        refine = [Fraction(k, self._divisor) for k in _geometric(first, self._divisor * top[0])]
         # Whole multiples of the number of the user's steps, so that all runs end at the same time.
-        multiples = np.array(_spread(1, top[1]), dtype=float)
+        multiples = np.array(_geometric(1, top[1]), dtype=float)
         cell_levels, step_levels = np.log2(np.array(refine, dtype=float)), np.log2(multiples)
         likely = bound = np.zeros((len(cell_levels), len(step_levels)))
         for name, convergence in self.crosses.items():
-            unit = self.units[name] / self._larger
+            unit = self.units[name] / self._error_ratio
             cells = convergence.cells.lack(cell_levels).reshape(len(cell_levels), 1, -1) / unit
             steps = convergence.steps.lack(step_levels).reshape(1, len(step_levels), -1) / unit
             likely = np.maximum(likely, np.abs(cells + steps).max(axis=2))
             bound = np.maximum(bound, np.abs(cells).max(axis=2) + np.abs(steps).max(axis=2))
-        seconds = self._speeds[self._newton] * self._seconds(2.0 ** cell_levels[:, None], multiples)
+        seconds = self._time_ratios[self._newton] * self._seconds(
+            2.0 ** cell_levels[:, None], multiples
+        )
         if math.isinf(self._target.budget):
-            # The middle half, on a logarithmic scale, of the allowed errors.
+            # The aim is the middle half, on a logarithmic scale, of the allowed errors.
             largest = 1 - uncertainty
             least, most = ((LEAST_USED ** (1 - p)) * largest**p for p in (1 / 4, 3 / 4))
             allowed = (likely <= most) & (bound <= largest)
             costs = np.where(allowed, seconds, np.inf)
-            # Errors that cancel may be smaller than needed; others may cost up to twice as much.
+            # A setting whose errors cancel below ``least`` is avoided, even at twice the cost.
             used = allowed & (likely >= least) & (seconds <= 2 * costs.min())
             costs = np.where(used, seconds, np.inf) if used.any() else costs
             k = costs.argmin() if allowed.any() else bound.argmin()
@@ -689,24 +698,26 @@ class _Search:
         return (1 - 2 * SCATTER) * budget <= run.seconds <= budget
 
     def _rank(self, run: Run) -> tuple[bool, bool, float]:
-        """Rank by time if accurate enough, else by errors; with a budget, the other way round.
+        """Return a key that is smaller for better runs.
 
-        A run that is accurate only because errors of cells and steps cancel does not count.
+        Accurate runs are sorted by time, others by error; with a budget, fast runs are sorted by
+        error, others by time.  A run that is accurate only because errors of cells and steps cancel
+        does not count as accurate.
         """
         _, refine, level, newton = run.refinement
-        bound = self._larger * max(
+        bound = self._error_ratio * max(
             (size(c.cells.lack(math.log2(refine))) + size(c.steps.lack(level))) / self.units[name]
             for name, c in self.crosses.items()
         )
         if math.isfinite(self._target.budget):
             slow = run.seconds > self._target.budget
             return slow, False, run.seconds if slow else bound
-        wrong = self.ratio(run) + self.uncertainty > 1 or bound > 1
-        seconds = self._speeds[newton] * float(self._seconds(float(refine), 2**level))
-        return wrong, not self._accepts(run), self.ratio(run) if wrong else seconds
+        inaccurate = self.ratio(run) + self.uncertainty > 1 or bound > 1
+        seconds = self._time_ratios[newton] * float(self._seconds(float(refine), 2**level))
+        return inaccurate, not self._accepts(run), self.ratio(run) if inaccurate else seconds
 
 
-def _spread(first: int, last: int) -> list[int]:
-    """Return integers in nearly geometric progression, GRID for each factor of 2."""
+def _geometric(first: int, last: int) -> list[int]:
+    """Return integers in nearly geometric progression, SETTINGS_PER_LEVEL for a factor of 2."""
     spread = first * 2 ** np.arange(0.0, math.log2(last / first) + 1e-9, 1 / SETTINGS_PER_LEVEL)
     return [int(x) for x in np.unique(np.round(spread))]

@@ -24,15 +24,15 @@ class Setting:
     """Setting of a run, the arguments of :func:`simulate`."""
 
     scheme: Scheme  # the time scheme
-    dt: Any  # step; s; or adaptive steps
+    dt: Any  # step (s), or adaptive steps
     mesh: Mesh  # the cells
-    newton: Newton  # how exactly equilibria are found
+    newton: Newton  # options of Newton's method
 
     def finer(self, refine: Fraction, level: float, t: tuple[float, float]) -> Setting:
         """Divide each cell by ``refine`` and multiply the number of steps by about ``2**level``.
 
         The error of an adaptive step is of third order, so the number of steps is proportional to
-        the cube root of 1/tol.
+        the cube root of 1/tolerance.
         """
         if refine == 1 and level == 0:
             return self  # unchanged, so that checks see the user's arguments
@@ -57,7 +57,7 @@ class Setting:
 
 
 class Refinement(NamedTuple):
-    """Family of settings, and refinement of a run relative to its coarsest setting."""
+    """Family of the setting of a run, and refinement from the coarsest setting of the family."""
 
     family: int  # number of the family, given by its coarsest setting
     refine: Fraction  # divisor of each cell
@@ -73,7 +73,7 @@ class Run:
     dials: Setting  # its setting
     values: dict[str, Array]  # the quantities
     seconds: float  # wall time without compiling; s
-    building: float  # part of it before the first step; s
+    building: float  # part of the wall time before the first step; s
     steps: float  # number of steps
     cells: float  # number of cells
     iterations: float  # Newton iterations per step
@@ -89,11 +89,11 @@ class Run:
 
 @dataclass(frozen=True)
 class Target:
-    """Target: tolerances, in the unit of each quantity or relative, or the wall time of a run."""
+    """Target of a trade-off: absolute or relative tolerances, or the wall time of a run."""
 
-    absolute: Mapping[str, float]  # by quantity, in its unit; others have ``relative``
-    relative: float  # unit of errors, as a fraction of a quantity's largest magnitude
-    budget: float  # wall time (s); infinite if errors are given
+    absolute: Mapping[str, float]  # tolerance of each quantity, in its unit; or empty
+    relative: float  # tolerance as a fraction of largest magnitudes; 1 with a budget
+    budget: float  # wall time (s); infinite if tolerances are given
 
     @property
     def measure(self) -> str:
@@ -102,7 +102,7 @@ class Target:
 
     @property
     def bounds(self) -> tuple[float, float]:
-        """Largest wall time (s) and largest error over its measure."""
+        """Largest wall time (s), and largest error divided by its measure."""
         return self.budget, 1.0 if math.isinf(self.budget) else math.inf
 
     def __str__(self) -> str:
@@ -122,8 +122,8 @@ class Tradeoff(Rich):
         best: The run with the recommended setting.
         t: Beginning and end; s.
         crosses: Convergence of each quantity in the recommended family of settings.
-        units: The tolerances, in the unit of each quantity; with a budget, the sizes of the
-            quantities.
+        units: The tolerances, in the unit of each quantity; with a budget, the largest magnitudes
+            of the quantities.
         target: The tolerances or the budget.
         families: The families of settings, in words.
         notes: Further remarks on the result.
@@ -132,7 +132,7 @@ class Tradeoff(Rich):
     Example:
         >>> tip = {"tip": lambda run: run.position(beam.end)[-1]}
         >>> found = ub.tradeoff(scene, tip, scheme=ub.Static(), t=(0, 1), dt=0.5, tolerance=0.01)
-        >>> found.ratio(found.best) <= 1  # largest error over the tolerance
+        >>> found.ratio(found.best) <= 1  # largest error divided by the tolerance
         True
     """
 
@@ -162,16 +162,16 @@ class Tradeoff(Rich):
         return {name: convergence.uncertainty for name, convergence in self.crosses.items()}
 
     def errors(self, run: Run) -> dict[str, float]:
-        """Return the distances of a run from the limits, by quantity, in its unit."""
+        """Return the distance of a run from the limit of each quantity, in the unit of each."""
         return {name: size(run.values[name] - limit) for name, limit in self.limit.items()}
 
     def ratio(self, run: Run) -> float:
-        """Return the largest of the errors over tolerance, or over the size of the quantity."""
+        """Return the largest of the errors divided by ``units``."""
         return max(error / self.units[name] for name, error in self.errors(run).items())
 
     @property
     def effort(self) -> float:
-        """Wall time of the steps of all runs over the wall time of the recommended run's steps."""
+        """Wall time of the steps of all runs, divided by this time of the recommended run."""
         return sum(run.stepping for run in self.runs) / self.best.stepping
 
     @property
@@ -186,7 +186,7 @@ class Tradeoff(Rich):
         return f"trade-off for {self.target}; errors are distances from the extrapolated limit"
 
     def table(self) -> list[list[str]]:
-        """Return cost, errors and settings of the unbeaten and the best runs, below a header."""
+        """Return a header, and cost, errors and setting of the best and of all unbeaten runs."""
         rows = [["", "seconds", "steps", "cells", "iterations", *self.limit, "dials"]]
         for run in sorted({*self.front, self.best}, key=lambda run: run.seconds):
             rows.append([
@@ -199,7 +199,7 @@ class Tradeoff(Rich):
     def remarks(self) -> list[str]:
         """Return lines on convergence, cost and the recommended setting."""
         shown = {*self.front, self.best}
-        lines = [f"and {len(self.runs) - len(shown)} runs that others beat in both"]
+        lines = [f"and {len(self.runs) - len(shown)} runs that others beat in both time and error"]
         for name, convergence in self.crosses.items():
             value = np.array2string(convergence.limit, precision=9, threshold=6, edgeitems=2)
             lines.append(f"{name}: limit {value} ± {convergence.uncertainty:.1g}{convergence}")

@@ -39,18 +39,18 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Annotation
 
-LEAST_STRAIN = 1e-10  # strain that may be due to rounding and the tolerance of iterations
+LEAST_STRAIN = 1e-10  # largest strain that may be due to rounding and the tolerance of iterations
 DRAWN_AS_ZERO = 1e-4  # fraction of the largest value below which a value is drawn as zero
 ALIKE = 0.999  # fraction of the peak of an area above which values count as equal to it
 LABELLED = 0.15  # fraction of the largest value above which the peak of an area is labelled
-MANY = 60  # beams beyond which only extreme values are labelled, and no directions drawn
+MOST_BEAMS = 60  # most beams for which all peaks are labelled and directions are drawn
 
 CROWDED = 0.08  # fraction of the axes under labels beyond which only extreme values are labelled
-FEW = 500  # areas whose ordinates texts should not cover
+MOST_AREAS = 500  # most areas whose ordinates labels should not cover
 MARGIN = 0.03  # margin around the drawing, as a fraction of the axes
 
 AROUND, LEAST, MOST = (1.0, 1.2), (3.6, 2.6), (9.0, 6.8)
-"""Space for words and numbers around the axes; least and largest size of a figure; inch."""
+"""Space for words and numbers around the axes, least size and largest size of a figure; inch."""
 
 SIGNS = {
     "N": ("N > 0: tension", "N < 0: compression"),
@@ -75,7 +75,7 @@ def plane_canvas(
         solution: Solution to draw.
         shown: Numbers of the kept times.
         magnify: Factor on the displacements.
-        ax: Axes of the user, if there are any.
+        ax: Axes of the user, or None.
         size: Largest width and height of the figure; by default 9 inches, and the height that all
             points need at this width; inch.
 
@@ -87,7 +87,7 @@ def plane_canvas(
     high = float(np.clip(8.0 * extent[1] / max(extent[0], 1e-12), 3.2, 6.8))
     size = (9.0, high) if size is None else size
     if ax is None:
-        space = np.subtract(size, (0.9, 0.9))  # without numbers and words
+        space = np.subtract(size, (0.9, 0.9))  # without the numbers and words around the axes
     else:
         style.require_axes(ax)
         space = style.axes_size(ax) / POINTS
@@ -96,7 +96,7 @@ def plane_canvas(
 
 
 def draw_beams(axes: Axes, solution: Solution, points: Array, **line: Any) -> None:
-    """Draw the axes of all beams through these points."""
+    """Draw the axes of all beams through the drawn nodes ``points``."""
     numbering = solution.numbering
     lines = [points[numbering.nodes_along(beam)] for beam in solution.scene.beams]
     axes.plot(*joined(lines).T, **line)
@@ -116,14 +116,14 @@ def draw_shape(
 ) -> Figure:  # fmt: skip
     """Draw the frame at the n-th kept time, optionally with the diagram of a section force.
 
-    M is on the side in tension, positive N and V to the left of the beam from start to end;
-    positive values are red, negative values blue.  Between vertices they follow from equilibrium,
-    see :meth:`Solution.diagram`.  Peaks of areas are labelled in the unit of the title; the largest
-    and the least value are bold.  Yielded or cracked cells are orange; open hinges are circles as
-    in :func:`draw_damage_state`.
+    M is drawn on the side in tension, positive N and V to the left of a beam that runs from start
+    to end.  Positive values are red, negative values blue.  Values between vertices follow from
+    equilibrium, see :meth:`Solution.diagram`.  Peaks of areas are labelled in the unit of the
+    title; the largest and the least value are bold.  Yielded or cracked cells are orange; open
+    hinges are circles as in :func:`draw_damage_state`.
 
     Raises:
-        ArgumentError: No such time, ``magnify`` not positive, or ``ax`` no axes.
+        ArgumentError: There is no such time, ``magnify`` is not positive, or ``ax`` is no axes.
     """
     shape = plane_canvas(solution, [n], magnify, ax, MOST)[0].shape(n)
     when = f"at {solution.parameter.at(solution.times[n])}{style.magnified(magnify)}"
@@ -165,7 +165,7 @@ def draw_frame(
         peaks: list[Peak] = []
         if (sizes > LEAST_STRAIN * np.array(stiffness)).any():  # more than rounding
             rows = _draw_diagrams(axes, solution, shape.nodes, what, diagrams)
-            peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MANY else 1.0)
+            peaks = _peaks(rows, factor, LABELLED if len(diagrams) <= MOST_BEAMS else 1.0)
         draw_beams(axes, solution, shape.nodes, color=shade(INK), linewidth=2.6, zorder=4)
         draw_strokes(axes, symbols.in_plane(shape))
         meanings = dict(zip((RED, BLUE), SIGNS.get(what, ()), strict=False))
@@ -212,13 +212,13 @@ def _draw_diagrams(
     for area in _areas(axis, axis + ordinates, values, diagram):
         outlines[RED if area.peak > 0 else BLUE].append(area.outline)
         rows.append(np.array([area.peak, *axis[area.place], *ordinates[area.place]]))
-    if what != "N" and len(diagrams) <= MANY:
+    if what != "N" and len(diagrams) <= MOST_BEAMS:
         firsts = {beam: k for k, (beam, _) in reversed([*enumerate(diagrams)])}
         for k in firsts.values():
             first, *_, last = np.flatnonzero(diagram == k)
             low, high = (first + last) // 2, (first + last + 1) // 2
             (x, y), (across, up) = (axis[low] + axis[high]) / 2, left[high]
-            angle = math.degrees(math.atan2(up, across)) - 180.0  # of an arrow that points up
+            angle = math.degrees(math.atan2(up, across)) - 180.0  # at 0 it points up
             axes.plot(x, y, marker=(3, 0, angle), ms=9.0, color=shade(INK), mew=0.0, zorder=4.1)
     for color, group in outlines.items():
         look: dict[str, Any] = {"facecolors": [(color, 0.28)], "edgecolors": color, "gid": color}
@@ -233,13 +233,13 @@ class Peak(NamedTuple):
     color: str
     tip: Array  # point of the diagram; (2,); m
     outward: Array  # unit vector away from the axis; (2,)
-    extreme: bool  # largest or least of all
+    extreme: bool  # True for the largest and the least value of all
 
 
 def _peaks(rows: Array, unit: float, least: float) -> list[Peak]:
     """Choose peaks to label, both extreme values first; corners have one label for both beams.
 
-    Other peaks are at least the fraction ``least`` of the largest magnitude.
+    The other chosen peaks exceed the fraction ``least`` of the largest magnitude.
     """
     values, axis, up = rows[:, 0], rows[:, 1:3], rows[:, 3:]
     ends = (1, int(values.argmax())), (-1, int(values.argmin()))
@@ -270,7 +270,7 @@ def _along(
     start, end, *between = solution.numbering.nodes_of_cells[cells].T
     lines = nodes[np.column_stack([start, *between, end])]
     ahead = unit_vectors(mesh.slopes(fractions) @ lines)
-    # Ordinates at corners between cells of a beam bisect the angle; ordinates near them lean
+    # Ordinates at corners between cells of a beam bisect the angle; ordinates near a corner lean
     # towards the bisector.
     lean = np.zeros((len(lines), 2, 2))
     k = np.flatnonzero(diagram[:-1] == diagram[1:])
@@ -290,8 +290,8 @@ class Area(NamedTuple):
 
 
 def _areas(axis: Array, tips: Array, values: Array, diagram: Index) -> Iterator[Area]:
-    """Divide diagrams, whose numbers are ``diagram``, where the sign changes."""
-    # At a change of sign both areas end in a point of the axis.
+    """Divide diagrams where signs change; ``diagram`` has the number of each point's diagram."""
+    # At a change of sign both areas end at the zero on the axis.
     first = np.flatnonzero((values[:-1] * values[1:] < 0.0) & (diagram[:-1] == diagram[1:]))
     fraction = values[first] / (values[first] - values[first + 1])
     zeros = axis[first] + fraction[:, None] * (axis[first + 1] - axis[first])
@@ -321,8 +321,8 @@ def draw_damage_state(
     """Draw yielded cells and opened hinges on the frame at the n-th kept time.
 
     Yielded cells are coloured by the energy that plastic strains dissipated per length (J/m), in
-    cells of fibres also by cracks.  Opened hinges are circles, larger the more of their fracture
-    energy is dissipated; from 99 % they are hollow, as joints.
+    cells of fibres together with the energy of cracks.  Opened hinges are circles, which grow with
+    the dissipated fraction of the fracture energy; from 99 % on they are hollow, as joints are.
 
     Args:
         solution: Solution to draw.
@@ -331,8 +331,8 @@ def draw_damage_state(
         ax: Axes to draw in; by default a new figure.
 
     Raises:
-        ArgumentError: The scene is elastic, no such time, ``magnify`` is not positive, or ``ax`` is
-            no axes.
+        ArgumentError: The scene is elastic, there is no such time, ``magnify`` is not positive, or
+            ``ax`` is no axes.
 
     Example:
         >>> ub.plot(broken, "damage").savefig("damage.png")
@@ -382,11 +382,11 @@ def draw_damage_state(
 
 
 def _arrange(axes: Axes, peaks: Sequence[Peak], *, own: bool) -> None:
-    """Fit limits, and the size of a new figure; write peaks where they cover the least."""
+    """Fit limits, and the size of a new figure; write labels where they cover the least."""
     axes.margins(MARGIN)
     without_texts = axes.dataLim.frozen()
     written: list[Annotation] = []
-    # Space for the texts changes the scale, and with it the objects beside them.
+    # Space for the labels changes the scale, and with it the lines that labels should not cover.
     for _ in range(3):
         _fit(axes, own)
         for text in written:
@@ -418,7 +418,7 @@ def _fit(axes: Axes, own: bool) -> None:
 
 
 def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
-    """Write peaks beside areas and lines; omit peaks that find no space, except extremes."""
+    """Write labels of peaks beside areas and lines; omit labels without space, except extremes."""
     figure = style.parent_figure(axes)
     figure.draw_without_rendering()
     looks: tuple[dict[str, Any], ...] = (
@@ -436,7 +436,7 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
 
     labels = []
     for k in chosen:
-        # First perpendicular to the axis, then more and more aside.
+        # Directions to try: first perpendicular to the axis, then more and more to the side.
         tilts = np.radians((0, 40, -40, 75, -75, 105, -105, 140, -140))
         x, y = peaks[k].outward
         at, ways = in_points(peaks[k].tip), positions.directions(math.atan2(y, x) + tilts)
@@ -449,7 +449,7 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
         if len(box.leader):
             end = (box.leader[1] - box.center + box.half) / (2 * box.half)
             line = {"arrowstyle": "-", "color": color, "linewidth": 0.8, "shrinkA": 0, "shrinkB": 0}
-            arrow = {**line, "relpos": end, "patchA": None}  # else Matplotlib computes this end
+            arrow = {**line, "relpos": end, "patchA": None}  # a patch would move this end
         if box.overlap == 0.0 or peaks[k].extreme:
             mark = axes.annotate(
                 text, (x, y), (right, up), textcoords="offset points", color=color,
@@ -460,7 +460,7 @@ def _write(axes: Axes, peaks: Sequence[Peak]) -> list[Annotation]:
 
 
 def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
-    """Return lines that texts should not cover, also lines within areas; (n, 4); points."""
+    """Return lines that labels should not cover, and ordinates within areas; (n, 4); points."""
     lines = [np.asarray(line.get_xydata()) for line in axes.lines if line.get_linestyle() != "None"]
     areas = []
     for collection in axes.collections:
@@ -474,7 +474,7 @@ def _lines(axes: Axes, in_points: Callable[[Any], Array]) -> Array:
         diagonals = np.array([[-half, -half], [half, half], [-half, half], [half, -half]])
         if line.get_linestyle() == "None":  # symbols
             groups += [segments(point + diagonals) for point in in_points(line.get_xydata())]
-    for outline in map(in_points, areas[:FEW]):
+    for outline in map(in_points, areas[:MOST_AREAS]):
         # Ordinates, from a point of the outline to its opposite point on the axis.
         for fraction in (0.0, 0.5):
             between = outline[:-1] + fraction * np.diff(outline, axis=0)

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: MIT
-"""Pictures of a solution over time, of modes, trade-offs, envelopes, and stress cycles."""
+"""Pictures of a solution over time, of modes, trade-offs, envelopes, studies, and stress cycles."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ COMPONENTS = {
     "dpsi/dt": ("angular velocity", "rad/s"),
 }  # fmt: skip
 
-MODES, SHAPES = 6, 5  # in a notebook
+MOST_MODES, NUM_SHAPES = 6, 5  # modes, and shapes of a solution, in a notebook
 VISIBLE = 0.1  # largest magnified displacement in a notebook, as a fraction of the scene's size
-FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # larger factors would show round-off
-LEAST_ERROR = 1e-12  # least drawn error; smaller ones are drawn here, in the quantity's unit
-CLASSES = 40  # classes of ranges and of means of cycles in pictures
+FACTORS = (1, 2, 5, 10, 20, 50, 100, 200, 500, 1000)  # magnifications; more would show round-off
+LEAST_ERROR = 1e-12  # least drawn ratio of an error; smaller ratios are drawn at this value
+CLASSES = 40  # number of classes of ranges, and of means, of cycles in pictures
 
 
 def draw_shapes(
@@ -105,7 +105,7 @@ def draw_shapes(
 
 @html_page.register
 def solution_page(solution: Solution) -> str:
-    """Write a solution: its summary, the energy ledger, and successive shapes.
+    """Write a solution as HTML: its summary, the energy ledger, and successive shapes.
 
     Small displacements are magnified.
     """
@@ -117,7 +117,7 @@ def solution_page(solution: Solution) -> str:
     moved = solution.q[:, solution.numbering.dofs[:, :2]]
     fraction = float(np.abs(moved).max(initial=0.0)) / solution.scene.size
     magnify = max(x for x in FACTORS if x == 1 or (fraction > 0.0 and x * fraction <= VISIBLE))
-    shapes = partial(draw_shapes, solution, count=SHAPES, magnify=magnify)
+    shapes = partial(draw_shapes, solution, count=NUM_SHAPES, magnify=magnify)
     return text + notebook.image("shapes", shapes)
 
 
@@ -137,8 +137,8 @@ def draw_history(
         ax: Axes to draw in; by default a new figure.
 
     Raises:
-        ArgumentError: Unknown ``component``, a place that is not in the scene, the velocity of a
-            static run, or ``ax`` is no axes.
+        ArgumentError: ``component`` is unknown, or a velocity in a static run; a place is not in
+            the scene; or ``ax`` is no axes.
 
     Example:
         >>> ub.plot(solution, "history", beam.end, component="v").savefig("history.png")
@@ -162,8 +162,9 @@ def draw_history(
 def draw_energy(solution: Solution) -> Figure:
     """Draw the energy ledger over time or along a path, and below it its imbalance.
 
-    Above: energy in the scene, solid; supplied, dashed; lost, dotted.  Below: the imbalance divided
-    by the transferred energy, with the machine precision for comparison.
+    Above, energies in the scene are solid, supplied energies dashed, and lost energies dotted.
+    Below is the imbalance divided by the transferred energy, with the machine precision for
+    comparison.
 
     Example:
         >>> ub.plot(solution, "energy").savefig("energy.png")
@@ -182,7 +183,7 @@ def draw_energy(solution: Solution) -> Figure:
         ledger.plot(along, energy.total, color=shade(INK), linewidth=1.2, label="in the scene")
         figure.legend(loc="outside upper left", ncols=5)
         fraction = np.abs(energy.imbalance) / (energy.energy_transferred or 1.0)
-        # A balance that is exactly zero has no logarithm: its points are at the lower edge.
+        # An imbalance of exactly zero has no logarithm; it is drawn at the lower edge.
         check.semilogy(
             along, np.maximum(fraction, 1e-2 * precision), color=style.RED, linewidth=1.2
         )
@@ -202,7 +203,7 @@ def draw_energy(solution: Solution) -> Figure:
 
 
 def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float = 0.1) -> Figure:
-    """Draw modes side by side, in both directions from the grey undeformed scene.
+    """Draw modes side by side, in both directions from the undeformed scene, which is grey.
 
     Args:
         shapes: Result of :func:`modes` or :func:`buckling`.
@@ -228,10 +229,10 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
     columns = min(len(chosen), 3 if height < 0.8 * width else 4)
     rows = -(-len(chosen) // columns)
     with picture((4.0 * columns, rows * (4.0 * height / width + 0.5))) as figure:
-        numbering = np.ravel(figure.subplots(rows, columns, squeeze=False))
-        for axes in numbering:
+        panels = np.ravel(figure.subplots(rows, columns, squeeze=False))
+        for axes in panels:
             axes.set_axis_off()
-        for k, swing, canvas, axes in zip(chosen, swings, stages, numbering, strict=False):
+        for k, swing, canvas, axes in zip(chosen, swings, stages, panels, strict=False):
             forward, backward = canvas.shape(0), canvas.shape(1)
             draw_undeformed(axes, swing, canvas)
             draw_beams(axes, swing, backward.nodes, color=SKY, linewidth=1.6, zorder=2)
@@ -244,20 +245,20 @@ def draw_modes(shapes: Shapes, *, numbers: Sequence[int] = (), amplitude: float 
 
 @html_page.register
 def shapes_page(shapes: Shapes) -> str:
-    """Write modes: their frequencies or load factors, and pictures of the first ones."""
+    """Write modes as HTML: their frequencies or load factors, and pictures of the first modes."""
     rows = [(str(k), title) for k, title in enumerate(shapes.titles)]
-    first = range(min(MODES, len(shapes)))
+    first = range(min(MOST_MODES, len(shapes)))
     return notebook.table((shapes.word, ""), rows) + notebook.image(
         "modes", partial(draw_modes, shapes, numbers=first)
     )
 
 
 def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
-    """Draw errors over wall times of all runs, and the recommended run in a ring.
+    """Draw errors of all runs against their wall times, and a ring around the recommended run.
 
-    Each family of scheme, steps and cells has a colour.  The line joins runs that no other run
-    beats in both time and error.  The error is divided by the tolerance, or with a budget, by the
-    quantity.
+    Each family of scheme, steps and cells has a colour and a marker.  The line joins runs that no
+    other run beats in both time and error.  Errors are divided by the tolerance, or by the largest
+    magnitude of the quantity if there is a budget.
 
     Args:
         tradeoff: Result of :func:`tradeoff`.
@@ -305,7 +306,7 @@ def draw_tradeoff(tradeoff: Tradeoff, *, ax: Axes | None = None) -> Figure:
 
 @html_page.register
 def tradeoff_page(result: Tradeoff) -> str:
-    """Write a trade-off: the runs that no other run beats, remarks, and a picture."""
+    """Write a trade-off as HTML: the runs that no other run beats, remarks, and a picture."""
     head, *rows = result.table()
     text = (
         notebook.lines(result.title())
@@ -316,9 +317,9 @@ def tradeoff_page(result: Tradeoff) -> str:
 
 
 def draw_extremes(extremes: Extremes, *, quantity: str = "M", ax: Axes | None = None) -> Figure:
-    """Draw the envelope of a section force on the undeformed frame: maxima red, minima blue.
+    """Draw maxima and minima of a section force on the undeformed frame, as two diagrams.
 
-    Values may occur at different times.
+    Positive values are red, negative values blue.  Values may occur at different times.
 
     Raises:
         ArgumentError: Nothing was run, or ``ax`` is no axes.
@@ -347,7 +348,8 @@ def draw_study(study: Study) -> Figure:
     An array result is drawn by its largest magnitude; failed cases are omitted.
 
     Raises:
-        ArgumentError: No case has a number, or no member has a result.
+        ArgumentError: The cases have no number, or several numbers of which none varies, or all
+            members failed.
 
     Example:
         >>> spans = [{"length": 1.0 + 0.25 * k} for k in range(5)]
@@ -364,13 +366,13 @@ def draw_study(study: Study) -> Figure:
         raise ArgumentError("plot: the study has no results over numbers of its cases")
     rows, columns = len(study.results), len(varied)
     with picture((max(6.0, 4.0 * columns), max(4.0, 2.6 * rows))) as figure:
-        numbering = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
-        for panels, (result, values) in zip(numbering, study.results.items(), strict=True):
+        grid = figure.subplots(rows, columns, squeeze=False, sharex="col", sharey="row")
+        for panels, (result, values) in zip(grid, study.results.items(), strict=True):
             sizes = np.abs(values.reshape(len(study), -1)).max(axis=1)
             panels[0].set_ylabel(result)
             for axes, x in zip(panels, varied.values(), strict=True):
                 axes.plot(x, sizes if values.ndim > 1 else values, "o", color=BLUE, ms=5.0)
-        for axes, name in zip(numbering[-1], varied, strict=True):
+        for axes, name in zip(grid[-1], varied, strict=True):
             axes.set_xlabel(name)
     return figure
 
@@ -386,8 +388,8 @@ def draw_cycles(fatigue: Fatigue, place: HotSpot) -> Figure:
         place: One of its hot spots.
 
     Raises:
-        ArgumentError: The recorder does not have the spot, nothing was run, or the stress has no
-            cycle.
+        ArgumentError: The recorder does not have the hot spot, nothing was run, or the stress has
+            no cycle.
 
     Example:
         >>> place = ub.HotSpot.fibre(beam.start, y=0.1, E=210e9)

@@ -25,19 +25,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-FULLY_OPEN = 0.99  # fraction of the fracture energy from which a hinge is drawn as a joint
+FULLY_OPEN = 0.99  # dissipated fraction of the fracture energy of hinges that are drawn as joints
 
 
 class OpenHinge(NamedTuple):
     """Hinge that has opened."""
 
     beam: Member
-    at: Array  # its present position; (2,); m
-    fraction: float  # dissipated fraction of its fracture energy, 1 for a joint; 0 if it hardens
+    at: Array  # drawn position; (2,); m
+    fraction: float  # dissipated fraction of its fracture energy; 0 if it hardens, 1 for a joint
 
 
 def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
-    """Find open hinges, in cells and of zero length; ``points`` are the drawn nodes."""
+    """Find open hinges, in cells and at vertices; ``points`` are positions of the drawn nodes."""
     numbering = solution.numbering
     hinges: list[tuple[Member, Array, HingeLaw, float]] = []  # with the dissipated energy (J)
     for beam in solution.scene.beams:
@@ -62,7 +62,7 @@ def open_hinges(solution: Solution, n: int, points: Array) -> list[OpenHinge]:
 
 
 def dissipated_per_length(solution: Solution, n: int) -> Array:
-    """Compute the energy that plastic strains and cracks dissipated; (num_cells,); J/m."""
+    """Compute energies per length dissipated by plastic strains and cracks; (num_cells,); J/m."""
     numbering = solution.numbering
     energy = np.zeros(len(numbering.cells))
     for beam in solution.scene.beams:
@@ -84,7 +84,7 @@ def circle(fraction: float) -> dict[str, Any]:
 
 
 def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[str, Artist]:
-    """Mark yielded cells and open hinges on the axes of beams; return their names for a legend."""
+    """Mark yielded cells and open hinges on the axes of beams; return marks by name in a legend."""
     named: dict[str, Artist] = {}
     yielded = np.flatnonzero(dissipated_per_length(solution, n))
     for ends in nodes[solution.numbering.cells[yielded]]:
@@ -102,12 +102,12 @@ def draw_damage(axes: Axes, solution: Solution, n: int, nodes: Array) -> dict[st
 def draw_moment_curvature(solution: Solution, place: Place, *, ax: Axes | None = None) -> Figure:
     """Draw the moment M (N m) of a cell against its curvature K (1/m), coloured by time.
 
-    The curvature includes the jump of a hinge divided by the length of the cell; the area of loops
-    is the dissipated energy per length.  A ring marks the first kept time, a dot the last.
+    The curvature includes the jump of a hinge divided by the length of the cell, so the area of
+    loops is the dissipated energy per length.  A ring marks the first kept time, a dot the last.
 
     Args:
         solution: Solution to draw.
-        place: Place in the cell; a vertex means the cell before it.
+        place: Place in the cell; at a vertex, the cell before the vertex is drawn.
         ax: Axes to draw in; by default a new figure.
 
     Raises:
@@ -130,12 +130,12 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
     """Draw the moment M (N m) of a hinge against its jump (rad), coloured by time.
 
     The area between the path and the axis is the energy that the hinge dissipated.  The title
-    states it (J), and its percentage of the fracture energy.
+    states this energy (J), also as a percentage of the fracture energy.
 
     Args:
         solution: Solution to draw.
-        place: Place of a plastic hinge; else the hinge of its cell is drawn, at a vertex the hinge
-            of the cell before it.
+        place: Place of a plastic hinge, or in a cell with a hinge; a vertex without a plastic hinge
+            is in the cell before it.
         ax: Axes to draw in; by default a new figure.
 
     Raises:
@@ -165,7 +165,7 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
             )
         _draw_path(axes, solution, jump, M)
         style.draw_legend(axes, ax, loc="outside upper left", ncols=2)
-        _prefix(axes.xaxis, jump, "jump of rotation", "rad")
+        _label_axis(axes.xaxis, jump, "jump of rotation", "rad")
         spent = f"{with_unit(lost, 'J')} dissipated"
         if math.isfinite(law.fracture_energy):
             whole = law.fracture_energy
@@ -175,18 +175,19 @@ def draw_hinge(solution: Solution, place: Place, *, ax: Axes | None = None) -> F
 
 
 def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
-    """Draw the energy losses over time (J) by their sinks, as stacked areas.
+    """Draw lost energies (J) over time or along a path, as stacked areas.
 
-    The line above them is the supplied work plus the initial energy of the scene.  The gap between
-    line and areas is the energy in the scene, which also has its own line.  The title states the
-    largest imbalance of the ledger.
+    The line above the areas is the supplied work plus the initial energy of the scene.  The gap
+    between line and areas is the energy in the scene, which also has its own line.  The title
+    states the largest imbalance of the ledger.
 
     Args:
         solution: Solution to draw.
         ax: Axes to draw in; by default a new figure.
 
     Raises:
-        ArgumentError: The scene is elastic and has no connectors, or ``ax`` is no axes.
+        ArgumentError: The scene is elastic or has no beams, and has no connectors; or ``ax`` is no
+            axes.
 
     Example:
         >>> ub.plot(broken, "dissipation").savefig("dissipation.png")
@@ -209,7 +210,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
         label = "at the start, and supplied" if start else "supplied"
         axes.plot(t, supplied, color=shade(INK), label=label)
         axes.plot(t, inside, color=BLUE, label="in the scene")
-        _prefix(axes.yaxis, np.concatenate([supplied, inside]), "energy", "J")
+        _label_axis(axes.yaxis, np.concatenate([supplied, inside]), "energy", "J")
         axes.set_xlabel(solution.parameter.progress)
         digits, power = f"{energy.worst:.1e}".split("e")
         worst, through = (
@@ -221,7 +222,7 @@ def draw_dissipation(solution: Solution, *, ax: Axes | None = None) -> Figure:
     return style.parent_figure(axes)
 
 
-def _prefix(axis: Axis, values: Array, quantity: str, unit: str) -> None:
+def _label_axis(axis: Axis, values: Array, quantity: str, unit: str) -> None:
     """Label an axis in a unit that suits the values; the data stay in SI units."""
     factor, prefix = style.decimal_prefix(float(np.max(np.abs(values))))
     axis.set_major_formatter(lambda x, _: f"{x / factor:.6g}".replace("-", "−"))
@@ -247,5 +248,5 @@ def _draw_path(axes: Axes, solution: Solution, x: Array, M: Array) -> None:
     for i, inside in ((0, WHITE), (-1, INK)):
         axes.plot(*path[i], "o", mfc=shade(inside), label=named.at(solution.times[i]), **ring)
     axes.autoscale_view()
-    _prefix(axes.yaxis, M, "bending moment M", "N m")
+    _label_axis(axes.yaxis, M, "bending moment M", "N m")
     style.draw_bar(axes, colors, named.progress)
