@@ -364,17 +364,17 @@ class _Friction(LawInStep):
         self._rest_motion = (
             increment_to_rest(self.setting.scheme, step.dt) * self.setting.rates[self.connector]
         )
-        self._direction, self._against, self._guessed = self.z["slip"], False, True
+        self._direction, self._motionless, self._guessed = self.z["slip"], False, True
 
     def row(self, e1: float, λ: float) -> Row:
         """Stick while the force is below the limit; slip until the sliding velocity reverses."""
         moved, stuck, search = e1 - self.e0, self._direction == 0, self.setting.search
-        if not self._against and self._direction * self._rest_motion > 0:
+        if not self._motionless and self._direction * self._rest_motion > 0:
             moved -= self._rest_motion  # rest at the end instead of a reversed velocity
         reverses = not stuck and self._direction * moved < -1e-14 * self.length
         # Coming to rest must not generate energy; otherwise the step has no motion at all.  The
         # force of the guess does not decide this, since it belongs to another motion.
-        gives = not self._guessed and not self._against and stuck and λ * self._rest_motion < 0
+        gives = not self._guessed and not self._motionless and stuck and λ * self._rest_motion < 0
         over = stuck and abs(λ) > self._limit * (1 + 1e-12)
         self._guessed, self.excess = False, 0.0
         if self.opens and search.hold and not self.released:
@@ -382,13 +382,13 @@ class _Friction(LawInStep):
                 changes = reverses or gives or not self._limit
                 self.excess, search.over = math.inf if changes else abs(λ) / self._limit - 1, True
         else:
-            self._against |= gives
+            self._motionless |= gives
             if reverses:
                 self._direction = 0.0
             elif over:
                 self._direction = math.copysign(1.0, λ)
         if self._direction == 0 and self._limit > 0:
-            return 1.0, -self._creep, self.e0 + (0.0 if self._against else self._rest_motion)
+            return 1.0, -self._creep, self.e0 + (0.0 if self._motionless else self._rest_motion)
         if not self.opens:
             return 0.0, 1.0, self._direction * self._limit
 
